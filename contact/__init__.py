@@ -1,0 +1,1 @@
+"""Roads, tread laws, and the unilateral contact problem of a rolling tire."""

@@ -1,0 +1,1 @@
+"""The tire as a body: mesh, materials, equilibrium, and the matrices at a static state."""

@@ -1,0 +1,9 @@
+"""The two ways a run can end without an answer. Nothing else is imported here, so every package may use it."""
+
+
+class InputError(ValueError):
+    """What the user gave is wrong: a key, a range, a file, a folder. The program ends with status 2."""
+
+
+class ConvergenceError(RuntimeError):
+    """A solver gave up: the message says what, where and what to try. The program ends with status 3."""

@@ -1,0 +1,1 @@
+"""Green's functions, receptances and residual flexibility from the modes."""

@@ -1,0 +1,1 @@
+"""Modes of the tire at its static state, standing and rolling."""

@@ -1,0 +1,1 @@
+"""Scenes, the staged pipeline, result files, the command line and reports."""
