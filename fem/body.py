@@ -1,0 +1,63 @@
+"""The tire as a discretised body: mesh, displacement field, clamped rim and integration measures."""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from fem import compat
+from fem.material import Material
+from fem.mesh import INNER, RIM, TREAD, Torus, build
+from fem.surface import Gather, outer_face
+
+
+class Body:
+    """A section made of one material, with its displacement `u` about the undeformed shape.
+
+    Collective to make. `ids` are the lattice ids of this process's owned nodes; `rim` and `tread`
+    its blocked dofs there (ghosts included in `rim`, as boundary conditions want them).
+    """
+
+    def __init__(self, comm: MPI.Comm, section: Torus, material: Material):
+        self.comm = comm
+        self.material = material
+        self.tire = build(comm, section)
+        self.mesh, self.lattice = self.tire.mesh, self.tire.lattice
+        self.space = compat.vector_space(self.mesh, section.order)
+        self.u = fem.Function(self.space)
+        self.nodes = self.space.dofmap.index_map.size_local
+        self.ids = self.lattice.ids(self.space.tabulate_dof_coordinates()[: self.nodes])
+        self.rim = self._face_dofs(RIM)
+        tread = self._face_dofs(TREAD)
+        self.tread = np.setdiff1d(tread[tread < self.nodes], self.rim)
+        # 2 x order integrates the quadratic form of an affine element exactly: full integration.
+        measure = {"metadata": {"quadrature_degree": 2 * section.order}}
+        self.dx = ufl.Measure("dx", domain=self.mesh, **measure)
+        self.inner_ds = ufl.Measure(
+            "ds", domain=self.mesh, subdomain_data=self.tire.facets, **measure
+        )(INNER)
+        self.everywhere = Gather(comm, self.ids, np.arange(self.lattice.size))
+        self.surface = Gather(comm, self.ids, outer_face(self.lattice))
+
+    def _face_dofs(self, tag: int) -> np.ndarray:
+        facets = self.tire.facets.indices[self.tire.facets.values == tag]
+        return fem.locate_dofs_topological(self.space, 2, facets)
+
+    def clamp(self):
+        """Boundary condition: all components zero on the rim."""
+        return fem.dirichletbc(np.zeros(3), self.rim, self.space)
+
+    def owned(self, vector: np.ndarray) -> np.ndarray:
+        """The owned part of a dof array as (nodes, 3)."""
+        return vector[: 3 * self.nodes].reshape(-1, 3)
+
+    def displacement(self) -> np.ndarray:
+        """Displacement of all lattice nodes (n, 3), m, on every process. Collective."""
+        return self.everywhere(self.owned(self.u.x.array))
+
+    def set_displacement(self, values: np.ndarray) -> None:
+        """Take the displacement of all lattice nodes (n, 3), m. Collective."""
+        self.owned(self.u.x.array)[:] = values[self.ids]
+        self.u.x.scatter_forward()

@@ -1,0 +1,82 @@
+"""Everything that differs between dolfinx releases, found by feature and not by version number.
+
+Debian 12 ships dolfinx 0.5.2 and Debian 13 ships 0.9; no other file of the program may ask which.
+"""
+
+from __future__ import annotations
+
+import inspect
+
+import basix
+import dolfinx.fem.petsc  # noqa: F401  (newer releases do not import it by themselves)
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+from petsc4py import PETSc
+
+try:
+    import basix.ufl
+except ImportError:  # dolfinx 0.5: elements come from legacy UFL
+    HAS_BASIX_UFL = False
+else:
+    HAS_BASIX_UFL = hasattr(basix.ufl, "element")
+
+# Newer FFCx vectorises better by itself; -O3 and the native instruction set halve the assembly
+# of a hyperelastic tangent on 27-node hexahedra either way.
+JIT = {"cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno"]}
+_JIT_KEY = (
+    "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
+)
+
+
+def geometry_nodes(degree: int) -> np.ndarray:
+    """Reference coordinates (nodes, 3) of a hexahedral geometry element, in its node order."""
+    # Through legacy UFL a geometry has equispaced nodes; basix.ufl warps them from order 3 on.
+    variants = basix.LagrangeVariant
+    return _nodes(degree, variants.gll_warped if HAS_BASIX_UFL else variants.equispaced)
+
+
+def field_nodes(degree: int) -> np.ndarray:
+    """Reference coordinates (nodes, 3) of a Lagrange field: the Gauss-Lobatto points."""
+    return _nodes(degree, basix.LagrangeVariant.gll_warped)
+
+
+def _nodes(degree: int, variant) -> np.ndarray:
+    family, cell = basix.ElementFamily.P, basix.CellType.hexahedron
+    return basix.create_element(family, cell, degree, variant).points
+
+
+def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, degree: int):
+    """Distributed mesh of curved hexahedra from each process's share of cells and points. Collective."""
+    if HAS_BASIX_UFL:
+        element = basix.ufl.element("Lagrange", "hexahedron", degree, shape=(3,))
+        names = inspect.signature(dmesh.create_mesh).parameters
+        key = "e" if "e" in names else "domain"
+        keywords = {key: ufl.Mesh(element) if key == "domain" else element}
+    else:
+        keywords = {"domain": ufl.Mesh(ufl.VectorElement("Lagrange", "hexahedron", degree))}
+    return dmesh.create_mesh(comm, cells=cells, x=points, **keywords)
+
+
+def vector_space(mesh, degree: int):
+    """Continuous Lagrange space of displacement vectors."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
+    return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+
+
+def petsc_vector(function: fem.Function) -> PETSc.Vec:
+    """The ghosted PETSc vector behind a function."""
+    return function.x.petsc_vec if hasattr(function.x, "petsc_vec") else function.vector
+
+
+def form(expression):
+    """Compile a UFL form with the program's compiler flags. Collective."""
+    return fem.form(expression, **{_JIT_KEY: JIT})
+
+
+def meshtags(mesh, dim: int, entities: np.ndarray, values: np.ndarray):
+    """Integer tags of mesh entities, entities ascending."""
+    return dmesh.meshtags(mesh, dim, entities.astype(np.int32), values.astype(np.int32))

@@ -1,0 +1,171 @@
+"""From a section to a ring of curved hexahedra: geometry, node lattice and boundary tags."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import dolfinx.mesh as dmesh
+import numpy as np
+from mpi4py import MPI
+
+from fem import compat
+
+INNER, TREAD, RIM = 1, 2, 3  # facet tags
+
+
+@dataclass(frozen=True)
+class Torus:
+    """A toroidal tire: section circle of `minor_radius` (to its outer face) about the axle (y).
+
+    Lengths in m, `half_angle` in rad: the arc from the crown to each bead. `segments` elements
+    around, `elements_arc` along the arc, `elements_thickness` through the wall, all of `order`.
+    """
+
+    outer_radius: float
+    minor_radius: float
+    thickness: float
+    half_angle: float
+    segments: int
+    elements_arc: int
+    elements_thickness: int
+    order: int
+    grading: str = "bead"
+
+    @property
+    def ring_corners(self) -> np.ndarray:
+        """Angles of the element corners around the axle, rad, from the lowest point towards +x."""
+        return np.linspace(0.0, 2 * np.pi, self.segments + 1)
+
+    @property
+    def wall_corners(self) -> np.ndarray:
+        """Distances of the element corners from the section's centre, m, inside to outside."""
+        inner = self.minor_radius - self.thickness
+        return np.linspace(inner, self.minor_radius, self.elements_thickness + 1)
+
+    @property
+    def arc_corners(self) -> np.ndarray:
+        """Angles of the element corners along the section, rad, bead to bead; the crown is 0."""
+        corners = np.linspace(-1.0, 1.0, self.elements_arc + 1)
+        if self.grading == "bead":
+            # The clamped edge is singular: the element at the bead is _BEAD times the uniform one.
+            corners = (1 - _BEAD) * np.sin(np.pi / 2 * corners) + _BEAD * corners
+        return self.half_angle * corners
+
+    def position(self, ring: np.ndarray, wall: np.ndarray, arc: np.ndarray) -> np.ndarray:
+        """Cartesian position of (angle around, distance from the section's centre, section angle)."""
+        reach = self.outer_radius - self.minor_radius + wall * np.cos(arc)
+        return np.stack([reach * np.sin(ring), wall * np.sin(arc), -reach * np.cos(ring)], axis=-1)
+
+    def coordinates(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Inverse of `position`, for points (n, 3); the ring angle is in [0, 2 pi)."""
+        x, y, z = points.T
+        reach = np.hypot(x, z) - (self.outer_radius - self.minor_radius)
+        return np.arctan2(x, -z) % (2 * np.pi), np.hypot(reach, y), np.arctan2(y, reach)
+
+
+class Lattice:
+    """The nodes of a section as a product of three lines: around, through the wall, along the arc.
+
+    The id of a node is the same on any number of processes. `nodes` are the nodes on one edge of
+    the reference element, ascending, 0 and 1 included.
+    """
+
+    def __init__(self, section: Torus, nodes: np.ndarray):
+        self.section = section
+        self.ring = _subdivide(section.ring_corners, nodes)[:-1]
+        self.wall = _subdivide(section.wall_corners, nodes)
+        self.arc = _subdivide(section.arc_corners, nodes)
+        self.shape = (len(self.ring), len(self.wall), len(self.arc))
+        self.size = len(self.ring) * len(self.wall) * len(self.arc)
+
+    def points(self, ids: np.ndarray) -> np.ndarray:
+        """Undeformed positions (n, 3), m."""
+        i, k, j = np.unravel_index(ids, self.shape)
+        return self.section.position(self.ring[i], self.wall[k], self.arc[j])
+
+    def ids(self, points: np.ndarray) -> np.ndarray:
+        """Ids of the nodes at the given points (n, 3); the element's own map may be off by a little."""
+        ring, wall, arc = self.section.coordinates(points)
+        i = _nearest(np.append(self.ring, 2 * np.pi), ring) % len(self.ring)
+        return np.ravel_multi_index(
+            (i, _nearest(self.wall, wall), _nearest(self.arc, arc)), self.shape
+        )
+
+
+_BEAD = 0.3
+
+
+def _subdivide(corners: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Corner coordinates with the inner nodes of each element set between them."""
+    steps = np.diff(corners)[:, None] * nodes[None, :-1] + corners[:-1, None]
+    return np.append(steps.ravel(), corners[-1])
+
+
+def _nearest(line: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Index of the entry of an ascending line next to each value."""
+    return np.searchsorted((line[1:] + line[:-1]) / 2, values)
+
+
+def _edge(nodes: np.ndarray) -> np.ndarray:
+    """Nodes on one edge of the reference element, ascending, from its node coordinates."""
+    return np.sort(nodes[(nodes[:, 1] == 0) & (nodes[:, 2] == 0), 0])
+
+
+@dataclass(frozen=True)
+class TireMesh:
+    """The distributed mesh; `lattice` names the nodes of its displacement field.
+
+    `facets` carries the tags INNER, TREAD and RIM.
+    """
+
+    section: Torus
+    lattice: Lattice
+    mesh: dmesh.Mesh
+    facets: dmesh.MeshTags
+
+
+def build(comm: MPI.Comm, section: Torus) -> TireMesh:
+    """The ring of hexahedra. Each process hands in its share of cells and points. Collective."""
+    nodes = compat.geometry_nodes(section.order)
+    geometry = Lattice(section, _edge(nodes))
+    count = section.segments * section.elements_thickness * section.elements_arc
+    cells = _cells(geometry, nodes, np.arange(*_share(comm, count)))
+    points = geometry.points(np.arange(*_share(comm, geometry.size)))
+    mesh = compat.create_mesh(comm, cells, points, section.order)
+    lattice = Lattice(section, _edge(compat.field_nodes(section.order)))
+    return TireMesh(section, lattice, mesh, _tag(mesh, section))
+
+
+def _share(comm: MPI.Comm, count: int) -> tuple[int, int]:
+    """This process's half-open part of range(count)."""
+    return count * comm.rank // comm.size, count * (comm.rank + 1) // comm.size
+
+
+def _cells(lattice: Lattice, nodes: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Ids of the nodes of the given cells, (cells, nodes), in the element's node order."""
+    section = lattice.section
+    step = np.searchsorted(_edge(nodes), nodes - 1e-9)
+    counts = (section.segments, section.elements_thickness, section.elements_arc)
+    i, k, j = (section.order * index[:, None] for index in np.unravel_index(cells, counts))
+    around = (i + step[:, 0]) % lattice.shape[0]
+    return np.ravel_multi_index((around, k + step[:, 1], j + step[:, 2]), lattice.shape)
+
+
+def _tag(mesh: dmesh.Mesh, section: Torus) -> dmesh.MeshTags:
+    """Tags of the inner face, the tread and the rim (bead end faces), from the vertices' positions."""
+    small = 1e-6 * section.thickness
+
+    def coordinate(axis):
+        return lambda x: section.coordinates(np.asarray(x).T)[axis]
+
+    wall, arc = coordinate(1), coordinate(2)
+    where = {
+        INNER: lambda x: wall(x) < section.minor_radius - section.thickness + small,
+        TREAD: lambda x: wall(x) > section.minor_radius - small,
+        RIM: lambda x: np.abs(arc(x)) > section.half_angle - 1e-9,
+    }
+    found = {tag: dmesh.locate_entities_boundary(mesh, 2, test) for tag, test in where.items()}
+    entities = np.concatenate(list(found.values()))
+    tags = np.concatenate([np.full(len(facets), tag) for tag, facets in found.items()])
+    order = np.argsort(entities)
+    return compat.meshtags(mesh, 2, entities[order], tags[order])

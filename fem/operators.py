@@ -1,0 +1,104 @@
+"""Matrices of small motions about a static state, with the clamped rim eliminated.
+
+For basis functions phi on the undeformed mesh, w = e_y x X (speed taken out), K the tangent with
+geometric and follower-pressure stiffness:
+
+    M_ij = int rho phi_i . phi_j                    G_ij = skew part of int rho phi_i . (grad phi_j w)
+    S_ij = -int rho (grad phi_i w) . (grad phi_j w) Q_ij = int rho phi_i . (e_y x phi_j),  B = G - Q
+    S_B_ij = -int rho (grad phi_i w - e_y x phi_i) . (grad phi_j w - e_y x phi_j)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from fem import compat, kinematics
+from fem.body import Body
+from fem.equilibrium import Rolling, static_residual
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """G, S and B of the full inertia, and S_B of the doppler one; Omega is taken out of all."""
+
+    gyroscopic: PETSc.Mat
+    convective: PETSc.Mat
+    body: PETSc.Mat
+    body_convective: PETSc.Mat
+
+
+class Operators:
+    """Matrices on the free dofs of a body at its present displacement. Collective.
+
+    `mass` is the diagonal of the Gauss-Lobatto mass matrix, kg: positive, and of the full order of
+    the elements (the quadrature points are the nodes). `free` are this process's owned free dofs.
+    """
+
+    def __init__(self, body: Body, inflation: float):
+        self.body = body
+        rim = body.rim[body.rim < body.nodes]
+        self.free_nodes = np.setdiff1d(np.arange(body.nodes), rim)
+        self.free = (3 * self.free_nodes[:, None] + np.arange(3)).ravel()
+        first = body.space.dofmap.index_map.local_range[0]
+        self._rows = PETSc.IS().createGeneral(
+            (self.free + 3 * first).astype(PETSc.IntType), comm=body.comm
+        )
+        self.mass = self._lobatto_mass()
+        self.stiffness = self._assemble(self._tangent(inflation))
+        self.stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+
+    def _tangent(self, inflation: float):
+        pressure = fem.Constant(self.body.mesh, inflation)
+        return ufl.derivative(static_residual(self.body, pressure, Rolling()), self.body.u)
+
+    def rotation(self) -> Rotation:
+        """The matrices of the rotating frame. Collective."""
+        body = self.body
+        u, v = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
+        w = kinematics.wheel_velocity(body.mesh)
+        rho = body.material.density
+        convect = kinematics.convective
+        skew = (ufl.inner(v, convect(u, w)) - ufl.inner(convect(v, w), u)) / 2
+        rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
+        forms = (
+            skew,
+            -ufl.inner(convect(v, w), convect(u, w)),
+            skew - ufl.inner(v, kinematics.turn(u)),
+            -ufl.inner(test_rate, rate),
+        )
+        return Rotation(*(self._assemble(rho * form * body.dx) for form in forms))
+
+    def _assemble(self, form) -> PETSc.Mat:
+        matrix = fem.petsc.assemble_matrix(compat.form(form))
+        matrix.assemble()
+        reduced = matrix.createSubMatrix(self._rows, self._rows)
+        matrix.destroy()
+        return reduced
+
+    def _lobatto_mass(self) -> np.ndarray:
+        """Owned free entries of int rho phi_i . (1, 1, 1) by the rule whose points are the nodes."""
+        body = self.body
+        order = body.tire.section.order
+        lobatto = {"quadrature_rule": "GLL", "quadrature_degree": 2 * order - 1}
+        v = ufl.TestFunction(body.space)
+        ones = ufl.as_vector((1.0, 1.0, 1.0))
+        density = fem.Constant(body.mesh, body.material.density)
+        dx = ufl.Measure("dx", domain=body.mesh, metadata=lobatto)
+        vector = fem.petsc.assemble_vector(compat.form(density * ufl.inner(v, ones) * dx))
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return vector.array[self.free].copy()
+
+    def spread(self, free: np.ndarray) -> np.ndarray:
+        """Owned nodal values (nodes, 3, ...) with zeros on the rim from values at the free dofs."""
+        out = np.zeros((3 * self.body.nodes, *free.shape[1:]))
+        out[self.free] = free
+        return out.reshape(self.body.nodes, 3, *free.shape[1:])
+
+    def restrict(self, nodal: np.ndarray) -> np.ndarray:
+        """Values at the free dofs from owned nodal values (nodes, 3, ...)."""
+        return nodal.reshape(-1, *nodal.shape[2:])[self.free]
