@@ -63,6 +63,8 @@ class Equilibrium:
         options = PETSc.Options(prefix)
         defaults = {
             "snes_type": "vinewtonrsls",
+            # PETSc takes a dof within 1e-8 (metres, here) of its bound as touching; only contact is.
+            "snes_vi_zero_tolerance": 1e-15,
             "snes_max_it": 25,
             "snes_rtol": 0.0,
             "snes_stol": 0.0,
