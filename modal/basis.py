@@ -1,0 +1,50 @@
+"""The rotating-frame matrices on the basis of undamped modes: small, replicated, and free of speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modal.undamped import Modes, gram, multiply
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Phi^T X Phi of the matrices with Omega taken out (physics of the rotating frame).
+
+    `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad skew; `convective`, `body_convective`
+    (m, m) 1/rad2 symmetric; `momentum` (3, m) kg^1/2: int rho phi_k, the mass each mode moves.
+    """
+
+    squares: np.ndarray
+    gyroscopic: np.ndarray
+    convective: np.ndarray
+    body: np.ndarray
+    body_convective: np.ndarray
+    momentum: np.ndarray
+
+
+def project(modes: Modes, rotation, mass: np.ndarray, comm) -> Projection:
+    """Project the rotation matrices (fem.operators.Rotation) and the momentum. Collective."""
+    vectors = modes.vectors
+
+    def reduced(matrix):
+        return gram(comm, vectors, multiply(matrix, vectors))
+
+    def skew(matrix):
+        return (matrix - matrix.T) / 2
+
+    def symmetric(matrix):
+        return (matrix + matrix.T) / 2
+
+    weighted = mass[:, None] * vectors
+    momentum = comm.allreduce(np.stack([weighted[d::3].sum(axis=0) for d in range(3)]))
+    return Projection(
+        modes.squares,
+        skew(reduced(rotation.gyroscopic)),
+        symmetric(reduced(rotation.convective)),
+        skew(reduced(rotation.body)),
+        symmetric(reduced(rotation.body_convective)),
+        momentum,
+    )

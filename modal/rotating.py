@@ -1,0 +1,159 @@
+"""The second eigenproblem on the modal basis: the tire as it turns, seen in the non-rotating frame.
+
+    s^2 I + s (D_mod + 2 Omega G) + (Lambda + Omega^2 S + Omega D_mod B),  D_mod = gamma1 I + gamma2 Lambda
+
+(thesis (2.1)-(2.5), put right; the doppler form takes B for G and S_B for S). Its response to modal
+forces is kept as  eta(t) = Re[R z(t)] + R_b y(t),  z' = s z + L f,  y' = T y + L_b f:  one complex
+state per conjugate pair or real eigenvalue, and a real block for eigenvalues too close to defective
+to have usable vectors of their own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from modal.basis import Projection
+
+# Above this condition an eigenvector loses ten of sixteen digits; such eigenvalues go to the block.
+DEFECTIVE = 1e6
+
+
+@dataclass(frozen=True)
+class StateModes:
+    """The decoupled equations of motion for m modal coordinates.
+
+    `eigenvalue` (q,) 1/s, Im >= 0; `right` (m, q) with the weight 2 of a pair already in it; `left`
+    (q, m), transposed and not conjugated, divided by a_q; `block` (k, k), `block_right` (m, k),
+    `block_left` (k, m). `residual`, `left_residual` (q,) relative to the terms of the quadratic
+    problem; `condition` the worst eigenvector condition among those kept as vectors.
+    """
+
+    eigenvalue: np.ndarray
+    right: np.ndarray
+    left: np.ndarray
+    block: np.ndarray
+    block_right: np.ndarray
+    block_left: np.ndarray
+    residual: np.ndarray
+    left_residual: np.ndarray
+    condition: float
+
+    @property
+    def unstable(self) -> int:
+        """Eigenvalues with a growing motion, beyond rounding."""
+        rates = np.concatenate([self.eigenvalue.real, np.linalg.eigvals(self.block).real])
+        fastest = np.abs(self.eigenvalue).max(initial=1.0)
+        return int((rates > 1e-9 * fastest).sum())
+
+
+def matrices(
+    projection: Projection, speed: float, damping: tuple[float, float], inertia: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """D~ (1/s) and K~ (1/s2) of the projected problem; damping is (gamma1 in 1/s, gamma2 in s)."""
+    rate = damping[0] + damping[1] * projection.squares
+    stiffness, drag = np.diag(projection.squares), np.diag(rate)
+    if speed == 0:
+        return drag, stiffness
+    full = inertia == "full"
+    gyroscopic = projection.gyroscopic if full else projection.body
+    convective = projection.convective if full else projection.body_convective
+    turning = speed * rate[:, None] * projection.body
+    return drag + 2 * speed * gyroscopic, stiffness + speed**2 * convective + turning
+
+
+def standing(projection: Projection, damping: tuple[float, float]) -> StateModes:
+    """Without rotation the modes stay uncoupled: s = -d/2 +- sqrt(d^2/4 - omega^2), a = 2 s + d."""
+    squares = projection.squares
+    m = len(squares)
+    half = (damping[0] + damping[1] * squares) / 2
+    root = np.sqrt(half.astype(complex) ** 2 - squares)
+    # Condition of the eigenvectors of one mode's companion matrix is about omega / |root|.
+    condition = np.sqrt(squares) / np.maximum(np.abs(root), np.finfo(float).tiny)
+    defective = np.flatnonzero(condition > DEFECTIVE)
+    paired = np.flatnonzero((root.imag != 0) & (condition <= DEFECTIVE))
+    real = np.flatnonzero((root.imag == 0) & (condition <= DEFECTIVE))
+    # Of the two real roots the slow one is omega^2 over the fast one: no cancellation.
+    fast = -half[real] - root[real].real
+    eigenvalue = np.concatenate([-half[paired] + root[paired], fast, squares[real] / fast])
+    mode = np.concatenate([paired, real, real])
+    weight = np.where(eigenvalue.imag != 0, 2.0, 1.0)
+    right = np.zeros((m, len(mode)), complex)
+    left = np.zeros((len(mode), m), complex)
+    k = np.arange(len(mode))
+    right[mode, k] = weight
+    left[k, mode] = 1 / (2 * eigenvalue + 2 * half[mode])
+    block, block_right, block_left = _companion_blocks(defective, squares, half, m)
+    none = np.zeros(len(mode))
+    worst = float(condition[np.r_[paired, real]].max(initial=1.0))
+    return StateModes(eigenvalue, right, left, block, block_right, block_left, none, none, worst)
+
+
+def _companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m: int):
+    """(T, R_b, L_b) of single modes at critical damping, each as its own companion matrix."""
+    k = 2 * len(modes)
+    block, right, left = np.zeros((k, k)), np.zeros((m, k)), np.zeros((k, m))
+    for i, mode in enumerate(modes):
+        block[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = [[0, 1], [-squares[mode], -2 * half[mode]]]
+        right[mode, 2 * i] = left[2 * i + 1, mode] = 1
+    return block, right, left
+
+
+def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
+    """Decouple s^2 + s D~ + K~ through the companion matrix and the inverse of its vectors.
+
+    The lower half of a row of that inverse is w^T / a: left vectors and their normalisation come
+    together, biorthogonal also inside clusters of repeated eigenvalues.
+    """
+    m = len(drag)
+    # Velocities in units of a mean circular frequency: displacements and they have one size.
+    scale = np.sqrt(np.abs(np.diag(stiffness)).mean())
+    companion = np.block([[np.zeros((m, m)), scale * np.eye(m)], [-stiffness / scale, -drag]])
+    values, vectors = linalg.eig(companion)
+    vectors /= np.linalg.norm(vectors, axis=0)
+    inverse = np.linalg.inv(vectors)
+    condition = np.linalg.norm(inverse, axis=1)
+    good = condition <= DEFECTIVE
+    block, block_vectors = np.zeros((0, 0)), np.zeros((2 * m, 0))
+    if not good.all():
+        block, block_vectors = _invariant(companion, values[~good])
+        inverse = np.linalg.inv(np.hstack([vectors[:, good], block_vectors]))
+        values, vectors = values[good], vectors[:, good]
+    keep = np.flatnonzero(values.imag >= 0)
+    values = values[keep]
+    weight = np.where(values.imag > 0, 2.0, 1.0)
+    right, left = vectors[:m, keep], inverse[keep, m:] / scale
+    return StateModes(
+        values,
+        right * weight * 1.0,
+        left * 1.0,
+        block,
+        block_vectors[:m].real,
+        inverse[len(inverse) - len(block) :, m:].real / scale,
+        _quadratic_residual(drag, stiffness, values, right),
+        _quadratic_residual(drag.T, stiffness.T, values, left.T),
+        float(condition[good].max(initial=1.0)),
+    )
+
+
+def _invariant(companion: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Schur block and orthonormal real basis of the invariant subspace of the chosen eigenvalues."""
+    near = 1e-6 * np.abs(chosen).max()
+
+    def wanted(re, im):
+        return bool(
+            np.abs(chosen - complex(re, abs(im))).min() < near
+            or np.abs(chosen - complex(re, -abs(im))).min() < near
+        )
+
+    schur, basis, count = linalg.schur(companion, output="real", sort=wanted)
+    return schur[:count, :count], basis[:, :count]
+
+
+def _quadratic_residual(drag, stiffness, values, vectors) -> np.ndarray:
+    """||(s^2 + s D + K) u|| over the sum of its terms' norms, column by column."""
+    terms = (vectors * values**2, drag @ vectors * values, stiffness @ vectors)
+    size = sum(np.linalg.norm(term, axis=0) for term in terms)
+    return np.linalg.norm(sum(terms), axis=0) / size
