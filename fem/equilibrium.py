@@ -16,6 +16,8 @@ from petsc4py import PETSc
 from fem import compat, kinematics, material
 from fem.body import Body
 
+TOUCH = 1e-15  # m above its bound up to which a dof touches the road: rounding, nothing else
+
 
 @dataclass(frozen=True)
 class Rolling:
@@ -64,7 +66,7 @@ class Equilibrium:
         defaults = {
             "snes_type": "vinewtonrsls",
             # PETSc takes a dof within 1e-8 (metres, here) of its bound as touching; only contact is.
-            "snes_vi_zero_tolerance": 1e-15,
+            "snes_vi_zero_tolerance": TOUCH,
             "snes_max_it": 25,
             "snes_rtol": 0.0,
             "snes_stol": 0.0,
@@ -89,7 +91,7 @@ class Equilibrium:
         x = self._work.duplicate()
         x.array[:] = start.ravel()
         self._place_road(road_height, x)
-        self._snes.setTolerances(atol=1e-10 * self._force_scale(x), rtol=0.0, stol=0.0)
+        self._snes.setTolerances(atol=1e-12 * self._force_scale(x), rtol=0.0, stol=0.0)
         self._snes.solve(None, x)
         reason = self._snes.getConvergedReason()
         step = Step(
@@ -111,9 +113,8 @@ class Equilibrium:
         self._assemble_residual(None, x, out)
         force = np.zeros(body.nodes)
         vertical = out.array.reshape(-1, 3)[body.tread, 2]
-        at_road = (
-            x.array.reshape(-1, 3)[body.tread, 2] <= self._lower.array.reshape(-1, 3)[body.tread, 2]
-        )
+        bound = self._lower.array.reshape(-1, 3)[body.tread, 2]
+        at_road = x.array.reshape(-1, 3)[body.tread, 2] <= bound + TOUCH
         force[body.tread] = np.where(at_road, vertical, 0.0)
         x.destroy()
         out.destroy()
@@ -137,7 +138,7 @@ class Equilibrium:
         self._snes.setVariableBounds(self._lower, self._upper)
 
     def _force_scale(self, x: PETSc.Vec) -> float:
-        """N: stiffness of a dof times the wall, so that 1e-10 of it is far below any load of interest.
+        """N: stiffness of a dof times the wall, so that 1e-12 of it is far below any load of interest.
 
         Once per problem: the tangent at the first state is stiff enough a yardstick for all.
         """

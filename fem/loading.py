@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 from mpi4py import MPI
 
 from fem.equilibrium import Equilibrium, Step
@@ -29,6 +30,15 @@ class Progress:
     load: float
     active: int
     step: Step
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A converged state on the way to a load."""
+
+    deflection: float
+    load: float
+    displacement: np.ndarray
 
 
 class Loader:
@@ -61,20 +71,55 @@ class Loader:
         """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket."""
         if load <= 0:
             raise InputError(f"static.load = {load:g} N: a road carries a positive load")
-        known = [(0.0, 0.0)]  # (deflection, load), by deflection
+        known = [_Known(0.0, 0.0, self.body.u.x.array.copy())]
         trial = 0.1 * self.body.tire.section.thickness
         for _ in range(60):
-            below = max((k for k in known if k[1] <= load), key=lambda k: k[0])
-            self._raise_road(below[0] if trial > below[0] else trial, trial)
-            known = sorted([*known, (trial, self.load())])
-            if abs(self.load() - load) <= LOAD_TOLERANCE * load:
+            self._try_deflection(trial, known)
+            known.append(_Known(trial, self.load(), self.body.u.x.array.copy()))
+            if abs(known[-1].load - load) <= LOAD_TOLERANCE * load:
                 return trial
-            trial = _next_deflection(known, load, self.body.tire.section.minor_radius)
+            trial = self._next_deflection(known, load)
+        nearest = min(known, key=lambda k: abs(k.load - load))
         raise ConvergenceError(
-            f"static: the load of {load:g} N was not met in 60 trials; nearest is "
-            f"{min((k[1] for k in known), key=lambda f: abs(f - load)):g} N. "
+            f"static: the load of {load:g} N was not met in 60 trials; nearest is {nearest.load:g} N. "
             "Give static.deflection instead, or refine the mesh."
         )
+
+    def _try_deflection(self, trial: float, known: list[_Known]) -> None:
+        """Solve at the trial deflection from a line through the two nearest states, else by steps."""
+        near = sorted(known, key=lambda k: abs(k.deflection - trial))[:2]
+        guess = near[0].displacement.copy()
+        if len(near) == 2:
+            reach = (trial - near[0].deflection) / (near[0].deflection - near[1].deflection)
+            guess += reach * (near[0].displacement - near[1].displacement)
+            self.body.u.x.array[:] = guess
+            step = self.equilibrium.solve(self.touch + trial)
+            self.newton_steps += step.iterations
+            if step.converged:
+                self._report("deflection", trial, "m", step)
+                return
+        below = max((k for k in known if k.deflection <= trial), key=lambda k: k.deflection)
+        self.body.u.x.array[:] = below.displacement
+        self._raise_road(below.deflection, trial)
+
+    def _next_deflection(self, known: list[_Known], load: float) -> float:
+        """Secant through the two loads nearest to the wanted one, kept inside the bracket."""
+        below = max((k for k in known if k.load <= load), key=lambda k: k.deflection)
+        above = [k.deflection for k in known if k.load > load]
+        far, near = sorted(known, key=lambda k: -abs(k.load - load))[-2:]
+        slope = (near.load - far.load) / (near.deflection - far.deflection)
+        secant = near.deflection + (load - near.load) / slope if slope > 0 else np.inf
+        if above:
+            low, high = below.deflection, min(above)
+            return secant if low < secant < high else (low + high) / 2
+        if below.deflection > self.body.tire.section.minor_radius:
+            raise ConvergenceError(
+                f"static: the tire carries {below.load:.4g} N at {below.deflection:.4g} m of "
+                f"deflection, beyond its section; {load:g} N is out of reach. Lower static.load or "
+                "raise static.inflation."
+            )
+        # Beyond what was tried the curve is not known: at most double the deflection.
+        return float(np.clip(secant, 1.01 * below.deflection, 2 * below.deflection))
 
     def load(self) -> float:
         """Total vertical force of the road, N. Collective."""
@@ -95,8 +140,7 @@ class Loader:
             step = attempt(target)
             self.newton_steps += step.iterations
             if step.converged:
-                force, active = self._contact()
-                self.report(Progress(what, target * scale, unit, force, active, step))
+                self._report(what, target * scale, unit, step)
                 done = target
                 if done == end:
                     return
@@ -111,26 +155,8 @@ class Loader:
                     "the inflation, stiffen the material or refine the mesh around the footprint."
                 )
 
-    def _contact(self) -> tuple[float, int]:
+    def _report(self, what: str, value: float, unit: str, step: Step) -> None:
         force = self.equilibrium.contact_force()
-        return self.body.comm.allreduce(force.sum()), self.body.comm.allreduce(
-            int((force > 0).sum())
-        )
-
-
-def _next_deflection(known: list[tuple[float, float]], load: float, largest: float) -> float:
-    """Secant through the two loads nearest to the wanted one, kept inside the bracket."""
-    below = [k for k in known if k[1] <= load]
-    above = [k for k in known if k[1] > load]
-    (d0, f0), (d1, f1) = sorted(known, key=lambda k: abs(k[1] - load))[:2]
-    secant = d1 + (load - f1) * (d1 - d0) / (f1 - f0) if f1 != f0 else d1 + (d1 - d0)
-    if above:
-        low, high = below[-1][0], above[0][0]
-        return secant if low < secant < high else (low + high) / 2
-    if below[-1][0] > largest:
-        raise ConvergenceError(
-            f"static: the tire carries {below[-1][1]:.4g} N at {below[-1][0]:.4g} m of deflection, "
-            f"beyond its section; {load:g} N is out of reach. Lower static.load or raise static.inflation."
-        )
-    # The load curve stiffens: never more than double the deflection in one trial.
-    return min(max(secant, below[-1][0] * 1.01), 2 * below[-1][0])
+        total = self.body.comm.allreduce(force.sum())
+        active = self.body.comm.allreduce(int((force > 0).sum()))
+        self.report(Progress(what, value, unit, total, active, step))

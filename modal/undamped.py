@@ -156,6 +156,10 @@ def _count_below(scaled: PETSc.Mat, shift: float) -> int:
     pc.setOperators(shifted)
     pc.setType(PETSc.PC.Type.CHOLESKY)
     pc.setFactorSolverType("mumps")
+    pc.setFactorSetUpSolverType()
+    # Null pivots found, and the root front on one process: only then are MUMPS's pivots all counted.
+    pc.getFactorMatrix().setMumpsIcntl(24, 1)
+    pc.getFactorMatrix().setMumpsIcntl(13, 1)
     pc.setUp()
     negative = pc.getFactorMatrix().getInertia()[0]
     pc.destroy()

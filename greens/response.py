@@ -1,0 +1,111 @@
+"""Semi-analytical response of the tire between chosen forces and displacements.
+
+    u(t) = Re[C z(t)] + C_b y(t) + G_res f(t),   z' = s z + P f,   y' = T y + P_b f
+    g(t) = Re[C e^{st} P] + C_b e^{Tt} P_b  (+ G_res delta(t)),   g(0) = 0 without truncation
+
+thesis (4.14) with its sum over eigenpairs kept as a product, C = Phi_out R and P = L Phi_in^T.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import linalg
+
+from modal.rotating import StateModes
+
+
+@dataclass(frozen=True)
+class Response:
+    """Poles with their input and output, for k forces and r displacements.
+
+    `eigenvalue` (q,) 1/s, `output` (r, q) and `input` (q, k) complex, `block` (b, b) with its
+    `block_output` (r, b) and `block_input` (b, k), `residual` (r, k) m/N; `momentum` (3, q) and
+    `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries.
+    """
+
+    eigenvalue: np.ndarray
+    output: np.ndarray
+    input: np.ndarray
+    block: np.ndarray
+    block_output: np.ndarray
+    block_input: np.ndarray
+    residual: np.ndarray
+    momentum: np.ndarray
+    block_momentum: np.ndarray
+
+    def impulse(self, times: np.ndarray) -> np.ndarray:
+        """Green's functions g (t, r, k), m/(N s), without the residual's delta at t = 0."""
+        waves = np.exp(np.multiply.outer(times, self.eigenvalue))
+        g = np.einsum("rq,tq,qk->trk", self.output, waves, self.input, optimize=True).real
+        if len(self.block):
+            steps = np.stack([linalg.expm(self.block * t) for t in times])
+            g += self.block_output @ steps @ self.block_input
+        return g
+
+    def receptance(self, frequency: np.ndarray) -> np.ndarray:
+        """H (f, r, k) complex, m/N, at the given frequencies in Hz."""
+        H = np.empty((len(frequency), *self.residual.shape), complex)
+        for k, s in enumerate(2j * np.pi * frequency):
+            poles = (self.output / (s - self.eigenvalue)) @ self.input
+            mirror = (self.output.conj() / (s - self.eigenvalue.conj())) @ self.input.conj()
+            H[k] = (poles + mirror) / 2 + self.residual
+            if len(self.block):
+                shifted = s * np.eye(len(self.block)) - self.block
+                H[k] += self.block_output @ np.linalg.solve(shifted, self.block_input)
+        return H
+
+    def static(self) -> np.ndarray:
+        """Displacement (r, k) per constant force, m/N, of the poles alone: H at 0 Hz."""
+        static = -((self.output / self.eigenvalue) @ self.input).real
+        if len(self.block):
+            static -= self.block_output @ np.linalg.solve(self.block, self.block_input)
+        return static
+
+    def resolved(self, step: float, limit: float = 1.0) -> Response:
+        """Poles with |s| step above the limit leave the dynamics and follow the force statically.
+
+        Integrating them over so long a step gains nothing and can gain energy.
+        """
+        keep = np.abs(self.eigenvalue) * step <= limit
+        if keep.all():
+            return self
+        fast = (self.output[:, ~keep] / self.eigenvalue[~keep]) @ self.input[~keep]
+        return replace(
+            self,
+            eigenvalue=self.eigenvalue[keep],
+            output=self.output[:, keep],
+            input=self.input[keep],
+            momentum=self.momentum[:, keep],
+            residual=self.residual - fast.real,
+        )
+
+
+def couple(
+    modes: StateModes,
+    output: np.ndarray,
+    forces: np.ndarray,
+    momentum: np.ndarray,
+    compliance: np.ndarray | None = None,
+) -> Response:
+    """Response from modal shapes at the outputs (r, m) and forces (k, m), kg^-1/2.
+
+    `momentum` (3, m) as in modal.basis. `compliance` (r, k) m/N is the exact static flexibility in the
+    rotating frame; with it G_res = [K_Omega^-1]_rk - Phi_r K~^-1 Phi_k^T stands for all modes left
+    out (static, exact at 0 Hz); without it they are simply missing.
+    """
+    response = Response(
+        modes.eigenvalue,
+        output @ modes.right,
+        modes.left @ forces.T,
+        modes.block,
+        output @ modes.block_right,
+        modes.block_left @ forces.T,
+        np.zeros((len(output), len(forces))),
+        momentum @ modes.right,
+        momentum @ modes.block_right,
+    )
+    if compliance is None:
+        return response
+    return replace(response, residual=compliance - response.static())
