@@ -178,9 +178,9 @@ def checked_compliance(matrix: Array) -> Array:
     except np.linalg.LinAlgError:
         eigenvalues = np.linalg.eigvalsh(symmetric)
         raise InputError(
-            "contact: the compliance is not positive definite (its symmetric part has the "
-            f"smallest eigenvalue {eigenvalues[0]:.3g} m/N, largest {eigenvalues[-1]:.3g} m/N), so the "
-            "contact forces are not unique; add tread compliance ([contact] tread) or a residual flexibility "
+            "contact: the compliance is not positive definite (eigenvalues of its symmetric part "
+            f"from {eigenvalues[0]:.3g} to {eigenvalues[-1]:.3g} m/N), so the contact forces are not "
+            "unique; add tread compliance ([contact] tread) or a residual flexibility "
             '([greens] residual = "static")'
         ) from None
     return matrix
