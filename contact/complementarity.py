@@ -179,8 +179,8 @@ def checked_compliance(matrix: Array) -> Array:
         eigenvalues = np.linalg.eigvalsh(symmetric)
         raise InputError(
             "contact: the compliance is not positive definite (eigenvalues of its symmetric part "
-            f"from {eigenvalues[0]:.3g} to {eigenvalues[-1]:.3g} m/N), so the contact forces are not "
-            "unique; add tread compliance ([contact] tread) or a residual flexibility "
+            f"from {eigenvalues[0]:.3g} to {eigenvalues[-1]:.3g} m/N), so the contact forces are "
+            "not unique; add tread compliance ([contact] tread) or a residual flexibility "
             '([greens] residual = "static")'
         ) from None
     return matrix
