@@ -68,14 +68,14 @@ class Grid:
         self._z = np.ascontiguousarray(z)
         self._flat = self._z.ravel()
         self._length = float(x[-1] - x[0])
-        self._period = 0.0
+        self._sides = float(y[0]), float(y[-1])
         self.filled = 0
 
     @property
     def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """((x0, x1), (y0, y1)) in m; a mirrored road has no end."""
         reach = (-np.inf, np.inf) if self._end == "mirror" else (0.0, self._length)
-        return reach, (float(self._y.positions[0]), float(self._y.positions[-1]))
+        return reach, self._sides
 
     @property
     def spacing(self) -> float:
@@ -144,7 +144,7 @@ class Grid:
 
     def _check_strip(self, x0: float, x1: float, y0: float, y1: float) -> None:
         slack = 1e-6 * self.spacing
-        left, right = self._y.positions[0], self._y.positions[-1]
+        left, right = self._sides
         if y0 < left - slack or y1 > right + slack:
             raise InputError(
                 f"{self.source}: the tire needs y from {y0:.4g} to {y1:.4g} m, the road has "

@@ -36,31 +36,33 @@ def _read_binary(payload: Payload) -> Array:
     """Big-endian numbers, packed without regard to rows; the last record is filled with NaN."""
     kind = np.dtype(">f4" if payload.code == "KRBI" else ">f8")
     size = payload.file.stat().st_size - payload.start
+    whole = size - size % RECORD
     rows = payload.rows
     if rows is None:
-        rows = size // (kind.itemsize * payload.channels)
+        rows = whole // (kind.itemsize * payload.channels)
     data = rows * payload.channels * kind.itemsize
     needed = -(-data // RECORD) * RECORD
-    if not data <= size or (payload.rows is not None and size > needed + 2):
+    # A line's end may follow the last record.
+    if size < data or size - whole > 2 or (payload.rows is not None and whole > needed):
         raise InputError(
             f"{payload.file}: {size:,} bytes of data from byte {payload.start:,} on, "
             f"{needed:,} expected for {rows} rows of {payload.channels} channels ({payload.code}): "
-            f"the file is {'truncated' if size < data else 'longer than its header says'}"
-        )
-    if payload.rows is None and size - data >= RECORD:
-        raise InputError(
-            f"{payload.file}: {size:,} bytes of data from byte {payload.start:,} on are no whole "
-            f"number of rows of {payload.channels} channels ({payload.code}): the file is truncated"
+            f"the file is {'longer than its header says' if whole > needed else 'truncated'}"
         )
     with payload.file.open("rb") as stream:
         stream.seek(payload.start)
-        numbers = np.fromfile(stream, dtype=kind, count=rows * payload.channels)
+        numbers = np.fromfile(stream, dtype=kind, count=whole // kind.itemsize)
     # A signalling NaN would raise an invalid-operation flag when widened to double.
     with np.errstate(invalid="ignore"):
-        table = numbers.astype(float).reshape(rows, payload.channels)
-    if payload.rows is None:
-        table = _without_padding(table, kind.itemsize)
-    return table
+        numbers = numbers.astype(float)
+    used = rows * payload.channels
+    if payload.rows is None and not np.isnan(numbers[used:]).all():
+        raise InputError(
+            f"{payload.file}: {whole:,} bytes of data from byte {payload.start:,} on end within a "
+            f"row of {payload.channels} channels ({payload.code}): the file is truncated"
+        )
+    table = numbers[:used].reshape(rows, payload.channels)
+    return _without_padding(table, kind.itemsize) if payload.rows is None else table
 
 
 def _without_padding(table: Array, itemsize: int) -> Array:
