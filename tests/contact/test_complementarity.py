@@ -60,21 +60,42 @@ def test_solvers_agree(skew: float) -> None:
         assert np.array_equal(ours.active, petsc.active)
 
 
-@pytest.mark.parametrize("n", [3, 8, 20, 101])
-@pytest.mark.parametrize("start", ["nothing", "everything", "every second"])
-def test_pivoting_backup_ends_where_exchanges_cycle(n: int, start: str) -> None:
-    # Full exchange alone cycles on this P-matrix of Ben Gharbia and Gilbert (2012), n = 3.
-    matrix = np.eye(n) + 0.9 * np.roll(np.eye(n), -1, axis=1) * 1.0
-    matrix = matrix if n > 3 else np.array([[1.0, 0.0, 0.9], [0.9, 1.0, 0.0], [0.0, 0.9, 1.0]])
-    guess = {
-        "nothing": np.zeros(n, dtype=bool),
-        "everything": np.ones(n, dtype=bool),
-        "every second": np.arange(n) % 2 == 0,
-    }[start]
-    q = -np.ones(n)
-    force = ActiveSet(matrix).solve(q, guess)
+def exchange_alone(matrix: np.ndarray, q: np.ndarray, active: np.ndarray) -> list[bytes]:
+    """The sets that full exchange without safeguard passes through, to the end or 60 of them."""
+    passed = [active.tobytes()]
+    for _ in range(60):
+        force = np.zeros(len(q))
+        force[active] = np.linalg.solve(matrix[np.ix_(active, active)], -q[active])
+        wrong = np.where(active, force, matrix @ force + q) < -1e-12
+        if not wrong.any():
+            break
+        active = active ^ wrong
+        passed.append(active.tobytes())
+    return passed
+
+
+@pytest.mark.parametrize("copies", [1, 3, 10])
+def test_backup_ends_where_full_exchange_cycles(copies: int) -> None:
+    # Positive definite (0.25, 0.25, 2.5), after Ben Gharbia and Gilbert, Math. Program. 134 (2012).
+    block = np.array([[1.0, 0.0, 1.5], [1.5, 1.0, 0.0], [0.0, 1.5, 1.0]])
+    matrix, q = np.kron(np.eye(copies), block), -np.ones(3 * copies)
+    start = np.arange(3 * copies) % 3 == 0
+    passed = exchange_alone(matrix, q, start)
+    assert len(set(passed)) < len(passed)
+    assert np.allclose(ActiveSet(matrix).solve(q, start), 0.4, atol=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 3.0])
+def test_bad_guess_and_strong_skew_part(share: float) -> None:
+    rng = np.random.default_rng(11)
+    matrix, turn = random_compliance(rng, 200, 0.0), rng.standard_normal((200, 200))
+    turn -= turn.T
+    matrix += share * np.linalg.norm(matrix, 2) / np.linalg.norm(turn, 2) * turn
+    q, contact = rng.standard_normal(200), ActiveSet(matrix)
+    force = contact.solve(q, rng.random(200) < 0.5)
     gap = matrix @ force + q
-    assert force.min() >= 0.0 and gap.min() > -1e-12 and abs(force @ gap) < 1e-12
+    assert force.min() >= 0.0 and gap.min() > -1e-11 and abs(force @ gap) < 1e-11 * force.sum()
+    assert contact.iterations < 60
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -121,14 +142,15 @@ def test_same_set_costs_no_factorisation_and_gives_the_same_bits() -> None:
 
 def test_reference_at_rest_is_returned_bit_for_bit() -> None:
     rng = np.random.default_rng(6)
-    contact = ActiveSet(random_compliance(rng, 80, 0.01))
-    gap = rng.standard_normal(80)
-    static = contact.solve(gap)
+    matrix = random_compliance(rng, 80, 0.01)
+    contact = ActiveSet(matrix)
+    static = contact.solve(rng.standard_normal(80))
     at_rest = np.where(static > 0.0, 0.0, contact.gap)
     force = static
     for _ in range(100):
         force = contact.solve(at_rest, reference=static)
     assert np.array_equal(force, static)
+    assert np.array_equal(ActiveSet(matrix).solve(at_rest, reference=static), static)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -160,12 +182,11 @@ def test_clipping_negative_forces_is_no_solution() -> None:
     overlap = q < 0.0
     clipped = np.zeros_like(q)
     clipped[overlap] = np.linalg.solve(matrix[np.ix_(overlap, overlap)], -q[overlap])
-    assert clipped.min() < 0.0
     clipped = np.maximum(clipped, 0.0)
-    assert abs(clipped.sum() / force.sum() - 1.0) > 0.2
-    assert (matrix @ clipped + q)[overlap].min() < -1e-2 * 3e-4 or (
-        (matrix @ clipped + q)[clipped > 0.0].max() > 1e-2 * 3e-4
-    )
+    gap = matrix @ clipped + q
+    assert clipped.sum() > 1.3 * force.sum()
+    # Without the pulling points, the pushing ones float above the road they are to press on.
+    assert gap[clipped > 0.0].max() > 0.1 * 3e-4
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

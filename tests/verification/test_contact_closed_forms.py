@@ -73,4 +73,7 @@ def test_rigid_square_punch_by_extrapolation() -> None:
     # Aitken: the edge singularity leaves one power of the cell size.
     limit = fine - (fine - middle) ** 2 / ((fine - middle) - (middle - coarse))
     assert limit == pytest.approx(SQUARE_PUNCH, rel=1e-3)
+    errors = SQUARE_PUNCH - np.array([coarse, middle, fine])
+    slopes = np.log2(errors[:-1] / errors[1:])
+    assert np.all(slopes > 0.9) and np.all(slopes < 1.1)
     assert square_punch_load(approach, half_side, MODULUS) == pytest.approx(loads[-1], rel=2e-2)
