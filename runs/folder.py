@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from fem.errors import InputError
-from runs.store import explained, plain, write_text
+from runs.disk import explained, write_text
+from runs.store import plain
 from runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
 OTHER = "choose another folder with --out, or remove this one; nothing was written"

@@ -9,26 +9,34 @@ from collections.abc import Callable
 from typing import Any
 
 from fem.errors import ConvergenceError, InputError
+from runs.disk import explained
 
 DONE, BUG, INPUT, GAVE_UP, STOPPED = 0, 1, 2, 3, 4
 TOGETHER = 3.0
 """Seconds a failing process waits for the others to fail likewise before it ends them all."""
 
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
+"""SIGUSR1 is what mpirun hands on to every process; the launcher uses it."""
+
 
 class Stopped(BaseException):
-    """The user (SIGINT) or the batch system (SIGTERM) asked to stop: exit status 4.
+    """The user (SIGINT) or the batch system (SIGTERM, SIGUSR1) asked to stop: exit status 4.
 
     Not an Exception, so that no solver callback takes it for its own failure.
     """
 
 
+class ToldByRoot(RuntimeError):
+    """The root process failed unexpectedly and says so; the others end without a word."""
+
+
 def stop_on_signals() -> None:
-    """Turn SIGINT and SIGTERM into `Stopped`."""
+    """Turn the stop signals into `Stopped`."""
 
     def stop(number: int, _frame: Any) -> None:
         raise Stopped(signal.Signals(number).name)
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in STOP_SIGNALS:
         signal.signal(number, stop)
 
 
@@ -52,19 +60,25 @@ def rank_before_mpi() -> int:
 
 
 def on_root(comm: Any, function: Callable[[], Any]) -> Any:
-    """Run `function` on the root process; its value, or its error, on every process. Collective."""
+    """Run `function` on the root process; its value on every process.
+
+    Where it fails, every process raises: the same InputError or ConvergenceError, or on the others
+    ToldByRoot for an error that is a bug. Collective.
+    """
     value, error = None, None
     if comm.rank == 0:
         try:
             value = function()
         except Exception as raised:
             error = raised
-    told = comm.bcast(error if comm.size > 1 else None)
+    if comm.size > 1:
+        clear = isinstance(error, InputError | ConvergenceError)
+        told = comm.bcast(error if clear or error is None else ToldByRoot())
+        value = comm.bcast(value if error is None else None)
+        error = error or told
     if error is not None:
         raise error
-    if told is not None:
-        raise told
-    return comm.bcast(value)
+    return value
 
 
 def judged(function: Callable[[], None]) -> tuple[int, str]:
@@ -79,8 +93,11 @@ def judged(function: Callable[[], None]) -> tuple[int, str]:
         return STOPPED, f"stopped by {stop}: finished stages are kept, the same command goes on"
     except MemoryError as error:
         return GAVE_UP, f"error: out of memory ({error}): use a coarser mesh, fewer modes or points"
-    except Exception:
-        return BUG, traceback.format_exc()
+    except ToldByRoot:
+        return BUG, ""
+    except Exception as error:
+        clear = explained(error, getattr(error, "filename", None) or "the result folder")
+        return (INPUT, f"error: {clear}") if clear else (BUG, traceback.format_exc())
     return DONE, ""
 
 
@@ -94,21 +111,30 @@ def guarded(comm: Any, function: Callable[[], None]) -> int:
     """
     agreement = comm.Dup()
     status, message = judged(function)
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in STOP_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-    if not _all_here(agreement, TOGETHER * (1 + 0.2 * comm.rank) if status else None):
-        print(message, file=sys.stderr, flush=True)
+    higher = range(comm.rank + 1, comm.size) if status else ()
+    notices = [agreement.isend(None, rank) for rank in higher]
+    if not all_here(agreement, TOGETHER if status else None):
+        if agreement.iprobe():  # a lower rank failed too: it speaks and ends us
+            time.sleep(TOGETHER)
+        else:
+            print(message, file=sys.stderr, flush=True)
         agreement.Abort(status)
     endings = agreement.allgather((status, message))
+    for rank in range(comm.rank):
+        if endings[rank][0]:
+            agreement.recv(source=rank)
+    for notice in notices:
+        notice.wait()
     if comm.rank == 0:
         for one in dict.fromkeys(text for _, text in endings if text):
             print(one, file=sys.stderr, flush=True)
-    agreement.Free()
     failed = [code for code, _ in endings if code != DONE]
     return BUG if BUG in failed else max(failed, default=DONE)
 
 
-def _all_here(comm: Any, patience: float | None) -> bool:
+def all_here(comm: Any, patience: float | None) -> bool:
     """Whether all processes came here within `patience` seconds (None: wait for ever)."""
     if comm.size == 1:
         return True

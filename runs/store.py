@@ -4,13 +4,11 @@ Only the root process calls what writes; arrays are gathered by the caller. Ever
 the resolved scene, the hash of what it was computed from, program, library versions, process count.
 """
 
-import errno
 import hashlib
 import json
-import os
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,12 +16,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from fem.errors import InputError
+from runs.disk import replacing
 from runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
 LIBRARIES = ("dolfinx", "petsc4py", "slepc4py", "mpi4py", "h5py", "numpy", "scipy")
-FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
-REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG}
 
 
 @dataclass(frozen=True)
@@ -56,48 +52,6 @@ class Provenance:
         }
 
 
-def explained(error: BaseException, path: Path) -> InputError | None:
-    """A full disk or a refused write as one message, or None when it is neither.
-
-    HDF5 reports the operating system's error inside its own text, hence the search.
-    """
-    number = getattr(error, "errno", None)
-    text = str(error)
-    if number in FULL or any(f"errno = {code}," in text for code in FULL):
-        reason = "the disk is full (or the file too large for it): free some space and run again"
-    elif number in REFUSED or any(f"errno = {code}," in text for code in REFUSED):
-        reason = "the folder is not writable: choose another with --out"
-    else:
-        return None
-    return InputError(f"{path}: cannot be written, {reason}; what was there before is kept")
-
-
-def _sync(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` that takes its place at the end, or vanishes on failure."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        yield part
-        _sync(part)
-        os.replace(part, path)
-        _sync(path.parent)
-    except BaseException as error:
-        with suppress(OSError):
-            part.unlink()
-        clear = explained(error, path) if isinstance(error, OSError | RuntimeError) else None
-        if clear is not None:
-            raise clear from error
-        raise
-
-
 @contextmanager
 def writing(path: Path, provenance: Provenance) -> Iterator[h5py.File]:
     """An HDF5 file open for writing; it appears as `path`, whole, when the block ends well.
@@ -113,12 +67,6 @@ def writing(path: Path, provenance: Provenance) -> Iterator[h5py.File]:
             file.flush()
         finally:
             file.close()
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a small text file at once or not at all."""
-    with replacing(path) as part:
-        part.write_text(text, encoding="utf-8")
 
 
 def put(file: h5py.Group, name: str, array: Any, unit: str, **attributes: Any) -> h5py.Dataset:
