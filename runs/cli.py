@@ -152,15 +152,17 @@ def _check(args: argparse.Namespace) -> None:
 
 
 def _report(args: argparse.Namespace) -> None:
+    directory = _results(args.directory)
     from runs.report import write_report
 
-    print(write_report(_results(args.directory)))
+    print(write_report(directory))
 
 
 def _export(args: argparse.Namespace) -> None:
+    directory = _results(args.directory)
     from runs.export import export
 
-    for path in export(_results(args.directory)):
+    for path in export(directory):
         print(path)
 
 

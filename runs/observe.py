@@ -172,7 +172,14 @@ class Progress:
         if self._rich is None:
             console = Console(file=sys.stderr, force_terminal=True)
             columns = (BarColumn(bar_width=24), TextColumn("{task.description}"))
-            self._rich = Bar(*columns, console=console, transient=True, auto_refresh=False)
+            self._rich = Bar(
+                *columns,
+                console=console,
+                transient=True,
+                auto_refresh=False,
+                redirect_stdout=False,
+                redirect_stderr=False,
+            )
             self._rich.start()
             self._rich.add_task(self.line(), total=self.total)
         task = self._rich.task_ids[0]

@@ -57,9 +57,9 @@ def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise InputError for the first contradiction between keys or tables."""
     _geometry(scene, error)
     _static(scene, raw, error)
-    _force(scene, error)
     if scene.contact is not None:
         _contact(scene, error)
+    _force(scene, error)
     if scene.road is not None:
         _road(scene, error)
     _time(scene, error)

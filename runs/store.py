@@ -5,6 +5,7 @@ the resolved scene, the hash of what it was computed from, program, library vers
 """
 
 import hashlib
+import io
 import json
 import sys
 from collections.abc import Iterator, Mapping
@@ -52,6 +53,64 @@ class Provenance:
         }
 
 
+class _Disk(io.RawIOBase):
+    """The file under HDF5. The first refused write is raised; later ones are taken and dropped.
+
+    HDF5's own file driver cannot close a file on a full disk: it tries again until the process ends
+    with a segmentation fault (seen with 1.10.8). Dropped writes let it close; the file is removed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("w+b", buffering=0)
+        self.error: OSError | None = None
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def readinto(self, buffer: Any) -> int:
+        view = memoryview(buffer).cast("B")
+        count = self._file.readinto(view)
+        view[count:] = bytes(len(view) - count)
+        return len(view)
+
+    def write(self, data: Any) -> int:
+        view = memoryview(data).cast("B")
+        written = 0
+        while written < len(view):
+            written += self._attempt(self._file.write, view[written:]) or len(view)
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        self._attempt(self._file.truncate, size)
+        return self._file.seek(0, io.SEEK_END) if size is None else size
+
+    def _attempt(self, call: Any, argument: Any) -> int | None:
+        """What `call` returns; None once the disk has refused."""
+        if self.error is not None:
+            return None
+        try:
+            return call(argument)
+        except OSError as error:
+            self.error = error
+            raise
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
+
 @contextmanager
 def writing(path: Path, provenance: Provenance) -> Iterator[h5py.File]:
     """An HDF5 file open for writing; it appears as `path`, whole, when the block ends well.
@@ -59,14 +118,19 @@ def writing(path: Path, provenance: Provenance) -> Iterator[h5py.File]:
     Root process only. Raises InputError when the disk is full or the folder not writable.
     """
     with replacing(path) as part:
-        file = h5py.File(part, "w")
+        disk = _Disk(part)
         try:
-            for name, value in provenance.attributes().items():
-                file.attrs[name] = value
-            yield file
-            file.flush()
+            file = h5py.File(disk, "w")
+            try:
+                for name, value in provenance.attributes().items():
+                    file.attrs[name] = value
+                yield file
+            finally:
+                file.close()
         finally:
-            file.close()
+            disk.close()
+        if disk.error is not None:
+            raise disk.error
 
 
 def put(file: h5py.Group, name: str, array: Any, unit: str, **attributes: Any) -> h5py.Dataset:
