@@ -171,9 +171,13 @@ def build_sections(
 
 
 def short_attributes(results: Results, name: str) -> list[tuple[str, str]]:
-    """Attributes of the file that are one line of text: versions, hash, host of the run."""
+    """Attributes of the file that are one line of text: versions, hash; libraries spelled out."""
     values = ((key, results.attribute(name, key)) for key in results.file(name).attrs)
-    return [(k, v) for k, v in values if isinstance(v, str) and "\n" not in v and len(v) < 300]
+    lines = {key: v for key, v in values if isinstance(v, str) and "\n" not in v}
+    if lines.get("libraries", "").startswith("{"):
+        versions = json.loads(lines["libraries"])
+        lines["libraries"] = ", ".join(f"{key} {version}" for key, version in versions.items())
+    return [(key.replace("_", " "), value) for key, value in lines.items()]
 
 
 def computed(directory: Path) -> str:

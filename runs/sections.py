@@ -119,7 +119,7 @@ def static(results: Results) -> Section:
     section.figures.append(
         (
             surface_figures.deformed(points, moved, quads, road),
-            f"Displacement at its true scale, {size:.3g} mm at most. Dashed-grey outline: as made.",
+            f"Displacement at its true scale, {size:.3g} mm at most. Grey: as made.",
         )
     )
     footprint(results, section)
@@ -236,6 +236,8 @@ def contact(results: Results) -> Section:
     picture = figures.forces(time, total, axle, active)
     section.figures.append((picture, "Forces over time; peaks are kept in the drawing."))
     pressure_maps(results, section, time, vertical)
+    if len(time) == 1:
+        return section
     points, normal = results.array(name, "points"), results.dataset(name, "normal_force")
     stride = max(1, -(-len(time) // SAMPLED))
     picture = surface_figures.space_time(time[::stride], points, sampled(normal, stride))

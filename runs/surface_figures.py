@@ -14,14 +14,14 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
-from runs.figures import COLOURS, MUTED, canvas, encode
+from runs.figures import COLOURS, MUTED, canvas, encode, styled
 
 PRESSURE = LinearSegmentedColormap.from_list(
     "pressure", ("#ffffff", "#fdd9a0", "#f59053", "#d4402f", "#7f1d3f", "#2b0a2e")
 )
 VIEW = (np.radians(-55.0), np.radians(18.0))  # azimuth of the viewer from +x, elevation
 BULGE = 0.14  # greatest displacement of a drawn mode over the tire's radius
-COLUMNS, INSTANTS = 48, 400  # cells of the space-time map
+COLUMNS = 64  # most cells along x of the space-time map
 
 
 def camera(azimuth: float, elevation: float) -> NDArray:
@@ -79,6 +79,7 @@ def carry(field: NDArray, ends: NDArray, weight: NDArray) -> NDArray:
     return field[ends[..., 0]] * (1 - weight[..., None]) + field[ends[..., 1]] * weight[..., None]
 
 
+@styled
 def deformed(points: NDArray, moved: NDArray, quads: NDArray, road: float | None) -> str:
     """The loaded tire in three panels: surface, side view and section; road (m) or None."""
     figure, axes = canvas(10.2, 3.9, 1, 3, gridspec_kw={"width_ratios": (1.25, 1.0, 0.75)})
@@ -128,6 +129,7 @@ def _profile(
     axes.legend(loc="center" if plane[0] == 0 else "upper center", fontsize=8)
 
 
+@styled
 def modes(points: NDArray, quads: NDArray, shapes: NDArray, titles: Sequence[str]) -> str:
     """Mode shapes (m, s, 3), m ≤ 6, exaggerated; coloured by the displacement along the normal."""
     figure, axes = canvas(9.8, 3.35 * (1 + (len(titles) > 3)), 1 + (len(titles) > 3), 3)
@@ -143,7 +145,12 @@ def modes(points: NDArray, quads: NDArray, shapes: NDArray, titles: Sequence[str
         paint(here, drawn, quads, scale.to_rgba(across[quads].mean(axis=1)))
         here.set_title(title)
     figure.colorbar(
-        scale, ax=axes, location="bottom", shrink=0.4, aspect=40, label="outward displacement, −1…1"
+        scale,
+        ax=axes,
+        location="bottom",
+        shrink=0.4,
+        aspect=40,
+        label="displacement along the normal",
     )
     return encode(figure, "png", dpi=110)
 
@@ -162,39 +169,43 @@ def outward(points: NDArray, quads: NDArray) -> NDArray:
     return normal * (np.where(side < 0, -1.0, 1.0) / np.maximum(length, 1e-300))[:, None]
 
 
+@styled
 def footprints(
     points: NDArray, maps: Sequence[NDArray], titles: Sequence[str], unit: str, wide: float
 ) -> str:
-    """Maps (n of (c)) of pressure or force on contact points (c, 3) m, one colour scale for all."""
-    figure, axes = canvas(wide, 3.3, 1, len(maps), sharey=True)
+    """Maps (n of (c)) of pressure or force on contact points (c, 3) m, one colour scale for all.
+
+    `wide` is the width of the picture in inches; its height follows from the footprint's.
+    """
     place = 1e3 * points[:, :2]
-    scale = Normalize(0.0, max(max(np.nanmax(values, initial=0.0) for values in maps), 1e-12))
-    mesh = triangles(place)
     touched = np.any([values > 0 for values in maps], axis=0)
+    low, high = frame(place[touched] if touched.any() else place)
+    panel = (wide - 1.6) / len(maps)
+    height = np.clip(panel * (high[1] - low[1]) / (high[0] - low[0]) + 0.8, 1.7, 4.5)
+    figure, axes = canvas(wide, height, 1, len(maps), sharey=True)
+    top = max(np.nan_to_num(values).max(initial=0.0) for values in maps)
+    scale, mesh = Normalize(0.0, max(top, 1e-12)), triangles(place)
     for here, values, title in zip(axes.flat, maps, titles, strict=True):
         if mesh is not None:
-            here.tripcolor(
-                mesh, np.nan_to_num(values), shading="gouraud", cmap=PRESSURE, norm=scale
-            )
+            shown = np.nan_to_num(values)
+            here.tripcolor(mesh, shown, shading="gouraud", cmap=PRESSURE, norm=scale)
         active = values > 0
         here.plot(*place[~active].T, ".", ms=2.0, color="#c3cbd4")
         dots = here.scatter(*place[active].T, s=9, c=values[active], cmap=PRESSURE, norm=scale)
         dots.set(edgecolor="#3e4c59", linewidth=0.4)
         here.set(title=title, xlabel="x (forward) in mm", aspect="equal")
-        frame(here, place[touched] if touched.any() else place)
+        here.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        here.grid(visible=False)
     axes[0, 0].set_ylabel("y (axle) in mm")
-    figure.colorbar(ScalarMappable(scale, PRESSURE), ax=axes, label=unit, shrink=0.85, pad=0.01)
+    figure.colorbar(ScalarMappable(scale, PRESSURE), ax=axes, label=unit, pad=0.01)
     return encode(figure, "png")
 
 
-def frame(axes: Axes, place: NDArray) -> None:
-    """Limits around the points (n, 2) mm, a fifth of their extent and at least 10 mm beyond."""
+def frame(place: NDArray) -> tuple[NDArray, NDArray]:
+    """Corners around points (n, 2) mm, a fifth of their extent and at least 10 mm beyond."""
     low, high = place.min(axis=0), place.max(axis=0)
     margin = np.maximum(0.2 * (high - low), 10.0)
-    axes.set(
-        xlim=(low[0] - margin[0], high[0] + margin[0]),
-        ylim=(low[1] - margin[1], high[1] + margin[1]),
-    )
+    return low - margin, high + margin
 
 
 def triangles(place: NDArray) -> Triangulation | None:
@@ -204,23 +215,28 @@ def triangles(place: NDArray) -> Triangulation | None:
     return Triangulation(*place.T)
 
 
+@styled
 def space_time(time: NDArray, points: NDArray, force: NDArray) -> str:
-    """Normal force (n, c) N at n instants, summed across the width, over time and x."""
-    low, high = 1e3 * points[:, 0].min(), 1e3 * points[:, 0].max()
-    edges = np.linspace(low, high + 1e-6, min(COLUMNS, len(np.unique(points[:, 0].round(4)))) + 1)
-    bins = np.clip(np.searchsorted(edges, 1e3 * points[:, 0], side="right") - 1, 0, len(edges) - 2)
-    summed = np.zeros((len(time), len(edges) - 1))
-    for column in range(len(edges) - 1):
-        summed[:, column] = force[:, bins == column].sum(axis=1)
+    """Normal force (n, c) N at n > 1 instants, summed across the width, over time and x.
+
+    Each point's force goes to the two nearest of a row of cells as wide as the widest gap between
+    points, in proportion: the sum is kept and no cell stays empty between columns of nodes.
+    """
+    place = np.sort(1e3 * points[:, 0])
+    extent = max(place[-1] - place[0], 1e-9)
+    count = int(np.clip(extent / max(np.diff(place).max(initial=0.0), 1e-9) + 1.01, 2, COLUMNS))
+    centres = np.linspace(place[0], place[-1], count)
+    width = centres[1] - centres[0]
+    share = np.maximum(1.0 - np.abs(1e3 * points[:, :1] - centres) / width, 0.0)
     figure, axes = canvas(9.5, 2.6)
     picture = axes[0, 0].imshow(
-        summed.T / (edges[1] - edges[0]),
-        extent=(time[0], time[-1], low, high),
+        (force @ share).T / width,
+        extent=(time[0], time[-1], place[0] - width / 2, place[-1] + width / 2),
         origin="lower",
         aspect="auto",
         cmap=PRESSURE,
         vmin=0.0,
-        interpolation="nearest",
+        interpolation="bilinear",
     )
     axes[0, 0].grid(visible=False)
     axes[0, 0].set(xlabel="time in s", ylabel="x (forward) in mm")

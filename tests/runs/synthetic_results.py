@@ -39,9 +39,10 @@ def put(file: h5py.File, name: str, values: NDArray, unit: str, **storage: objec
 
 
 def provenance(file: h5py.File, stage: str) -> None:
-    file.attrs.update(
-        program="tireroad", version="0.1.0", stage=stage, hash="0f" * 32, processes=2, scene=SCENE
-    )
+    libraries = json.dumps({"h5py": h5py.__version__, "numpy": np.__version__})
+    file.attrs.update(program="tireroad", version="0.1.0", format=1, libraries=libraries)
+    file.attrs.update(processes=2, scene_name="synthetic-torus", scene=SCENE)
+    file.attrs.update(stage=stage, input_hash="0f" * 32)
 
 
 def lattice(around: int, across: int) -> tuple[NDArray, NDArray]:
