@@ -230,7 +230,7 @@ def space_time(time: NDArray, points: NDArray, force: NDArray) -> str:
     share = np.maximum(1.0 - np.abs(1e3 * points[:, :1] - centres) / width, 0.0)
     figure, axes = canvas(9.5, 2.6)
     picture = axes[0, 0].imshow(
-        (force @ share).T / width,
+        (np.nan_to_num(force) @ share).T / width,
         extent=(time[0], time[-1], place[0] - width / 2, place[-1] + width / 2),
         origin="lower",
         aspect="auto",
