@@ -1,58 +1,30 @@
 """report.html: one self-contained page about a result folder."""
 
 import json
-import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import fields
 from datetime import UTC, datetime
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from fem.errors import InputError
+from runs import force_sections, tire_sections
 from runs.quantities import quantity
-from runs.sections import SECTIONS, Absent, Results, Section
+from runs.results import Absent, Results, Section
+from runs.schema import key_of, table_of
+from runs.store import write_text
+from runs.tables import Scene
 
 STAGES = ("static", "modes", "rotating", "greens", "response", "contact", "spectra", "report")
-UNITS = {
-    "tire": {"outer_radius": "m", "minor_radius": "m", "thickness": "m", "half_angle": "°"},
-    "tire.material": {
-        "youngs_modulus": "Pa",
-        "density": "kg/m3",
-        "bulk_modulus": "Pa",
-        "c10": "Pa",
-        "c01": "Pa",
-        "c20": "Pa",
-        "c30": "Pa",
-    },
-    "static": {"inflation": "Pa", "load": "N", "deflection": "m", "road_height": "m"},
-    "damping": {"mass": "1/s", "stiffness": "s"},
-    "rotation": {"speed": "rad/s", "rolling_radius": "m"},
-    "contact": {
-        "youngs_modulus": "Pa",
-        "brush_stiffness": "N/m",
-        "winkler_stiffness": "N/m³",
-        "reach": "m",
-    },
-    "road": {
-        key: "m"
-        for key in (
-            *("amplitude", "wavelength", "block_length", "block_width", "joint_width"),
-            *(
-                "joint_depth",
-                "edge_radius",
-                "height_scatter",
-                "run_in",
-                "lateral",
-                "start",
-                "offset",
-            ),
-        )
-    }
-    | {"phase": "°"},
-    "road.motion": {"amplitude": "m", "frequency": "Hz", "duration": "s"},
-    "time": {"duration": "s", "step": "s", "checkpoint": "s"},
-    "force": {"angle": "°", "arc": "°", "spread": "°", "amplitude": "N", "frequency": "Hz"},
+SECTIONS: Mapping[str, Callable[[Results], Section]] = {
+    "static.h5": tire_sections.static,
+    "modes.h5": tire_sections.modes,
+    "rotating.h5": tire_sections.rotating,
+    "response.h5": force_sections.response,
+    "contact.h5": force_sections.contact,
+    "spectra.h5": force_sections.spectra,
 }
 
 
@@ -61,8 +33,7 @@ def write_report(directory: Path) -> Path:
 
     The page needs no network and no other file. A file that is absent or damaged leaves its section
     out, and the page says so. It is written to a temporary name and renamed. Not collective: call
-    it on one process. Raises InputError where the folder holds no results, OSError where it cannot
-    be written.
+    it on one process. Raises InputError where the folder holds no results or cannot be written to.
     """
     if not directory.is_dir():
         raise InputError(f"{directory} is no folder: give the result folder of a run")
@@ -71,12 +42,8 @@ def write_report(directory: Path) -> Path:
             f"{directory} holds no results (no summary.json, scene.toml or *.h5 of a run): "
             "give the result folder of a run"
         )
-    target, temporary = directory / "report.html", directory / ".report.html.partial"
-    try:
-        temporary.write_text(render(directory), encoding="utf-8")
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    target = directory / "report.html"
+    write_text(target, render(directory))
     return target
 
 
@@ -202,21 +169,25 @@ def costs(stages: Mapping) -> list[dict]:
 
 
 def parameters(scene: Mapping) -> list[tuple[str, list[tuple[str, str]]]]:
-    """The scene's tables as (title, [(key, value with unit)]), sub-tables of their own."""
-    tables: list[tuple[str, list[tuple[str, str]]]] = []
+    """The scene's tables as (title, [(key, value with its unit)]), sub-tables on their own."""
+    found: list[tuple[str, list[tuple[str, str]]]] = []
 
-    def visit(path: str, table: Mapping) -> None:
-        units = UNITS.get(path.rstrip("0123456789 "), {})
-        plain = {k: v for k, v in table.items() if not isinstance(v, dict)}
-        rows = [(k.replace("_", " "), quantity(v, units.get(k, ""))) for k, v in plain.items()]
-        if rows:
-            tables.append((path, rows))
-        for key, value in table.items():
+    def visit(title: str, table: Mapping, kind: type | None) -> None:
+        known = {item.name: item for item in fields(kind)} if kind else {}
+        rows: list[tuple[str, str]] = []
+        if title:
+            found.append((title, rows))
+        for name, value in table.items():
+            part = table_of(known[name]) if name in known else None
+            below, path = part.of if part else None, f"{title}.{name}" if title else name
             if isinstance(value, dict):
-                visit(f"{path}.{key}" if path else key, value)
+                visit(path, value, below)
+            elif isinstance(value, list) and value and isinstance(value[0], dict):
+                for number, one in enumerate(value):
+                    visit(f"{path} {number + 1}", one, below)
+            else:
+                key = key_of(known[name]) if name in known else None
+                rows.append((name.replace("_", " "), quantity(value, key.unit if key else "")))
 
-    for key, value in scene.items():
-        for number, table in enumerate(value if isinstance(value, list) else [value]):
-            if isinstance(table, dict):
-                visit(f"{key} {number + 1}" if isinstance(value, list) else key, table)
-    return tables
+    visit("", scene, Scene)
+    return [(title, rows) for title, rows in found if rows]
