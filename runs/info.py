@@ -96,6 +96,8 @@ def _datasets(file: h5py.File) -> Iterator[str]:
 
 
 def _shape(dataset: h5py.Dataset) -> str:
+    if dataset.shape is None:
+        return "empty"
     return f"({', '.join(str(size) for size in dataset.shape)})"
 
 

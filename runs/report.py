@@ -16,6 +16,7 @@ from runs.results import Absent, Results, Section
 from runs.schema import key_of, table_of
 from runs.store import write_text
 from runs.tables import Scene
+from runs.version import PROGRAM
 
 STAGES = ("static", "modes", "rotating", "greens", "response", "contact", "spectra", "report")
 SECTIONS: Mapping[str, Callable[[Results], Section]] = {
@@ -61,7 +62,7 @@ def render(directory: Path) -> str:
     pages.filters["quantity"] = quantity
     return pages.get_template("report.html.j2").render(
         name=summary.get("scene") or scene.get("name") or directory.resolve().name,
-        program=summary.get("program", {}),
+        program={"name": PROGRAM, "version": ""} | summary.get("program", {}),
         processes=summary.get("processes"),
         computed=computed(directory),
         warnings=[("report", problem) for problem in problems] + told,
@@ -87,7 +88,7 @@ def read_summary(path: Path, problems: list[str]) -> dict:
         stages = summary.get("stages", {})
         known = sorted(stages, key=lambda name: (*STAGES, name).index(name))
         summary["stages"] = {name: whole_stage(stages[name]) for name in known}
-    except (ValueError, AttributeError, TypeError) as error:
+    except (ValueError, AttributeError, TypeError, KeyError) as error:
         problems.append(f"summary.json cannot be read ({error}).")
         return {}
     return summary
@@ -98,11 +99,16 @@ def whole_stage(stage: Mapping) -> dict:
         "status": str(stage.get("status", "computed")),
         "reason": str(stage.get("reason") or ""),
         "seconds": float(stage.get("seconds") or 0.0),
-        "headline": dict(stage.get("headline") or {}),
-        "indicators": dict(stage.get("indicators") or {}),
+        "headline": quantities(stage.get("headline") or {}),
+        "indicators": quantities(stage.get("indicators") or {}),
         "warnings": [str(warning) for warning in stage.get("warnings") or []],
         "cost": {key: float(value) for key, value in (stage.get("cost") or {}).items()},
     }
+
+
+def quantities(named: Mapping) -> dict[str, str]:
+    """{name: {"value": v, "unit": u}} as {name: text}."""
+    return {key: quantity(entry["value"], entry.get("unit", "")) for key, entry in named.items()}
 
 
 def read_scene(path: Path, problems: list[str]) -> tuple[str, dict]:

@@ -84,13 +84,12 @@ def deformed(points: NDArray, moved: NDArray, quads: NDArray, road: float | None
     """The loaded tire in three panels: surface, side view and section; road (m) or None."""
     figure, axes = canvas(10.2, 3.9, 1, 3, gridspec_kw={"width_ratios": (1.25, 1.0, 0.75)})
     size = 1e3 * np.linalg.norm(moved, axis=1)
-    scale = ScalarMappable(Normalize(size.min(), max(size.max(), 1e-9)), "viridis")
+    scale = ScalarMappable(Normalize(size.min(), max(size.max(), 1e-9)), "YlGnBu")
     if road is not None:
         paint_road(axes[0, 0], road, 1.05 * np.abs(points[:, 0]).max())
     paint(axes[0, 0], points + moved, quads, scale.to_rgba(size[quads].mean(axis=1)))
-    figure.colorbar(
-        scale, ax=axes[0, 0], location="bottom", shrink=0.7, label="displacement in mm", pad=0.02
-    )
+    beside = axes[0, 0].inset_axes((0.2, -0.06, 0.6, 0.035))
+    figure.colorbar(scale, cax=beside, orientation="horizontal", label="displacement in mm")
     everywhere = np.ones(len(quads), dtype=bool)
     middle = cut(points, quads, points[:, 1], everywhere)
     _profile(axes[0, 1], points, moved, (0, 2), [(middle, COLOURS[0], "loaded")], road)

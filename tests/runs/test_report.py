@@ -1,0 +1,307 @@
+"""The report: complete, self-contained, honest about what is missing, and quick."""
+
+import json
+import re
+import resource
+import subprocess
+import sys
+from base64 import b64decode
+from html import unescape
+from html.parser import HTMLParser
+from io import BytesIO
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib import image
+from synthetic_results import lattice, write_results, write_rotating
+
+from fem.errors import InputError
+from runs import figures, surface_figures
+from runs.quantities import quantity
+from runs.report import write_report
+
+TITLES = {
+    "static.h5": "Loaded tire and footprint",
+    "modes.h5": "Modes of the loaded tire",
+    "rotating.h5": "Modes of the rolling tire",
+    "response.h5": "Point forces",
+    "contact.h5": "Rolling contact",
+    "spectra.h5": "Spectra of the axle force",
+}
+PICTURES = 11  # of a folder with every file
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    return write_results(tmp_path / "run")
+
+
+@pytest.fixture
+def blank(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures stay unpainted, which is 9/10 of the time: for tests of what the page says."""
+    for module in (figures, surface_figures):
+        monkeypatch.setattr(module, "encode", lambda *_, **__: "data:image/png;base64,iVBORw0KGgo=")
+
+
+def page(directory: Path) -> str:
+    return write_report(directory).read_text(encoding="utf-8")
+
+
+def titles(text: str) -> list[str]:
+    return [unescape(title) for title in re.findall(r"<h2>(.*?)</h2>", text)]
+
+
+class Balance(HTMLParser):
+    """Fails on a tag that is closed out of turn; collects what the page would load."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.loaded: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.loaded += [value or "" for key, value in attrs if key in ("src", "href", "srcset")]
+        if tag not in ("meta", "img", "br", "link"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_every_section_is_there_and_the_page_loads_nothing(results: Path) -> None:
+    text = page(results)
+    assert [title for title in titles(text) if title in TITLES.values()] == list(TITLES.values())
+    parser = Balance()
+    parser.feed(text)
+    assert parser.open == []
+    assert len(parser.loaded) == PICTURES
+    assert all(source.startswith("data:image/") for source in parser.loaded)
+    assert "@import" not in text
+    assert "url(" not in text
+    for source in parser.loaded:
+        kind, data = source.split(";base64,")
+        start = b"\x89PNG" if kind.endswith("png") else b"<?xml"
+        assert b64decode(data).startswith(start)
+
+
+@pytest.mark.usefixtures("blank")
+def test_warnings_come_first_and_are_escaped(results: Path) -> None:
+    text = page(results)
+    warning = "in 12 steps the tire left the road &amp; the load was &lt;zero&gt;"
+    assert text.count(warning) == 1
+    assert text.index(warning) < text.index("500 N") < text.index("<h2>")
+
+
+@pytest.mark.usefixtures("blank")
+def test_numbers_carry_units(results: Path) -> None:
+    text = page(results)
+    for shown in (">500 N<", ">15 mm<", ">316 mm<", ">200 kPa<", ">48 MPa<", ">50 rad/s<"):
+        assert shown in text, shown
+    assert f">{3.6 * 50 * 0.316:.4g} km/h<" in text
+    assert "of [[force]]" not in text
+    assert "the scene has no [[force]] table" in text
+    assert "same mesh, load and material as before" in text
+
+
+@pytest.mark.parametrize("name", TITLES)
+@pytest.mark.usefixtures("blank")
+def test_an_absent_file_leaves_out_its_section_only(results: Path, name: str) -> None:
+    (results / name).unlink()
+    shown = titles(text := page(results))
+    assert TITLES[name] not in shown
+    assert [title for key, title in TITLES.items() if key != name] == [
+        title for title in shown if title in TITLES.values()
+    ]
+    assert f"section of {name}" in text
+
+
+@pytest.mark.parametrize("name", TITLES)
+@pytest.mark.usefixtures("blank")
+def test_a_truncated_file_is_a_warning(results: Path, name: str) -> None:
+    whole = (results / name).read_bytes()
+    (results / name).write_bytes(whole[: len(whole) // 2])
+    text = page(results)
+    assert f"{name} is damaged and left out" in text
+    assert TITLES[name] not in titles(text)
+
+
+@pytest.mark.parametrize(("name", "content"), [("summary.json", "{"), ("scene.toml", "a = = 1")])
+@pytest.mark.usefixtures("blank")
+def test_an_unreadable_or_absent_text_file_is_a_warning(
+    results: Path, name: str, content: str
+) -> None:
+    (results / name).write_text(content)
+    assert f"{name} cannot be read" in page(results)
+    (results / name).unlink()
+    assert f"There is no {name}" in page(results)
+
+
+@pytest.mark.usefixtures("blank")
+def test_a_summary_of_strange_content_is_a_warning(results: Path) -> None:
+    for content in (
+        "[]",
+        '{"stages": {"static": 3}}',
+        '{"stages": {"static": {"cost": {"a": "b"}}}}',
+        '{"stages": {"static": {"headline": {"load": {}}}}}',
+    ):
+        (results / "summary.json").write_text(content)
+        assert "summary.json cannot be read" in page(results), content
+
+
+@pytest.mark.usefixtures("blank")
+def test_a_missing_dataset_is_named(results: Path) -> None:
+    with h5py.File(results / "contact.h5", "a") as file:
+        del file["total_force"]
+    assert "contact.h5 holds no dataset total_force" in page(results)
+
+
+@pytest.mark.usefixtures("blank")
+def test_an_unstable_tire_is_a_warning_at_the_top(results: Path) -> None:
+    write_rotating(results / "rotating.h5", 10, unstable=True)
+    text = page(results)
+    assert text.index("The rolling tire is unstable: 2 eigenvalues") < text.index("<h2>")
+    assert "The rolling tire is unstable" not in page(write_results(results.parent / "stable"))
+
+
+def test_a_tire_without_a_road(results: Path) -> None:
+    with h5py.File(results / "static.h5", "a") as file:
+        del file["contact"]
+        del file.attrs["road_height"]
+    assert "there is no footprint" in page(results)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3])
+def test_short_runs(tmp_path: Path, steps: int) -> None:
+    assert TITLES["contact.h5"] in titles(page(write_results(tmp_path / "run", steps=steps)))
+
+
+def test_not_a_number_in_a_result_does_not_stop_the_report(results: Path) -> None:
+    with h5py.File(results / "contact.h5", "a") as file:
+        file["normal_force"][5] = np.nan
+    with h5py.File(results / "spectra.h5", "a") as file:
+        file["axle_force"][7] = np.nan
+        file["third_octave/level"][3] = -np.inf
+    shown = titles(page(results))
+    assert {TITLES["contact.h5"], TITLES["spectra.h5"]} <= set(shown)
+
+
+def test_an_earlier_report_is_replaced_whole(results: Path) -> None:
+    first = page(results)
+    assert page(results) == first, "the same results give the same page"
+    assert sorted(path.name for path in results.glob("*report*")) == ["report.html"]
+
+
+@pytest.mark.parametrize("name", ["nowhere", "empty"])
+def test_a_folder_without_results_is_an_input_error(tmp_path: Path, name: str) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="give the result folder of a run"):
+        write_report(tmp_path / name)
+    assert list((tmp_path / "empty").iterdir()) == []
+
+
+def test_a_typical_run_takes_seconds_and_a_small_page_without_dolfinx(tmp_path: Path) -> None:
+    directory = write_results(tmp_path / "run", around=120, across=33, steps=10000, modes=60)
+    program = (
+        "import sys; from pathlib import Path; from runs.report import write_report;"
+        f"write_report(Path({str(directory)!r}));"
+        "sys.exit(any(m.split('.')[0] in ('dolfinx', 'petsc4py', 'pyplot') for m in sys.modules))"
+    )
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    root = Path(__file__).parents[2]
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=root)
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    assert spent < 10.0, "2.6 s where this was written and 4 s is the aim; machines differ"
+    assert (directory / "report.html").stat().st_size < 3e6
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.0123, "m", "12.3 mm"),
+        (-0.309, "m", "−309 mm"),
+        (2.0e5, "Pa", "200 kPa"),
+        (12345.678, "N", "12.35 kN"),
+        (9999.0, "N", "9\u202f999 N"),
+        (2.5e-5, "s", "25 µs"),
+        (14200.0, "Hz", "14.2 kHz"),
+        (3.1e-12, "-", "3.1·10⁻¹²"),
+        (0, "N", "0 N"),
+        (True, "", "yes"),
+        (None, "m", "–"),
+        ([0.5, 2], "deg", "0.5 °, 2 °"),
+        (float("nan"), "N", "nan N"),
+        (float("inf"), "m", "inf m"),
+    ],
+)
+def test_quantities(value: object, unit: str, text: str) -> None:
+    assert quantity(value, unit) == text
+
+
+def test_the_envelope_keeps_a_peak_of_one_sample() -> None:
+    y = np.zeros(100_003)
+    y[[12_345, 100_002]] = 5.0, -3.0
+    x, drawn = figures.envelope(np.arange(y.size), y)
+    assert drawn.size < 3 * figures.DRAWN
+    assert (x[drawn.argmax()], x[drawn.argmin()]) == (12_345, 100_002)
+    assert (np.diff(x) >= 0).all()
+
+
+def test_a_spectrum_keeps_its_highest_line() -> None:
+    frequency = np.arange(1.0, 50_001.0)
+    level = np.full(frequency.size, -40.0)
+    level[33_333] = 12.0
+    drawn, kept = figures.peak_hold(frequency, level)
+    assert kept.max() == 12.0
+    assert drawn[kept.argmax()] == pytest.approx(33_334.0, rel=0.03)
+
+
+def test_preferred_band_names() -> None:
+    exact = 1000.0 * 10.0 ** (np.arange(-15, 6) / 10.0)
+    names = figures.nominal(exact)
+    assert names[[0, 1, 4, 15, 16]] == pytest.approx([31.5, 40.0, 80.0, 1000.0, 1250.0])
+    assert figures.nominal(np.array([87.0])) == 87.0
+
+
+def test_a_cut_lies_in_its_plane_and_on_the_surface() -> None:
+    points, quads = lattice(60, 21)
+    ends, weight = surface_figures.cut(
+        points, quads, points[:, 1] - 0.02, np.ones(len(quads), dtype=bool)
+    )
+    line = surface_figures.carry(points, ends, weight)
+    assert len(line) == 60, "one ring: the arc ends above y = 0.087 m on the side of the beads"
+    assert line[..., 1] == pytest.approx(0.02)
+    section = np.hypot(np.hypot(line[..., 0], line[..., 2]) - 0.22, 0.02)
+    assert section == pytest.approx(0.1, rel=0.02)
+
+
+def test_normals_point_out_of_the_section() -> None:
+    points, quads = lattice(60, 21)
+    ring = points * (0.22 / np.hypot(points[:, 0], points[:, 2]))[:, None] * (1, 0, 1)
+    exact = (points - ring) / 0.1
+    assert np.einsum("si,si->s", surface_figures.outward(points, quads), exact).min() > 0.97
+    turned = surface_figures.outward(points, quads[:, ::-1])
+    assert np.einsum("si,si->s", turned, exact).min() > 0.97
+
+
+def test_the_space_time_map_shows_where_the_force_is() -> None:
+    points = np.zeros((40, 3))
+    points[:, 0] = np.repeat(np.linspace(-0.05, 0.05, 10), 4)
+    force = np.zeros((20, 40))
+    force[:, points[:, 0] > 0.045] = 10.0
+    picture = surface_figures.space_time(np.arange(20.0), points, force)
+    pixels = image.imread(BytesIO(b64decode(picture.split(",")[1])))[..., :3]
+    middle = pixels[:, pixels.shape[1] // 2].sum(axis=1)
+    dark = np.flatnonzero(middle < 1.0)
+    assert dark.size and dark.max() < 0.3 * len(middle), "the foremost points are drawn on top"
+
+
+@pytest.mark.usefixtures("blank")
+def test_stages_come_in_the_order_they_ran(results: Path) -> None:
+    summary = json.loads((results / "summary.json").read_text())
+    summary["stages"] = dict(reversed(summary["stages"].items()))
+    (results / "summary.json").write_text(json.dumps(summary))
+    text = page(results)
+    order = [text.index(f"<tr><td>{name}</td><td>") for name in ("static", "modes", "contact")]
+    assert order == sorted(order)
