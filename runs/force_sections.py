@@ -12,6 +12,7 @@ from runs.results import Absent, Results, Section, attributes
 from runs.tire_sections import pressure
 
 SAMPLED = 400  # instants read of a (time, point) dataset: the file may be larger than memory
+AT_ONCE = 2e8  # bytes
 PAIRED = 6  # receptances drawn
 
 
@@ -44,9 +45,12 @@ def contact(results: Results) -> Section:
 
 
 def sampled(dataset: h5py.Dataset, stride: int) -> NDArray:
-    """Every `stride`-th row."""
-    if stride == 1:
-        return dataset[()]
+    """Every `stride`-th row (n, c): of a small dataset at once, of a large one row by row.
+
+    One row costs the unpacking of its whole chunk, so that 400 rows cost more than 20 MB at once.
+    """
+    if dataset.nbytes <= AT_ONCE:
+        return dataset[()][::stride]
     return np.stack([dataset[row] for row in range(0, dataset.shape[0], stride)])
 
 
@@ -57,7 +61,7 @@ def pressure_maps(results: Results, section: Section, time: NDArray, vertical: N
     chosen["last"] = len(time) - 1
     normal, area = results.dataset("contact.h5", "normal_force"), None
     for name, path in (("contact.h5", "area"), ("static.h5", "contact/area")):
-        area = results.optional(name, path) if area is None else area
+        area = results.borrowed(name, path) if area is None else area
     shown = [pressure(normal[row], area) for row in chosen.values()]
     titles = [
         f"{key} {quantity(float(vertical[row]), 'N')}, {quantity(float(time[row]), 's')}"

@@ -70,9 +70,16 @@ class Results:
         except Absent:
             return None
 
+    def borrowed(self, name: str, path: str) -> NDArray | None:
+        """An optional array of another section's file, whose damage is that section's to report."""
+        try:
+            return self.optional(name, path)
+        except OSError:
+            return None
+
     def attribute(self, name: str, key: str) -> float | str | None:
         value = self.file(name).attrs.get(key)
-        return value.item() if isinstance(value, (np.generic, np.ndarray)) else value
+        return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
 def attributes(results: Results, name: str, wanted: tuple[tuple[str, str], ...]) -> list:

@@ -98,7 +98,7 @@ def modes(results: Results) -> Section:
     section.table = Table(head, list(zip(numbers, *columns, strict=True)))
     points, quads = (
         results.array(name, "surface/points"),
-        results.optional("static.h5", "surface/quads"),
+        results.borrowed("static.h5", "surface/quads"),
     )
     if quads is None or quads.max(initial=-1) >= len(points):
         section.notes.append("No pictures: static.h5 holds no quads for this surface.")

@@ -124,7 +124,8 @@ def test_a_truncated_file_is_a_warning(results: Path, name: str) -> None:
     (results / name).write_bytes(whole[: len(whole) // 2])
     text = page(results)
     assert f"{name} is damaged and left out" in text
-    assert TITLES[name] not in titles(text)
+    left = [title for title in titles(text) if title in TITLES.values()]
+    assert left == [title for key, title in TITLES.items() if key != name]
 
 
 @pytest.mark.parametrize(("name", "content"), [("summary.json", "{"), ("scene.toml", "a = = 1")])
