@@ -1,0 +1,124 @@
+"""The same contact problem through PETSc's SNES VI: independent of ours, slower, and open to PETSc
+options.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from contact.complementarity import (
+    TOLERANCE,
+    check_residual,
+    checked_compliance,
+    complementarity_residual,
+)
+from fem.errors import ConvergenceError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+PREFIX = "contact_"
+MAX_ITERATIONS = 200
+
+
+class SnesVI:
+    """Reduced-space Newton (vinewtonrsls) for f >= 0, A (f - f_ref) + q >= 0, on this process.
+
+    PETSc sees it without units, A / max diag(A) and q / max |q|, because SNES VI's own tolerance of
+    what lies on a bound is absolute. PETSc options with the prefix `contact_` are read last and
+    win. The dense matrix is factorised anew in every Newton step. The line search can give up when
+    the skew part of A outweighs the symmetric one; the tire's does not.
+    Source: Benson and Munson, Optim. Methods Softw. 21 (2006) 575.
+    """
+
+    def __init__(self, matrix: Array) -> None:
+        self._matrix = checked_compliance(matrix)
+        self._diagonal = self._matrix.diagonal().copy()
+        self._unit = float(self._diagonal.max())
+        self._scaled = self._matrix / self._unit
+        n = len(self._diagonal)
+        self.active: Mask = np.zeros(n, dtype=bool)
+        self.gap: Array = np.zeros(n)
+        self.residual = 0.0
+        self.iterations = 0
+        self.factorisations = 0
+        self._offset = np.zeros(n)
+        self._make_vectors(n)
+        self._make_snes()
+
+    def _make_vectors(self, n: int) -> None:
+        comm = PETSc.COMM_SELF
+        self._jacobian = PETSc.Mat().createDense((n, n), comm=comm)
+        self._jacobian.setUp()
+        rows = np.arange(n, dtype=PETSc.IntType)
+        self._jacobian.setValues(rows, rows, self._scaled)
+        self._jacobian.assemble()
+        self._force = PETSc.Vec().createSeq(n, comm=comm)
+        self._function = self._force.duplicate()
+        self._bounds = self._force.duplicate(), self._force.duplicate()
+        self._bounds[0].set(0.0)
+        self._bounds[1].set(PETSc.INFINITY)
+
+    def _make_snes(self) -> None:
+        snes = PETSc.SNES().create(comm=PETSc.COMM_SELF)
+        snes.setType(PETSc.SNES.Type.VINEWTONRSLS)
+        snes.setFunction(self._evaluate, self._function)
+        snes.setJacobian(lambda _s, _x, _J, _P: None, self._jacobian)
+        snes.setVariableBounds(*self._bounds)
+        snes.setTolerances(rtol=0.0, atol=1e-12, stol=0.0, max_it=MAX_ITERATIONS)
+        snes.ksp.setType(PETSc.KSP.Type.PREONLY)
+        snes.ksp.pc.setType(PETSc.PC.Type.LU)
+        snes.setOptionsPrefix(PREFIX)
+        # 1e-8 by default: forces below it would count as none, above our tolerance.
+        options = PETSc.Options(PREFIX)
+        if not options.hasName("snes_vi_zero_tolerance"):
+            options["snes_vi_zero_tolerance"] = 1e-12
+        snes.setFromOptions()
+        self._snes = snes
+
+    def _evaluate(self, _snes: PETSc.SNES, force: PETSc.Vec, function: PETSc.Vec) -> None:
+        function.array[:] = self._scaled @ force.array_r + self._offset
+
+    def solve(
+        self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
+    ) -> Array:
+        """Forces f (n,) N with f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0; see ActiveSet.solve.
+
+        `guess_active` limits the first guess to those points. ConvergenceError when SNES gives up.
+        """
+        q = np.asarray(q, dtype=float)
+        if not np.all(np.isfinite(q)):
+            check_residual("snes-vi", np.nan)
+        offset = q if reference is None else q - self._matrix @ reference
+        length = float(np.abs(offset).max()) or 1.0
+        self._offset = offset / length
+        if guess_active is not None:
+            self._force.array[~np.asarray(guess_active, dtype=bool)] = 0.0
+        self._snes.solve(None, self._force)
+        self.iterations = self._snes.getIterationNumber()
+        self.factorisations += self.iterations
+        return self._finish(length)
+
+    def _finish(self, length: float) -> Array:
+        """Back to newtons and metres, and the residual by the same measure as ActiveSet's."""
+        force = np.maximum(self._force.array_r, 0.0)
+        gap = self._scaled @ force + self._offset
+        scale = float(np.abs(self._offset).max() + force.max())
+        diagonal = self._diagonal / self._unit
+        self.residual = complementarity_residual(force, gap, diagonal, scale)
+        reason = self._snes.getConvergedReason()
+        if reason < 0 and not self.residual <= TOLERANCE:
+            raise ConvergenceError(
+                f"contact (snes-vi): PETSc gave up after {self.iterations} iterations (reason "
+                f"{reason}, residual {self.residual:.2g} of the largest gap); take solver = "
+                '"active-set", or pass -contact_snes_monitor to watch it'
+            )
+        check_residual("snes-vi", self.residual)
+        self.active = force > 0.0
+        self.gap = length * np.where(self.active, 0.0, gap)
+        return force * (length / self._unit)
+
+    def destroy(self) -> None:
+        """Free PETSc's objects."""
+        for thing in (self._snes, self._jacobian, self._force, self._function, *self._bounds):
+            thing.destroy()

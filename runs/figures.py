@@ -1,0 +1,231 @@
+"""Line charts and bars of the report, as data URIs.
+
+matplotlib's Figure objects only: no window, no global state.
+"""
+
+from base64 import b64encode
+from collections.abc import Sequence
+from io import BytesIO
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+COMPONENTS = ("x, forward", "y, along the axle", "z, up")
+COLOURS = ("#2f6db5", "#2e8b6a", "#c8502d")
+MUTED = "#9aa5b1"
+STYLE = {
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#7b8794",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e7eb",
+    "legend.frameon": False,
+    "lines.linewidth": 1.0,
+    "svg.hashsalt": "tireroad",
+    "path.simplify_threshold": 0.5,
+}
+styled = matplotlib.rc_context(STYLE)  # decorates every picture
+DRAWN = 600  # bins of a long series: each keeps its least and its greatest value
+RANGE_DB = 100.0  # what lies further below the highest line of a spectrum is not drawn
+
+
+def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more: object) -> tuple:
+    """Figure of width × height inches and its axes (rows, columns)."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(rows, columns, squeeze=False, **more)
+
+
+def encode(figure: Figure, kind: str = "svg", dpi: int = 130) -> str:
+    """The figure as a data URI: svg for lines, png for coloured surfaces."""
+    stream = BytesIO()
+    metadata = {"Date": None} if kind == "svg" else {}
+    figure.savefig(stream, format=kind, dpi=dpi, metadata=metadata)
+    mime = "image/svg+xml" if kind == "svg" else "image/png"
+    return f"data:{mime};base64,{b64encode(stream.getvalue()).decode()}"
+
+
+def envelope(x: NDArray, y: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArray]:
+    """Least and greatest y (n) of each of `bins` runs of samples, in the order they come; x alike.
+
+    A peak of one sample stays visible, which skipping samples would not grant. Short series are
+    returned as they are.
+    """
+    width = len(y) // bins
+    if width <= 2:
+        return x, y
+    whole = width * bins
+    blocks = np.nan_to_num(y[:whole]).reshape(bins, width)
+    ends = np.sort(np.stack((blocks.argmin(axis=1), blocks.argmax(axis=1)), -1), axis=1)
+    kept = np.append((ends + width * np.arange(bins)[:, None]).ravel(), np.arange(whole, len(y)))
+    return x[kept], y[kept]
+
+
+def decibels(amplitude: NDArray) -> NDArray:
+    """20 lg |a|, re 1 of its unit; nothing and not-a-number lie at −6000 dB, out of sight."""
+    return 20.0 * np.log10(np.maximum(np.nan_to_num(np.abs(amplitude)), 1e-300))
+
+
+def peak_hold(frequency: NDArray, level: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArray]:
+    """The highest line of each of `bins` bands equal on a logarithmic axis; frequency (n) > 0."""
+    if len(frequency) <= bins:
+        return frequency, level
+    edges = np.linspace(*np.log(frequency[[0, -1]]), bins)
+    first = np.unique(np.searchsorted(np.log(frequency), edges[:-1]))
+    highest = np.maximum.reduceat(level, first)
+    return frequency[first], highest
+
+
+@styled
+def forces(time: NDArray, contact: NDArray, axle: NDArray | None, active: NDArray | None) -> str:
+    """Contact and axle force (nt, 3) N over time (nt) s, and the number of points in contact."""
+    rows = 3 + (active is not None)
+    figure, axes = canvas(9.5, 1.45 * rows + 0.4, rows, sharex=True)
+    for row, name in enumerate(COMPONENTS):
+        here: Axes = axes[row, 0]
+        here.plot(*envelope(time, contact[:, row]), color=COLOURS[0], label="contact", lw=0.8)
+        if axle is not None:
+            here.plot(*envelope(time, axle[:, row]), color=COLOURS[2], label="axle", lw=0.8)
+        here.set_title(name)
+        here.set_ylabel("force in N")
+    axes[0, 0].legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.0)
+    if active is not None:
+        axes[3, 0].plot(*envelope(time, active), color="#52606d", lw=0.8)
+        axes[3, 0].set(title="points in contact", ylabel="number")
+    _over_time(axes[-1, 0], time)
+    figure.align_ylabels()
+    return encode(figure)
+
+
+@styled
+def spectrum(frequency: NDArray, axle: NDArray) -> str:
+    """Amplitude spectrum (nf, 3) N of the axle force over frequency (nf) Hz."""
+    figure, axes = canvas(9.5, 3.4)
+    here, kept = axes[0, 0], frequency > 0
+    levels = decibels(axle[kept])
+    for column, name in enumerate(COMPONENTS):
+        here.plot(*peak_hold(frequency[kept], levels[:, column]), color=COLOURS[column], label=name)
+    here.set(xscale="log", xlabel="frequency in Hz", ylabel="axle force in dB re 1 N")
+    _over_frequency(here, frequency[kept])
+    _top_decibels(here, levels)
+    here.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return encode(figure)
+
+
+@styled
+def third_octaves(centre: NDArray, level: NDArray) -> str:
+    """Third-octave levels (nb, 3) dB re 1 N as bars over band centres (nb) Hz."""
+    figure, axes = canvas(9.5, 3.2)
+    here, place = axes[0, 0], np.arange(len(centre))
+    finite = np.where(np.isfinite(level), level, -np.inf)
+    top = finite.max(initial=0.0)
+    floor = max(finite[np.isfinite(finite)].min(initial=top), top - RANGE_DB)
+    floor = 10.0 * np.floor(floor / 10.0)
+    for column, name in enumerate(COMPONENTS):
+        height = np.maximum(finite[:, column] - floor, 0.0)
+        where = place + 0.28 * (column - 1)
+        here.bar(where, height, 0.26, bottom=floor, color=COLOURS[column], label=name)
+    here.set_xticks(place, [f"{value:g}" for value in nominal(centre)], rotation=45)
+    here.grid(axis="x", visible=False)
+    here.set(xlabel="third-octave band in Hz", ylabel="axle force, rms, in dB re 1 N")
+    here.margins(x=0.01)
+    here.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return encode(figure)
+
+
+def nominal(centre: NDArray) -> NDArray:
+    """Preferred numbers of IEC 61260 for exact band centres 1000·10^(k/10) Hz; others unchanged."""
+    preferred = np.array((1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0))
+    band = np.rint(10.0 * np.log10(np.maximum(centre, 1e-9)))
+    name = preferred[(band % 10).astype(int)] * 10.0 ** (band // 10)
+    return np.where(np.abs(name / np.maximum(centre, 1e-9) - 1.0) < 0.03, name, centre)
+
+
+@styled
+def eigenvalues(eigenvalue: NDArray) -> str:
+    """Growth rate Re s over frequency Im s / 2π of eigenvalues (n) 1/s, from 0 Hz up."""
+    figure, axes = canvas(9.5, 3.0)
+    here = axes[0, 0]
+    shown = eigenvalue[eigenvalue.imag >= 0.0]
+    unstable = shown.real > 0.0
+    for group, colour, label in (
+        (shown[~unstable], COLOURS[0], "decaying"),
+        (shown[unstable], COLOURS[2], "growing: unstable"),
+    ):
+        if group.size:
+            place = group.imag / (2 * np.pi)
+            here.plot(place, group.real, ".", ms=4, color=colour, label=label)
+    here.axhline(0.0, color="#7b8794", lw=0.8)
+    here.set(xlabel="frequency in Hz", ylabel="Re s in 1/s")
+    here.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return encode(figure)
+
+
+@styled
+def driven_points(time: NDArray, force: NDArray | None, moved: NDArray, names: list[str]) -> str:
+    """Displacement (nt, k, 3) m, and force (nt, k) N, of k driven points over time (nt) s."""
+    rows = len(names)
+    figure, axes = canvas(9.5, 1.9 * rows + 0.4, rows, sharex=True)
+    for point, name in enumerate(names):
+        here: Axes = axes[point, 0]
+        for column, component in enumerate(COMPONENTS):
+            drawn = envelope(time, 1e6 * moved[:, point, column])
+            here.plot(*drawn, color=COLOURS[column], label=component)
+        here.set_title(name)
+        here.set_ylabel("displacement in µm")
+        if force is not None:
+            other = here.twinx()
+            other.plot(*envelope(time, force[:, point]), color=MUTED, lw=0.8, ls="--")
+            other.set_ylabel("force in N (dashed)", color="#52606d")
+            other.grid(visible=False)
+            other.spines["right"].set_visible(True)
+    axes[0, 0].legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)
+    _over_time(axes[-1, 0], time)
+    return encode(figure)
+
+
+@styled
+def receptance(frequency: NDArray, pairs: Sequence[tuple[str, NDArray]]) -> str:
+    """Magnitude (dB re 1 m/N) and phase (degrees) of named receptances (nf) m/N."""
+    figure, axes = canvas(9.5, 4.4, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
+    cycle = (*COLOURS, "#7a4fa3", "#b58a1f", "#52606d")
+    kept = frequency > 0
+    levels = decibels(np.stack([values[kept] for _, values in pairs]))
+    for number, (name, values) in enumerate(pairs):
+        colour = cycle[number % len(cycle)]
+        axes[0, 0].plot(frequency[kept], levels[number], color=colour, label=name)
+        axes[1, 0].plot(frequency[kept], np.angle(values[kept], deg=True), color=colour)
+    axes[0, 0].set(xscale="log", ylabel="receptance in dB re 1 m/N")
+    axes[0, 0].legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    axes[1, 0].set(ylabel="phase in °", xlabel="frequency in Hz", yticks=(-180, -90, 0, 90, 180))
+    _over_frequency(axes[1, 0], frequency[kept])
+    _top_decibels(axes[0, 0], levels)
+    return encode(figure)
+
+
+def _over_time(axes: Axes, time: NDArray) -> None:
+    axes.set_xlabel("time in s")
+    if len(time) > 1:  # one instant has no extent, and matplotlib warns of it
+        axes.set_xlim(time[0], time[-1])
+
+
+def _over_frequency(axes: Axes, frequency: NDArray) -> None:
+    if len(frequency) > 1:
+        axes.set_xlim(frequency[0], frequency[-1])
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.grid(which="minor", axis="x", color="#f1f3f5")
+
+
+def _top_decibels(axes: Axes, level: NDArray) -> None:
+    """The upper RANGE_DB of the levels, less where they need less."""
+    top = level.max(initial=-RANGE_DB)
+    axes.set_ylim(max(level.min(initial=top), top - RANGE_DB) - 3.0, top + 3.0)

@@ -1,0 +1,186 @@
+"""What the user sees while the program runs: lines, progress with rate and time left, the log.
+
+Only the root process shows anything; the other processes call the same functions to no effect, so
+callers need no rank tests. Nothing here is collective.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+PATIENCE = 2.0
+"""Seconds before a progress display appears: shorter things are not worth a look."""
+PLAIN_EVERY = 10.0
+"""Seconds between progress lines where the output is no terminal."""
+
+
+class _State:
+    """The one console of this process."""
+
+    root: bool = True
+    log: TextIO | None = None
+    bar: "Progress | None" = None
+
+
+def set_root(root: bool) -> None:
+    """Tell whether this process is the one that shows; called once at the start."""
+    _State.root = root
+
+
+@contextmanager
+def log_to(path: Path) -> Iterator[None]:
+    """While inside, everything shown also goes to the end of `path`, on the root process."""
+    if not _State.root:
+        yield
+        return
+    with path.open("a", encoding="utf-8") as _State.log:
+        print(time.strftime("--- %Y-%m-%d %H:%M:%S %z"), file=_State.log)
+        try:
+            yield
+        finally:
+            _State.log = None
+
+
+def log(text: str) -> None:
+    """A line for the log only, e.g. the settings of a solver."""
+    if _State.root and _State.log is not None:
+        print(text, file=_State.log, flush=True)
+
+
+def _show(text: str, stream: TextIO) -> None:
+    log(text)
+    if _State.bar is not None:
+        _State.bar.hide()
+    print(text, file=stream, flush=True)
+
+
+def say(text: str = "") -> None:
+    """One line for the user, shown on the root process and kept in the log."""
+    if _State.root:
+        _show(text, sys.stdout)
+
+
+def warn(text: str) -> None:
+    """A warning: to stderr and the log."""
+    if _State.root:
+        _show(f"warning: {text}", sys.stderr)
+
+
+def is_terminal() -> bool:
+    """Whether stderr reaches a terminal; the launcher knows when mpirun stands in between."""
+    return sys.stderr.isatty() or os.environ.get("TIREROAD_TERMINAL") == "1"
+
+
+def seconds(value: float) -> str:
+    """A duration for people: 12 s, 3 min 05 s, 2 h 10 min."""
+    whole = int(round(value))
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+class Progress:
+    """Progress of something that may take long: `with Progress("contact", 4000, "steps") as bar`.
+
+    Appears after two seconds, with rate and time left; on a terminal as a bar (rich), else as a
+    line every ten seconds. `advance` costs about 0.1 µs to 0.2 µs until there is something to show.
+    `total` None: only what is done and the time so far are shown.
+    """
+
+    def __init__(self, title: str, total: int | None = None, unit: str = "steps") -> None:
+        self.title, self.total, self.unit = title, total, unit
+        self.done = 0
+        self.text = ""
+        self._rich: Any = None
+        self._began = time.perf_counter()
+        self._next = self._began + PATIENCE
+        self._shown = False
+
+    def __enter__(self) -> "Progress":
+        if _State.root and _State.bar is None:
+            _State.bar = self
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if _State.bar is self:
+            self.hide()
+            _State.bar = None
+
+    def advance(self, steps: int = 1) -> None:
+        """Count `steps` more."""
+        self.done += steps
+        if time.perf_counter() >= self._next:
+            self._refresh()
+
+    def update(self, done: int) -> None:
+        """Set how many are done."""
+        self.done = done
+        if time.perf_counter() >= self._next:
+            self._refresh()
+
+    def note(self, text: str) -> None:
+        """A live figure beside the bar, e.g. a residual."""
+        self.text = text
+        if time.perf_counter() >= self._next:
+            self._refresh()
+
+    def hide(self) -> None:
+        """Take a bar off the terminal; the next refresh puts it back."""
+        if self._rich is not None:
+            self._rich.stop()
+            self._rich = None
+
+    def line(self) -> str:
+        """The state in words: done of total, rate, time left."""
+        spent = time.perf_counter() - self._began
+        rate = self.done / spent if spent > 0 else 0.0
+        words = [f"{self.title}: {self.done}"]
+        if self.total is not None:
+            words[0] += f" of {self.total}"
+        words[0] += f" {self.unit}"
+        if self.done:
+            words.append(f"{rate:.3g} {self.unit}/s")
+        if self.total is not None and rate > 0:
+            words.append(f"{seconds(max(self.total - self.done, 0) / rate)} left")
+        else:
+            words.append(f"{seconds(spent)} so far")
+        return ", ".join(words + ([self.text] if self.text else []))
+
+    def _refresh(self) -> None:
+        now = time.perf_counter()
+        if _State.bar is not self:
+            self._next = float("inf")
+            return
+        if not is_terminal():
+            self._next = now + PLAIN_EVERY
+            print(self.line(), file=sys.stderr, flush=True)
+            return
+        self._next = now + 0.2
+        self._draw()
+
+    def _draw(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, TextColumn
+        from rich.progress import Progress as Bar
+
+        if self._rich is None:
+            console = Console(file=sys.stderr, force_terminal=True)
+            columns = (BarColumn(bar_width=24), TextColumn("{task.description}"))
+            self._rich = Bar(
+                *columns,
+                console=console,
+                transient=True,
+                auto_refresh=False,
+                redirect_stdout=False,
+                redirect_stderr=False,
+            )
+            self._rich.start()
+            self._rich.add_task(self.line(), total=self.total)
+        task = self._rich.task_ids[0]
+        self._rich.update(task, completed=self.done, description=self.line(), refresh=True)

@@ -1,0 +1,174 @@
+"""What no single key can tell: contradictions between tables, and what this version leaves out."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from fem.errors import InputError
+from runs.schema import described
+from runs.tables import Scene, Tire
+
+Where = Callable[[tuple[str, ...], str], InputError]
+
+# Keys of the public interface that this version does not compute, with the values it does take and
+# what to write instead. A later version takes its lines out.
+LATER: dict[str, tuple[tuple[Any, ...], str]] = {
+    "tire.mesh": ((), 'only section = "torus" is supported in this version'),
+    "tire.section": (("torus",), 'only "torus" is supported in this version'),
+    "rotation.method": (("projected",), 'only "projected" is supported in this version'),
+    "greens.residual": (
+        ("none", "dirac", "static"),
+        '"none", "dirac" and "static" are supported in this version',
+    ),
+    "contact.points": (("nodes",), 'only "nodes" is supported in this version'),
+    "contact.brush_stiffness": ((), "horizontal contact forces are not in this version: leave it"),
+    "contact.friction": ((), "friction is not in this version: leave it"),
+    "road.kind": (
+        ("flat", "sine", "cobblestones", "grid", "crg"),
+        "flat, sine, cobblestones, grid and crg are supported in this version",
+    ),
+    "output.vibration": ((False,), "only false is supported in this version"),
+    "output.fields": ((False,), "only false is supported in this version"),
+}
+ASKED_FOR = {"road.kind": ("step", "cleat", "iso8608", "texture")}
+
+
+def refuse_later(raw: dict[str, Any], error: Where) -> None:
+    """Raise for the first value in `raw` that is of the interface but not of this version."""
+    for dotted, (supported, message) in LATER.items():
+        path = tuple(dotted.split("."))
+        here: Any = raw
+        for part in path:
+            here = here.get(part) if isinstance(here, dict) else None
+        asked = ASKED_FOR.get(dotted)
+        if here is not None and here not in supported and (asked is None or here in asked):
+            raise error(path, f"= {described(here)}: {message}")
+
+
+def free_unknowns(tire: Tire) -> int:
+    """Displacement unknowns of the torus without the clamped bead faces."""
+    around = tire.segments * tire.order
+    inner_arc = tire.elements_arc * tire.order - 1
+    through = tire.elements_thickness * tire.order + 1
+    return 3 * around * inner_arc * through
+
+
+def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Raise InputError for the first contradiction between keys or tables."""
+    _geometry(scene, error)
+    _static(scene, raw, error)
+    if scene.contact is not None:
+        _contact(scene, error)
+    _force(scene, error)
+    if scene.road is not None:
+        _road(scene, error)
+    _time(scene, error)
+
+
+def _geometry(scene: Scene, error: Where) -> None:
+    tire = scene.tire
+    if tire.thickness >= tire.minor_radius:
+        raise error(
+            ("tire", "thickness"),
+            f"= {tire.thickness:g} m must be less than minor_radius = {tire.minor_radius:g} m",
+        )
+    if tire.minor_radius >= tire.outer_radius:
+        raise error(
+            ("tire", "minor_radius"),
+            f"= {tire.minor_radius:g} m must be less than outer_radius = {tire.outer_radius:g} m",
+        )
+    bead = (
+        tire.outer_radius
+        - tire.minor_radius
+        + tire.minor_radius * math.cos(math.radians(tire.half_angle))
+    )
+    if bead <= 0:
+        raise error(
+            ("tire", "half_angle"),
+            f"= {tire.half_angle:g} deg puts the beads at {bead:g} m from the axle:"
+            " make it or minor_radius smaller",
+        )
+    free = free_unknowns(tire)
+    if scene.modal.count >= free:
+        raise error(
+            ("modal", "count"),
+            f"= {scene.modal.count} must be less than the {free} free unknowns of the mesh",
+        )
+
+
+def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
+    if len(given) > 1:
+        raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
+    if scene.modal.road == "held" and not given:
+        raise error(("modal", "road"), '= "held" needs a road: load or deflection in [static]')
+    rolling = scene.rotation is not None and scene.rotation.speed > 0
+    if rolling and scene.static.steady_rolling and scene.damping.stiffness > 0:
+        raise error(
+            ("damping", "stiffness"),
+            "> 0 is not part of the steady rolling state: set static.steady_rolling = false",
+        )
+
+
+def _force(scene: Scene, error: Where) -> None:
+    receptance = scene.output.receptance
+    if receptance is not None and not scene.force:
+        raise error(("output", "receptance"), "is read at driven points: add a [[force]]")
+    if receptance is not None and receptance.step > receptance.to:
+        raise error(
+            ("output", "receptance", "step"),
+            f"= {receptance.step:g} Hz must not be more than to = {receptance.to:g} Hz",
+        )
+    if scene.force and scene.time is None and receptance is None:
+        raise error(("force",), "has nothing to drive: add [time] or output.receptance")
+    for number, force in enumerate(scene.force):
+        if not any(force.direction):
+            raise error(("force", str(number), "direction"), "must not be all zeros")
+        if abs(force.arc) >= scene.tire.half_angle:
+            raise error(
+                ("force", str(number), "arc"),
+                f"= {force.arc:g} deg lies beyond the bead at {scene.tire.half_angle:g} deg",
+            )
+
+
+def _contact(scene: Scene, error: Where) -> None:
+    static = scene.static
+    if scene.road is None:
+        raise error(("contact",), 'needs a road: add [road], e.g. kind = "flat"')
+    if scene.time is None:
+        raise error(("contact",), "needs a time to run: add [time] with duration")
+    if static.load is None and static.deflection is None and static.road_height is None:
+        raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
+    if scene.modal.road == "held":
+        raise error(
+            ("modal", "road"), '= "held" keeps the road in the modes: with [contact] use "forces"'
+        )
+
+
+def _road(scene: Scene, error: Where) -> None:
+    road = scene.road
+    if road.kind != "cobblestones":
+        return
+    for side in ("block_length", "block_width"):
+        if road.joint_width >= getattr(road, side):
+            raise error(
+                ("road", "joint_width"),
+                f"= {road.joint_width:g} m must be less than"
+                f" {side} = {getattr(road, side):g} m, the pitch of the blocks",
+            )
+
+
+def _time(scene: Scene, error: Where) -> None:
+    time = scene.time
+    if time is None or time.step == "auto":
+        return
+    if time.step > time.duration:
+        raise error(
+            ("time", "step"),
+            f"= {time.step:g} s must not be more than duration = {time.duration:g} s",
+        )
+    if time.duration / time.step > 1e8:
+        raise error(
+            ("time", "step"),
+            f"= {time.step:g} s makes {time.duration / time.step:.3g} steps; at most 1e8",
+        )

@@ -1,0 +1,242 @@
+"""The tables of a scene, key by key, with units, ranges and defaults (contract: Scene)."""
+
+from dataclasses import dataclass
+
+from runs.schema import choice, flag, integer, number, table, tables, text, vector
+
+LINEAR = ("model", ("linear", "neo-hookean"))
+SINE = ("kind", ("sine",))
+STONES = ("kind", ("cobblestones",))
+MEASURED = ("kind", ("grid", "crg"))
+
+
+@dataclass(frozen=True)
+class Material:
+    model: str = choice(
+        "neo-hookean", ("linear", "neo-hookean", "mooney-rivlin", "yeoh"), "strain energy"
+    )
+    youngs_modulus: float = number(
+        4.8e8, "Pa", "at small strain", above=0, most=1e13, only_for=LINEAR
+    )
+    poisson_ratio: float = number(
+        0.45, "-", "at small strain", above=-1, below=0.5, only_for=LINEAR
+    )
+    density: float = number(1200.0, "kg/m³", "of the undeformed wall", above=0, most=1e5)
+    c10: float = number(
+        6.6e7,
+        "Pa",
+        "first invariant, linear",
+        above=0,
+        most=1e13,
+        only_for=("model", ("mooney-rivlin", "yeoh")),
+    )
+    c01: float = number(
+        1.6e7,
+        "Pa",
+        "second invariant, linear",
+        least=0,
+        most=1e13,
+        only_for=("model", ("mooney-rivlin",)),
+    )
+    c20: float = number(
+        0.0,
+        "Pa",
+        "first invariant, squared",
+        least=-1e13,
+        most=1e13,
+        only_for=("model", ("yeoh",)),
+    )
+    c30: float = number(
+        0.0,
+        "Pa",
+        "first invariant, cubed",
+        least=-1e13,
+        most=1e13,
+        only_for=("model", ("yeoh",)),
+    )
+    bulk_modulus: float = number(
+        1.6e9,
+        "Pa",
+        "of the volumetric term",
+        above=0,
+        most=1e15,
+        only_for=("model", ("mooney-rivlin", "yeoh")),
+    )
+
+
+@dataclass(frozen=True)
+class Tire:
+    section: str = choice("torus", ("torus",), "shape of the section")
+    outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10)
+    minor_radius: float = number(0.10, "m", "of the section, to its outer face", above=0, most=10)
+    thickness: float = number(0.012, "m", "of the wall", above=0, most=5)
+    half_angle: float = number(120.0, "deg", "arc from the crown to each bead", least=10, most=175)
+    segments: int = integer(100, "elements around", least=8, most=4000)
+    elements_arc: int = integer(16, "elements from bead to bead", least=2, most=1000)
+    elements_thickness: int = integer(1, "elements through the wall", least=1, most=20)
+    order: int = integer(2, "of the elements", least=1, most=3)
+    grading: str = choice("bead", ("bead", "uniform"), "of the elements along the arc")
+    material: Material = table(Material, "what the wall is made of")
+
+
+@dataclass(frozen=True)
+class Static:
+    inflation: float = number(2.0e5, "Pa", "pressure on the inner face", least=0, most=1e8)
+    load: float | None = number(None, "N", "vertical load on the road", above=0, most=1e8)
+    deflection: float | None = number(
+        None, "m", "road raised from first touch of the inflated tire", above=0, most=10
+    )
+    road_height: float | None = number(None, "m", "z of the road plane", least=-10, below=0)
+    steady_rolling: bool = flag(
+        True, "inertia and damping of the rolling shape; false: the state at rest"
+    )
+
+
+@dataclass(frozen=True)
+class Modal:
+    count: int = integer(500, "modes wanted", least=1, most=100000)
+    rim: str = choice("fixed", ("fixed", "free"), "the two bead faces")
+    road: str = choice("forces", ("forces", "held"), "after the static state: its forces, or held")
+
+
+@dataclass(frozen=True)
+class Damping:
+    mass: float = number(500.0, "1/s", "γ1, times the mass", least=0, most=1e7)
+    stiffness: float = number(0.0, "s", "γ2, times the stiffness", least=0, most=1.0)
+
+
+@dataclass(frozen=True)
+class Rotation:
+    speed: float = number(100.0, "rad/s", "of the wheel; 0: standing", least=0, most=2000)
+    inertia: str = choice("full", ("full", "doppler"), "doppler: without Coriolis, centrifugal")
+    method: str = choice("projected", ("projected", "full"), "second eigenproblem")
+    count: int = integer(40, "pairs wanted of method full", least=1, most=10000)
+    rolling_radius: float | None = number(
+        None, "m", "effective; absent: from the static state", above=0, most=10
+    )
+
+
+@dataclass(frozen=True)
+class Greens:
+    residual: str = choice(
+        "static", ("none", "dirac", "static", "attachment"), "flexibility of the modes left out"
+    )
+
+
+@dataclass(frozen=True)
+class PointForce:
+    angle: float = number(
+        0.0, "deg", "around the axle from the lowest point, towards +x", least=-360, most=360
+    )
+    arc: float = number(
+        0.0, "deg", "along the section from the crown, towards +y", least=-175, most=175
+    )
+    spread: tuple[float, float] = vector(
+        (0.0, 0.0), "deg", "half widths (angle, arc); 0: one point", least=0, most=180
+    )
+    direction: tuple[float, float, float] = vector((0.0, 0.0, 1.0), "-", "of the force")
+    amplitude: float = number(1.0, "N", "of the force", least=-1e8, most=1e8)
+    frequency: float = number(5.0, "Hz", "0: a constant switched on at t = 0", least=0, most=1e6)
+
+
+@dataclass(frozen=True)
+class Contact:
+    tread: str = choice("half-space", ("half-space", "winkler", "none"), "local compliance")
+    youngs_modulus: float = number(3.4e8, "Pa", "of the half-space", above=0, most=1e13)
+    poisson_ratio: float = number(0.49, "-", "of the half-space", above=-1, most=0.5)
+    winkler_stiffness: float = number(2.0e8, "N/m³", "of the winkler tread", above=0, most=1e15)
+    points: str = choice("nodes", ("nodes",), "contact points")
+    brush_stiffness: float | None = number(
+        None, "N/m", "per point; absent: no horizontal forces", above=0, most=1e12
+    )
+    friction: float | None = number(None, "-", "absent: never slips", least=0, most=10)
+    solver: str = choice("active-set", ("active-set", "snes-vi"), "of the complementarity problem")
+    reach: float | None = number(
+        None, "m", "gap up to which points take part; absent: from the road", above=0, most=1
+    )
+
+
+@dataclass(frozen=True)
+class Motion:
+    kind: str = choice("none", ("none", "ramp", "sine"), "vertical motion of the whole road")
+    amplitude: float = number(1.0e-3, "m", "upwards", least=-1, most=1)
+    frequency: float = number(
+        50.0, "Hz", "of the sine", above=0, most=1e6, only_for=("kind", ("none", "sine"))
+    )
+    duration: float = number(
+        0.01, "s", "of the ramp", above=0, most=1e5, only_for=("kind", ("none", "ramp"))
+    )
+
+
+@dataclass(frozen=True)
+class Road:
+    kind: str = choice("flat", ("flat", "sine", "cobblestones", "grid", "crg"), "of road")
+    run_in: float = number(0.1, "m", "over which the road grows from flat", least=0, most=1e4)
+    lateral: float = number(0.0, "m", "road y under the tire's middle", least=-1e4, most=1e4)
+    start: float = number(0.0, "m", "road x under the axle at t = 0", least=-1e6, most=1e6)
+    offset: float = number(0.0, "m", "added to all heights", least=-10, most=10)
+    datum: str = choice("mean", ("mean", "zero"), "road height laid on the static road plane")
+    amplitude: float = number(1.0e-3, "m", "of the waves", least=0, most=1, only_for=SINE)
+    wavelength: float = number(0.1, "m", "of the waves", above=0, most=1e4, only_for=SINE)
+    phase: float = number(
+        0.0, "deg", "of the waves at the start", least=-360, most=360, only_for=SINE
+    )
+    block_length: float = number(0.14, "m", "pitch along x", above=0, most=10, only_for=STONES)
+    block_width: float = number(0.12, "m", "pitch along y", above=0, most=10, only_for=STONES)
+    joint_width: float = number(0.012, "m", "between two blocks", above=0, most=10, only_for=STONES)
+    joint_depth: float = number(0.006, "m", "below the blocks", least=0, most=1, only_for=STONES)
+    edge_radius: float = number(
+        0.006, "m", "of the rounded edges", least=0, most=1, only_for=STONES
+    )
+    height_scatter: float = number(
+        0.001, "m", "standard deviation of the blocks' heights", least=0, most=1, only_for=STONES
+    )
+    stagger: bool = flag(True, "every second row is shifted by half a block", only_for=STONES)
+    seed: int = integer(0, "of the scatter", least=0, most=2**31 - 1, only_for=STONES)
+    file: str | None = text(None, "of the measured road; relative: to the scene", only_for=MEASURED)
+    holes: str = choice("refuse", ("refuse", "fill"), "in the measured road", only_for=MEASURED)
+    end: str = choice(
+        "refuse", ("refuse", "mirror"), "when the run is longer than the road", only_for=MEASURED
+    )
+    motion: Motion = table(Motion, "of the whole road, vertical")
+
+
+@dataclass(frozen=True)
+class Time:
+    duration: float = number(0.1, "s", "of the run", above=0, most=1e5)
+    step: float | str = number(
+        "auto", "s", "of the time integration", above=0, most=1e3, word="auto"
+    )
+    scheme: str = choice("auto", ("auto", "linear", "constant", "convolution"), "force over a step")
+    checkpoint: float = number(60.0, "s", "wall-clock time between checkpoints", above=0, most=1e6)
+
+
+@dataclass(frozen=True)
+class Receptance:
+    to: float = number(500.0, "Hz", "highest frequency", above=0, most=1e6)
+    step: float = number(2.0, "Hz", "between two frequencies", above=0, most=1e6)
+
+
+@dataclass(frozen=True)
+class Output:
+    spectra: bool = flag(True, "of contact and axle force")
+    axle_force: bool = flag(True, "from momentum")
+    vibration: bool = flag(False, "u(ω) on the whole tire")
+    fields: bool = flag(False, "XDMF of every kept step")
+    receptance: Receptance | None = table(Receptance, "of the driven points", optional=True)
+
+
+@dataclass(frozen=True)
+class Scene:
+    name: str = text("scene", "of the result folder")
+    tire: Tire = table(Tire, "geometry and mesh")
+    static: Static = table(Static, "inflation and road of the static state")
+    modal: Modal = table(Modal, "modes at the static state")
+    damping: Damping = table(Damping, "of the material")
+    rotation: Rotation | None = table(Rotation, "of the wheel", optional=True)
+    greens: Greens = table(Greens, "Green's functions")
+    force: tuple[PointForce, ...] = tables(PointForce, "prescribed point forces")
+    contact: Contact | None = table(Contact, "with the road, in time", optional=True)
+    road: Road | None = table(Road, "the road driven over", optional=True)
+    time: Time | None = table(Time, "of the run", optional=True)
+    output: Output = table(Output, "what is kept")

@@ -1,0 +1,142 @@
+"""Roads under the axle: placing, datum, run-in, bounds, and the factory's refusals."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from contact.grid import Grid
+from contact.motion import make_motion
+from contact.road import PreparedRoad, RoadUnderTire, make_road
+from contact.sine import Sine
+from fem.errors import InputError
+
+STRIP = (0.1, 5.0, -0.1, 0.1)
+
+
+def test_flat_is_zero_everywhere() -> None:
+    road = make_road(kind="flat").prepare(*STRIP)
+    x = np.linspace(-0.2, 5.0, 50)
+    assert np.array_equal(road.height(x, 0 * x), np.zeros(50))
+    assert road.highest(*STRIP) == road.lowest(*STRIP) == 0.0
+
+
+def test_sine_with_phase_in_degrees() -> None:
+    road = make_road(kind="sine", amplitude=2e-3, wavelength=0.5, phase=90.0, run_in=0.0)
+    x = np.linspace(0.11, 5.0, 200)
+    expected = 2e-3 * np.cos(2 * np.pi * x / 0.5)
+    assert np.allclose(road.prepare(*STRIP).height(x, 0 * x), expected, atol=1e-15)
+
+
+def test_start_lateral_and_offset_shift_the_road() -> None:
+    x, y = np.linspace(0.0, 10.0, 11), np.linspace(-2.0, 2.0, 9)
+    plane = Grid(x, y, 0.3 * x[:, None] + 0.7 * y[None, :])
+    road = RoadUnderTire(plane, start=2.0, lateral=0.5, run_in=0.0, offset=0.25).prepare(*STRIP)
+    px, py = np.array([0.2, 1.37, 4.9]), np.array([-0.1, 0.03, 0.1])
+    expected = 0.3 * (px + 2.0) + 0.7 * (py + 0.5) + 0.25
+    assert np.allclose(road.height(px, py), expected, atol=1e-14)
+    assert np.allclose(road.extent, ((-2.0, 8.0), (-2.5, 1.5)))
+
+
+def test_mean_datum_takes_the_strips_mean_and_nothing_else() -> None:
+    x, y = np.linspace(0.0, 10.0, 11), np.linspace(-2.0, 2.0, 9)
+    heights = 1.0 + 0.3 * x[:, None] + 0.7 * y[None, :]
+    road = make_road_of(Grid(x, y, heights), datum="mean")
+    middle = np.array([0.5 * (STRIP[0] + STRIP[1])])
+    assert road.height(middle, np.zeros(1))[0] == pytest.approx(0.0, abs=1e-12)
+    assert road.level == pytest.approx(-1.0 - 0.3 * middle[0])
+
+
+def make_road_of(grid: Grid, datum: str) -> PreparedRoad:
+    return RoadUnderTire(grid, run_in=0.0, datum=datum).prepare(*STRIP)
+
+
+def test_run_in_starts_flat_and_is_twice_differentiable() -> None:
+    road = RoadUnderTire(Sine(1e-3, 0.8, 0.5 * np.pi), run_in=0.4).prepare(*STRIP)
+    bare = Sine(1e-3, 0.8, 0.5 * np.pi)
+    under_the_tire = np.linspace(-0.3, 0.1, 40)
+    assert np.all(road.height(under_the_tire, np.zeros(40)) == 0.0)
+    beyond = np.linspace(0.5, 5.0, 100)
+    assert np.array_equal(road.height(beyond, 0 * beyond), bare.height(beyond, 0 * beyond))
+    h = 1e-4
+    for joint in (0.1, 0.5):
+        x = joint + h * np.arange(-2, 3)
+        z = road.height(x, 0 * x)
+        left, right = z[0] - 2 * z[1] + z[2], z[2] - 2 * z[3] + z[4]
+        assert abs(left - right) / h**2 < 1e-3 * (2 * np.pi / 0.8) ** 2
+
+
+@pytest.mark.parametrize("kind", ["sine", "cobblestones", "grid"])
+def test_bounds_hold(kind: str) -> None:
+    rng = np.random.default_rng(1)
+    road = {
+        "sine": make_road(kind="sine", amplitude=1e-3, wavelength=0.3),
+        "cobblestones": make_road(
+            kind="cobblestones",
+            block_length=0.1,
+            block_width=0.08,
+            joint_width=0.01,
+            joint_depth=0.008,
+            edge_radius=0.004,
+            height_scatter=0.002,
+        ),
+        "grid": RoadUnderTire(
+            Grid(np.linspace(0, 6, 61), np.linspace(-1, 1, 21), rng.standard_normal((61, 21))),
+            offset=0.3,
+            datum="mean",
+        ),
+    }[kind].prepare(*STRIP)
+    x, y = rng.uniform(-0.1, 5.0, 20_000), rng.uniform(-0.1, 0.1, 20_000)
+    z = road.height(x, y)
+    assert road.lowest(*STRIP) <= z.min() < 0.0 < z.max() <= road.highest(*STRIP)
+
+
+def test_points_beyond_the_strip_are_an_error() -> None:
+    road = make_road(kind="sine", amplitude=1e-3, wavelength=0.3).prepare(*STRIP)
+    with pytest.raises(ValueError, match="beyond the prepared strip"):
+        road.height(np.array([5.1]), np.zeros(1))
+
+
+def test_factory_takes_a_scenes_object_and_ignores_what_is_none() -> None:
+    spec = SimpleNamespace(kind="sine", amplitude=1e-3, wavelength=0.2, phase=None, datum=None)
+    road = make_road(spec).prepare(*STRIP)
+    assert road.spacing == 0.2 and road.level == 0.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"kind": "gravel"}, "gravel"),
+        ({"kind": "sine", "amplitude": 1e-3}, "wavelength is missing"),
+        ({"kind": "sine", "amplitude": 1e-3, "wavelength": 0.0}, "wavelength 0 m"),
+        ({"kind": "sine", "amplitude": -1.0, "wavelength": 1.0}, "amplitude"),
+        ({"kind": "flat", "datum": "median"}, "median"),
+        ({"kind": "flat", "run_in": -1.0}, "run_in"),
+        ({"kind": "crg", "file": "nowhere.crg"}, "no such file"),
+        ({"kind": "grid", "file": "road.txt"}, r"\.txt"),
+    ],
+)
+def test_factory_refuses(keys: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make_road(**keys)
+
+
+def test_empty_strip_is_refused() -> None:
+    with pytest.raises(InputError, match="empty strip"):
+        make_road(kind="flat").prepare(1.0, 0.0, -0.1, 0.1)
+
+
+def test_motions() -> None:
+    assert make_motion("none")(3.0) == 0.0
+    ramp = make_motion("ramp", amplitude=-2e-3, duration=0.5)
+    assert ramp(0.0) == 0.0 and ramp(-1.0) == 0.0
+    assert ramp(0.25) == pytest.approx(-1e-3) and ramp(7.0) == -2e-3
+    sine = make_motion("sine", amplitude=1e-3, frequency=50.0)
+    assert sine(0.0) == 0.0 and sine(0.005) == pytest.approx(1e-3)
+    for keys, message in (
+        ({"kind": "hop"}, "hop"),
+        ({"kind": "ramp", "amplitude": 1.0}, "duration"),
+        ({"kind": "sine", "amplitude": 1.0}, "frequency"),
+    ):
+        with pytest.raises(InputError, match=message):
+            make_motion(**keys)

@@ -1,0 +1,144 @@
+"""The command line: help without heavy imports, exit statuses, one message and no traceback."""
+
+from pathlib import Path
+
+import pytest
+
+from runs import cli
+from runs.plan import STAGES, skipped
+from runs.scene import load
+from runs.version import VERSION
+
+LIGHT = """
+import sys
+from runs.cli import main
+try:
+    status = main(sys.argv[1:])
+except SystemExit as ending:
+    status = ending.code
+heavy = [name for name in ("dolfinx", "petsc4py", "mpi4py", "h5py", "scipy") if name in sys.modules]
+sys.exit(f"imports {heavy}" if heavy else status)
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "my scene.toml"
+    path.write_text("[static]\nload = 500\n[rotation]\nspeed = 50\n")
+    return path
+
+
+@pytest.mark.parametrize("command", [["--help"], ["run", "--help"], ["check", "--help"]])
+def test_help_is_light_and_names_statuses(launch, command: list[str]) -> None:
+    done = launch("-c", LIGHT, *command)
+    assert done.returncode == 0, done.stderr
+    for status in "0234":
+        assert f"\n  {status}  " in done.stdout
+
+
+def test_every_command_is_in_the_help(launch) -> None:
+    text = launch("-m", "runs", "--help").stdout
+    for command in ("run", "check", "report", "export", "info", "test"):
+        assert f"\n    {command} " in text
+    text = launch("-m", "runs", "run", "--help").stdout
+    for option in ("-n N", "--out", "--set", "--until", "--fresh", "-- PETSc", *STAGES):
+        assert option in text
+
+
+def test_check_is_light_and_shows_all(launch, scene: Path) -> None:
+    done = launch("-c", LIGHT, "check", scene, "--set", "static.load=400")
+    assert done.returncode == 0, done.stderr
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert ["load", "400.0", "N", ">", "0,", "≤", "1e+08", "vertical", "load"] in [
+        line[:9] for line in lines
+    ]
+    assert ["rotating", "runs"] in lines
+    assert "contact   skipped: no [contact]" in done.stdout
+    assert "estimated memory" in done.stdout
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_bad_scene_ends_with_two(launch, scene: Path, command: str, processes: int) -> None:
+    done = launch("-m", "runs", command, scene, "--set", "static.lod=1", processes=processes)
+    assert done.returncode == 2
+    assert done.stderr.count("error: --set static.lod: unknown key") == 1
+    assert "Traceback" not in done.stderr and done.stdout == ""
+
+
+def test_bad_scene_touches_nothing(launch, scene: Path, tmp_path: Path) -> None:
+    launch("-m", "runs", "run", scene, "--out", tmp_path / "out", "--set", "static.load=-1")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["run"],
+        ["go"],
+        ["run", "x.toml", "--until", "never"],
+        ["run", "x.toml", "--unknown"],
+        ["run", "x.toml", "-n", "many"],
+        ["report", "nowhere"],
+        ["export", "nowhere"],
+    ],
+)
+def test_wrong_commands_end_with_two(launch, tmp_path: Path, command: list[str]) -> None:
+    done = launch("-m", "runs", *command, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr and done.stderr.count("error: ") == 1
+
+
+def test_wrong_process_count_is_explained(launch, scene: Path) -> None:
+    done = launch("-m", "runs", "run", scene, "-n", "5")
+    assert done.returncode == 2 and "mpirun -n 5" in done.stderr
+
+
+def test_folder_of_another_scene_is_left_alone(launch, scene: Path, tmp_path: Path) -> None:
+    from runs.folder import Summary
+
+    Summary(tmp_path, "other", 1).record("static", "computed")
+    before = (tmp_path / "summary.json").read_bytes()
+    done = launch("-m", "runs", "run", scene, "--set", "name=mine", "--out", tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert '"other"' in done.stderr and "Traceback" not in done.stderr
+    assert (tmp_path / "summary.json").read_bytes() == before
+
+
+def test_unusable_folder_ends_with_two(launch, scene: Path) -> None:
+    done = launch("-m", "runs", "run", scene, "--out", "/proc/none/results", processes=2)
+    assert done.returncode == 2
+    assert done.stderr.count("/proc/none/results") == 1 and "Traceback" not in done.stderr
+
+
+def test_petsc_options_follow_two_dashes(monkeypatch) -> None:
+    seen = []
+    monkeypatch.setattr(cli, "_run", lambda args, options: seen.append((args, options)) or 0)
+    assert cli.main(["run", "a.toml", "--fresh", "--", "-snes_monitor", "--set", "x"]) == 0
+    args, options = seen[0]
+    assert args.fresh and args.set == [] and options == ["-snes_monitor", "--set", "x"]
+
+
+def test_version(launch) -> None:
+    assert launch("-m", "runs", "--version").stdout == f"tireroad {VERSION}\n"
+
+
+def test_version_is_that_of_the_package(root: Path) -> None:
+    assert f'version = "{VERSION}"' in (root / "pyproject.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("overrides", "until", "expected"),
+    [
+        ([], None, {"response", "contact", "spectra", "greens"}),
+        (["rotation.speed=0"], None, {"rotating", "response", "contact", "spectra", "greens"}),
+        (["force=[{}]", "time={}"], None, {"contact", "spectra"}),
+        (["contact={}", "road={}", "time={}"], None, {"response"}),
+        (["contact={}", "road={}", "time={}", "output.spectra=false"], None, None),
+        ([], "modes", set(STAGES) - {"static", "modes"}),
+    ],
+)
+def test_stages_follow_from_the_scene(scene: Path, overrides, until, expected) -> None:
+    reasons = skipped(load(scene, overrides), until)
+    assert set(reasons) == (expected if expected is not None else {"response", "spectra"})
+    assert all(reasons.values())

@@ -1,0 +1,149 @@
+"""CSV that a spreadsheet reads, XDMF whose every reference leads to the right numbers."""
+
+import csv
+from pathlib import Path
+from xml.etree import ElementTree
+
+import h5py
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from synthetic_results import write_results
+
+from fem.errors import InputError
+from runs.export import export
+from runs.xdmf import INSTANTS, SHAPES
+
+CSV = {
+    "footprint.csv",
+    "modes.csv",
+    "contact_force.csv",
+    "spectra.csv",
+    "third_octave.csv",
+    "response.csv",
+    "receptance.csv",
+}
+XDMF = {"static.xdmf", "modes.xdmf", "contact.xdmf"}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = write_results(tmp_path_factory.mktemp("export") / "run", steps=900, modes=30)
+    export(directory)
+    return directory
+
+
+def columns(path: Path) -> dict[str, NDArray]:
+    with path.open(newline="") as stream:
+        head, *rows = csv.reader(stream)
+    return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
+
+
+def follow(item: ElementTree.Element, page: Path) -> NDArray:
+    """The numbers of a DataItem, as a reader of XDMF finds them."""
+    if item.get("ItemType") == "HyperSlab":
+        slab, source = item
+        start, stride, count = np.array(slab.text.split(), dtype=int).reshape(3, -1)
+        picked = tuple(
+            slice(s, s + n * step, step) for s, step, n in zip(start, stride, count, strict=True)
+        )
+        values = follow(source, page)[picked]
+    else:
+        name, place = item.text.split(":")
+        with h5py.File(page.parent / name, "r") as file:
+            values = file[place][()]
+            assert values.dtype.itemsize == int(item.get("Precision"))
+            assert {"f": "Float", "i": "Int"}[values.dtype.kind] == item.get("NumberType")
+    return values.reshape([int(size) for size in item.get("Dimensions").split()])
+
+
+def test_all_files_are_written_and_nothing_else(results: Path) -> None:
+    again = export(results)
+    assert {path.name for path in again} == CSV | XDMF
+    assert {path.name for path in (results / "export").iterdir()} == CSV | XDMF
+
+
+@pytest.mark.parametrize("name", sorted(CSV))
+def test_every_column_names_its_unit(results: Path, name: str) -> None:
+    for heading in columns(results / "export" / name):
+        assert heading == "mode" or (heading.endswith("]") and " [" in heading)
+
+
+def test_forces_and_spectra_are_those_of_the_results(results: Path) -> None:
+    force, spectrum = (
+        columns(results / "export" / f"{n}.csv") for n in ("contact_force", "spectra")
+    )
+    with h5py.File(results / "contact.h5") as file:
+        assert force["time [s]"] == pytest.approx(file["time"][()], rel=1e-9)
+        assert force["contact force z [N]"] == pytest.approx(file["total_force"][:, 2], rel=1e-9)
+        assert force["axle force x [N]"] == pytest.approx(file["axle_force"][:, 0], rel=1e-9)
+    with h5py.File(results / "spectra.h5") as file:
+        both = spectrum["Re axle force z [N]"] + 1j * spectrum["Im axle force z [N]"]
+        assert both == pytest.approx(file["axle_force"][:, 2], rel=1e-9)
+    receptance = columns(results / "export" / "receptance.csv")
+    with h5py.File(results / "response.h5") as file:
+        exact = file["receptance"][:, 1, 0]
+        assert receptance["Im receptance 2,1 [m/N]"] == pytest.approx(exact.imag, rel=1e-9)
+
+
+def test_surface_and_displacement(results: Path) -> None:
+    page = results / "export" / "static.xdmf"
+    grid = ElementTree.parse(page).find(".//Grid")
+    points = follow(grid.find("Geometry/DataItem"), page)
+    quads = follow(grid.find("Topology/DataItem"), page)
+    assert int(grid.find("Topology").get("NumberOfElements")) == len(quads)
+    assert quads.max() < len(points)
+    with h5py.File(results / "static.h5") as file:
+        assert (points == file["surface/points"][()]).all()
+        moved = follow(grid.find("Attribute/DataItem"), page)
+        assert (moved == file["surface/displacement"][()]).all()
+
+
+def test_first_modes_are_vector_fields(results: Path) -> None:
+    page = results / "export" / "modes.xdmf"
+    fields = ElementTree.parse(page).findall(".//Attribute")
+    assert len(fields) == SHAPES
+    with h5py.File(results / "modes.h5") as file:
+        for number, field in enumerate(fields):
+            assert f"{file['frequency'][number]:.2f} Hz" in field.get("Name")
+            assert (follow(field[0], page) == file["surface/shape"][number]).all()
+
+
+def test_contact_over_time_is_thinned_and_ends_at_the_end(results: Path) -> None:
+    page = results / "export" / "contact.xdmf"
+    grids = ElementTree.parse(page).findall(".//Grid[@GridType='Uniform']")
+    assert len(grids) == INSTANTS
+    with h5py.File(results / "contact.h5") as file:
+        for grid, row in ((grids[0], 0), (grids[-1], 899)):
+            assert float(grid.find("Time").get("Value")) == pytest.approx(file["time"][row])
+            force = grid.find("Attribute[@Name='normal_force']")[0]
+            assert (follow(force, page) == file["normal_force"][row]).all()
+
+
+def test_only_what_is_there_is_exported(tmp_path: Path) -> None:
+    directory = write_results(tmp_path / "run")
+    for name in ("static.h5", "contact.h5", "response.h5"):
+        (directory / name).unlink()
+    assert {path.name for path in export(directory)} == {
+        "modes.csv",
+        "modes.xdmf",
+        "spectra.csv",
+        "third_octave.csv",
+    }
+    topology = ElementTree.parse(directory / "export" / "modes.xdmf").find(".//Topology")
+    assert topology.get("TopologyType") == "Polyvertex", "the quads are in static.h5"
+
+
+def test_damage_is_an_input_error_and_writes_nothing(tmp_path: Path) -> None:
+    directory = write_results(tmp_path / "run")
+    whole = (directory / "spectra.h5").read_bytes()
+    (directory / "spectra.h5").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match=r"spectra\.h5 is damaged"):
+        export(directory)
+    assert not (directory / "export").exists()
+
+
+def test_nothing_to_export_is_an_input_error(tmp_path: Path) -> None:
+    for directory in (tmp_path, tmp_path / "nowhere"):
+        with pytest.raises(InputError, match="give the result folder of a run"):
+            export(directory)

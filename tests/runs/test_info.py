@@ -1,0 +1,72 @@
+"""`tireroad info`: what a result file holds."""
+
+from pathlib import Path
+
+import h5py
+import pytest
+from synthetic_results import write_results
+
+from fem.errors import InputError
+from runs.info import describe
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_results(tmp_path_factory.mktemp("info") / "run")
+
+
+def row(text: str, name: str) -> list[str]:
+    (found,) = [line for line in text.splitlines() if line.split()[:1] == [name]]
+    return found.split()
+
+
+def test_datasets_with_shape_type_and_unit(results: Path) -> None:
+    text = describe(results / "contact.h5")
+    with h5py.File(results / "contact.h5") as file:
+        points = file["points"].shape[0]
+    assert row(text, "normal_force")[1:5] == ["(400,", f"{points})", "float64", "N"]
+    assert row(text, "normal_force")[-1] == "gzip"
+    assert row(text, "active")[1:4] == ["(400)", "int64", "-"]
+    assert "dB re 1 N" in describe(results / "spectra.h5")
+    assert row(describe(results / "rotating.h5"), "eigenvalue")[2:4] == ["complex128", "1/s"]
+
+
+def test_provenance_and_attributes(results: Path) -> None:
+    text = describe(results / "static.h5")
+    assert row(text, "processes")[1] == "2"
+    assert row(text, "version")[1] == "0.1.0"
+    assert row(text, "input_hash")[1] == "0f" * 32
+    assert row(text, "rolling_radius")[1] == "0.316"
+    assert row(text, "scene")[1] == "synthetic-torus,"
+    assert f"h5py {h5py.__version__}" in text
+    assert "[tire.material]" not in text, "the scene is named, not printed"
+
+
+def test_a_foreign_file_is_described_too(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file.attrs["scene"] = "not = = toml\n"
+        file["name"] = "text"
+        file["group/empty"] = h5py.Empty("f8")
+    text = describe(tmp_path / "other.h5")
+    assert row(text, "name")[1:5] == ["()", "text", "none", "given"]
+    assert "group/empty" in text
+    assert "no TOML" in text
+    with h5py.File(tmp_path / "bare.h5", "w"):
+        pass
+    assert "no datasets" in describe(tmp_path / "bare.h5")
+
+
+@pytest.mark.parametrize("kept", [0, 1, 7, 100, 5000])
+def test_a_truncated_file_is_an_input_error(results: Path, tmp_path: Path, kept: int) -> None:
+    (tmp_path / "cut.h5").write_bytes((results / "static.h5").read_bytes()[:kept])
+    with pytest.raises(InputError, match=r"cut\.h5"):
+        describe(tmp_path / "cut.h5")
+
+
+def test_what_is_no_result_is_an_input_error(results: Path) -> None:
+    with pytest.raises(InputError, match="no HDF5 file"):
+        describe(results / "scene.toml")
+    with pytest.raises(InputError, match="no such file"):
+        describe(results / "absent.h5")
+    with pytest.raises(InputError, match="no such file"):
+        describe(results)

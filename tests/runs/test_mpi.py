@@ -1,0 +1,111 @@
+"""All processes end together, with one message and one status, however they fail."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from conftest import environment
+from mpi4py import MPI
+
+from fem.errors import ConvergenceError, InputError
+from runs import mpi
+
+CASE = """
+import sys, time
+from mpi4py import MPI
+from fem.errors import ConvergenceError, InputError
+from runs import mpi
+
+def fail(error):
+    raise error
+
+comm = MPI.COMM_WORLD
+last = comm.rank == comm.size - 1
+cases = {
+    "none": lambda: comm.Barrier(),
+    "all": lambda: fail(InputError("bad key")),
+    "last": lambda: fail(InputError("bad key")) if last else comm.Barrier(),
+    "most": lambda: fail(ConvergenceError("no luck")) if comm.rank else comm.Barrier(),
+    "bug": lambda: fail(KeyError("odd")) if comm.rank == 0 else comm.Barrier(),
+    "told": lambda: mpi.on_root(comm, lambda: fail(KeyError("odd"))),
+    "full": lambda: fail(OSError(28, "No space left on device", "a.h5")),
+    "wait": lambda: (print("begun", flush=True), time.sleep(60)),
+}
+mpi.stop_on_signals()
+sys.exit(mpi.guarded(comm, cases[sys.argv[1]]))
+"""
+
+
+@pytest.mark.parametrize("processes", [1, 3])
+@pytest.mark.parametrize(
+    ("case", "status", "message"),
+    [
+        ("none", 0, ""),
+        ("all", 2, "error: bad key\n"),
+        ("last", 2, "error: bad key\n"),
+        ("told", 1, "KeyError: 'odd'"),
+        ("full", 2, "disk is full"),
+    ],
+)
+def test_endings(launch, case: str, status: int, message: str, processes: int) -> None:
+    done = launch("-c", CASE, case, processes=processes)
+    assert done.returncode == status, done.stderr
+    assert done.stderr.count(message) == 1 if message else done.stderr == ""
+    assert done.stderr.count("Traceback") == (1 if status == 1 else 0)
+
+
+@pytest.mark.parametrize(
+    ("case", "status", "message"),
+    [("most", 3, "error: no luck\n"), ("bug", 1, "KeyError: 'odd'")],
+)
+def test_hanging_processes_are_ended(launch, case: str, status: int, message: str) -> None:
+    began = time.monotonic()
+    done = launch("-c", CASE, case, processes=3)
+    assert done.returncode == status, done.stderr
+    assert done.stderr.count(message) == 1
+    assert time.monotonic() - began < 30
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signals_end_with_four(number: signal.Signals) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", CASE, "wait"],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout.readline() == "begun\n"
+        process.send_signal(number)
+        _, text = process.communicate(timeout=30)
+    assert process.returncode == 4
+    assert text.startswith(f"stopped by {number.name}") and "Traceback" not in text
+
+
+@pytest.mark.mpi
+def test_root_tells_all() -> None:
+    comm = MPI.COMM_WORLD
+    assert mpi.on_root(comm, lambda: comm.rank) == 0
+
+    def fail(error: Exception):
+        raise error
+
+    for error in (InputError("bad key"), ConvergenceError("no luck")):
+        with pytest.raises(type(error), match=str(error)):
+            mpi.on_root(comm, lambda error=error: fail(error))
+    unexpected = KeyError if comm.rank == 0 else mpi.ToldByRoot
+    with pytest.raises(unexpected):
+        mpi.on_root(comm, lambda: fail(KeyError("odd")))
+
+
+@pytest.mark.mpi
+def test_all_here_sees_who_is_late() -> None:
+    comm = MPI.COMM_WORLD.Dup()
+    assert mpi.all_here(comm, 10.0)
+    late = comm.rank == comm.size - 1
+    if late:
+        time.sleep(0.5)
+    came = mpi.all_here(comm, None if late else 0.1)
+    assert came is (late or comm.size == 1)
