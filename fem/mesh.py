@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import dolfinx.mesh as dmesh
@@ -18,7 +19,8 @@ class Torus:
     """A toroidal tire: section circle of `minor_radius` (to its outer face) about the axle (y).
 
     Lengths in m, `half_angle` in rad: the arc from the crown to each bead. `segments` elements
-    around, `elements_arc` along the arc, `elements_thickness` through the wall, all of `order`.
+    around, `elements_arc` along the arc, `elements_thickness` through the wall, all of `order`;
+    elements where the road touches are `footprint_size` times as long as they would be otherwise.
     """
 
     outer_radius: float
@@ -30,11 +32,12 @@ class Torus:
     elements_thickness: int
     order: int
     grading: str = "bead"
+    footprint_size: float = 1.0
 
     @property
     def ring_corners(self) -> np.ndarray:
         """Angles of the element corners around the axle, rad, from the lowest point towards +x."""
-        return np.linspace(0.0, 2 * np.pi, self.segments + 1)
+        return np.pi + np.pi * _graded(self.segments, lambda t: self._near_road(1 - np.abs(t)))
 
     @property
     def wall_corners(self) -> np.ndarray:
@@ -45,11 +48,17 @@ class Torus:
     @property
     def arc_corners(self) -> np.ndarray:
         """Angles of the element corners along the section, rad, bead to bead; the crown is 0."""
-        corners = np.linspace(-1.0, 1.0, self.elements_arc + 1)
-        if self.grading == "bead":
-            # The clamped edge is singular: the element at the bead is _BEAD times the uniform one.
-            corners = (1 - _BEAD) * np.sin(np.pi / 2 * corners) + _BEAD * corners
-        return self.half_angle * corners
+
+        def size(t):
+            # The clamped edge is singular: at the bead an element is _BEAD times the uniform one.
+            bead = _BEAD + (1 - _BEAD) * np.pi / 2 * np.cos(np.pi / 2 * t)
+            return self._near_road(np.abs(t)) * (bead if self.grading == "bead" else 1.0)
+
+        return self.half_angle * _graded(self.elements_arc, size)
+
+    def _near_road(self, distance: np.ndarray) -> np.ndarray:
+        """Relative element size at a distance from the footprint, both by element count, 0 to 1."""
+        return 1 - (1 - self.footprint_size) * np.exp(-((distance / _NEAR) ** 2))
 
     def position(self, ring: np.ndarray, wall: np.ndarray, arc: np.ndarray) -> np.ndarray:
         """Cartesian position of (angle around, distance from the section's centre, section angle)."""
@@ -93,6 +102,24 @@ class Lattice:
 
 
 _BEAD = 0.3
+_NEAR = (
+    0.4  # of the elements on either side of the footprint: enough for the road, and a soft change
+)
+
+
+def _graded(count: int, size: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Corners of `count` elements over [-1, 1] whose lengths follow size(t), t in [-1, 1] by count.
+
+    The size must be even in t; so are the corners then, to the last bit, and a symmetric tire
+    keeps its mirror planes.
+    """
+    t, weight = np.polynomial.legendre.leggauss(8)
+    middle = (2 * np.arange(count) + 1) / count - 1
+    lengths = size(middle[:, None] + t / count) @ weight
+    lengths = lengths + lengths[::-1]
+    corners = np.concatenate([[0.0], np.cumsum(lengths)])
+    corners = 2 * corners / corners[-1] - 1
+    return (corners - corners[::-1]) / 2
 
 
 def _subdivide(corners: np.ndarray, nodes: np.ndarray) -> np.ndarray:
