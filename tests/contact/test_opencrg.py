@@ -194,7 +194,8 @@ def test_steps_are_taken_from_the_virtual_channel_and_the_borders(tmp_path: Path
 
 
 def test_blocks_without_effect_on_heights_are_accepted(tmp_path: Path) -> None:
-    blocks = "$ROAD_CRG_MODS\nREFLINE_OFFSET_X = 100\nSCALE_WIDTH = 1\n$ROAD_CRG_OPTS\nCHECK_EPS = 1e-5\n$\n"
+    blocks = "$ROAD_CRG_MODS\nREFLINE_OFFSET_X = 100\nSCALE_WIDTH = 1\n"
+    blocks += "$ROAD_CRG_OPTS\nCHECK_EPS = 1e-5\n$\n"
     (tmp_path / "road.crg").write_bytes(crg("KDBI", Z, blocks=blocks))
     assert np.allclose(heights(tmp_path / "road.crg"), Z, atol=1e-8)
 
