@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 SIGMAS = 3.0
 TAIL = float(ndtr(-SIGMAS))
 # A prepared strip keeps its blocks' heights in a table up to this size (16 MB); beyond it they are
-# drawn again at every call, three times slower.
+# drawn again at every call, 89 instead of 35 us for 300 points.
 TABLE_LIMIT = 2_000_000
 
 
@@ -59,15 +59,15 @@ class Cobblestones:
         """Heights (m) at x, y (m), in their shape."""
         px, py = self._pitch
         u = np.asarray(x) / px
-        row = np.floor(u)
+        row = np.floor(u).astype(np.int64)
         v = np.asarray(y) / py
         if self._b.stagger:
-            v = v + 0.5 * np.mod(row, 2.0)
-        column = np.floor(v)
-        beyond_x = np.abs(u - row - 0.5) * px - self._plateau[0]
-        beyond_y = np.abs(v - column - 0.5) * py - self._plateau[1]
-        beyond = np.hypot(np.maximum(beyond_x, 0.0), np.maximum(beyond_y, 0.0))
-        return self._profile(beyond, self._top(row.astype(np.int64), column.astype(np.int64)))
+            v = v + 0.5 * (row & 1)
+        column = np.floor(v).astype(np.int64)
+        beyond_x = np.maximum(np.abs(u - row - 0.5) * px - self._plateau[0], 0.0)
+        beyond_y = np.maximum(np.abs(v - column - 0.5) * py - self._plateau[1], 0.0)
+        beyond = np.sqrt(beyond_x * beyond_x + beyond_y * beyond_y)
+        return self._profile(beyond, self._top(row, column))
 
     def _profile(self, beyond: Array, top: Array) -> Array:
         radius, depth = self._b.edge_radius, self._b.joint_depth

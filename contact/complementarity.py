@@ -49,8 +49,8 @@ class ActiveSet:
 
     A step exchanges every point of wrong sign (f < 0 where active, g < 0 where not). When
     `PATIENCE` steps in a row do not reduce their number, only the last wrong point is exchanged
-    (Murty's rule) until it falls: finite for every P-matrix. Of random matrices, n = 200, those with
-    a skew part three times the symmetric one take 15 steps, those with ten times run out of them.
+    (Murty's rule) until it falls: finite for every P-matrix. Of random matrices, n = 200, one whose
+    skew part is three times the symmetric one takes 15 steps, ten times that runs out of them.
     Source: Judice and Pires, Computers Ops Res. 21 (1994) 587.
 
     The factor of the last active set is kept: a step that ends in the set it began with factorises

@@ -65,11 +65,16 @@ class Grid:
         _check_choice("end", end, ("refuse", "mirror"))
         self._holes, self._end, self.source = holes, end, source
         self._x, self._y = Axis(x - x[0]), Axis(y)
-        self._z = np.ascontiguousarray(z)
-        self._flat = self._z.ravel()
+        self._set_heights(z)
         self._length = float(x[-1] - x[0])
         self._sides = float(y[0]), float(y[-1])
         self.filled = 0
+
+    def _set_heights(self, z: Array) -> None:
+        """z and its four views in which one index finds the corners of a cell."""
+        self._z = np.ascontiguousarray(z)
+        flat, width = self._z.ravel(), z.shape[1]
+        self._corners = flat, flat[1:], flat[width:], flat[width + 1 :]
 
     @property
     def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -89,14 +94,10 @@ class Grid:
             x = self._reflect(x)
         i, s = self._x.locate(x)
         j, t = self._y.locate(y)
-        width = self._z.shape[1]
-        k = i * width + j
-        z = self._flat
-        near, near_next = z.take(k), z.take(k + 1)
-        k += width
-        far, far_next = z.take(k), z.take(k + 1)
-        near += t * (near_next - near)
-        far += t * (far_next - far)
+        k = i * self._z.shape[1] + j
+        near, near_left, far, far_left = (corner.take(k) for corner in self._corners)
+        near += t * (near_left - near)
+        far += t * (far_left - far)
         return near + s * (far - near)
 
     def _reflect(self, x: Array) -> Array:
@@ -137,8 +138,7 @@ class Grid:
         road = copy.copy(self)
         x, y = self._x.positions[rows], self._y.positions[columns]
         road.filled = int(missing.sum())
-        road._z = np.ascontiguousarray(fill_holes(z, x, y, self.source))
-        road._flat = road._z.ravel()
+        road._set_heights(fill_holes(z, x, y, self.source))
         road._x, road._y = Axis(x), Axis(y)
         return road
 

@@ -1,6 +1,7 @@
 """Road heights on a grid from .npz, .csv and .h5 files, read as data and checked before use."""
 
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,16 @@ Array = NDArray[np.float64]
 
 # 4 GB of doubles: a larger road has to be cut before it is driven on.
 MAX_VALUES = 500_000_000
+# What the standard library, numpy and h5py raise for damaged files; NotImplementedError and
+# RuntimeError are zipfile's for damaged version numbers and flags.
+UNREADABLE = (
+    OSError,
+    EOFError,
+    zipfile.BadZipFile,
+    zlib.error,
+    NotImplementedError,
+    RuntimeError,
+)
 
 
 def read_grid(file: Path, holes: str = "refuse", end: str = "refuse") -> Grid:
@@ -35,7 +46,7 @@ def read_grid(file: Path, holes: str = "refuse", end: str = "refuse") -> Grid:
         raise InputError(f"road.file {file}: no such file")
     try:
         x, y, z = reader(file)
-    except (OSError, zipfile.BadZipFile, EOFError) as error:
+    except UNREADABLE as error:
         raise InputError(f"road.file {file}: cannot be read ({error}); is it complete?") from error
     return Grid(x, y, z, holes=holes, end=end, source=f"road.file {file}")
 

@@ -14,16 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contact.grid import Grid
+from contact.opencrg_header import MAX_BYTES, Blocks, key_values, read_header
 from contact.opencrg_payload import Payload, read_payload
 from fem.errors import InputError
 
 Array = NDArray[np.float64]
 
 SMALLEST_RADIUS = 20.0
-# Ten thousand channels of 72 bytes each fit; a binary file without separator is not read to its
-# end.
-MAX_HEADER = 1_000_000
-MAX_BYTES = 4_000_000_000
 FORMATS = ("KRBI", "KDBI", "LRFI", "LDFI")
 # Options that say how to search, check and log: heights do not depend on them.
 HARMLESS_OPTIONS = ("REFLINE_SEARCH_", "WARN_", "LOG_", "CHECK_")
@@ -44,11 +41,11 @@ def read_opencrg(file: Path, holes: str = "refuse", end: str = "refuse") -> Grid
     if not file.is_file():
         raise InputError(f"road.file {file}: no such file")
     try:
-        blocks, start, line = _read_header(file)
+        blocks, start, line = read_header(file)
         _refuse_blocks(file, blocks)
-        parameters = _pairs(file, blocks.get("ROAD_CRG", []))
+        parameters = key_values(file, blocks.get("ROAD_CRG", []))
         code, channels = _definition(file, blocks)
-        step, rows = _rows(file, parameters)
+        step, rows = _rows(file, parameters, blocks["KD_DEFINITION"])
         payload = Payload(file, code, start, line, len(channels), rows)
         table = read_payload(payload)
     except OSError as error:
@@ -61,47 +58,7 @@ def read_opencrg(file: Path, holes: str = "refuse", end: str = "refuse") -> Grid
     return Grid(u, v, table[:, columns], holes=holes, end=end, source=f"road.file {file}")
 
 
-def _read_header(file: Path) -> tuple[dict[str, list[tuple[int, str]]], int, int]:
-    """Named blocks of (line number, text) without comments; byte and line where the data begin."""
-    if file.stat().st_size > MAX_BYTES:
-        raise InputError(f"{file}: larger than {MAX_BYTES:,} bytes; cut the road first")
-    with file.open("rb") as stream:
-        head = stream.read(MAX_HEADER)
-    blocks: dict[str, list[tuple[int, str]]] = {}
-    name, position = "", 0
-    for number, raw in enumerate(head.splitlines(keepends=True), 1):
-        position += len(raw)
-        text = raw.decode("latin-1").rstrip("\r\n")
-        if text.startswith("$$"):
-            return blocks, position, number + 1
-        if text.startswith("$"):
-            name = re.split(r"[\s!]", text[1:], maxsplit=1)[0].upper()
-            blocks.setdefault(name, [])
-        elif name and not text.startswith("*"):
-            blocks[name].append((number, text.split("!", 1)[0].strip()))
-    raise InputError(
-        f"{file}: no line of $$$$ that separates header and data within {len(head):,} bytes: "
-        "this is no OpenCRG file, or it is truncated"
-    )
-
-
-def _pairs(file: Path, lines: list[tuple[int, str]]) -> dict[str, float]:
-    """KEY = number of a block, keys in capitals."""
-    pairs = {}
-    for number, text in lines:
-        if not text:
-            continue
-        key, equals, value = text.partition("=")
-        try:
-            pairs[key.strip().upper()] = float(value.replace("'", ""))
-        except ValueError:
-            raise InputError(f"{file}, line {number}: {text!r} is not KEY = number") from None
-        if not np.isfinite(pairs[key.strip().upper()]):
-            raise InputError(f"{file}, line {number}: {text!r} is not finite")
-    return pairs
-
-
-def _refuse_blocks(file: Path, blocks: dict[str, list[tuple[int, str]]]) -> None:
+def _refuse_blocks(file: Path, blocks: Blocks) -> None:
     """What would change the heights and is not honoured, by name."""
     for name in ("ROAD_CRG", "KD_DEFINITION"):
         if name not in blocks and "ROAD_CRG_FILE" not in blocks:
@@ -112,17 +69,16 @@ def _refuse_blocks(file: Path, blocks: dict[str, list[tuple[int, str]]]) -> None
         ("ROAD_CRG_OPTS", HARMLESS_OPTIONS),
         ("ROAD_CRG_MODS", HARMLESS_MODIFIERS),
     ):
-        for key, value in _pairs(file, blocks.get(block, [])).items():
-            if value != 0.0 and not key.startswith(harmless):
+        for key, value in key_values(file, blocks.get(block, [])).items():
+            without_effect = value == 0.0 or (value == 1.0 and key.startswith("SCALE_"))
+            if not without_effect and not key.startswith(harmless):
                 raise InputError(
                     f"{file}: ${block} {key} = {value:g} is not supported; apply it to the file "
                     "first, or remove it"
                 )
 
 
-def _definition(
-    file: Path, blocks: dict[str, list[tuple[int, str]]]
-) -> tuple[str, list[tuple[int, str, str]]]:
+def _definition(file: Path, blocks: Blocks) -> tuple[str, list[tuple[int, str, str]]]:
     """Format code and the channels as (line, name, unit) of $KD_DEFINITION."""
     code, channels = "KRBI", []
     for number, text in blocks["KD_DEFINITION"]:
@@ -139,9 +95,25 @@ def _definition(
     return code, channels
 
 
-def _rows(file: Path, parameters: dict[str, float]) -> tuple[float, int | None]:
+def _rows(
+    file: Path, parameters: dict[str, float], definition: list[tuple[int, str]]
+) -> tuple[float, int | None]:
     """Step along the line (m), and the number of cross sections where the header gives an end."""
-    step = parameters.get("REFERENCE_LINE_INCREMENT", 0.01)
+    step = parameters.get("REFERENCE_LINE_INCREMENT")
+    for number, text in definition:
+        # The virtual channel repeats the step: U:reference line u,m,start,step
+        fields = [field.strip().lower() for field in text.split(",")]
+        if fields[:2] != ["u:reference line u", "m"] or len(fields) < 4:
+            continue
+        (virtual,) = key_values(file, [(number, f"U={fields[3]}")]).values()
+        if step is not None and abs(virtual - step) > 1e-3 * abs(step):
+            raise InputError(
+                f"{file}, line {number}: step {virtual:g} m, but REFERENCE_LINE_INCREMENT = "
+                f"{step:g} m"
+            )
+        step = virtual if step is None else step
+    if step is None:
+        raise InputError(f"{file}: REFERENCE_LINE_INCREMENT is missing in $ROAD_CRG")
     if not step > 0.0:
         raise InputError(f"{file}: REFERENCE_LINE_INCREMENT = {step:g} m must be positive")
     if "REFERENCE_LINE_END_U" not in parameters:
@@ -186,9 +158,15 @@ def _numbered(file: Path, numbers: Array, parameters: dict[str, float]) -> Array
     """v (m) of numbered sections, from the right border on; centred on the line by default."""
     if not np.array_equal(np.sort(numbers), np.arange(1, len(numbers) + 1)):
         raise InputError(f"{file}: long sections are not numbered 1 to {len(numbers)}")
-    step = parameters.get("LONG_SECTION_V_INCREMENT", 0.01)
-    if not step > 0.0:
-        raise InputError(f"{file}: LONG_SECTION_V_INCREMENT = {step:g} m must be positive")
+    borders = ("LONG_SECTION_V_RIGHT", "LONG_SECTION_V_LEFT")
+    step = parameters.get("LONG_SECTION_V_INCREMENT")
+    if step is None and all(key in parameters for key in borders):
+        step = (parameters[borders[1]] - parameters[borders[0]]) / (len(numbers) - 1)
+    if step is None or not step > 0.0:
+        raise InputError(
+            f"{file}: LONG_SECTION_V_INCREMENT is "
+            f"{'missing' if step is None else f'{step:g} m, not positive'}"
+        )
     right = parameters.get("LONG_SECTION_V_RIGHT", -0.5 * step * (len(numbers) - 1))
     left = right + step * (len(numbers) - 1)
     announced = parameters.get("LONG_SECTION_V_LEFT", left)

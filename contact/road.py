@@ -132,8 +132,9 @@ class PreparedRoad:
         ValueError for x beyond the strip that was prepared: the border would pass for the road.
         """
         ahead = np.asarray(x) - self._lead
-        if ahead.max(initial=0.0) > self._span:
-            raise ValueError(f"x = {ahead.max() + self._lead:g} m lies beyond the prepared strip")
+        farthest = ahead.max(initial=0.0)
+        if farthest > self._span:
+            raise ValueError(f"x = {farthest + self._lead:g} m lies beyond the prepared strip")
         first = self._lead + self._shift[0]
         z = self._road.height(np.maximum(ahead, 0.0) + first, np.asarray(y) + self._shift[1])
         if self.level != 0.0:

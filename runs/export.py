@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fem.errors import InputError
 from runs import xdmf
-from runs.store import replacing
+from runs.disk import replacing
 
 AXES = ("x", "y", "z")
 Columns = dict[str, NDArray]  # heading with unit -> values (n)

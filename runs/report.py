@@ -11,10 +11,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from fem.errors import InputError
 from runs import force_sections, tire_sections
+from runs.disk import write_text
 from runs.quantities import quantity
 from runs.results import Absent, Results, Section
 from runs.schema import key_of, table_of
-from runs.store import write_text
 from runs.tables import Scene
 from runs.version import PROGRAM
 

@@ -139,6 +139,16 @@ def test_truncated_files_are_refused_by_name(tmp_path: Path, name: str) -> None:
         read_grid(file)
 
 
+def test_archive_of_an_unknown_version_is_refused(tmp_path: Path) -> None:
+    np.savez_compressed(tmp_path / "road.npz", x=X, y=Y, z=Z)
+    data = bytearray((tmp_path / "road.npz").read_bytes())
+    for entry in (i for i in range(len(data)) if data[i : i + 4] == b"PK\x01\x02"):
+        data[entry + 6] = 83
+    (tmp_path / "road.npz").write_bytes(bytes(data))
+    with pytest.raises(InputError, match=r"road\.npz: cannot be read"):
+        read_grid(tmp_path / "road.npz")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -32,10 +32,14 @@ def crg(
     """An OpenCRG file with rows z; channels default to numbered long sections every 0.25 m."""
     if channels is None:
         channels = "".join(f"D:long section {i + 1},m ! note\n" for i in range(z.shape[1]))
-    header = "$CT\nmade by a test\n$\n$ROAD_CRG\nREFERENCE_LINE_INCREMENT = 0.5 ! comment\n"
+    header = "$CT\nmade by a test\n$\n$ROAD_CRG\n"
+    if "REFERENCE_LINE_INCREMENT" not in parameters:
+        header += "REFERENCE_LINE_INCREMENT = 0.5 ! comment\n"
     if end:
         header += f"reference_line_start_u = 3.0\nreference_line_end_u = {3 + 0.5 * (len(z) - 1)}\n"
-    header += f"LONG_SECTION_V_INCREMENT = 2.5e-1\n{parameters}{blocks}"
+    if "LONG_SECTION_V" not in parameters:
+        header += "LONG_SECTION_V_INCREMENT = 2.5e-1\n"
+    header += f"{parameters}{blocks}"
     header += f"* a comment\n$KD_DEFINITION\n#:{code}\n{channels}$\n$$$$\n"
     return header.encode("latin-1") + payload(code, z)
 
@@ -151,10 +155,16 @@ SLOPE = PHI.replace("phi,rad", "slope,m/m")
         ({"parameters": "REFERENCE_LINE_START_S = 0.01\n"}, "slope is not supported"),
         ({"parameters": "REFERENCE_LINE_START_B = 0.01\n"}, "banking is not supported"),
         ({"parameters": "REFERENCE_LINE_END_Z = 1.0\n"}, "slope is not supported"),
-        ({"parameters": "LONG_SECTION_V_LEFT = 9.0\n"}, "LONG_SECTION_V_LEFT = 9"),
+        (
+            {"parameters": "LONG_SECTION_V_INCREMENT = 1\nLONG_SECTION_V_LEFT = 9.0\n"},
+            "LONG_SECTION_V_LEFT = 9",
+        ),
+        ({"parameters": "LONG_SECTION_V_RIGHT = -1\n"}, "V_INCREMENT is missing"),
+        ({"parameters": "* REFERENCE_LINE_INCREMENT\n"}, "INCREMENT is missing"),
+        ({"channels": f"U:reference line u,m,0,0.1\n{PHI}"}, "step 0.1 m, but"),
         ({"parameters": "REFERENCE_LINE_INCREMENT = 0.0\n"}, "INCREMENT = 0"),
         ({"parameters": "REFERENCE_LINE_END_U = 1e300\n"}, "no whole number"),
-        ({"parameters": "LONG_SECTION_V_RIGHT = one\n"}, "line 9: .*KEY = number"),
+        ({"parameters": "LONG_SECTION_V_RIGHT = one\n"}, "line 8: .*KEY = number"),
         ({"blocks": "$ROAD_CRG_MODS\nSCALE_Z_GRID = 2.0\n"}, "SCALE_Z_GRID = 2"),
         ({"blocks": "$ROAD_CRG_OPTS\nBORDER_MODE_U = 1\n"}, "BORDER_MODE_U = 1"),
         ({"blocks": "$ROAD_CRG_FILE\nother.crg\n"}, "refers to another file"),
@@ -174,8 +184,18 @@ def test_what_is_not_honoured_is_refused_by_name(tmp_path: Path, keys: dict, mes
         read_opencrg(tmp_path / "road.crg")
 
 
+def test_steps_are_taken_from_the_virtual_channel_and_the_borders(tmp_path: Path) -> None:
+    channels = "U:reference line u,m,3.0,0.5\n"
+    channels += "".join(f"D:long section {i + 1},m\n" for i in range(11))
+    parameters = "* REFERENCE_LINE_INCREMENT\n"
+    parameters += "LONG_SECTION_V_RIGHT = -1.25\nLONG_SECTION_V_LEFT = 1.25\n"
+    (tmp_path / "road.crg").write_bytes(crg("KDBI", Z, parameters=parameters, channels=channels))
+    assert np.allclose(heights(tmp_path / "road.crg"), Z, atol=1e-8)
+
+
 def test_blocks_without_effect_on_heights_are_accepted(tmp_path: Path) -> None:
-    blocks = "$ROAD_CRG_MODS\nREFLINE_OFFSET_X = 100\n$ROAD_CRG_OPTS\nCHECK_EPS = 1e-5\n$\n"
+    blocks = "$ROAD_CRG_MODS\nREFLINE_OFFSET_X = 100\nSCALE_WIDTH = 1\n"
+    blocks += "$ROAD_CRG_OPTS\nCHECK_EPS = 1e-5\n$\n"
     (tmp_path / "road.crg").write_bytes(crg("KDBI", Z, blocks=blocks))
     assert np.allclose(heights(tmp_path / "road.crg"), Z, atol=1e-8)
 
