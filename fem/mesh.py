@@ -81,6 +81,7 @@ class Lattice:
 
     def __init__(self, section: Torus, nodes: np.ndarray):
         self.section = section
+        self.edge = nodes
         self.ring = _subdivide(section.ring_corners, nodes)[:-1]
         self.wall = _subdivide(section.wall_corners, nodes)
         self.arc = _subdivide(section.arc_corners, nodes)

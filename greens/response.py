@@ -37,11 +37,23 @@ class Response:
 
     def impulse(self, times: np.ndarray) -> np.ndarray:
         """Green's functions g (t, r, k), m/(N s), without the residual's delta at t = 0."""
-        waves = np.exp(np.multiply.outer(times, self.eigenvalue))
-        g = np.einsum("rq,tq,qk->trk", self.output, waves, self.input, optimize=True).real
+        return self._waves(times, self.output, self.block_output)
+
+    def momentum_rate(self, times: np.ndarray) -> np.ndarray:
+        """Rate of momentum (t, 3, k) 1/s after a unit impulse of each force, its own jump left out."""
+        s, block = self.eigenvalue, self.block
+        return self._waves(times, self.momentum * s**2, self.block_momentum @ block @ block)
+
+    def direct_momentum_rate(self) -> np.ndarray:
+        """Rate of momentum (3, k) per force acting at the moment itself."""
+        direct = ((self.momentum * self.eigenvalue) @ self.input).real
+        return direct + self.block_momentum @ self.block @ self.block_input
+
+    def _waves(self, times: np.ndarray, output: np.ndarray, block_output: np.ndarray) -> np.ndarray:
+        g = np.stack([((output * np.exp(self.eigenvalue * t)) @ self.input).real for t in times])
         if len(self.block):
             steps = np.stack([linalg.expm(self.block * t) for t in times])
-            g += self.block_output @ steps @ self.block_input
+            g += block_output @ steps @ self.block_input
         return g
 
     def receptance(self, frequency: np.ndarray) -> np.ndarray:

@@ -1,0 +1,66 @@
+"""The points of the tread that may touch the road in a run, in the static state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.errors import ConvergenceError
+
+
+@dataclass(frozen=True)
+class Patch:
+    """c points: `index` (c,) into the outer face, `points` (c, 3) m deformed, `half_sizes` (c, 2) m of
+    the rectangle of each, `force` (c,) N and `gap` (c,) m of the static state on a flat road,
+    `edge` (c,) marks points with a neighbour outside the patch.
+    """
+
+    index: np.ndarray
+    points: np.ndarray
+    half_sizes: np.ndarray
+    force: np.ndarray
+    gap: np.ndarray
+    edge: np.ndarray
+
+    @property
+    def area(self) -> np.ndarray:
+        """Area of each point's rectangle, (c,) m2."""
+        return 4 * self.half_sizes.prod(axis=1)
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """x0, x1, y0, y1 of the points, m."""
+        low, high = self.points[:, :2].min(axis=0), self.points[:, :2].max(axis=0)
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+    def check_edge(self, force: np.ndarray, time: float, reach: float) -> None:
+        """Raise ConvergenceError when a point on the edge touches: its neighbours may touch too."""
+        touching = np.flatnonzero(self.edge & (force > 0))
+        if len(touching):
+            x, y, _ = self.points[touching[0]]
+            raise ConvergenceError(
+                f"contact: at t = {time:.6g} s the road touches the edge of the patch at "
+                f"x = {x:.4g} m, y = {y:.4g} m; points beyond it were left out because their static "
+                f"gap is more than {reach:.4g} m. Give contact.reach a larger value, "
+                f"e.g. {2 * reach:.2g}."
+            )
+
+
+def make_patch(
+    positions: np.ndarray,
+    half_sizes: np.ndarray,
+    force: np.ndarray,
+    gap: np.ndarray,
+    shape: tuple[int, int],
+    reach: float,
+) -> Patch:
+    """The points of the outer face (s of them, as a ring of `shape`) with a static gap within reach (m)."""
+    near = (gap <= reach).reshape(shape)
+    # The beads are the end of the tread; around the axle it closes on itself.
+    grown = np.pad(near, ((0, 0), (1, 1)), constant_values=True)
+    inside = np.roll(near, 1, 0) & np.roll(near, -1, 0) & grown[:, 2:] & grown[:, :-2]
+    index = np.flatnonzero(near.ravel())
+    return Patch(
+        index, positions[index], half_sizes[index], force[index], gap[index], ~inside.ravel()[index]
+    )

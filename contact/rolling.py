@@ -1,0 +1,82 @@
+"""The time loop: a linear tire, its tread, and a road that moves under it.
+
+Each step finds the total contact forces f >= 0 with gaps g >= 0, f . g = 0,
+
+    g = g_static + u_free - r(x + v t, y, t) + (A + C~)(f - f_static),
+
+u_free the tire's motion from past forces, A its answer within the step, C~ the tread's compliance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from contact.complementarity import ContactSolver
+from contact.patch import Patch
+
+
+class Tire(Protocol):
+    """A linear tire between the patch's forces and displacements (greens.recursion, .convolution)."""
+
+    same_step: np.ndarray
+
+    def predict(self) -> np.ndarray: ...
+
+    def advance(self, force: np.ndarray) -> None: ...
+
+    def inertia_force(self) -> np.ndarray: ...
+
+
+@dataclass(frozen=True)
+class Instant:
+    """The state at the end of a step: (c,) arrays in N and m, `axle_force` (3,) N."""
+
+    time: float
+    force: np.ndarray
+    gap: np.ndarray
+    displacement: np.ndarray
+    axle_force: np.ndarray
+    residual: float
+    active: int
+
+
+@dataclass(frozen=True)
+class Drive:
+    """How the road comes: `height(x, y)` m over the static plane, `motion(t)` m, `speed` in m/s."""
+
+    height: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    motion: Callable[[float], float]
+    speed: float
+
+
+def roll(
+    tire: Tire, solver: ContactSolver, patch: Patch, drive: Drive, step: float, steps: int
+) -> Iterator[Instant]:
+    """Yield the state after each of `steps` steps of `step` seconds. Collective when the tire is.
+
+    The solver was made for A + C~. Every process solves the same small contact problem on the same
+    bits, so no process has to wait for another's answer.
+    """
+    x, y = patch.points[:, 0], patch.points[:, 1]
+    for k in range(1, steps + 1):
+        time = k * step
+        free = tire.predict()
+        road = drive.height(x + drive.speed * time, y) + drive.motion(time)
+        force = solver.solve(patch.gap + free - road, reference=patch.force)
+        change = force - patch.force
+        tire.advance(change)
+        axle = -tire.inertia_force()
+        axle[2] += force.sum()
+        yield Instant(
+            time,
+            force,
+            solver.gap,
+            free + tire.same_step @ change,
+            axle,
+            solver.residual,
+            int(np.count_nonzero(force)),
+        )

@@ -1,0 +1,56 @@
+"""Direct convolution with sampled Green's functions (thesis (5.3)): the reference, not the way.
+
+    u_n = sum_{k<n} g((n - k) h) f_k h + G_res f_n,   g(0) = 0
+
+A rectangle rule: first order in h, and only for modes that h resolves well. Time and memory grow
+with the number of steps: n r k multiplications in step n.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fem.errors import InputError
+from greens.response import Response
+
+LARGEST = 4e9  # bytes of sampled Green's functions
+
+
+class Convolution:
+    """The interface of `Recursion` by direct sums over the whole history. Not collective."""
+
+    def __init__(self, response: Response, step: float, steps: int):
+        outputs, forces = response.residual.shape
+        needed = 8.0 * steps * outputs * forces
+        if needed > LARGEST:
+            raise InputError(
+                f'time.scheme = "convolution" needs {needed / 1e9:.1f} GB for {steps} steps of '
+                f"{outputs} x {forces} Green's functions (at most {LARGEST / 1e9:.0f} GB): shorten "
+                'time.duration, or take scheme = "linear", which needs no history'
+            )
+        times = step * np.arange(1, steps + 1)
+        self._kernel = step * response.impulse(times)
+        self._momentum = step * response.momentum_rate(times)
+        self._direct = response.direct_momentum_rate()
+        self._history = np.zeros((steps + 1, forces))
+        self._n = 0
+        self.same_step = response.residual
+
+    def predict(self) -> np.ndarray:
+        """Displacement (r,) m at the end of the step from all forces before it."""
+        self._n += 1
+        return _convolve(self._kernel[: self._n], self._history[: self._n])
+
+    def advance(self, force: np.ndarray) -> None:
+        """Take the force (k,) N at the end of the step."""
+        self._history[self._n] = force
+
+    def inertia_force(self) -> np.ndarray:
+        """Rate of the tire's momentum (3,), N."""
+        past = _convolve(self._momentum[: self._n], self._history[: self._n])
+        return past + self._direct @ self._history[self._n]
+
+
+def _convolve(kernel: np.ndarray, history: np.ndarray) -> np.ndarray:
+    """sum_k kernel[n - 1 - k] history[k]."""
+    return np.einsum("trk,tk->r", kernel[::-1], history, optimize=True)
