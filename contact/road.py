@@ -167,8 +167,8 @@ def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
     Read are the attributes kind, start, lateral, run_in, offset, datum, and by kind: sine:
     amplitude and wavelength (m), phase (degrees); cobblestones: block_length, block_width,
     joint_width, joint_depth, edge_radius, height_scatter (m), stagger, seed; grid and crg: file,
-    holes, end. What is absent or None takes its default; datum is "mean" for files and "zero"
-    otherwise. InputError for an unknown kind, a missing key or a file that cannot be used.
+    holes, end. What is absent or None takes its default; datum is only for files and cobblestones,
+    and "mean" by default: a flat road or a sine is about zero by itself. InputError for an unknown kind, a missing key or a file that cannot be used.
     """
     spec = SimpleNamespace(**keys) if spec is None else spec
     kind = _get(spec, "kind")
@@ -180,7 +180,7 @@ def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
         lateral=_get(spec, "lateral", 0.0),
         run_in=_get(spec, "run_in", 0.1),
         offset=_get(spec, "offset", 0.0),
-        datum=_get(spec, "datum", "mean" if kind in ("grid", "crg") else "zero"),
+        datum=_get(spec, "datum", "mean") if kind in _UNEVEN else "zero",
     )
 
 
@@ -229,6 +229,9 @@ _MAKERS = {
     "grid": _from_file(read_grid),
     "crg": _from_file(read_opencrg),
 }
+
+
+_UNEVEN = ("cobblestones", "grid", "crg")
 
 
 def _mean(road: Road, x0: float, x1: float, y0: float, y1: float) -> float:

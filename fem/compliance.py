@@ -14,14 +14,19 @@ RESIDUAL_TOLERANCE = 1e-8
 
 
 def rotating_stiffness(
-    operators: Operators, rotation: Rotation | None, speed: float, damping: tuple[float, float]
+    operators: Operators,
+    rotation: Rotation | None,
+    speed: float,
+    damping: tuple[float, float],
+    inertia: str = "full",
 ) -> PETSc.Mat:
-    """K_Omega = K + Omega^2 S + gamma1 Omega B + gamma2 Omega K M^-1 B (full inertia). Collective."""
+    """K_Omega = K + Omega^2 S + gamma1 Omega B + gamma2 Omega K M^-1 B; doppler: S_B for S. Collective."""
     stiffness = operators.stiffness.copy()
     if speed == 0:
         return stiffness
     different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
-    stiffness.axpy(speed**2, rotation.convective, different)
+    convective = rotation.convective if inertia == "full" else rotation.body_convective
+    stiffness.axpy(speed**2, convective, different)
     stiffness.axpy(speed * damping[0], rotation.body, different)
     if damping[1]:
         scaled = rotation.body.copy()

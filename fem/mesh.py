@@ -101,6 +101,20 @@ class Lattice:
             (i, _nearest(self.wall, wall), _nearest(self.arc, arc)), self.shape
         )
 
+    def cells(self) -> np.ndarray:
+        """Ids of the nodes of all elements, (cells, nodes), in the order of the Lagrange element."""
+        section = self.section
+        count = section.segments * section.elements_thickness * section.elements_arc
+        return _cells(self, compat.field_nodes(section.order), np.arange(count))
+
+    def quads(self) -> np.ndarray:
+        """The outer face as quadrilaterals between neighbouring nodes, (q, 4) indices into it."""
+        around, _, along = self.shape
+        i, j = np.meshgrid(np.arange(around), np.arange(along - 1), indexing="ij")
+        next_i = (i + 1) % around
+        corners = [i * along + j, next_i * along + j, next_i * along + j + 1, i * along + j + 1]
+        return np.stack(corners, axis=-1).reshape(-1, 4)
+
 
 _BEAD = 0.3
 _NEAR = (
@@ -160,8 +174,12 @@ def build(comm: MPI.Comm, section: Torus) -> TireMesh:
     cells = _cells(geometry, nodes, np.arange(*_share(comm, count)))
     points = geometry.points(np.arange(*_share(comm, geometry.size)))
     mesh = compat.create_mesh(comm, cells, points, section.order)
-    lattice = Lattice(section, _edge(compat.field_nodes(section.order)))
-    return TireMesh(section, lattice, mesh, _tag(mesh, section))
+    return TireMesh(section, field_lattice(section), mesh, _tag(mesh, section))
+
+
+def field_lattice(section: Torus) -> Lattice:
+    """The nodes of the displacement field of a section's mesh."""
+    return Lattice(section, _edge(compat.field_nodes(section.order)))
 
 
 def _share(comm: MPI.Comm, count: int) -> tuple[int, int]:

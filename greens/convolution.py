@@ -36,6 +36,10 @@ class Convolution:
         self._n = 0
         self.same_step = response.residual
 
+    def start(self, force: np.ndarray) -> None:
+        """Begin with a force (k,) N that is already there at t = 0."""
+        self._history[0] = force
+
     def predict(self) -> np.ndarray:
         """Displacement (r,) m at the end of the step from all forces before it."""
         self._n += 1

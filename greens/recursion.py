@@ -61,6 +61,12 @@ class Recursion:
         self.comm.Allreduce(MPI.IN_PLACE, total)
         return total
 
+    def start(self, force: np.ndarray) -> None:
+        """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
+        self._push = self._complex(self._input @ force)
+        if self._block:
+            self._block.start(force)
+
     def predict(self) -> np.ndarray:
         """Displacement (r,) m at the end of the step with no new force. Collective."""
         self._free = self._decay * self.state + self._old * self._push
@@ -107,6 +113,9 @@ class _Block:
 
     def direct(self) -> np.ndarray:
         return self._response.block_output @ self._new
+
+    def start(self, force: np.ndarray) -> None:
+        self._force = force
 
     def predict(self) -> np.ndarray:
         self._free = self._decay @ self.state + self._old @ self._force

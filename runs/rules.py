@@ -16,10 +16,9 @@ LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "tire.mesh": ((), 'only section = "torus" is supported in this version'),
     "tire.section": (("torus",), 'only "torus" is supported in this version'),
     "rotation.method": (("projected",), 'only "projected" is supported in this version'),
-    "greens.residual": (
-        ("none", "dirac", "static"),
-        '"none", "dirac" and "static" are supported in this version',
-    ),
+    "greens.residual": (("none", "static"), '"none" and "static" are supported in this version'),
+    "modal.rim": (("fixed",), 'only "fixed" is supported in this version'),
+    "modal.road": (("forces",), 'only "forces" is supported in this version'),
     "contact.points": (("nodes",), 'only "nodes" is supported in this version'),
     "contact.brush_stiffness": ((), "horizontal contact forces are not in this version: leave it"),
     "contact.friction": ((), "friction is not in this version: leave it"),
@@ -100,8 +99,6 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
     if len(given) > 1:
         raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
-    if scene.modal.road == "held" and not given:
-        raise error(("modal", "road"), '= "held" needs a road: load or deflection in [static]')
     rolling = scene.rotation is not None and scene.rotation.speed > 0
     if rolling and scene.static.steady_rolling and scene.damping.stiffness > 0:
         raise error(
@@ -139,10 +136,6 @@ def _contact(scene: Scene, error: Where) -> None:
         raise error(("contact",), "needs a time to run: add [time] with duration")
     if static.load is None and static.deflection is None and static.road_height is None:
         raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
-    if scene.modal.road == "held":
-        raise error(
-            ("modal", "road"), '= "held" keeps the road in the modes: with [contact] use "forces"'
-        )
 
 
 def _road(scene: Scene, error: Where) -> None:

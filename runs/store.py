@@ -148,6 +148,12 @@ def stage_hash(inputs: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def file_hash(path: str | Path) -> str:
+    """SHA-256 of a file's content: what a stage that reads it depends on."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def stored_hash(path: Path) -> str | None:
     """The input hash of a result file; None when it is absent or no readable result."""
     try:

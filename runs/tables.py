@@ -7,6 +7,7 @@ from runs.schema import choice, flag, integer, number, table, tables, text, vect
 LINEAR = ("model", ("linear", "neo-hookean"))
 SINE = ("kind", ("sine",))
 STONES = ("kind", ("cobblestones",))
+UNEVEN = ("kind", ("cobblestones", "grid", "crg"))
 MEASURED = ("kind", ("grid", "crg"))
 
 
@@ -76,6 +77,9 @@ class Tire:
     elements_thickness: int = integer(1, "elements through the wall", least=1, most=20)
     order: int = integer(2, "of the elements", least=1, most=3)
     grading: str = choice("bead", ("bead", "uniform"), "of the elements along the arc")
+    footprint_size: float = number(
+        1.0, "-", "length of elements at the footprint, relative to ungraded", least=0.05, most=1
+    )
     material: Material = table(Material, "what the wall is made of")
 
 
@@ -175,7 +179,9 @@ class Road:
     lateral: float = number(0.0, "m", "road y under the tire's middle", least=-1e4, most=1e4)
     start: float = number(0.0, "m", "road x under the axle at t = 0", least=-1e6, most=1e6)
     offset: float = number(0.0, "m", "added to all heights", least=-10, most=10)
-    datum: str = choice("mean", ("mean", "zero"), "road height laid on the static road plane")
+    datum: str = choice(
+        "mean", ("mean", "zero"), "road height laid on the static road plane", only_for=UNEVEN
+    )
     amplitude: float = number(1.0e-3, "m", "of the waves", least=0, most=1, only_for=SINE)
     wavelength: float = number(0.1, "m", "of the waves", above=0, most=1e4, only_for=SINE)
     phase: float = number(

@@ -1,0 +1,138 @@
+"""What the stages of one run share: the scene, where results go, and models made on demand."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from mpi4py import MPI
+
+from runs import store
+from runs.mpi import on_root
+from runs.resolved import dumps
+from runs.tables import Scene
+
+
+@dataclass
+class Record:
+    """What a stage tells about itself: figures as name: (value, unit), seconds by part."""
+
+    headline: dict[str, tuple[Any, str]] = field(default_factory=dict)
+    indicators: dict[str, tuple[Any, str]] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    cost: dict[str, float] = field(default_factory=dict)
+
+    def line(self) -> str:
+        """The headline figures in one line."""
+        return ", ".join(
+            f"{name} {_shown(v)} {unit}".rstrip(" -") for name, (v, unit) in self.headline.items()
+        )
+
+    @contextmanager
+    def timing(self, part: str) -> Iterator[None]:
+        """Add the seconds spent inside to a part of the stage's cost."""
+        began = time.perf_counter()
+        yield
+        self.cost[part] = self.cost.get(part, 0.0) + time.perf_counter() - began
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+class Session:
+    """One run of one scene. Stages put what later ones need into `static`, `modal`, `state_modes`,
+    `patch` and so on; the finite-element model is made when a stage first asks for it.
+    """
+
+    def __init__(self, scene: Scene, directory: Path, comm: MPI.Comm):
+        self.scene, self.directory, self.comm = scene, directory, comm
+        self.hashes: dict[str, str] = {}
+        self.record = Record()
+
+    @contextmanager
+    def recording(self, stage: str) -> Iterator[Record]:
+        """A fresh record for a stage; solvers' own figures go there."""
+        self.record = Record()
+        yield self.record
+
+    @property
+    def speed(self) -> float:
+        """Speed of rotation, rad/s; 0 when the wheel stands."""
+        return self.scene.rotation.speed if self.scene.rotation else 0.0
+
+    @property
+    def damping(self) -> tuple[float, float]:
+        """gamma1 (1/s) and gamma2 (s)."""
+        return self.scene.damping.mass, self.scene.damping.stiffness
+
+    @cached_property
+    def section(self):
+        """The torus of the scene."""
+        from fem.mesh import Torus
+
+        tire = self.scene.tire
+        names = {f.name for f in fields(Torus)} - {"half_angle"}
+        given = {name: getattr(tire, name) for name in names}
+        return Torus(half_angle=np.radians(tire.half_angle), **given)
+
+    @cached_property
+    def lattice(self):
+        """The nodes of the displacement field, without a mesh."""
+        from fem.mesh import field_lattice
+
+        return field_lattice(self.section)
+
+    @cached_property
+    def body(self):
+        """The finite-element body, at the static state once that is known. Collective."""
+        from fem.body import Body
+        from fem.material import Material
+
+        body = Body(self.comm, self.section, Material(**vars(self.scene.tire.material)))
+        if hasattr(self, "static"):
+            body.set_displacement(self.static.displacement)
+        return body
+
+    @cached_property
+    def operators(self):
+        """Matrices at the static state. Collective."""
+        from fem.operators import Operators
+
+        with self.record.timing("matrices"):
+            return Operators(self.body, self.scene.static.inflation)
+
+    @cached_property
+    def rotation_matrices(self):
+        """The matrices of the rotating frame. Collective."""
+        with self.record.timing("rotation matrices"):
+            return self.operators.rotation()
+
+    def write(self, path: Path, stage: str, fill) -> None:
+        """Write a stage's file by `fill(file)` on the root process. Collective."""
+        on_root(self.comm, lambda: self._write(path, stage, fill))
+
+    def _write(self, path: Path, stage: str, fill) -> None:
+        with store.writing(path, self.provenance(stage)) as file:
+            fill(file)
+
+    def provenance(self, stage: str) -> store.Provenance:
+        """Where the stage's file comes from."""
+        scene = self.scene
+        return store.Provenance(scene.name, dumps(scene), stage, self.hashes[stage], self.comm.size)
+
+    def read(self, path: Path, pick) -> Any:
+        """What `pick(file)` returns, on every process. Collective."""
+
+        def opened():
+            with h5py.File(path, "r") as file:
+                return pick(file)
+
+        return on_root(self.comm, opened)

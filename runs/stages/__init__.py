@@ -1,0 +1,1 @@
+"""One module a stage: `inputs` (what it depends on), `compute`, and `reuse` of its file."""

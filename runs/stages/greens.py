@@ -1,0 +1,194 @@
+"""greens: responses between the driven points, and between the points of the contact patch."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from scipy import sparse
+
+from contact.motion import make_motion
+from contact.patch import Patch, make_patch
+from contact.road import make_road
+from greens.response import Response, couple
+from modal.rotating import standing
+from runs.session import Session
+from runs.store import put
+
+# What the tire may give way beyond the road's own height, m: the smallest reach of the patch.
+_MARGIN = 5e-3
+
+
+def inputs(session: Session) -> dict:
+    """The state modes and what is driven; the road only through the reach of the patch."""
+    scene = session.scene
+    prepare(session)
+    return {
+        "modes": session.hashes.get("rotating", session.hashes["modes"]),
+        "damping": session.damping,
+        "residual": scene.greens.residual,
+        "forces": [asdict(force) for force in scene.force],
+        "points": session.patch.index.tolist() if scene.contact else [],
+    }
+
+
+def prepare(session: Session) -> None:
+    """The road, the patch and the probes: cheap, and made in every run."""
+    scene = session.scene
+    if session.speed == 0:
+        session.state_modes = standing(session.modal.projection, session.damping)
+    if scene.contact:
+        _prepare_contact(session)
+    if scene.force:
+        _prepare_forces(session)
+
+
+def _prepare_contact(session: Session) -> None:
+    scene, state = session.scene, session.static
+    given = scene.rotation.rolling_radius if scene.rotation else None
+    session.road_speed = session.speed * (given or state.rolling_radius())
+    motion = scene.road.motion
+    session.motion = make_motion(motion.kind, motion.amplitude, motion.frequency, motion.duration)
+    road = make_road(scene.road)
+    session.reach = scene.contact.reach or _reach(session, road)
+    session.patch = _patch(session, session.reach)
+    session.road = _under(session, road, session.patch)
+
+
+def _patch(session: Session, reach: float) -> Patch:
+    state = session.static
+    return make_patch(state.positions, state.half_sizes, state.force, state.gap, state.shape, reach)
+
+
+def _under(session: Session, road, patch: Patch):
+    """The strip of road that the patch drives over in this run."""
+    x0, x1, y0, y1 = patch.extent
+    way = session.road_speed * session.scene.time.duration
+    return road.prepare(x1, x1 + way, y0, y1)
+
+
+def _reach(session: Session, road) -> float:
+    """Static gap up to which a point can touch: the road's highest spot, its motion, a margin.
+
+    The highest spot depends on the strip, the strip on the patch: two rounds settle it.
+    """
+    motion = session.scene.road.motion
+    lift = abs(motion.amplitude) if motion.kind != "none" else 0.0
+    reach = lift + _MARGIN
+    for _ in range(2):
+        patch = _patch(session, reach)
+        strip = _under(session, road, patch)
+        x0, x1, y0, y1 = patch.extent
+        way = session.road_speed * session.scene.time.duration
+        highest = max(strip.highest(x0, x1 + way, y0, y1), 0.0)
+        reach = 1.5 * (highest + lift) + _MARGIN
+    return reach
+
+
+def _prepare_forces(session: Session) -> None:
+    from fem import probe
+
+    lattice = session.lattice
+    loads, readings = [], []
+    for force in session.scene.force:
+        angles = np.radians([force.angle, force.arc])
+        spread = tuple(np.radians(force.spread))
+        loads.append(probe.directed(probe.spot(lattice, *angles, spread), force.direction))
+        here = probe.spot(lattice, *angles)
+        readings += [probe.directed(here, axis) for axis in np.eye(3)]
+    session.loads = sparse.csr_matrix(np.stack(loads))
+    session.readings = sparse.csr_matrix(np.stack(readings))
+
+
+def compute(session: Session, path: Path) -> None:
+    """Static flexibilities, responses, and their file. Collective."""
+    scene = session.scene
+    flexibility: dict[str, np.ndarray] = {}
+    if scene.greens.residual == "static":
+        flexibility = _flexibilities(session)
+    _couple(session, flexibility)
+    _describe(session)
+
+    def fill(file) -> None:
+        for name, values in flexibility.items():
+            put(file, f"{name}/static_flexibility", values, "m/N")
+        if scene.contact:
+            put(file, "contact/index", session.patch.index, "-")
+
+    session.write(path, "greens", fill)
+
+
+def _flexibilities(session: Session) -> dict[str, np.ndarray]:
+    """Exact static flexibility of the contact points and of the driven ones. Collective."""
+    from fem.compliance import compliance, rotating_stiffness
+    from fem.probe import nodes
+
+    operators = session.operators
+    rotation = session.rotation_matrices if session.speed else None
+    inertia = session.scene.rotation.inertia if session.speed else "full"
+    stiffness = rotating_stiffness(operators, rotation, session.speed, session.damping, inertia)
+    out = {}
+    with session.record.timing("static flexibility"):
+        if session.scene.contact:
+            points = nodes(session.patch.index, len(session.static.points))
+            out["contact"] = compliance(operators, stiffness, points, points)
+        if session.scene.force:
+            out["force"] = compliance(operators, stiffness, session.readings, session.loads)
+    stiffness.destroy()
+    return out
+
+
+def _couple(session: Session, flexibility: dict[str, np.ndarray]) -> None:
+    """Responses from the state modes, the residual where its flexibility is given."""
+    modal, modes = session.modal, session.state_modes
+    momentum = modal.projection.momentum
+    if session.scene.contact:
+        shape = modal.shape[3 * session.patch.index + 2]
+        session.contact_response = couple(modes, shape, shape, momentum, flexibility.get("contact"))
+    if session.scene.force:
+        session.force_response = couple(
+            modes,
+            session.readings @ modal.shape,
+            session.loads @ modal.shape,
+            momentum,
+            flexibility.get("force"),
+        )
+
+
+def _describe(session: Session) -> None:
+    record = session.record
+    record.headline["residual flexibility"] = (session.scene.greens.residual, "-")
+    if session.scene.contact:
+        response = session.contact_response
+        record.headline |= {
+            "contact points": (len(session.patch.index), "-"),
+            "reach of the patch": (session.reach, "m"),
+            "rolling speed": (session.road_speed, "m/s"),
+        }
+        _share_of_residual(record, "contact points", response)
+    if session.scene.force:
+        record.headline["driven points"] = (len(session.scene.force), "-")
+
+
+def _share_of_residual(record, where: str, response: Response) -> None:
+    """How much of the static flexibility the modes lack: the truncation, were it not for the residual."""
+    diagonal = np.diag(response.residual)
+    total = diagonal + np.diag(response.static())
+    record.indicators[f"share of the residual in the static flexibility of the {where}"] = (
+        float((diagonal / total).max()),
+        "-",
+    )
+
+
+def reuse(session: Session, path: Path) -> None:
+    """Couple again from the stored flexibilities. Collective."""
+    stored = session.read(
+        path,
+        lambda file: {
+            name: group["static_flexibility"][:]
+            for name, group in file.items()
+            if "static_flexibility" in group
+        },
+    )
+    _couple(session, stored)

@@ -1,0 +1,94 @@
+"""modes: the lowest modes at the static state, and the rotation matrices on them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from runs.session import Session
+from runs.store import put
+
+
+@dataclass(frozen=True)
+class ModalBasis:
+    """`frequency` (m,) Hz, `shape` (3 s, m) kg^-1/2 of the outer face, and the small matrices."""
+
+    frequency: np.ndarray
+    shape: np.ndarray
+    projection: object
+
+
+def inputs(session: Session) -> dict:
+    """The static state and the modal table; rotation matrices only when the wheel turns."""
+    return {
+        "static": session.hashes["static"],
+        "modal": asdict(session.scene.modal),
+        "rotating": session.speed != 0,
+    }
+
+
+def compute(session: Session, path: Path) -> None:
+    """Solve, project and store. Collective."""
+    from modal import undamped
+    from modal.basis import project
+
+    record, operators = session.record, session.operators
+    with record.timing("eigensolver"):
+        modes = undamped.solve(operators.stiffness, operators.mass, session.scene.modal.count)
+    rotation = session.rotation_matrices if session.speed else None
+    with record.timing("projection"):
+        projection = project(modes, rotation, operators.mass, session.comm)
+        nodal = operators.spread(modes.vectors)
+        shape = session.body.surface(nodal).reshape(-1, len(modes.squares))
+    session.modal = ModalBasis(modes.frequency, shape, projection)
+    record.headline |= {
+        "modes": (len(modes.squares), "-"),
+        "lowest": (float(modes.frequency[0]), "Hz"),
+        "highest": (float(modes.frequency[-1]), "Hz"),
+    }
+    record.indicators |= {
+        "worst residual": (float(modes.residual.max()), "-"),
+        "orthonormality": (modes.orthonormality, "-"),
+        "modes by inertia count": (modes.inertia_count, "-"),
+        "counted below": (float(np.sqrt(modes.counted_below) / (2 * np.pi)), "Hz"),
+    }
+    session.write(path, "modes", lambda file: _fill(file, session, modes))
+
+
+def _fill(file, session: Session, modes) -> None:
+    basis = session.modal
+    m = len(basis.frequency)
+    put(file, "frequency", basis.frequency, "Hz")
+    put(file, "residual", modes.residual, "-")
+    put(file, "surface/points", session.static.points, "m")
+    put(file, "surface/shape", basis.shape.T.reshape(m, -1, 3), "kg^-1/2")
+    for name, unit in _UNITS.items():
+        put(file, f"projected/{name}", getattr(basis.projection, name), unit)
+    file.attrs["inertia_count"] = modes.inertia_count
+    file.attrs["rigid_modes"] = 0
+
+
+_UNITS = {
+    "squares": "1/s2",
+    "gyroscopic": "1/rad",
+    "convective": "1/rad2",
+    "body": "1/rad",
+    "body_convective": "1/rad2",
+    "momentum": "kg^1/2",
+}
+
+
+def reuse(session: Session, path: Path) -> None:
+    """Read the basis back. Collective."""
+    from modal.basis import Projection
+
+    def pick(file):
+        shape = file["surface/shape"][:]
+        matrices = {f.name: file[f"projected/{f.name}"][:] for f in fields(Projection)}
+        return ModalBasis(
+            file["frequency"][:], shape.reshape(len(shape), -1).T.copy(), Projection(**matrices)
+        )
+
+    session.modal = session.read(path, pick)

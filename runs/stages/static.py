@@ -1,0 +1,146 @@
+"""static: inflate the tire, press it on the road."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from runs import observe
+from runs.session import Session
+from runs.store import put
+
+
+def inputs(session: Session) -> dict:
+    """The tire, the static loads, and the rolling terms where they take part."""
+    scene = session.scene
+    return {
+        "tire": asdict(scene.tire),
+        "static": asdict(scene.static),
+        "rolling": _rolling(session),
+    }
+
+
+def _rolling(session: Session) -> tuple[float, float]:
+    """Speed and damping of the steady-rolling state; zeros at rest."""
+    if not session.scene.static.steady_rolling or session.speed == 0:
+        return 0.0, 0.0
+    return session.speed, session.damping[0]
+
+
+def compute(session: Session, path: Path) -> None:
+    """Solve and store. Collective."""
+    from fem.equilibrium import Equilibrium, Rolling
+    from fem.loading import Loader
+    from fem.state import static_state
+
+    record, wanted = session.record, session.scene.static
+    with record.timing("mesh and forms"):
+        equilibrium = Equilibrium(session.body, Rolling(*_rolling(session)))
+    loader = Loader(equilibrium, _show)
+    with record.timing("inflation"):
+        loader.inflate(wanted.inflation)
+    with record.timing("road"):
+        road = _place(loader, wanted)
+    state = static_state(equilibrium, loader.touch, road)
+    session.static = state
+    _describe(session, loader)
+    session.write(path, "static", lambda file: _fill(file, session))
+
+
+def _place(loader, wanted) -> float | None:
+    """Height of the road plane, m, after pressing the tire on it. Collective."""
+    if wanted.load is not None:
+        return loader.touch + loader.carry(wanted.load)
+    if wanted.deflection is not None:
+        loader.deflect(wanted.deflection)
+        return loader.touch + wanted.deflection
+    if wanted.road_height is not None:
+        loader.deflect(wanted.road_height - loader.touch)
+    return wanted.road_height
+
+
+def _show(progress) -> None:
+    step = progress.step
+    observe.say(
+        f"  {progress.what} {progress.value:.6g} {progress.unit}: load {progress.load:.6g} N on "
+        f"{progress.active} points, {step.iterations} Newton steps, residual {step.residual:.1e}"
+    )
+
+
+def _describe(session: Session, loader) -> None:
+    record, state = session.record, session.static
+    free = 3 * len(state.displacement)
+    record.headline["unknowns"] = (free, "-")
+    if state.road_height is not None:
+        length, width = state.footprint()
+        record.headline |= {
+            "load": (state.load, "N"),
+            "deflection": (state.road_height - state.touch_height, "m"),
+            "footprint length": (length, "m"),
+            "footprint width": (width, "m"),
+            "contact points": (int((state.force > 0).sum()), "-"),
+        }
+        record.indicators["least contact force"] = (float(state.force.min()), "N")
+        record.indicators["largest penetration"] = (float(-min(state.gap.min(), 0.0)), "m")
+    record.headline["rolling radius"] = (state.rolling_radius(), "m")
+    record.indicators["Newton steps"] = (loader.newton_steps, "-")
+    if session.speed and not session.scene.static.steady_rolling:
+        record.warnings.append(
+            "the tire rolls on its state at rest (static.steady_rolling = false): centrifugal and "
+            "damping forces of the rolling shape are left out of it"
+        )
+
+
+def _fill(file, session: Session) -> None:
+    state, lattice = session.static, session.body.lattice
+    put(file, "mesh/points", lattice.points(np.arange(lattice.size)), "m")
+    put(file, "mesh/cells", lattice.cells(), "-")
+    put(file, "displacement", state.displacement, "m")
+    put(file, "surface/points", state.points, "m")
+    put(file, "surface/displacement", state.moved, "m")
+    put(file, "surface/quads", lattice.quads(), "-")
+    put(file, "surface/force", state.force, "N")
+    put(file, "surface/half_sizes", state.half_sizes, "m")
+    put(file, "surface/ring_rate", state.ring_rate, "m/rad")
+    file.attrs["touch_height"] = state.touch_height
+    file.attrs["inflation"] = session.scene.static.inflation
+    file.attrs["load"] = state.load
+    file.attrs["rolling_radius"] = state.rolling_radius()
+    if state.road_height is None:
+        return
+    near = np.flatnonzero(state.gap < session.scene.tire.thickness)
+    force = np.zeros((len(near), 3))
+    force[:, 2] = state.force[near]
+    put(file, "contact/index", near, "-")
+    put(file, "contact/points", state.positions[near], "m")
+    put(file, "contact/force", force, "N")
+    put(file, "contact/gap", state.gap[near], "m")
+    put(file, "contact/area", 4 * state.half_sizes[near].prod(axis=1), "m2")
+    file.attrs["road_height"] = state.road_height
+    file.attrs["deflection"] = state.road_height - state.touch_height
+    file.attrs["footprint_length"], file.attrs["footprint_width"] = state.footprint()
+
+
+def reuse(session: Session, path: Path) -> None:
+    """Read the state back. Collective."""
+    from fem.state import StaticState
+
+    def pick(file):
+        surface = file["surface"]
+        section = session.scene.tire
+        along = section.elements_arc * section.order + 1
+        return StaticState(
+            file["displacement"][:],
+            surface["points"][:],
+            surface["displacement"][:],
+            surface["force"][:],
+            surface["half_sizes"][:],
+            surface["ring_rate"][:],
+            shape=(len(surface["points"]) // along, along),
+            touch_height=float(file.attrs["touch_height"]),
+            road_height=float(file.attrs["road_height"]) if "road_height" in file.attrs else None,
+        )
+
+    session.static = session.read(path, pick)
