@@ -59,7 +59,7 @@ def solve(stiffness: PETSc.Mat, mass: np.ndarray, count: int) -> Modes:
     iterations = eps.getIterationNumber()
     eps.destroy()
     _check_stable(values)
-    below, wanted = _gap_above(values, count)
+    below, wanted = _gap_above(values[: count + _EXTRA], count)
     inertia = _count_below(scaled, below)
     if inertia != wanted:
         raise ConvergenceError(
