@@ -22,11 +22,9 @@ MEAN_POINTS = 1_000_000
 
 
 class Road(Protocol):
-    """Heights over a plane: x (m) in rolling direction from the road's beginning, y (m) to the
-    left.
+    """Heights (m) at x in rolling direction from the road's beginning and y to the left (m).
 
-    `extent` ((x0, x1), (y0, y1)) in m, may be infinite; `spacing` the shortest length it resolves,
-    m.
+    `extent` ((x0, x1), (y0, y1)) in m, may be infinite; `spacing` (m) the shortest length resolved.
     """
 
     @property
@@ -71,11 +69,11 @@ class RoadUnderTire:
         self._start, self._lateral, self._run_in, self._offset = start, lateral, run_in, offset
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "PreparedRoad":
-        """The strip of a run: x0 (m) is the foremost point of the patch at t = 0, ahead of the
-        axle, x1 the farthest it gets, y0 and y1 its sides, from the tire's middle.
+        """The strip of a run, in distances (m) from the axle's start and from the tire's middle.
 
-        Up to x0 the road is flat, whatever the file holds there: the tire stands on it at t = 0.
-        InputError when the road is too short or too narrow or has holes there.
+        x0 is the foremost point of the patch at t = 0, ahead of the axle, x1 the farthest it gets,
+        y0 and y1 its sides. Up to x0 the road is flat, whatever the file holds there: the tire
+        stands on it at t = 0. InputError when the road is too short, too narrow or has holes there.
         """
         if not (x0 <= x1 and y0 <= y1):
             raise InputError(f"road: empty strip, x {x0:g} to {x1:g} m, y {y0:g} to {y1:g} m")
@@ -97,8 +95,7 @@ class RoadUnderTire:
 
 
 class PreparedRoad:
-    """z(x, y) = s((x - lead)/run_in) [h(x + start, y + lateral) + level], s the smoothstep, all in
-    m.
+    """z(x, y) = s((x - lead)/run_in) [h(x + start, y + lateral) + level] in m, s the smoothstep.
 
     x is the distance from the axle's starting point, y from the tire's middle. Also a `Road`, apart
     from `prepare`. `filled` counts the holes that were filled, `level` is what was added to all
@@ -161,14 +158,14 @@ class PreparedRoad:
 
 
 def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
-    """The road of a scene: `make_road(scene.road)` or `make_road(kind="sine", amplitude=1e-3,
-    ...)`.
+    """The road of a scene, make_road(scene.road), or of keys, make_road(kind="flat").
 
     Read are the attributes kind, start, lateral, run_in, offset, datum, and by kind: sine:
     amplitude and wavelength (m), phase (degrees); cobblestones: block_length, block_width,
     joint_width, joint_depth, edge_radius, height_scatter (m), stagger, seed; grid and crg: file,
-    holes, end. What is absent or None takes its default; datum is "mean" for files and "zero"
-    otherwise. InputError for an unknown kind, a missing key or a file that cannot be used.
+    holes, end.
+    What is absent or None takes its default; datum is "mean" for files and "zero" otherwise.
+    InputError for an unknown kind, a missing key or a file that cannot be used.
     """
     spec = SimpleNamespace(**keys) if spec is None else spec
     kind = _get(spec, "kind")
@@ -232,9 +229,7 @@ _MAKERS = {
 
 
 def _mean(road: Road, x0: float, x1: float, y0: float, y1: float) -> float:
-    """Mean height (m) of the strip over its area, at half the road's spacing or as fine as
-    affordable.
-    """
+    """Mean height (m) over the strip's area, at half the road's spacing where affordable."""
     step = 0.5 * road.spacing
     if not np.isfinite(step):
         return 0.0
