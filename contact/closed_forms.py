@@ -36,8 +36,9 @@ def contact_modulus(youngs_modulus: float, poisson_ratio: float) -> float:
 
 
 def hertz_sphere(load: float, radius: float, modulus: float) -> SphereContact:
-    """Sphere of relative radius R (m) under a load F (N): a^3 = 3FR/4E*, delta = a^2/R, p0 = 3F/(2
-    pi a^2).
+    """Sphere of relative radius R (m) under a load F (N).
+
+    a^3 = 3FR/4E*, approach a^2/R, peak pressure 3F/(2 pi a^2).
     """
     a = (0.75 * load * radius / modulus) ** (1.0 / 3.0)
     return SphereContact(a, a**2 / radius, 1.5 * load / (math.pi * a**2))
@@ -49,22 +50,19 @@ def hertz_sphere_load(approach: float, radius: float, modulus: float) -> float:
 
 
 def hertz_cylinder(load: float, radius: float, modulus: float) -> CylinderContact:
-    """Cylinder of relative radius R (m), load P per length (N/m): a^2 = 4PR/(pi E*), p0 = 2P/(pi
-    a).
+    """Cylinder of relative radius R (m) under a load P per length (N/m).
+
+    a^2 = 4PR/(pi E*), peak pressure 2P/(pi a).
     """
     a = math.sqrt(4.0 * load * radius / (math.pi * modulus))
     return CylinderContact(a, 2.0 * load / (math.pi * a))
 
 
 def square_punch_load(approach: float, half_side: float, modulus: float) -> float:
-    """Load (N) on a rigid flat square punch: F = 2.3046 E* a delta, lengths in m, from the plate's
-    capacity.
-    """
+    """Load (N) on a rigid flat square punch: F = 2.3046 E* a delta, lengths in m."""
     return SQUARE_PUNCH * modulus * half_side * approach
 
 
 def love_square_centre(pressure: float, half_side: float, modulus: float) -> float:
-    """Displacement (m) at the centre of a square under uniform pressure: 8 ln(1 + sqrt 2) p a/(pi
-    E*).
-    """
+    """Displacement (m) at the centre of a uniformly loaded square: 8 ln(1 + sqrt 2) p a/(pi E*)."""
     return LOVE_SQUARE_CENTRE * pressure * half_side / (math.pi * modulus)

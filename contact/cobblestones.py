@@ -19,8 +19,11 @@ TABLE_LIMIT = 2_000_000
 
 
 class Blocks(NamedTuple):
-    """Sizes of the pavement in m; `length` along x, `width` along y, `scatter` the standard
-    deviation of the blocks' heights, `stagger` shifts every second row by half a block."""
+    """Sizes of the pavement, m.
+
+    `length` along x, `width` along y, `scatter` the standard deviation of the blocks' heights;
+    `stagger` shifts every second row by half a block.
+    """
 
     length: float
     width: float

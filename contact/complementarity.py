@@ -18,20 +18,17 @@ from fem.errors import ConvergenceError, InputError
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# A sign error below this share of the problem's scale is rounding: without it a point with f = g =
-# 0 flips in and out for ever.
+# A sign error below this share of the scale is rounding: without it a point whose force and gap are
+# both 0 flips in and out for ever.
 ROUNDING = 1e-12
 # Share of the scale the complementarity residual may reach in the end.
 TOLERANCE = 1e-9
-# Full exchanges that may fail to reduce the number of wrong signs before single exchanges take
-# over.
+# Full exchanges that may fail to reduce the wrong signs before single exchanges take over.
 PATIENCE = 10
 
 
 class ContactSolver(Protocol):
-    """What the time loop needs of a solver. After `solve`: `active`, `gap`, `residual`,
-    `iterations`.
-    """
+    """What the time loop needs; `active`, `gap` (m), `residual`, ... are of the last solve."""
 
     active: Mask
     gap: Array
@@ -84,10 +81,13 @@ class ActiveSet:
         """
         n = len(self._diagonal)
         active = self.active if guess_active is None else np.asarray(guess_active, dtype=bool)
+        largest = float(np.abs(q).max())
+        if not np.isfinite(largest):
+            check_residual("active-set", np.nan)
         best, patience = n + 1, PATIENCE
         for self.iterations in range(1, 20 * n + 100):
             force, gap = self._at(active, q, reference)
-            scale = np.abs(q).max() + self._scale * np.abs(force).max()
+            scale = largest + self._scale * float(np.abs(force).max())
             wrong = np.where(active, force * self._diagonal, gap) < -ROUNDING * scale
             count = np.count_nonzero(wrong)
             if count == 0:
@@ -110,7 +110,6 @@ class ActiveSet:
     def _at(self, active: Mask, q: Array, reference: Array | None) -> tuple[Array, Array]:
         """Forces and gaps when exactly the active points touch (g = 0 there, f = 0 elsewhere)."""
         self._factorise(active)
-        index = self._index
         index, force, gap = self._index, np.zeros(len(q)), q
         if reference is not None:
             lifted = np.where(active, 0.0, reference)
@@ -154,9 +153,7 @@ class ActiveSet:
 
 
 def make_solver(name: str, matrix: Array) -> ContactSolver:
-    """The solver of the scene's `contact.solver`: "active-set" or "snes-vi". InputError for another
-    name.
-    """
+    """The solver named "active-set" or "snes-vi" (`contact.solver`). InputError for another."""
     if name == "active-set":
         return ActiveSet(matrix)
     if name == "snes-vi":

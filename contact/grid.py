@@ -40,8 +40,7 @@ class Axis:
 
 
 class Grid:
-    """Heights z (nx, ny) m at x (nx,) and y (ny,) m, both ascending; x is counted from its first
-    value.
+    """Heights z (nx, ny) at ascending x (nx,) and y (ny,), all in m; x counts from its first value.
 
     `holes`: what becomes of missing heights (NaN) inside the strip that `prepare` is asked for:
     "refuse" them, or "fill" them by linear interpolation across the road, then along it, and by the
@@ -168,8 +167,11 @@ class Grid:
 
 
 def fill_holes(z: Array, x: Array, y: Array, source: str = "road") -> Array:
-    """z (nx, ny) m with NaN replaced: linear across y between valid neighbours (the nearest one
-    beyond the last), then the same along x for rows without any. InputError when all is missing."""
+    """z (nx, ny) m with its NaN replaced.
+
+    Linear across y between valid neighbours, the nearest one beyond the last, then the same along x
+    for rows without any. InputError when all is missing.
+    """
     if not np.isnan(z).any():
         return z
     z = z.copy()

@@ -21,6 +21,8 @@ from fem.errors import InputError
 Array = NDArray[np.float64]
 
 SMALLEST_RADIUS = 20.0
+# Steps (m) beyond it are damage, and would overflow further on.
+LONGEST_STEP = 1e6
 FORMATS = ("KRBI", "KDBI", "LRFI", "LDFI")
 # Options that say how to search, check and log: heights do not depend on them.
 HARMLESS_OPTIONS = ("REFLINE_SEARCH_", "WARN_", "LOG_", "CHECK_")
@@ -114,8 +116,8 @@ def _rows(
         step = virtual if step is None else step
     if step is None:
         raise InputError(f"{file}: REFERENCE_LINE_INCREMENT is missing in $ROAD_CRG")
-    if not step > 0.0:
-        raise InputError(f"{file}: REFERENCE_LINE_INCREMENT = {step:g} m must be positive")
+    if not 0.0 < step < LONGEST_STEP:
+        raise InputError(f"{file}: REFERENCE_LINE_INCREMENT = {step:g} m is no step of a road")
     if "REFERENCE_LINE_END_U" not in parameters:
         return step, None
     length = parameters["REFERENCE_LINE_END_U"] - parameters.get("REFERENCE_LINE_START_U", 0.0)
@@ -162,10 +164,10 @@ def _numbered(file: Path, numbers: Array, parameters: dict[str, float]) -> Array
     step = parameters.get("LONG_SECTION_V_INCREMENT")
     if step is None and all(key in parameters for key in borders):
         step = (parameters[borders[1]] - parameters[borders[0]]) / (len(numbers) - 1)
-    if step is None or not step > 0.0:
+    if step is None or not 0.0 < step < LONGEST_STEP:
         raise InputError(
             f"{file}: LONG_SECTION_V_INCREMENT is "
-            f"{'missing' if step is None else f'{step:g} m, not positive'}"
+            f"{'missing' if step is None else f'{step:g} m, no step of a road'}"
         )
     right = parameters.get("LONG_SECTION_V_RIGHT", -0.5 * step * (len(numbers) - 1))
     left = right + step * (len(numbers) - 1)

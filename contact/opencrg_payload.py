@@ -14,8 +14,11 @@ RECORD = 80
 
 
 class Payload(NamedTuple):
-    """Where a file's numbers are: format code, byte and line where they begin, numbers a row, and
-    the rows its header announces (None if it does not)."""
+    """Where a file's numbers are and how many.
+
+    Format code, byte and line where they begin, numbers a row, and the rows the header announces
+    (None if it does not).
+    """
 
     file: Path
     code: str

@@ -11,22 +11,22 @@ from contact.cobblestones import Blocks, Cobblestones
 from contact.flat import Flat
 from contact.grid import Grid
 from contact.grid_file import read_grid
+from contact.levelling import Level, mean_level, wave_level
 from contact.opencrg import read_opencrg
 from contact.sine import Sine
 from fem.errors import InputError
 
 Array = NDArray[np.float64]
 
-# The mean height of the strip is taken over at most this many points.
-MEAN_POINTS = 1_000_000
+
+# Pieces a strip is cut into for its bounds: the level changes slowly over one.
+PIECES = 64
 
 
 class Road(Protocol):
-    """Heights over a plane: x (m) in rolling direction from the road's beginning, y (m) to the
-    left.
+    """Heights (m) at x in rolling direction from the road's beginning and y to the left (m).
 
-    `extent` ((x0, x1), (y0, y1)) in m, may be infinite; `spacing` the shortest length it resolves,
-    m.
+    `extent` ((x0, x1), (y0, y1)) in m, may be infinite; `spacing` (m) the shortest length resolved.
     """
 
     @property
@@ -50,7 +50,7 @@ class RoadUnderTire:
     start (m): the road's x under the axle at t = 0; lateral (m): the road's y under the tire's
     middle; run_in (m): the length over which heights are eased in, so that the run starts at rest;
     offset (m): added to all heights; datum: "mean" subtracts the strip's mean height, "zero"
-    nothing.
+    nothing; longest_wave (m): longer waves are taken out too, as an axle that follows them does.
     """
 
     def __init__(
@@ -62,6 +62,7 @@ class RoadUnderTire:
         run_in: float = 0.1,
         offset: float = 0.0,
         datum: str = "zero",
+        longest_wave: float | None = None,
     ) -> None:
         if datum not in ("mean", "zero"):
             raise InputError(f'road: datum = "{datum}" is unknown: take "mean" or "zero"')
@@ -69,13 +70,14 @@ class RoadUnderTire:
             raise InputError(f"road: run_in {run_in:g} m must not be negative")
         self.road, self._datum = road, datum
         self._start, self._lateral, self._run_in, self._offset = start, lateral, run_in, offset
+        self._longest_wave = longest_wave
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "PreparedRoad":
-        """The strip of a run: x0 (m) is the foremost point of the patch at t = 0, ahead of the
-        axle, x1 the farthest it gets, y0 and y1 its sides, from the tire's middle.
+        """The strip of a run, in distances (m) from the axle's start and from the tire's middle.
 
-        Up to x0 the road is flat, whatever the file holds there: the tire stands on it at t = 0.
-        InputError when the road is too short or too narrow or has holes there.
+        x0 is the foremost point of the patch at t = 0, ahead of the axle, x1 the farthest it gets,
+        y0 and y1 its sides. Up to x0 the road is flat, whatever the file holds there: the tire
+        stands on it at t = 0. InputError when the road is too short, too narrow or has holes there.
         """
         if not (x0 <= x1 and y0 <= y1):
             raise InputError(f"road: empty strip, x {x0:g} to {x1:g} m, y {y0:g} to {y1:g} m")
@@ -86,34 +88,38 @@ class RoadUnderTire:
             y1 + self._lateral,
         )
         road = self.road.prepare(*strip)
-        level = _mean(road, *strip) if self._datum == "mean" else 0.0
         return PreparedRoad(
             road,
             shift=(self._start, self._lateral),
-            level=self._offset - level,
+            level=self._level(road, strip),
+            offset=self._offset,
             reach=(x0, x1),
             run_in=self._run_in,
         )
 
+    def _level(self, road: Road, strip: tuple[float, float, float, float]) -> Level | None:
+        if self._longest_wave is not None:
+            return wave_level(road, *strip, self._longest_wave)
+        return mean_level(road, *strip) if self._datum == "mean" else None
+
 
 class PreparedRoad:
-    """z(x, y) = s((x - lead)/run_in) [h(x + start, y + lateral) + level], s the smoothstep, all in
-    m.
+    """z(x, y) = s((x - lead)/run_in) [h(x + start, y + lateral) + offset - level] in m.
 
-    x is the distance from the axle's starting point, y from the tire's middle. Also a `Road`, apart
-    from `prepare`. `filled` counts the holes that were filled, `level` is what was added to all
-    heights.
+    s is the smoothstep, x the distance from the axle's starting point, y from the tire's middle.
+    Also a `Road`, apart from `prepare`. `filled` counts the holes that were filled.
     """
 
     def __init__(
         self,
         road: Road,
         shift: tuple[float, float],
-        level: float,
+        level: Level | None,
+        offset: float,
         reach: tuple[float, float],
         run_in: float,
     ) -> None:
-        self._road, self._shift, self.level = road, shift, level
+        self._road, self._shift, self._level, self._offset = road, shift, level, offset
         self._lead, self._run_in = reach[0], run_in
         self._span = (reach[1] - reach[0]) * (1.0 + 1e-9)
         self.spacing = road.spacing
@@ -136,9 +142,12 @@ class PreparedRoad:
         if farthest > self._span:
             raise ValueError(f"x = {farthest + self._lead:g} m lies beyond the prepared strip")
         first = self._lead + self._shift[0]
-        z = self._road.height(np.maximum(ahead, 0.0) + first, np.asarray(y) + self._shift[1])
-        if self.level != 0.0:
-            z = z + self.level
+        along = np.maximum(ahead, 0.0) + first
+        z = self._road.height(along, np.asarray(y) + self._shift[1])
+        if self._offset != 0.0:
+            z = z + self._offset
+        if self._level is not None:
+            z = z - self._level(along)
         if ahead.min(initial=np.inf) >= self._run_in:
             return z
         return z * self._share(ahead)
@@ -151,24 +160,33 @@ class PreparedRoad:
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """Upper bound (m) of the heights in a strip, the flat start included."""
-        dx, dy = self._shift
-        return max(0.0, self._road.highest(x0 + dx, x1 + dx, y0 + dy, y1 + dy) + self.level)
+        pieces = self._pieces(x0, x1, y0, y1)
+        return max(0.0, *(self._road.highest(*piece) - low for piece, low, _ in pieces))
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """Lower bound (m) of the heights in a strip, the flat start included."""
+        pieces = self._pieces(x0, x1, y0, y1)
+        return min(0.0, *(self._road.lowest(*piece) - high for piece, _, high in pieces))
+
+    def _pieces(self, x0: float, x1: float, y0: float, y1: float):
+        """The strip in the road's own coordinates, piece by piece with bounds of what is taken off."""
         dx, dy = self._shift
-        return min(0.0, self._road.lowest(x0 + dx, x1 + dx, y0 + dy, y1 + dy) + self.level)
+        edges = np.linspace(x0 + dx, x1 + dx, PIECES + 1)
+        for start, end in zip(edges[:-1], edges[1:], strict=True):
+            low, high = self._level.bounds(start, end) if self._level else (0.0, 0.0)
+            yield (start, end, y0 + dy, y1 + dy), low - self._offset, high - self._offset
 
 
 def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
-    """The road of a scene: `make_road(scene.road)` or `make_road(kind="sine", amplitude=1e-3,
-    ...)`.
+    """The road of a scene, make_road(scene.road), or of keys, make_road(kind="flat").
 
-    Read are the attributes kind, start, lateral, run_in, offset, datum, and by kind: sine:
-    amplitude and wavelength (m), phase (degrees); cobblestones: block_length, block_width,
+    Read are the attributes kind, start, lateral, run_in, offset, datum, longest_wave, and by kind:
+    sine: amplitude and wavelength (m), phase (degrees); cobblestones: block_length, block_width,
     joint_width, joint_depth, edge_radius, height_scatter (m), stagger, seed; grid and crg: file,
-    holes, end. What is absent or None takes its default; datum is only for files and cobblestones,
-    and "mean" by default: a flat road or a sine is about zero by itself. InputError for an unknown kind, a missing key or a file that cannot be used.
+    holes, end.
+    What is absent or None takes its default; datum and longest_wave are only for files and
+    cobblestones, datum "mean" by default: a flat road or a sine is about zero by itself.
+    InputError for an unknown kind, a missing key or a file that cannot be used.
     """
     spec = SimpleNamespace(**keys) if spec is None else spec
     kind = _get(spec, "kind")
@@ -181,6 +199,7 @@ def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
         run_in=_get(spec, "run_in", 0.1),
         offset=_get(spec, "offset", 0.0),
         datum=_get(spec, "datum", "mean") if kind in _UNEVEN else "zero",
+        longest_wave=getattr(spec, "longest_wave", None),
     )
 
 
@@ -232,19 +251,3 @@ _MAKERS = {
 
 
 _UNEVEN = ("cobblestones", "grid", "crg")
-
-
-def _mean(road: Road, x0: float, x1: float, y0: float, y1: float) -> float:
-    """Mean height (m) of the strip over its area, at half the road's spacing or as fine as
-    affordable.
-    """
-    step = 0.5 * road.spacing
-    if not np.isfinite(step):
-        return 0.0
-    counts = [max(int(np.ceil(d / step)), 1) for d in (x1 - x0, y1 - y0)]
-    excess = np.sqrt(max(1.0, counts[0] * counts[1] / MEAN_POINTS))
-    nx, ny = (max(int(c / excess), 1) for c in counts)
-    x = x0 + (np.arange(nx) + 0.5) * (x1 - x0) / nx
-    y = y0 + (np.arange(ny) + 0.5) * (y1 - y0) / ny
-    total = sum(road.height(x, np.full(nx, yj)).sum() for yj in y)
-    return float(total) / (nx * ny)

@@ -1,6 +1,4 @@
-"""The same contact problem through PETSc's SNES VI: independent of ours, slower, and open to PETSc
-options.
-"""
+"""The same contact problem through PETSc's SNES VI: an independent check, slower."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,5 +1,4 @@
-"""Tread rubber between the carcass and the road: the compliance added to that of the tire, point by
-point.
+"""Tread rubber between carcass and road: a compliance added to the tire's, point by point.
 
 Each function returns a dense (n, n) array in m/N: entry (i, j) is the approach of point i to the
 carcass when a unit force presses on point j. None of them is collective.
@@ -104,9 +103,7 @@ def _primitive(x: Array, y: Array) -> Array:
 
 
 def _far_potential(x: Array, y: Array, a: Array, b: Array) -> Array:
-    """The same integral by a product Gauss rule: smooth away from the rectangle, and nothing
-    cancels.
-    """
+    """The same integral by a product Gauss rule: smooth out there, and nothing cancels."""
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     total = np.zeros_like(x)
     for s, ws in zip(nodes, weights, strict=True):

@@ -14,19 +14,20 @@ class Projection:
     """Phi^T X Phi of the matrices with Omega taken out (physics of the rotating frame).
 
     `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad skew; `convective`, `body_convective`
-    (m, m) 1/rad2 symmetric; `momentum` (3, m) kg^1/2: int rho phi_k, the mass each mode moves.
+    (m, m) 1/rad2 symmetric, all four None for a wheel that stands; `momentum` (3, m) kg^1/2:
+    int rho phi_k, the mass each mode moves.
     """
 
     squares: np.ndarray
-    gyroscopic: np.ndarray
-    convective: np.ndarray
-    body: np.ndarray
-    body_convective: np.ndarray
     momentum: np.ndarray
+    gyroscopic: np.ndarray | None = None
+    convective: np.ndarray | None = None
+    body: np.ndarray | None = None
+    body_convective: np.ndarray | None = None
 
 
 def project(modes: Modes, rotation, mass: np.ndarray, comm) -> Projection:
-    """Project the rotation matrices (fem.operators.Rotation) and the momentum. Collective."""
+    """Project the rotation matrices (fem.operators.Rotation, or None) and the momentum. Collective."""
     vectors = modes.vectors
 
     def reduced(matrix):
@@ -40,11 +41,13 @@ def project(modes: Modes, rotation, mass: np.ndarray, comm) -> Projection:
 
     weighted = mass[:, None] * vectors
     momentum = comm.allreduce(np.stack([weighted[d::3].sum(axis=0) for d in range(3)]))
+    if rotation is None:
+        return Projection(modes.squares, momentum)
     return Projection(
         modes.squares,
+        momentum,
         skew(reduced(rotation.gyroscopic)),
         symmetric(reduced(rotation.convective)),
         skew(reduced(rotation.body)),
         symmetric(reduced(rotation.body_convective)),
-        momentum,
     )

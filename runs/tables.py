@@ -182,6 +182,14 @@ class Road:
     datum: str = choice(
         "mean", ("mean", "zero"), "road height laid on the static road plane", only_for=UNEVEN
     )
+    longest_wave: float | None = number(
+        None,
+        "m",
+        "longer waves are taken out: the axle follows them; absent: all stay",
+        above=0,
+        most=1e4,
+        only_for=UNEVEN,
+    )
     amplitude: float = number(1.0e-3, "m", "of the waves", least=0, most=1, only_for=SINE)
     wavelength: float = number(0.1, "m", "of the waves", above=0, most=1e4, only_for=SINE)
     phase: float = number(

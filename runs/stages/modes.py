@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +65,8 @@ def _fill(file, session: Session, modes) -> None:
     put(file, "surface/points", session.static.points, "m")
     put(file, "surface/shape", basis.shape.T.reshape(m, -1, 3), "kg^-1/2")
     for name, unit in _UNITS.items():
-        put(file, f"projected/{name}", getattr(basis.projection, name), unit)
+        if getattr(basis.projection, name) is not None:
+            put(file, f"projected/{name}", getattr(basis.projection, name), unit)
     file.attrs["inertia_count"] = modes.inertia_count
     file.attrs["rigid_modes"] = 0
 
@@ -86,7 +87,7 @@ def reuse(session: Session, path: Path) -> None:
 
     def pick(file):
         shape = file["surface/shape"][:]
-        matrices = {f.name: file[f"projected/{f.name}"][:] for f in fields(Projection)}
+        matrices = {name: values[:] for name, values in file["projected"].items()}
         return ModalBasis(
             file["frequency"][:], shape.reshape(len(shape), -1).T.copy(), Projection(**matrices)
         )

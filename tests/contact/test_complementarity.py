@@ -190,9 +190,10 @@ def test_clipping_negative_forces_is_no_solution() -> None:
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_gaps_that_are_not_finite_stop_the_run(solver: str) -> None:
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_gaps_that_are_not_finite_stop_the_run(solver: str, value: float) -> None:
     with pytest.raises(ConvergenceError, match="grown without bound"):
-        make_solver(solver, np.eye(3)).solve(np.array([0.0, np.nan, 1.0]))
+        make_solver(solver, np.eye(3)).solve(np.array([0.0, value, 1.0]))
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

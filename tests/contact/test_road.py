@@ -12,6 +12,13 @@ from contact.sine import Sine
 from fem.errors import InputError
 
 STRIP = (0.1, 5.0, -0.1, 0.1)
+STONES = {
+    "kind": "cobblestones",
+    "block_length": 0.14,
+    "block_width": 0.12,
+    "joint_width": 0.012,
+    "joint_depth": 0.006,
+}
 
 
 def test_flat_is_zero_everywhere() -> None:
@@ -44,7 +51,25 @@ def test_mean_datum_takes_the_strips_mean_and_nothing_else() -> None:
     road = make_road_of(Grid(x, y, heights), datum="mean")
     middle = np.array([0.5 * (STRIP[0] + STRIP[1])])
     assert road.height(middle, np.zeros(1))[0] == pytest.approx(0.0, abs=1e-12)
-    assert road.level == pytest.approx(-1.0 - 0.3 * middle[0])
+    assert road.height(middle + 1.0, np.zeros(1))[0] == pytest.approx(0.3)
+
+
+def test_longest_wave_takes_hills_out_and_leaves_the_texture() -> None:
+    """ISO 16610-21: half of a wave of the cut-off length passes, far shorter ones whole."""
+    x = np.arange(0.0, 40.0, 0.01)
+    y = np.linspace(-1.0, 1.0, 5)
+    middle = np.arange(15.0, 20.0, 0.01)
+    left = {}
+    for wavelength in (20.0, 2.0, 0.2):
+        wave = np.sin(2 * np.pi * x / wavelength)
+        grid = Grid(x, y, np.tile(wave[:, None], (1, len(y))))
+        road = RoadUnderTire(grid, run_in=0.0, longest_wave=2.0).prepare(0.0, 39.0, -0.1, 0.1)
+        left[wavelength] = np.abs(road.height(middle, 0 * middle)).max()
+        assert road.lowest(15.0, 20.0, -0.1, 0.1) <= -left[wavelength]
+        assert road.highest(15.0, 20.0, -0.1, 0.1) >= left[wavelength]
+    assert left[20.0] < 0.01
+    assert left[2.0] == pytest.approx(0.5, abs=0.01)
+    assert left[0.2] == pytest.approx(1.0, abs=0.01)
 
 
 def make_road_of(grid: Grid, datum: str) -> PreparedRoad:
@@ -100,7 +125,8 @@ def test_points_beyond_the_strip_are_an_error() -> None:
 def test_factory_takes_a_scenes_object_and_ignores_what_is_none() -> None:
     spec = SimpleNamespace(kind="sine", amplitude=1e-3, wavelength=0.2, phase=None, datum=None)
     road = make_road(spec).prepare(*STRIP)
-    assert road.spacing == 0.2 and road.level == 0.0
+    assert road.spacing == 0.2
+    assert road.height(np.array([2.05]), np.zeros(1))[0] == pytest.approx(1e-3 * np.sin(41 / 2 * np.pi))
 
 
 @pytest.mark.parametrize(
@@ -110,7 +136,7 @@ def test_factory_takes_a_scenes_object_and_ignores_what_is_none() -> None:
         ({"kind": "sine", "amplitude": 1e-3}, "wavelength is missing"),
         ({"kind": "sine", "amplitude": 1e-3, "wavelength": 0.0}, "wavelength 0 m"),
         ({"kind": "sine", "amplitude": -1.0, "wavelength": 1.0}, "amplitude"),
-        ({"kind": "flat", "datum": "median"}, "median"),
+        ({**STONES, "datum": "median"}, "median"),
         ({"kind": "flat", "run_in": -1.0}, "run_in"),
         ({"kind": "crg", "file": "nowhere.crg"}, "no such file"),
         ({"kind": "grid", "file": "road.txt"}, r"\.txt"),

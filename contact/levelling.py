@@ -1,0 +1,59 @@
+"""What of a road the axle is taken to follow: its mean height, or its long waves."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+Array = NDArray[np.float64]
+
+# The strip's profile is taken over at most this many points.
+MOST_POINTS = 1_000_000
+# The Gaussian profile filter of ISO 16610-21 passes half of a wave of the cut-off length; its
+# weight exp(-pi (x / (alpha lambda))^2) has the standard deviation alpha lambda / sqrt(2 pi).
+DEVIATION = np.sqrt(np.log(2) / np.pi) / np.sqrt(2 * np.pi)
+
+
+class Level:
+    """Heights (m) along x (m), linear between its points and constant beyond them."""
+
+    def __init__(self, x: Array, z: Array) -> None:
+        self._x, self._z = x, z
+
+    def __call__(self, x: Array) -> Array:
+        return np.interp(x, self._x, self._z)
+
+    def bounds(self, x0: float, x1: float) -> tuple[float, float]:
+        """Least and greatest height from x0 to x1, m."""
+        inside = self._z[(self._x > x0) & (self._x < x1)]
+        ends = np.interp([x0, x1], self._x, self._z)
+        values = np.concatenate([inside, ends])
+        return float(values.min()), float(values.max())
+
+
+def mean_level(road, x0: float, x1: float, y0: float, y1: float) -> Level:
+    """The mean height of a strip of road (contact.road.Road), everywhere the same."""
+    _, profile = _profile(road, x0, x1, y0, y1)
+    return Level(np.array([x0]), np.array([profile.mean()]))
+
+
+def wave_level(road, x0: float, x1: float, y0: float, y1: float, longest_wave: float) -> Level:
+    """The waves of the strip longer than `longest_wave` (m): ISO 16610-21 on its mean profile.
+
+    Past its ends the profile is continued by reflection.
+    """
+    x, profile = _profile(road, x0, x1, y0, y1)
+    step = (x1 - x0) / len(x)
+    return Level(x, gaussian_filter1d(profile, DEVIATION * longest_wave / step, mode="reflect"))
+
+
+def _profile(road, x0: float, x1: float, y0: float, y1: float) -> tuple[Array, Array]:
+    """x (n,) m and the mean height over the width (n,) m, at half the road's spacing if affordable."""
+    step = 0.5 * road.spacing
+    if not np.isfinite(step):
+        return np.array([x0]), np.zeros(1)
+    counts = [max(int(np.ceil(d / step)), 1) for d in (x1 - x0, y1 - y0)]
+    excess = np.sqrt(max(1.0, counts[0] * counts[1] / MOST_POINTS))
+    nx, ny = (max(int(c / excess), 1) for c in counts)
+    x = x0 + (np.arange(nx) + 0.5) * (x1 - x0) / nx
+    y = y0 + (np.arange(ny) + 0.5) * (y1 - y0) / ny
+    return x, sum(road.height(x, np.full(nx, yj)) for yj in y) / ny
