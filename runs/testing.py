@@ -92,7 +92,7 @@ def _command(processes: int) -> list[str]:
     here = [sys.executable, "-P", "-m", "runs.testing"]
     if processes == 1:
         return here
-    return [*os.environ.get("TIREROAD_MPIRUN", "mpirun").split(), "-n", str(processes), *here]
+    return ["mpirun", "-n", str(processes), *here]
 
 
 def _run(folder: Path, processes: int, arguments: list[str]) -> tuple[int, dict[str, str], int]:
@@ -146,6 +146,8 @@ def _from_root(argument: str) -> str:
 def run_tests(arguments: list[str]) -> int:
     """The whole suite; prints `N passed, N failed, N skipped` over all runs. Exit status 0 or 1."""
     arguments = [_from_root(argument) for argument in arguments]
+    if not sys.stdout.isatty():  # mpirun gives its processes a terminal of their own
+        arguments.insert(0, "--color=no")
     totals = dict.fromkeys(("passed", "failed", "skipped"), 0)
     collected = 0
     with tempfile.TemporaryDirectory() as name:
