@@ -154,7 +154,7 @@ def run_tests(arguments: list[str]) -> int:
         for processes in (1, *PARALLEL):
             print(f"--- on {processes} process{'es' if processes > 1 else ''}", flush=True)
             status, outcomes, found = _run(Path(name), processes, arguments)
-            if processes == 1 and status == int(pytest.ExitCode.USAGE_ERROR):
+            if status == int(pytest.ExitCode.USAGE_ERROR):
                 return 2
             collected += found
             for outcome in outcomes.values():
@@ -162,6 +162,8 @@ def run_tests(arguments: list[str]) -> int:
             for test, outcome in outcomes.items():
                 if outcome == "failed":
                     print(f"failed on {processes}: {test}")
+            if not outcomes and not found or status == int(pytest.ExitCode.INTERRUPTED):
+                break  # nothing to run, or not even collected: no different on more processes
     if "--collect-only" in arguments or "--co" in arguments:
         print(f"{collected} collected")
         return 0 if collected and not totals["failed"] else 1

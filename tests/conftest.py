@@ -16,7 +16,7 @@ MPIRUN = {
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "OMPI_MCA_orte_execute_quiet": "1",
-    "OMPI_MCA_btl": "^tcp",
+    "OMPI_MCA_btl": "self,vader",
 }
 """What the launcher sets for mpirun, where pytest was started without it."""
 
