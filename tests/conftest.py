@@ -17,6 +17,7 @@ MPIRUN = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "OMPI_MCA_orte_execute_quiet": "1",
     "OMPI_MCA_btl": "self,vader",
+    "OMPI_MCA_odls_base_sigkill_timeout": "0",
 }
 """What the launcher sets for mpirun, where pytest was started without it."""
 
