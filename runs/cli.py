@@ -4,7 +4,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from pathlib import Path
 
 from fem.errors import ConvergenceError, InputError
@@ -203,9 +203,16 @@ def main(argv: list[str]) -> int:
     if "--" in argv and argv[0] == "run":
         cut = argv.index("--")
         argv, options = argv[:cut], argv[cut + 1 :]
-    args = parser().parse_args(argv)
+    try:
+        with open(os.devnull, "w") as nowhere, ExitStack() as quiet:
+            if mpi.rank_before_mpi() != 0:
+                quiet.enter_context(redirect_stdout(nowhere))
+                quiet.enter_context(redirect_stderr(nowhere))
+            args = parser().parse_args(argv)
+    except SystemExit as ending:
+        return mpi.handed_over(int(ending.code or 0))
     if args.command == "run":
-        return _run(args, options)
+        return mpi.handed_over(_run(args, options))
     if args.command == "test":
         from runs.testing import run_tests
 

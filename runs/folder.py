@@ -5,6 +5,7 @@ import json
 import math
 import os
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 
 from fem.errors import InputError
 from runs.disk import explained, write_text
+from runs.resolved import MARK
 from runs.store import plain
 from runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
@@ -35,18 +37,34 @@ def _earlier(directory: Path) -> dict[str, Any] | None:
     return found
 
 
+def _check_name(directory: Path, found: Any, scene_name: str) -> None:
+    if found != scene_name:
+        raise InputError(
+            f'{directory}: holds results of the scene "{found}", not of "{scene_name}"; {OTHER}'
+        )
+
+
+def _check_scene(directory: Path, scene_name: str) -> None:
+    """A folder without summary: its scene.toml must be one that a run of this scene left."""
+    try:
+        text = (directory / "scene.toml").read_text(encoding="utf-8")
+        name = tomllib.loads(text).get("name")
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError):
+        text, name = "", None
+    if not text.startswith(MARK):
+        raise InputError(f"{directory}: holds a scene.toml that is not a result; {OTHER}")
+    _check_name(directory, name, scene_name)
+
+
 def check_owner(directory: Path, scene_name: str) -> None:
     """Raise InputError where the folder holds results of another scene or another version."""
     found = _earlier(directory)
     if found is None:
-        if (directory / "scene.toml").exists():
-            raise InputError(f"{directory}: holds a scene.toml but no results; {OTHER}")
+        _check_scene(directory, scene_name)
         return
-    if found["scene"] != scene_name:
-        raise InputError(
-            f'{directory}: holds results of the scene "{found["scene"]}", not of "{scene_name}";'
-            f" {OTHER}"
-        )
+    _check_name(directory, found["scene"], scene_name)
     program = found["program"]
     if (program["version"], program.get("format")) != (VERSION, RESULT_FORMAT):
         raise InputError(

@@ -81,6 +81,20 @@ def on_root(comm: Any, function: Callable[[], Any]) -> Any:
     return value
 
 
+def handed_over(status: int) -> int:
+    """Leave the status where the launcher asked for it (TIREROAD_STATUS), and 0 to mpirun.
+
+    Without a launcher on this machine, the status itself. Not collective.
+    """
+    file = os.environ.get("TIREROAD_STATUS", "")
+    if not os.path.exists(file):
+        return status
+    if rank_before_mpi() == 0:
+        with open(file, "w", encoding="ascii") as stream:
+            stream.write(str(status))
+    return DONE
+
+
 def judged(function: Callable[[], None]) -> tuple[int, str]:
     """Run `function`; the exit status it earns and the message for the user."""
     try:
@@ -130,6 +144,10 @@ def guarded(comm: Any, function: Callable[[], None]) -> int:
     if comm.rank == 0:
         for one in dict.fromkeys(text for _, text in endings if text):
             print(one, file=sys.stderr, flush=True)
+    if comm.size > 1:
+        # mpirun ends the others by SIGTERM when the first has exited; ignored, it costs two seconds
+        for number in STOP_SIGNALS:
+            signal.signal(number, signal.SIG_DFL)
     failed = [code for code, _ in endings if code != DONE]
     return BUG if BUG in failed else max(failed, default=DONE)
 

@@ -7,6 +7,10 @@ from typing import Any
 from runs.scene import applies
 from runs.schema import Key, key_of, table_of
 from runs.tables import Scene
+from runs.version import PROGRAM, RESULT_FORMAT, VERSION
+
+MARK = f"# {PROGRAM} "
+HEADER = f"{MARK}{VERSION}, format {RESULT_FORMAT}: the resolved scene, every default written back"
 
 
 def literal(value: Any) -> str:
@@ -56,4 +60,4 @@ def _lines(holder: Any, path: str) -> list[str]:
 
 def dumps(scene: Scene) -> str:
     """The scene as TOML that `load` reads back to an equal scene."""
-    return "\n".join(_lines(scene, "")) + "\n"
+    return "\n".join([HEADER, *_lines(scene, "")]) + "\n"

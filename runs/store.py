@@ -60,8 +60,8 @@ class _Disk(io.RawIOBase):
     with a segmentation fault (seen with 1.10.8). Dropped writes let it close; the file is removed.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("w+b", buffering=0)
+    def __init__(self, file: io.FileIO) -> None:
+        self._file = file
         self.error: OSError | None = None
 
     def readable(self) -> bool:
@@ -118,7 +118,7 @@ def writing(path: Path, provenance: Provenance) -> Iterator[h5py.File]:
     Root process only. Raises InputError when the disk is full or the folder not writable.
     """
     with replacing(path) as part:
-        disk = _Disk(part)
+        disk = _Disk(part.open("w+b", buffering=0))
         try:
             file = h5py.File(disk, "w")
             try:

@@ -92,7 +92,7 @@ def _command(processes: int) -> list[str]:
     here = [sys.executable, "-P", "-m", "runs.testing"]
     if processes == 1:
         return here
-    return [*os.environ.get("TIREROAD_MPIRUN", "mpirun").split(), "-n", str(processes), *here]
+    return ["mpirun", "-n", str(processes), *here]
 
 
 def _run(folder: Path, processes: int, arguments: list[str]) -> tuple[int, dict[str, str], int]:
@@ -146,13 +146,15 @@ def _from_root(argument: str) -> str:
 def run_tests(arguments: list[str]) -> int:
     """The whole suite; prints `N passed, N failed, N skipped` over all runs. Exit status 0 or 1."""
     arguments = [_from_root(argument) for argument in arguments]
+    if not sys.stdout.isatty():  # mpirun gives its processes a terminal of their own
+        arguments.insert(0, "--color=no")
     totals = dict.fromkeys(("passed", "failed", "skipped"), 0)
     collected = 0
     with tempfile.TemporaryDirectory() as name:
         for processes in (1, *PARALLEL):
             print(f"--- on {processes} process{'es' if processes > 1 else ''}", flush=True)
             status, outcomes, found = _run(Path(name), processes, arguments)
-            if processes == 1 and status == int(pytest.ExitCode.USAGE_ERROR):
+            if status == int(pytest.ExitCode.USAGE_ERROR):
                 return 2
             collected += found
             for outcome in outcomes.values():
@@ -160,6 +162,8 @@ def run_tests(arguments: list[str]) -> int:
             for test, outcome in outcomes.items():
                 if outcome == "failed":
                     print(f"failed on {processes}: {test}")
+            if not outcomes and not found or status == int(pytest.ExitCode.INTERRUPTED):
+                break  # nothing to run, or not even collected: no different on more processes
     if "--collect-only" in arguments or "--co" in arguments:
         print(f"{collected} collected")
         return 0 if collected and not totals["failed"] else 1

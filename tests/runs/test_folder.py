@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from fem.errors import InputError
-from runs.folder import Summary, claimed
+from runs.folder import Summary, check_owner, claimed
+from runs.resolved import dumps
+from runs.scene import load
 
 
 def test_new_folder_is_made(tmp_path: Path) -> None:
@@ -49,11 +51,23 @@ def test_own_folder_is_taken_again(tmp_path: Path) -> None:
 
 def test_damaged_summary_and_foreign_scene(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text("name = 'mine'")
-    with pytest.raises(InputError, match="no results"), claimed(tmp_path, "mine"):
+    with pytest.raises(InputError, match="not a result"), claimed(tmp_path, "mine"):
         pass
     (tmp_path / "summary.json").write_text('{"program": ')
     with pytest.raises(InputError, match="not a summary"), claimed(tmp_path, "mine"):
         pass
+
+
+def test_stopped_run_goes_on(tmp_path: Path) -> None:
+    """A run stopped in its first stage leaves its scene and no summary."""
+    (tmp_path / "user.toml").write_text("name = 'mine'")
+    (tmp_path / "scene.toml").write_text(dumps(load(tmp_path / "user.toml")))
+    entered = False
+    with claimed(tmp_path, "mine"):
+        entered = True
+    assert entered
+    with pytest.raises(InputError, match='scene "mine", not of "yours"'):
+        check_owner(tmp_path, "yours")
 
 
 def test_a_file_is_no_folder(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from runs import mpi
 def fail(error):
     raise error
 
+mpi.TOGETHER = 1.0
 comm = MPI.COMM_WORLD
 last = comm.rank == comm.size - 1
 cases = {
