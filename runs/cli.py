@@ -78,6 +78,13 @@ def parser() -> argparse.ArgumentParser:
     command("info", "what a result file holds: datasets, shapes, units, provenance").add_argument(
         "file", type=Path, metavar="FILE"
     )
+    for name, text in (
+        ("bench", "run time against error, scaling and floors, measured on this machine"),
+        ("validate", "against full finite elements, closed forms and stress"),
+    ):
+        some = command(name, text)
+        some.add_argument("names", nargs="*", metavar="NAME", help="all by default")
+        some.add_argument("--out", type=Path, metavar="FILE.json", help="also a page beside it")
     test = command("test", "the test suite, serial and on 2 and 3 processes")
     test.add_argument("arguments", nargs=argparse.REMAINDER, metavar="PYTEST ARGUMENTS")
     return top
@@ -172,6 +179,18 @@ def _info(args: argparse.Namespace) -> None:
     print(describe(args.file))
 
 
+def _bench(args: argparse.Namespace) -> None:
+    from runs.tabulate import run_all
+
+    run_all("runs.bench", args.names, args.out)
+
+
+def _validate(args: argparse.Namespace) -> None:
+    from runs.tabulate import run_all
+
+    run_all("runs.validation", args.names, args.out)
+
+
 def _results(directory: Path) -> Path:
     if not (directory / "summary.json").is_file():
         raise InputError(f"{directory}: no result folder: it has no summary.json")
@@ -183,6 +202,8 @@ ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
     "report": _report,
     "export": _export,
     "info": _info,
+    "bench": _bench,
+    "validate": _validate,
 }
 
 
