@@ -1,6 +1,7 @@
 """The command line. Nothing heavy is imported before the command that needs it."""
 
 import argparse
+import logging
 import os
 import sys
 from collections.abc import Callable
@@ -104,8 +105,16 @@ def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
 
     comm = MPI.COMM_WORLD
     observe.set_root(comm.rank == 0)
+    _only_warnings()
     mpi.stop_on_signals()
     return mpi.guarded(comm, lambda: _run_inside(args, petsc_options, comm))
+
+
+def _only_warnings() -> None:
+    """Keep the compiler's chatter (distutils, at its first use of a form) off the terminal."""
+    handler = logging.StreamHandler()
+    handler.setLevel(logging.WARNING)
+    logging.getLogger().addHandler(handler)
 
 
 def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
