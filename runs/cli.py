@@ -80,7 +80,7 @@ def parser() -> argparse.ArgumentParser:
         "file", type=Path, metavar="FILE"
     )
     test = command("test", "the test suite, serial and on 2 and 3 processes")
-    test.add_argument("arguments", nargs=argparse.REMAINDER, metavar="PYTEST ARGUMENTS")
+    test.add_argument("arguments", nargs="*", metavar="PYTEST ARGUMENTS")
     return top
 
 
@@ -208,6 +208,10 @@ def _alone(function: Callable[[], None]) -> int:
 
 def main(argv: list[str]) -> int:
     """The exit status of a command line."""
+    if argv[:1] == ["test"] and argv[1:] not in (["-h"], ["--help"]):
+        from runs.testing import run_tests
+
+        return run_tests(argv[1:])  # all of it is pytest's
     options: list[str] = []
     if "--" in argv and argv[0] == "run":
         cut = argv.index("--")
@@ -222,10 +226,6 @@ def main(argv: list[str]) -> int:
         return mpi.handed_over(int(ending.code or 0))
     if args.command == "run":
         return mpi.handed_over(_run(args, options))
-    if args.command == "test":
-        from runs.testing import run_tests
-
-        return run_tests(args.arguments)
     try:
         return _alone(lambda: ALONE[args.command](args))
     except BrokenPipeError:
