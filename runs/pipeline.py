@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
+from contact.road import make_road
 from runs import observe, store
 from runs.disk import write_text
 from runs.folder import Summary
@@ -41,6 +42,9 @@ def run_scene(
     session = Session(scene, directory, comm)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", dumps(scene)))
+    if scene.road is not None:
+        # A road file that cannot be used should be told before hours of solving, not after.
+        on_root(comm, lambda: make_road(scene.road) and None)
     reasons = skipped(scene, until)
     if petsc_options:
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
