@@ -37,8 +37,8 @@ def run_scene(
     until: str | None,
     fresh: bool,
     petsc_options: list[str],
-) -> None:
-    """Run the stages a scene needs into the directory. Collective over `comm`."""
+) -> Session:
+    """Run the stages a scene needs into the directory; what they left in memory. Collective."""
     session = Session(scene, directory, comm)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", dumps(scene)))
@@ -59,6 +59,7 @@ def run_scene(
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))
     else:
         on_root(comm, lambda: _report(directory, summary))
+    return session
 
 
 def _run_stage(session: Session, stage: str, summary: Summary, fresh: bool) -> None:
