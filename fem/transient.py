@@ -2,8 +2,11 @@
 
     M u'' + (D + 2 Omega G) u' + K_Omega u = W^T f,   D = gamma1 M + gamma2 K,
 
-by Newmark's average acceleration (beta = 1/4, gamma = 1/2): second order, unconditionally stable,
-no algorithmic damping. One factorisation, then one pair of triangular solves a step.
+by the method of Wood, Bossak and Zienkiewicz (1980), M [(1 - a) u''_{n+1} + a u''_n] + ... = f_{n+1}:
+second order, unconditionally stable, damping what the step does not resolve down to a spectral
+radius rho: a = (rho - 1)/(rho + 1), gamma = 1/2 - a, beta = (1 - a)^2/4. rho = 1 is Newmark's average
+acceleration, which chatters in unilateral contact and does not converge there; rho = 0 is quiet.
+One factorisation, then one pair of triangular solves a step.
 """
 
 from __future__ import annotations
@@ -33,7 +36,9 @@ class FullTire:
         outputs: sparse.csr_matrix,
         loads: sparse.csr_matrix,
         inertia: str = "full",
+        spectral_radius: float = 0.0,
     ):
+        self._set_scheme(step, spectral_radius)
         self._operators, self._comm, self._step = operators, operators.body.comm, step
         self._mass = operators.mass
         self._outputs = on_own_rows(operators, outputs).T.tocsr()
@@ -41,9 +46,9 @@ class FullTire:
         stiffness = rotating_stiffness(operators, rotation, speed, damping, inertia)
         system = stiffness.copy()
         different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
-        system.axpy(2 / step, self._drag, different)
+        system.axpy(self._gamma / (self._beta * step), self._drag, different)
         diagonal = system.getDiagonal()
-        diagonal.array[:] += 4 / step**2 * self._mass
+        diagonal.array[:] += (1 - self._a) / (self._beta * step**2) * self._mass
         system.setDiagonal(diagonal)
         system.setOption(PETSc.Mat.Option.SYMMETRIC, speed == 0)
         self._solver = factorise(system)
@@ -56,16 +61,23 @@ class FullTire:
         self._columns = columns
         self._vectors = system.createVecs()
 
+    def _set_scheme(self, step: float, spectral_radius: float) -> None:
+        self._a = (spectral_radius - 1) / (spectral_radius + 1)
+        self._gamma, self._beta = 0.5 - self._a, (1 - self._a) ** 2 / 4
+
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
         self.acceleration = self._columns @ force / self._mass
 
     def predict(self) -> np.ndarray:
         """Displacement (r,) m at the end of the step with no new force."""
-        h = self._step
-        moved = 2 / h * self.displacement + self.velocity
-        right = self._mass * (2 / h * moved + 2 / h * self.velocity + self.acceleration)
-        right += self._product(moved)
+        h, a, beta, gamma = self._step, self._a, self._beta, self._gamma
+        moved = self.displacement + h * self.velocity
+        kept = (0.5 / beta - 1) * self.acceleration
+        right = (1 - a) * (moved / (beta * h**2) + kept) - a * self.acceleration
+        rate = gamma / (beta * h) * moved - self.velocity
+        rate += h * (gamma * kept - (1 - gamma) * self.acceleration)
+        right = self._mass * right + self._product(rate)
         b, x = self._vectors
         b.array[:] = right
         self._solver.apply(b, x)
@@ -81,11 +93,12 @@ class FullTire:
 
     def advance(self, force: np.ndarray) -> None:
         """Take the force (k,) N at the end of the step; after `predict`."""
-        h = self._step
+        h, beta, gamma = self._step, self._beta, self._gamma
         new = self._free + self._answer @ force
-        velocity = 2 / h * (new - self.displacement) - self.velocity
-        self.acceleration = 2 / h * (velocity - self.velocity) - self.acceleration
-        self.displacement, self.velocity = new, velocity
+        moved = new - self.displacement - h * self.velocity
+        acceleration = moved / (beta * h**2) - (0.5 / beta - 1) * self.acceleration
+        self.velocity += h * ((1 - gamma) * self.acceleration + gamma * acceleration)
+        self.displacement, self.acceleration = new, acceleration
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N: the convective parts cancel around the ring."""
