@@ -13,7 +13,7 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
-from fem import compat, kinematics, material
+from fem import compat, kinematics
 from fem.body import Body
 
 TOUCH = 1e-15  # m above its bound up to which a dof touches the road: rounding, nothing else
@@ -175,21 +175,38 @@ class Equilibrium:
 
 def static_residual(body: Body, pressure, rolling: Rolling):
     """The virtual work of everything but the road, as a UFL form in the body's displacement."""
+    work = elastic_work(body, pressure)
+    return work + _rolling_work(body, rolling) if rolling.speed else work
+
+
+def elastic_work(body: Body, pressure):
+    """The virtual work of the stresses and of the follower pressure.
+
+    The dilatation is integrated by one Gauss point a direction less than the rest. In full it locks:
+    first frequency of the clamped torus at Poisson's ratio 0.4995, order 2, 20 x 8 and 40 x 16
+    elements, 137 and 99 Hz against 94 and 88 Hz so (87 Hz with discontinuous pressures of order 1);
+    at 0.45 it is 104 and 87.1 against 91 and 85.6 (84.9 converged). No unknowns are added: every
+    one keeps a positive mass. Source: Malkus and Hughes 1978, doi 10.1016/0045-7825(78)90005-1.
+    """
     u, v = body.u, ufl.TestFunction(body.space)
     F = ufl.variable(kinematics.deformation_gradient(u))
-    stress = ufl.diff(material.energy(F.T * F, body.material), F)
-    work = ufl.inner(stress, ufl.grad(v)) * body.dx
+    distortion, dilatation = body.wall.energy(F.T * F)
+    work = ufl.inner(ufl.diff(distortion, F), ufl.grad(v)) * body.dx
+    work += ufl.inner(ufl.diff(dilatation, F), ufl.grad(v)) * body.reduced_dx
     normal = ufl.FacetNormal(body.mesh)
-    work += pressure * kinematics.pressure_virtual_work(u, v, normal) * body.inner_ds
-    if rolling.speed:
-        w = kinematics.wheel_velocity(body.mesh)
-        rate, test_rate = w + kinematics.convective(u, w), kinematics.convective(v, w)
-        density = body.material.density
-        work -= density * rolling.speed**2 * ufl.inner(rate, test_rate) * body.dx
-        if rolling.damping:
-            drag = density * rolling.speed * rolling.damping
-            work += drag * ufl.inner(kinematics.body_rate(u, w), v) * body.dx
-    return work
+    return work + pressure * kinematics.pressure_virtual_work(u, v, normal) * body.inner_ds
+
+
+def _rolling_work(body: Body, rolling: Rolling):
+    """The virtual work of inertia and of damping by the mass."""
+    u, v = body.u, ufl.TestFunction(body.space)
+    w = kinematics.wheel_velocity(body.mesh)
+    rate, test_rate = w + kinematics.convective(u, w), kinematics.convective(v, w)
+    # Constants and not numbers: another speed compiles nothing.
+    inertia = fem.Constant(body.mesh, rolling.speed**2)
+    drag = fem.Constant(body.mesh, rolling.speed * rolling.damping)
+    work = -inertia * body.wall.density * ufl.inner(rate, test_rate) * body.dx
+    return work + drag * body.wall.density * ufl.inner(kinematics.body_rate(u, w), v) * body.dx
 
 
 def _reason_name(reason: int) -> str:
