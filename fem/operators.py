@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from fem import compat, kinematics
 from fem.body import Body
-from fem.equilibrium import Rolling, static_residual
+from fem.virtual_work import AT_REST, static_residual, tangent
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Operators:
 
     def _tangent(self, inflation: float):
         pressure = fem.Constant(self.body.mesh, inflation)
-        return ufl.derivative(static_residual(self.body, pressure, Rolling()), self.body.u)
+        return tangent(self.body, static_residual(self.body, pressure, AT_REST))
 
     def rotation(self) -> Rotation:
         """The matrices of the rotating frame. Collective."""

@@ -31,9 +31,10 @@ def _rolling(session: Session) -> tuple[float, float]:
 
 def compute(session: Session, path: Path) -> None:
     """Solve and store. Collective."""
-    from fem.equilibrium import Equilibrium, Rolling
+    from fem.equilibrium import Equilibrium
     from fem.loading import Loader
     from fem.state import static_state
+    from fem.virtual_work import Rolling
 
     record, wanted = session.record, session.scene.static
     with record.timing("mesh and forms"):
