@@ -32,9 +32,9 @@ class Body:
     ):
         self.comm = comm
         self.tire = build(comm, section)
-        self.wall = Wall(self.tire, material, regions)
         self.mesh, self.lattice = self.tire.mesh, self.tire.lattice
         self.space = compat.vector_space(self.mesh, section.order)
+        self.wall = Wall(self.tire, self.space, material, regions)
         self.u = fem.Function(self.space)
         self.nodes = self.space.dofmap.index_map.size_local
         self.ids = self.lattice.ids(self.space.tabulate_dof_coordinates()[: self.nodes])

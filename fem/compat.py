@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 import logging
+import warnings
 
 import basix
 import dolfinx.fem.petsc  # noqa: F401  (newer releases do not import it by themselves)
@@ -85,7 +86,9 @@ def form(expression):
     before = logging.root.manager.disable
     logging.disable(logging.INFO)  # setuptools shows the compiler's command line
     try:
-        return fem.form(expression, **{_JIT_KEY: JIT})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResourceWarning)  # FFCx leaves its lock file open
+            return fem.form(expression, **{_JIT_KEY: JIT})
     finally:
         logging.disable(before)
 

@@ -6,6 +6,9 @@ z + u_z >= z_road and one of both zero.
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,11 +39,12 @@ class Equilibrium:
     """The nonlinear problem of one body. Forms, matrix and solver are made once. Collective.
 
     `inflation` (Pa) may be changed between solves; `solve` starts from the body's displacement and
-    puts it back when it does not converge.
+    puts it back when it does not converge. `cost`: seconds by part.
     """
 
     def __init__(self, body: Body, rolling: Rolling = AT_REST):
         self.body = body
+        self.cost: dict[str, float] = {}
         self.pressure = fem.Constant(body.mesh, 0.0)
         self._before = fem.Function(body.space)
         residual = static_residual(body, self.pressure, rolling)
@@ -123,7 +127,8 @@ class Equilibrium:
 
     def _error(self) -> float:
         """Norm of what is out of balance over the force scale, distance to the road as the dof's force."""
-        out = self._assemble_residual().copy()
+        with self._timing("assembly"):
+            out = self._assemble_residual().copy()
         out[self._vertical] -= self._force
         distance = (self._stiffness * self._gap())[self._active]
         square = self.body.comm.allreduce(out @ out + distance @ distance)
@@ -138,7 +143,8 @@ class Equilibrium:
         field, held = self.body.u.x, self._vertical[self._active]
         if first:
             self._before.x.array[:] = field.array
-        self._assemble_tangent()
+        with self._timing("assembly"):
+            self._assemble_tangent()
         rows = (held + self._work.getOwnershipRange()[0]).astype(PETSc.IntType)
         own = PETSc.IS().createGeneral(rows, comm=self.body.comm)
         reaction = self.matrix.createSubMatrix(own, None)
@@ -146,7 +152,8 @@ class Equilibrium:
         self._change.set(0.0)
         self._change.array[held] = -self._gap()[self._active]
         self.matrix.zeroRowsColumns(rows, 1.0, self._change, self._right)
-        self._ksp.solve(self._right, self._change)
+        with self._timing("factorisation"):
+            self._ksp.solve(self._right, self._change)
         force = reaction.createVecLeft()
         reaction.mult(self._change, force)
         self._force[self._active] = force.array + self._work.array[held]
@@ -188,6 +195,12 @@ class Equilibrium:
         self._work.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         self._work.array[self._rim] = 0.0
         return self._work.array_r
+
+    @contextmanager
+    def _timing(self, part: str) -> Iterator[None]:
+        began = time.perf_counter()
+        yield
+        self.cost[part] = self.cost.get(part, 0.0) + time.perf_counter() - began
 
     def _assemble_tangent(self) -> None:
         self.matrix.zeroEntries()

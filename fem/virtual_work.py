@@ -52,8 +52,8 @@ def _rolling_work(body: Body, rolling: Rolling):
     w = kinematics.wheel_velocity(body.mesh)
     rate, test_rate = w + kinematics.convective(u, w), kinematics.convective(v, w)
     # Constants and not numbers: another speed compiles nothing.
-    inertia = fem.Constant(body.mesh, rolling.speed**2)
-    drag = fem.Constant(body.mesh, rolling.speed * rolling.damping)
+    inertia = fem.Constant(body.mesh, float(rolling.speed**2))
+    drag = fem.Constant(body.mesh, float(rolling.speed * rolling.damping))
     work = -inertia * body.wall.density * ufl.inner(rate, test_rate) * body.dx
     return work + drag * body.wall.density * ufl.inner(kinematics.body_rate(u, w), v) * body.dx
 

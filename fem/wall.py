@@ -11,7 +11,7 @@ from dolfinx import fem
 from fem import compat
 from fem.errors import InputError
 from fem.material import LAWS, Material
-from fem.mesh import TireMesh
+from fem.mesh import TireMesh, Torus
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,10 @@ class Wall:
     raises InputError for a region that holds no cell.
     """
 
-    def __init__(self, tire: TireMesh, material: Material, regions: Sequence[Region] = ()):
+    def __init__(self, tire: TireMesh, space, material: Material, regions: Sequence[Region] = ()):
         self._space = compat.cell_space(tire.mesh)
-        middles = self._space.tabulate_dof_coordinates()
-        section = tire.section
-        _, wall, arc = section.coordinates(middles)
-        depth = 1 - (section.minor_radius - wall) / section.thickness
-        owner = np.zeros(len(middles), dtype=int)
+        arc, depth = _middles(tire.section, space)
+        owner = np.zeros(len(arc), dtype=int)
         for number, region in enumerate(regions):
             covered = region.covers(arc, depth)
             if not tire.mesh.comm.allreduce(int(covered.sum())):
@@ -78,3 +75,16 @@ class Wall:
         """Strain energy density as (distortion, dilatation), J/m3, in UFL."""
         parts = [energy(C, *coefficients) for energy, coefficients in self._laws]
         return sum(part[0] for part in parts), sum(part[1] for part in parts)
+
+
+def _middles(section: Torus, space) -> tuple[np.ndarray, np.ndarray]:
+    """Section angle (rad) and depth (0 inner face, 1 outer) of the middle of each cell, ghosts too.
+
+    From the cell's own nodes: the middle in space of a flat-faced element lies inside the curve.
+    """
+    _, wall, arc = section.coordinates(space.tabulate_dof_coordinates())
+    cells = space.mesh.topology.index_map(3)
+    count = cells.size_local + cells.num_ghosts
+    nodes = np.array([space.dofmap.cell_dofs(cell) for cell in range(count)])
+    depth = 1 - (section.minor_radius - wall) / section.thickness
+    return arc[nodes].mean(axis=1), depth[nodes].mean(axis=1)

@@ -40,10 +40,9 @@ def compute(session: Session, path: Path) -> None:
     with record.timing("mesh and forms"):
         equilibrium = Equilibrium(session.body, Rolling(*_rolling(session)))
     loader = Loader(equilibrium, _show)
-    with record.timing("inflation"):
-        loader.inflate(wanted.inflation)
-    with record.timing("road"):
-        road = _place(loader, wanted)
+    loader.inflate(wanted.inflation)
+    road = _place(loader, wanted)
+    record.cost |= equilibrium.cost
     state = static_state(equilibrium, loader.touch, road)
     session.static = state
     _describe(session, loader)
