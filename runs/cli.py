@@ -1,6 +1,7 @@
 """The command line. Nothing heavy is imported before the command that needs it."""
 
 import argparse
+import logging
 import os
 import sys
 from collections.abc import Callable
@@ -78,8 +79,15 @@ def parser() -> argparse.ArgumentParser:
     command("info", "what a result file holds: datasets, shapes, units, provenance").add_argument(
         "file", type=Path, metavar="FILE"
     )
+    for name, text in (
+        ("bench", "run time against error, scaling and floors, measured on this machine"),
+        ("validate", "against full finite elements, closed forms and stress"),
+    ):
+        some = command(name, text)
+        some.add_argument("names", nargs="*", metavar="NAME", help="all by default")
+        some.add_argument("--out", type=Path, metavar="FILE.json", help="also a page beside it")
     test = command("test", "the test suite, serial and on 2 and 3 processes")
-    test.add_argument("arguments", nargs=argparse.REMAINDER, metavar="PYTEST ARGUMENTS")
+    test.add_argument("arguments", nargs="*", metavar="PYTEST ARGUMENTS")
     return top
 
 
@@ -104,8 +112,16 @@ def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
 
     comm = MPI.COMM_WORLD
     observe.set_root(comm.rank == 0)
+    _only_warnings()
     mpi.stop_on_signals()
     return mpi.guarded(comm, lambda: _run_inside(args, petsc_options, comm))
+
+
+def _only_warnings() -> None:
+    """Keep the compiler's chatter (distutils, at its first use of a form) off the terminal."""
+    handler = logging.StreamHandler()
+    handler.setLevel(logging.WARNING)
+    logging.getLogger().addHandler(handler)
 
 
 def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
@@ -172,6 +188,18 @@ def _info(args: argparse.Namespace) -> None:
     print(describe(args.file))
 
 
+def _bench(args: argparse.Namespace) -> None:
+    from runs.tabulate import run_all
+
+    run_all("runs.bench", args.names, args.out)
+
+
+def _validate(args: argparse.Namespace) -> None:
+    from runs.tabulate import run_all
+
+    run_all("runs.validation", args.names, args.out)
+
+
 def _results(directory: Path) -> Path:
     if not (directory / "summary.json").is_file():
         raise InputError(f"{directory}: no result folder: it has no summary.json")
@@ -183,6 +211,8 @@ ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
     "report": _report,
     "export": _export,
     "info": _info,
+    "bench": _bench,
+    "validate": _validate,
 }
 
 
@@ -199,6 +229,10 @@ def _alone(function: Callable[[], None]) -> int:
 
 def main(argv: list[str]) -> int:
     """The exit status of a command line."""
+    if argv[:1] == ["test"] and argv[1:] not in (["-h"], ["--help"]):
+        from runs.testing import run_tests
+
+        return run_tests(argv[1:])  # all of it is pytest's
     options: list[str] = []
     if "--" in argv and argv[0] == "run":
         cut = argv.index("--")
@@ -213,10 +247,6 @@ def main(argv: list[str]) -> int:
         return mpi.handed_over(int(ending.code or 0))
     if args.command == "run":
         return mpi.handed_over(_run(args, options))
-    if args.command == "test":
-        from runs.testing import run_tests
-
-        return run_tests(args.arguments)
     try:
         return _alone(lambda: ALONE[args.command](args))
     except BrokenPipeError:

@@ -31,7 +31,7 @@ def test_last_fails():
 def run(launch, folder: Path, text: str, *arguments: str):
     file = folder / "test_sample.py"
     file.write_text(text)
-    done = launch("-m", "runs", "test", file, *arguments)
+    done = launch("-m", "runs", "test", *arguments, file)
     return done, done.stdout.splitlines()[-1]
 
 

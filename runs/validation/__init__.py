@@ -1,0 +1,1 @@
+"""This program against full finite elements, closed forms and stress: one module a validation."""
