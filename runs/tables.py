@@ -66,6 +66,18 @@ class Material:
 
 
 @dataclass(frozen=True)
+class Region:
+    arc: tuple[float, float] = vector(
+        (0.0, 45.0), "deg", "from, to, measured from the crown", least=0, most=175
+    )
+    side: str = choice("both", ("both", "left", "right"), "of the crown; left: y < 0")
+    depth: tuple[float, float] = vector(
+        (0.0, 1.0), "-", "from, to, through the wall; 0: inner face", least=0, most=1
+    )
+    material: Material = table(Material, "what the region is made of")
+
+
+@dataclass(frozen=True)
 class Tire:
     section: str = choice("torus", ("torus",), "shape of the section")
     outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10)
@@ -81,6 +93,9 @@ class Tire:
         1.0, "-", "length of elements at the footprint, relative to ungraded", least=0.05, most=1
     )
     material: Material = table(Material, "what the wall is made of")
+    region: tuple[Region, ...] = tables(
+        Region, "a part of the section of another material; elements whose middle it holds"
+    )
 
 
 @dataclass(frozen=True)
