@@ -17,7 +17,7 @@ class Shifted:
     """
 
     def __init__(self, matrix: sparse.csr_matrix, shift: float):
-        self.size = matrix.shape[0]
+        self.size, self.shift = matrix.shape[0], shift
         csr = (_index(matrix.indptr), _index(matrix.indices), matrix.data)
         shifted = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
         shifted.shift(-shift)
