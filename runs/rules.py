@@ -95,7 +95,7 @@ def _geometry(scene: Scene, error: Where) -> None:
                     ("tire", "region", str(number), key), f"= [{low:g}, {high:g}] must ascend"
                 )
     free = free_unknowns(tire)
-    if scene.modal.count >= free:
+    if scene.modal.up_to is None and scene.modal.count >= free:
         raise error(
             ("modal", "count"),
             f"= {scene.modal.count} must be less than the {free} free unknowns of the mesh",

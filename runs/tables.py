@@ -113,7 +113,10 @@ class Static:
 
 @dataclass(frozen=True)
 class Modal:
-    count: int = integer(500, "modes wanted", least=1, most=100000)
+    count: int = integer(500, "lowest modes wanted", least=1, most=100000)
+    up_to: float | None = number(
+        None, "Hz", "all modes below it are wanted, instead of count", above=0, most=1e6
+    )
     rim: str = choice("fixed", ("fixed", "free"), "the two bead faces")
     road: str = choice("forces", ("forces", "held"), "after the static state: its forces, or held")
 
