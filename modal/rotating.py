@@ -71,7 +71,8 @@ def standing(projection: Projection, damping: tuple[float, float]) -> StateModes
     half = (damping[0] + damping[1] * squares) / 2
     root = np.sqrt(half.astype(complex) ** 2 - squares)
     # Condition of the eigenvectors of one mode's companion matrix is about omega / |root|.
-    condition = np.sqrt(squares) / np.maximum(np.abs(root), np.finfo(float).tiny)
+    circular = np.sqrt(squares)
+    condition = circular / np.maximum(np.abs(root), np.finfo(float).eps * circular)
     defective = np.flatnonzero(condition > DEFECTIVE)
     paired = np.flatnonzero((root.imag != 0) & (condition <= DEFECTIVE))
     real = np.flatnonzero((root.imag == 0) & (condition <= DEFECTIVE))
