@@ -22,7 +22,9 @@ class Response:
 
     `eigenvalue` (q,) 1/s, `output` (r, q) and `input` (q, k) complex, `block` (b, b) with its
     `block_output` (r, b) and `block_input` (b, k), `residual` (r, k) m/N; `momentum` (3, q) and
-    `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries.
+    `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries. With `pulse` the
+    residual answers not at once but with a pulse 1/step high and one step long in place of its
+    delta(t) (thesis (C.4)).
     """
 
     eigenvalue: np.ndarray
@@ -34,6 +36,7 @@ class Response:
     residual: np.ndarray
     momentum: np.ndarray
     block_momentum: np.ndarray
+    pulse: bool = False
 
     def impulse(self, times: np.ndarray) -> np.ndarray:
         """Green's functions g (t, r, k), m/(N s), without the residual's delta at t = 0."""
@@ -140,6 +143,7 @@ class Response:
             self.residual + other.residual,
             np.hstack([self.momentum, other.momentum]),
             np.hstack([self.block_momentum, other.block_momentum]),
+            self.pulse,
         )
 
 

@@ -1,5 +1,7 @@
 """The recursion against the matrix exponential, and against the direct convolution."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -144,3 +146,19 @@ def test_the_same_on_any_number_of_processes(make, scheme) -> None:
     one, all_of_them = march(alone, force), march(spread, force)
     assert np.abs(one - all_of_them).max() < 1e-12 * np.abs(one).max()
     assert np.abs(alone.inertia_force() - spread.inertia_force()).max() < 1e-10
+
+
+def test_dirac_residual_answers_with_a_pulse_of_one_step(make) -> None:
+    """Thesis (C.4): G_res / step for one step is the mean force over it; in the end the same."""
+    system = make(damping=80.0)
+    whole = system.shape @ np.linalg.solve(system.stiffness, system.shape.T) + np.eye(4) * 1e-4
+    at_once = system.response(compliance=whole)
+    pulse = replace(at_once, pulse=True)
+    force = some_force(4)
+    first, second = (
+        march(Recursion(r, 1e-3, "linear", MPI.COMM_SELF), force) for r in (at_once, pulse)
+    )
+    late = (force[:-1] - force[1:]) @ at_once.residual.T / 2
+    assert np.abs(second - first - late).max() < 1e-13
+    held = [march(Recursion(r, 1e-3, "constant", MPI.COMM_SELF), force) for r in (at_once, pulse)]
+    assert np.array_equal(*held)
