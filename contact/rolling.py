@@ -62,6 +62,7 @@ def roll(
     bits, so no process has to wait for another's answer.
     """
     x, y = patch.points[:, 0], patch.points[:, 1]
+    solver.active = patch.force > 0  # the first step starts from the static contact set
     for k in range(1, steps + 1):
         time = k * step
         free = tire.predict()

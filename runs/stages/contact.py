@@ -141,6 +141,10 @@ def _describe(session: Session, totals: _Totals, solver, step, steps, scheme) ->
         "largest penetration": (float(totals.penetration), "m"),
         "factorisations": (solver.factorisations, "-"),
     }
+    if session.scene.force:
+        record.warnings.append(
+            "the point forces of [[force]] act in response.h5 alone, not in the contact"
+        )
     if totals.least == 0:
         record.warnings.append("the tire lost contact with the road for a while")
 
