@@ -109,16 +109,12 @@ def static_shapes(
     )
 
 
-def solve_all(stiffness: PETSc.Mat, loads: sparse.csc_matrix) -> np.ndarray:
-    """Own rows of stiffness^-1 loads (n, p). Collective."""
-    dense = loads.toarray()
-    pc = _factorise(stiffness)
-    factor = pc.getFactorMatrix()
-    for start in range(0, dense.shape[1], _CHUNK):
-        chunk = np.asfortranarray(dense[:, start : start + _CHUNK])
-        dense[:, start : start + _CHUNK] = _solve(factor, stiffness, chunk)
+def solve_all(matrix: PETSc.Mat, loads: sparse.csc_matrix) -> np.ndarray:
+    """Own rows of matrix^-1 loads (n, p), by one factorisation. Collective."""
+    pc = factorise(matrix)
+    solution = solve_columns(pc, matrix, loads.toarray())
     pc.destroy()
-    return dense
+    return solution
 
 
 def compliance(
@@ -129,10 +125,16 @@ def compliance(
     `outputs` (r, 3 s) and `loads` (k, 3 s) weigh the nodes of the outer face, three dofs a node.
     Raises ConvergenceError when a solve leaves a relative residual above 1e-8.
     """
-    body = operators.body
     rows = on_own_rows(operators, outputs).T.tocsr()
     solution = solve_all(stiffness, on_own_rows(operators, loads))
-    return body.comm.allreduce(rows @ solution)
+    return operators.body.comm.allreduce(rows @ solution)
+
+
+def solve_columns(pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray) -> np.ndarray:
+    """Own rows of matrix^-1 columns, (n, k), by the matrix's factorisation; checked. Collective."""
+    factor = pc.getFactorMatrix()
+    chunks = range(0, columns.shape[1], _CHUNK)
+    return np.hstack([_solve(factor, matrix, columns[:, k : k + _CHUNK]) for k in chunks])
 
 
 def on_own_rows(operators: Operators, probes: sparse.csr_matrix) -> sparse.csr_matrix:
@@ -151,7 +153,8 @@ def _symmetric(matrix: PETSc.Mat) -> bool:
     return bool(known and symmetric)
 
 
-def _factorise(stiffness: PETSc.Mat) -> PETSc.PC:
+def factorise(stiffness: PETSc.Mat) -> PETSc.PC:
+    """A direct factorisation by MUMPS: L D L^T where the matrix is marked symmetric. Collective."""
     pc = PETSc.PC().create(stiffness.comm)
     pc.setOperators(stiffness)
     pc.setType(PETSc.PC.Type.CHOLESKY if _symmetric(stiffness) else PETSc.PC.Type.LU)

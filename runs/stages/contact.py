@@ -43,7 +43,7 @@ def compute(session: Session, path: Path) -> None:
     shortest = _shortest_period(session)
     tire, step, steps, scheme = integration(session, session.contact_response, shortest)
     with record.timing("tread and solver"):
-        solver = make_solver(scene.contact.solver, tire.same_step + _tread(session))
+        solver = make_solver(scene.contact.solver, tire.same_step + tread(session))
     drive = Drive(session.road.height, session.motion, session.road_speed)
     totals = _Totals()
     with ExitStack() as stack:
@@ -95,7 +95,7 @@ def _shortest_period(session: Session) -> float:
     return min(passing, 1 / motion.frequency) if motion.kind == "sine" else passing
 
 
-def _tread(session: Session) -> np.ndarray:
+def tread(session: Session) -> np.ndarray:
     """Compliance of the tread, (c, c) m/N."""
     contact, patch = session.scene.contact, session.patch
     if contact.tread == "half-space":
