@@ -118,6 +118,7 @@ class Response:
             output=self.output * self.eigenvalue,
             block_output=self.block_output @ self.block,
             residual=(self.output @ self.input).real + self.block_output @ self.block_input,
+            pulse=False,
         )
 
     def between(self, outputs: slice, forces: slice) -> Response:

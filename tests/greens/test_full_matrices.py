@@ -69,7 +69,6 @@ OPTIONS = ("dirac", "static", "second-order", "attachment")
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("option", OPTIONS)
 @pytest.mark.parametrize(
     ("speed", "damping", "inertia"),
     [
@@ -80,14 +79,15 @@ OPTIONS = ("dirac", "static", "second-order", "attachment")
         (60.0, (0.0, 0.0), "full"),
     ],
 )
-def test_static_limit_is_exact(option, speed, damping, inertia) -> None:
+def test_static_limit_is_exact(speed, damping, inertia) -> None:
     """H(0) is the full matrices' own, to 1e-9, with every residual option."""
     made, basis = wheel(speed, damping, inertia)
     _, _, _, readings, loads = tire()
     exact = made.receptance(readings, loads, np.zeros(1))
-    found = response(made, basis, option)
-    assert off(found.receptance(np.zeros(1)), exact)[0] < 1e-9
-    assert found.eigenvalue.real.max() <= 1e-9 * np.abs(found.eigenvalue).max()
+    for option in OPTIONS:
+        found = response(made, basis, option)
+        assert off(found.receptance(np.zeros(1)), exact)[0] < 1e-9, option
+        assert found.eigenvalue.real.max() <= 1e-9 * np.abs(found.eigenvalue).max(), option
 
 
 def test_hundredth_of_the_error_up_to_half_the_highest_mode() -> None:
