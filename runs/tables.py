@@ -141,7 +141,20 @@ class Rotation:
 @dataclass(frozen=True)
 class Greens:
     residual: str = choice(
-        "static", ("none", "dirac", "static", "attachment"), "flexibility of the modes left out"
+        "static",
+        ("none", "dirac", "static", "second-order", "attachment"),
+        "flexibility of the modes left out",
+    )
+    dynamic: int | None = integer(
+        None, "states kept dynamic, the others follow statically; absent: all", least=1, most=200000
+    )
+    choice: str = choice(
+        "participation",
+        ("participation", "frequency"),
+        "of the dynamic states: in the band, or the slowest",
+    )
+    band: float | None = number(
+        None, "Hz", "that matters; absent: up to half the highest mode", above=0, most=1e6
     )
 
 
@@ -247,12 +260,17 @@ class Time:
 class Receptance:
     to: float = number(500.0, "Hz", "highest frequency", above=0, most=1e6)
     step: float = number(2.0, "Hz", "between two frequencies", above=0, most=1e6)
+    direct: int = integer(
+        0, "frequencies also solved on the full matrices, as a check", least=0, most=1000
+    )
 
 
 @dataclass(frozen=True)
 class Output:
     spectra: bool = flag(True, "of contact and axle force")
     axle_force: bool = flag(True, "from momentum")
+    velocity: bool = flag(False, "of the driven points")
+    acceleration: bool = flag(False, "of the driven points")
     vibration: bool = flag(False, "u(ω) on the whole tire")
     fields: bool = flag(False, "XDMF of every kept step")
     receptance: Receptance | None = table(Receptance, "of the driven points", optional=True)

@@ -48,6 +48,7 @@ def compute(session: Session, path: Path) -> None:
         projection = project(modes, rotation, operators.mass, session.comm)
         nodal = operators.spread(modes.vectors)
         shape = session.body.surface(nodal).reshape(-1, len(modes.squares))
+    session.modes = modes
     session.modal = ModalBasis(modes.frequency, shape, projection)
     record.headline |= {
         "modes": (len(modes.squares), "-"),
