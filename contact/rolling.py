@@ -62,11 +62,13 @@ def roll(
     bits, so no process has to wait for another's answer.
     """
     x, y = patch.points[:, 0], patch.points[:, 1]
+    touching = patch.force > 0
     for k in range(1, steps + 1):
         time = k * step
         free = tire.predict()
         road = drive.height(x + drive.speed * time, y) + drive.motion(time)
-        force = solver.solve(patch.gap + free - road, reference=patch.force)
+        force = solver.solve(patch.gap + free - road, touching, reference=patch.force)
+        touching = None  # from now on the solver's own last set is the best guess
         change = force - patch.force
         tire.advance(change)
         axle = -tire.inertia_force()
