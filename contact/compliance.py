@@ -11,12 +11,21 @@ from scipy import sparse
 from contact.kernel import KernelTread
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 
 class Compliance(Protocol):
-    """What the iterative solver needs of A (c, c) m/N."""
+    """What the solvers need of A (c, c) m/N.
+
+    `block` is its part between the points `index`; `spread` the approach (c,) m under forces that
+    act on those points alone, `values` (a,) N; `precondition` roughly its inverse.
+    """
 
     diagonal: Array
+
+    def block(self, index: Index) -> Array: ...
+
+    def spread(self, values: Array, index: Index) -> Array: ...
 
     def apply(self, force: Array) -> Array: ...
 
@@ -32,9 +41,20 @@ class SpreadCompliance:
     def __init__(self, tire: Array, weights: sparse.csr_matrix, tread: KernelTread) -> None:
         self._tire, self._weights, self._tread = tire, weights, tread
         self._transposed = weights.T.tocsr()
-        own = weights @ tire
-        self.diagonal = tread.diagonal + np.asarray(weights.multiply(own).sum(axis=1)).ravel()
+        own = weights.multiply(weights @ tire).sum(axis=1)
+        self.diagonal = tread.diagonal + np.asarray(own).ravel()
         self.precondition = tread.precondition
+
+    def block(self, index: Index) -> Array:
+        """A between the points `index`, (a, a) m/N."""
+        own = self._weights[index]
+        return own @ (own @ self._tire.T).T + self._tread.block(index)
+
+    def spread(self, values: Array, index: Index) -> Array:
+        """Approach (c,) m under forces `values` (a,) N on the points `index`."""
+        force = np.zeros(len(self.diagonal))
+        force[index] = values
+        return self.apply(force)
 
     def apply(self, force: Array) -> Array:
         """Approach (c,) m under forces (c,) N."""
@@ -46,7 +66,20 @@ class MatrixCompliance:
 
     def __init__(self, matrix: Array) -> None:
         self._matrix = matrix
+        # Rows of the transpose are the columns of A: picking some of them copies whole rows.
+        self._columns = np.ascontiguousarray(matrix.T)
         self.diagonal = matrix.diagonal().copy()
+        self._index: Index | None = None
+
+    def block(self, index: Index) -> Array:
+        """A between the points `index`, (a, a) m/N, column-major as LAPACK takes it."""
+        self._index, self._touching = index, self._columns[index]
+        return self._touching[:, index].T
+
+    def spread(self, values: Array, index: Index) -> Array:
+        """Approach (c,) m under forces `values` (a,) N on the points `index`."""
+        touching = self._touching if index is self._index else self._columns[index]
+        return values @ touching
 
     def apply(self, force: Array) -> Array:
         """Approach (c,) m under forces (c,) N."""

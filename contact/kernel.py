@@ -41,9 +41,15 @@ class KernelTread:
         self.diagonal = float(kernel[0, 0])
         for axis, n in enumerate(grid.shape):
             kernel = _bridged(kernel, axis, n)
+        self._kernel = kernel
         self._transform = fft.rfft2(kernel).real
         least = 1e-3 * self.diagonal
         self._inverse = 1.0 / np.maximum(self._transform, least)
+
+    def block(self, index: NDArray[np.intp]) -> Array:
+        """The matrix between the points `index`, (a, a) m/N."""
+        i, j = np.divmod(self._grid.place[index], self._grid.shape[1])
+        return self._kernel[i[:, None] - i, j[:, None] - j]
 
     def apply(self, force: Array) -> Array:
         """Approach (c,) m under forces (c,) N."""

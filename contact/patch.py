@@ -5,15 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 
+from contact.kernel import GridPlaces
 from fem.errors import ConvergenceError
 
 
 @dataclass(frozen=True)
 class Patch:
-    """c points: `index` (c,) into the outer face, `points` (c, 3) m deformed, `half_sizes` (c, 2) m of
-    the rectangle of each, `force` (c,) N and `gap` (c,) m of the static state on a flat road,
-    `edge` (c,) marks points with a neighbour outside the patch.
+    """c points on p nodes of the outer face.
+
+    `index` (p,) into the outer face; `points` (c, 3) m deformed, `half_sizes` (c, 2) m of the
+    rectangle of each, `force` (c,) N and `gap` (c,) m of the static state on a flat road, `edge`
+    (c,) marks points with a neighbour outside the patch. `weights` W (c, p) takes nodal values to
+    the points; None: the points are the nodes. `places`: where they lie on a regular grid, or None.
     """
 
     index: np.ndarray
@@ -22,6 +27,8 @@ class Patch:
     force: np.ndarray
     gap: np.ndarray
     edge: np.ndarray
+    weights: sparse.csr_matrix | None = None
+    places: GridPlaces | None = None
 
     @property
     def area(self) -> np.ndarray:

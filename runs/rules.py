@@ -19,7 +19,6 @@ LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "greens.residual": (("none", "static"), '"none" and "static" are supported in this version'),
     "modal.rim": (("fixed",), 'only "fixed" is supported in this version'),
     "modal.road": (("forces",), 'only "forces" is supported in this version'),
-    "contact.points": (("nodes",), 'only "nodes" is supported in this version'),
     "contact.brush_stiffness": ((), "horizontal contact forces are not in this version: leave it"),
     "contact.friction": ((), "friction is not in this version: leave it"),
     "road.kind": (

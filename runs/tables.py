@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from runs.schema import choice, flag, integer, number, table, tables, text, vector
+from runs.schema import Pitch, choice, flag, integer, number, points, table, tables, text, vector
 
 LINEAR = ("model", ("linear", "neo-hookean"))
 SINE = ("kind", ("sine",))
@@ -145,16 +145,30 @@ class PointForce:
 
 @dataclass(frozen=True)
 class Contact:
-    tread: str = choice("half-space", ("half-space", "winkler", "none"), "local compliance")
-    youngs_modulus: float = number(3.4e8, "Pa", "of the half-space", above=0, most=1e13)
-    poisson_ratio: float = number(0.49, "-", "of the half-space", above=-1, most=0.5)
+    tread: str = choice(
+        "half-space", ("half-space", "layer", "winkler", "none"), "local compliance"
+    )
+    youngs_modulus: float = number(3.4e8, "Pa", "of the half-space or layer", above=0, most=1e13)
+    poisson_ratio: float = number(0.49, "-", "of the half-space or layer", above=-1, most=0.5)
+    thickness: float = number(
+        0.010,
+        "m",
+        "of the layer on its stiff base",
+        above=0,
+        most=1,
+        only_for=("tread", ("layer",)),
+    )
     winkler_stiffness: float = number(2.0e8, "N/m³", "of the winkler tread", above=0, most=1e15)
-    points: str = choice("nodes", ("nodes",), "contact points")
+    points: str | Pitch = points("contact points: the nodes, or a grid of pitch", above=0, most=1)
     brush_stiffness: float | None = number(
         None, "N/m", "per point; absent: no horizontal forces", above=0, most=1e12
     )
     friction: float | None = number(None, "-", "absent: never slips", least=0, most=10)
-    solver: str = choice("active-set", ("active-set", "snes-vi"), "of the complementarity problem")
+    solver: str = choice(
+        "auto",
+        ("auto", "active-set", "projected-cg", "snes-vi"),
+        "of the complementarity problem",
+    )
     reach: float | None = number(
         None, "m", "gap up to which points take part; absent: from the road", above=0, most=1
     )

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from contact.complementarity import make_solver
+from contact.grid_patch import OnPoints, settle
+from contact.model import solver_name, step_solver
 from contact.rolling import Drive, roll
-from contact.tread import half_space_compliance, no_tread, winkler_compliance
 from greens.convolution import Convolution
 from greens.recursion import Recursion
 from greens.response import Response
@@ -39,11 +39,13 @@ def inputs(session: Session) -> dict:
 
 def compute(session: Session, path: Path) -> None:
     """The time loop, written block by block. Collective."""
-    scene, patch, record = session.scene, session.patch, session.record
+    record = session.record
     shortest = _shortest_period(session)
     tire, step, steps, scheme = integration(session, session.contact_response, shortest)
     with record.timing("tread and solver"):
-        solver = make_solver(scene.contact.solver, tire.same_step + _tread(session))
+        _settled(session)
+        tire, solver = _step_solver(session, tire)
+    patch = session.patch
     drive = Drive(session.road.height, session.motion, session.road_speed)
     totals = _Totals()
     with ExitStack() as stack:
@@ -95,16 +97,28 @@ def _shortest_period(session: Session) -> float:
     return min(passing, 1 / motion.frequency) if motion.kind == "sine" else passing
 
 
-def _tread(session: Session) -> np.ndarray:
-    """Compliance of the tread, (c, c) m/N."""
-    contact, patch = session.scene.contact, session.patch
-    if contact.tread == "half-space":
-        return half_space_compliance(
-            patch.points[:, :2], patch.half_sizes, contact.youngs_modulus, contact.poisson_ratio
-        )
-    if contact.tread == "winkler":
-        return winkler_compliance(patch.area, contact.winkler_stiffness)
-    return no_tread(len(patch.index))
+def _settled(session: Session) -> None:
+    """A grid of points takes up the static load that the finite elements gave to nodes."""
+    patch = session.patch
+    if patch.weights is None:
+        return
+    response = session.contact_response
+    flexibility = response.static() + response.residual
+    nodal = session.static.force[patch.index]
+    solver = step_solver(session.scene.contact, patch, flexibility)
+    session.patch, rise = settle(patch, solver, flexibility, nodal)
+    session.record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
+
+
+def _step_solver(session: Session, tire):
+    """(tire as seen at the patch's points, the solver of a step); the choice is shown."""
+    spec, patch = session.scene.contact, session.patch
+    solver = step_solver(spec, patch, tire.same_step)
+    observe.say(
+        f"  {len(patch.points)} contact points on {len(patch.index)} nodes, tread {spec.tread}, "
+        f"solver {solver_name(spec, patch)}"
+    )
+    return (tire if patch.weights is None else OnPoints(tire, patch.weights)), solver
 
 
 class _Totals:
@@ -164,7 +178,7 @@ class _Writer:
         provenance = self._session.provenance("contact")
         self._file = stack.enter_context(store.writing(path, provenance))
         patch = self._session.patch
-        c = len(patch.index)
+        c = len(patch.points)
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
         for name, (shape, unit) in _LAYOUT.items():
