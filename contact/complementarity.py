@@ -41,6 +41,8 @@ class ContactSolver(Protocol):
         self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
     ) -> Array: ...
 
+    def block(self, index: NDArray[np.intp]) -> Array: ...
+
 
 class ActiveSet:
     """Semismooth Newton (primal-dual active set), made safe as block principal pivoting.
@@ -106,6 +108,10 @@ class ActiveSet:
             "close to singular or far from symmetric: add tread compliance or a residual "
             'flexibility, or take solver = "snes-vi"'
         )
+
+    def block(self, index: NDArray[np.intp]) -> Array:
+        """A between the points `index`, (a, a) m/N."""
+        return self._compliance.block(index)
 
     def _at(self, active: Mask, q: Array, reference: Array | None) -> tuple[Array, Array]:
         """Forces and gaps when exactly the active points touch (g = 0 there, f = 0 elsewhere)."""

@@ -83,6 +83,7 @@ def make_grid_patch(
         force=np.zeros(len(place)),
         gap=(height - road_height)[place],
         edge=~inside.ravel()[place],
+        line=place % shape[1],
         weights=weights[:, used].tocsr(),
         places=GridPlaces(shape, spacing, place),
     )
@@ -132,12 +133,16 @@ def _bracket(excess, step: float) -> tuple[float, float]:
 
 
 class OnPoints:
-    """A tire between nodes as seen at the points of a patch: W u, and W^T f into it."""
+    """A tire between nodes as seen at the points of a patch: W u, and W^T f into it.
 
-    def __init__(self, tire, weights: sparse.csr_matrix) -> None:
-        self._tire, self._weights = tire, weights
-        self._transposed = weights.T.tocsr()
-        count = weights.shape[0]
+    `components` 1: vertical only; 3: z, then x, then y of all points.
+    """
+
+    def __init__(self, tire, weights: sparse.csr_matrix, components: int = 1) -> None:
+        self._tire = tire
+        self._weights = sparse.block_diag([weights] * components, format="csr")
+        self._transposed = self._weights.T.tocsr()
+        count = self._weights.shape[0]
         self.same_step = LinearOperator((count, count), matvec=self._answer, dtype=float)
         self.inertia_force = tire.inertia_force
 

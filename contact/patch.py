@@ -19,6 +19,7 @@ class Patch:
     rectangle of each, `force` (c,) N and `gap` (c,) m of the static state on a flat road, `edge`
     (c,) marks points with a neighbour outside the patch. `weights` W (c, p) takes nodal values to
     the points; None: the points are the nodes. `places`: where they lie on a regular grid, or None.
+    Points of equal `line` (c,) int follow each other in the rolling direction.
     """
 
     index: np.ndarray
@@ -27,6 +28,7 @@ class Patch:
     force: np.ndarray
     gap: np.ndarray
     edge: np.ndarray
+    line: np.ndarray
     weights: sparse.csr_matrix | None = None
     places: GridPlaces | None = None
 
@@ -69,5 +71,11 @@ def make_patch(
     inside = np.roll(near, 1, 0) & np.roll(near, -1, 0) & grown[:, 2:] & grown[:, :-2]
     index = np.flatnonzero(near.ravel())
     return Patch(
-        index, positions[index], half_sizes[index], force[index], gap[index], ~inside.ravel()[index]
+        index=index,
+        points=positions[index],
+        half_sizes=half_sizes[index],
+        force=force[index],
+        gap=gap[index],
+        edge=~inside.ravel()[index],
+        line=index % shape[1],
     )

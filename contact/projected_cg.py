@@ -80,6 +80,10 @@ class ProjectedCG:
             '"active-set", or a softer tread'
         )
 
+    def block(self, index: NDArray[np.intp]) -> Array:
+        """A between the points `index`, (a, a) m/N."""
+        return self._compliance.block(index)
+
     def _begin(self, base: Array, guess_active: Mask | None) -> Array:
         if self._last is None or guess_active is not None:
             return base.copy()

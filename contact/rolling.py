@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from contact.complementarity import ContactSolver
+from contact.friction import Friction
 from contact.patch import Patch
 
 
@@ -33,10 +34,13 @@ class Tire(Protocol):
 
 @dataclass(frozen=True)
 class Instant:
-    """The state at the end of a step: (c,) arrays in N and m, `axle_force` (3,) N."""
+    """The state at the end of a step: (c,) arrays in N and m, `horizontal` (c, 2) N, `axle_force`
+    (3,) N.
+    """
 
     time: float
     force: np.ndarray
+    horizontal: np.ndarray
     gap: np.ndarray
     displacement: np.ndarray
     axle_force: np.ndarray
@@ -54,30 +58,46 @@ class Drive:
 
 
 def roll(
-    tire: Tire, solver: ContactSolver, patch: Patch, drive: Drive, step: float, steps: int
+    tire: Tire,
+    solver: ContactSolver,
+    patch: Patch,
+    drive: Drive,
+    step: float,
+    steps: range,
+    friction: Friction | None = None,
 ) -> Iterator[Instant]:
-    """Yield the state after each of `steps` steps of `step` seconds. Collective when the tire is.
+    """Yield the state after each of `steps`, numbered from 1, of `step` seconds. Collective when the
+    tire is.
 
     The solver was made for A + C~. Every process solves the same small contact problem on the same
-    bits, so no process has to wait for another's answer.
+    bits, so no process has to wait for another's answer. With `friction`, the tire's forces and
+    displacements are three times as many: z, then x, then y of all points.
     """
     x, y = patch.points[:, 0], patch.points[:, 1]
-    touching = patch.force > 0
-    for k in range(1, steps + 1):
+    count = len(x)
+    horizontal = np.zeros((count, 2))
+    touching = patch.force > 0 if steps.start == 1 else None
+    for k in steps:
         time = k * step
         free = tire.predict()
         road = drive.height(x + drive.speed * time, y) + drive.motion(time)
-        force = solver.solve(patch.gap + free - road, touching, reference=patch.force)
+        q = patch.gap + free[:count] - road
+        if friction is None:
+            force = solver.solve(q, touching, reference=patch.force)
+            change = force - patch.force
+        else:
+            force, horizontal = friction.solve(solver, q, touching, patch.force, free[count:])
+            change = np.concatenate([force - patch.force, *horizontal.T])
         touching = None  # from now on the solver's own last set is the best guess
-        change = force - patch.force
         tire.advance(change)
         axle = -tire.inertia_force()
-        axle[2] += force.sum()
+        axle += [*horizontal.sum(axis=0), force.sum()]
         yield Instant(
             time,
             force,
+            horizontal,
             solver.gap,
-            free + tire.same_step @ change,
+            (free + tire.same_step @ change)[:count],
             axle,
             solver.residual,
             int(np.count_nonzero(force)),

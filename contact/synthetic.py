@@ -46,6 +46,33 @@ class Strip:
         more = self._waves(points, around + residual, across + residual)
         return replace(kept, residual=more.static() - kept.static())
 
+    def horizontal_response(
+        self, points: Array, around: int, across: int, stiff: float
+    ) -> Response:
+        """Response (3c, 3c) in z, x, y: the vertical one, and `stiff` times stiffer in the road's plane.
+
+        The tire leans a little: every mode moves in its own direction, x up to 0.3 of z.
+        """
+        plain = self._waves(points, around, across)
+        q = len(plain.eigenvalue)
+        lean = 0.3 * np.cos(np.arange(q))
+        direction = np.stack([np.ones(q), lean, 0.2 * np.ones(q)])
+        # A second set of the same waves moves in the plane alone.
+        plane = np.stack([-lean, np.ones(q), 0.5 * lean]) / stiff
+        out = np.hstack([_stacked(plain.output, d) for d in (direction, plane)])
+        into = np.vstack([_stacked(plain.input.T, d).T for d in (direction, plane * stiff)])
+        count = len(points)
+        return replace(
+            plain,
+            eigenvalue=np.concatenate([plain.eigenvalue, plain.eigenvalue]),
+            output=out,
+            input=into,
+            block_output=np.zeros((3 * count, 0)),
+            block_input=np.zeros((0, 3 * count)),
+            residual=np.zeros((3 * count, 3 * count)),
+            momentum=np.zeros((3, 2 * q)),
+        )
+
     def _waves(self, points: Array, around: int, across: int) -> Response:
         n, j = (a.ravel() for a in np.meshgrid(np.arange(around + 1), np.arange(1, across + 1)))
         # A standing wave and its mirror image: two states for n > 0, one for n = 0.
@@ -74,6 +101,11 @@ class Strip:
         )
 
 
+def _stacked(values: Array, direction: Array) -> Array:
+    """(c, q) scaled for each of three components, (3c, q)."""
+    return np.concatenate([values * part for part in direction])
+
+
 def oval_patch(shape: tuple[int, int], spacing: tuple[float, float], load: float) -> Patch:
     """A grid of points (m) around the origin that carries a load (N) inside an ellipse.
 
@@ -91,4 +123,5 @@ def oval_patch(shape: tuple[int, int], spacing: tuple[float, float], load: float
         force=load * force / force.sum(),
         gap=2e-3 * np.maximum(-inside, 0.0),
         edge=edge,
+        line=np.arange(len(px)) % shape[1],
     )

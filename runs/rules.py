@@ -19,8 +19,6 @@ LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "greens.residual": (("none", "static"), '"none" and "static" are supported in this version'),
     "modal.rim": (("fixed",), 'only "fixed" is supported in this version'),
     "modal.road": (("forces",), 'only "forces" is supported in this version'),
-    "contact.brush_stiffness": ((), "horizontal contact forces are not in this version: leave it"),
-    "contact.friction": ((), "friction is not in this version: leave it"),
     "road.kind": (
         ("flat", "sine", "cobblestones", "grid", "crg"),
         "flat, sine, cobblestones, grid and crg are supported in this version",
@@ -135,6 +133,12 @@ def _contact(scene: Scene, error: Where) -> None:
         raise error(("contact",), "needs a time to run: add [time] with duration")
     if static.load is None and static.deflection is None and static.road_height is None:
         raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
+    contact = scene.contact
+    if contact.brush_stiffness is None and contact.friction is not None:
+        raise error(("contact", "friction"), "needs brush_stiffness (N/m), which carries it")
+    standing = scene.rotation is None or scene.rotation.speed == 0
+    if any(contact.slip) and (contact.brush_stiffness is None or standing):
+        raise error(("contact", "slip"), "needs brush_stiffness (N/m) and a rolling tire")
 
 
 def _road(scene: Scene, error: Where) -> None:

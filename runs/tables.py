@@ -163,7 +163,13 @@ class Contact:
     brush_stiffness: float | None = number(
         None, "N/m", "per point; absent: no horizontal forces", above=0, most=1e12
     )
+    brush: str = choice(
+        "rolling", ("rolling", "spring"), "transported through the patch, or the thesis's spring"
+    )
     friction: float | None = number(None, "-", "absent: never slips", least=0, most=10)
+    slip: tuple[float, float] = vector(
+        (0.0, 0.0), "-", "of the rolling tire: longitudinal (> 0 drives), lateral", least=-1, most=1
+    )
     solver: str = choice(
         "auto",
         ("auto", "active-set", "projected-cg", "snes-vi"),

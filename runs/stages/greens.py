@@ -32,7 +32,13 @@ def inputs(session: Session) -> dict:
         "forces": [asdict(force) for force in scene.force],
         "points": session.patch.index.tolist() if scene.contact else [],
         "pitch": scene.contact.points if scene.contact else None,
+        "components": _components(session) if scene.contact else (),
     }
+
+
+def _components(session: Session) -> tuple[int, ...]:
+    """Directions of the contact forces: z, and with a brush x and y after it."""
+    return (2,) if session.scene.contact.brush_stiffness is None else (2, 0, 1)
 
 
 def prepare(session: Session) -> None:
@@ -146,7 +152,11 @@ def _flexibilities(session: Session) -> dict[str, np.ndarray]:
     out = {}
     with session.record.timing("static flexibility"):
         if session.scene.contact:
-            points = nodes(session.patch.index, len(session.static.points))
+            count = len(session.static.points)
+            points = sparse.vstack(
+                [nodes(session.patch.index, count, part) for part in _components(session)],
+                format="csr",
+            )
             out["contact"] = compliance(operators, stiffness, points, points)
         if session.scene.force:
             out["force"] = compliance(operators, stiffness, session.readings, session.loads)
@@ -159,7 +169,8 @@ def _couple(session: Session, flexibility: dict[str, np.ndarray]) -> None:
     modal, modes = session.modal, session.state_modes
     momentum = modal.projection.momentum
     if session.scene.contact:
-        shape = modal.shape[3 * session.patch.index + 2]
+        rows = [3 * session.patch.index + part for part in _components(session)]
+        shape = modal.shape[np.concatenate(rows)]
         session.contact_response = couple(modes, shape, shape, momentum, flexibility.get("contact"))
     if session.scene.force:
         session.force_response = couple(

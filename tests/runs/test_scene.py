@@ -174,8 +174,6 @@ def test_contradictions_need_both_sides(scene_file) -> None:
         "tire.section=car",
         "rotation.method=full",
         "greens.residual=attachment",
-        "contact.brush_stiffness=2e5",
-        "contact.friction=0.8",
         "output.vibration=true",
         "output.fields=true",
         "road.kind=step",
