@@ -19,14 +19,9 @@ LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "greens.residual": (("none", "static"), '"none" and "static" are supported in this version'),
     "modal.rim": (("fixed",), 'only "fixed" is supported in this version'),
     "modal.road": (("forces",), 'only "forces" is supported in this version'),
-    "road.kind": (
-        ("flat", "sine", "cobblestones", "grid", "crg"),
-        "flat, sine, cobblestones, grid and crg are supported in this version",
-    ),
     "output.vibration": ((False,), "only false is supported in this version"),
     "output.fields": ((False,), "only false is supported in this version"),
 }
-ASKED_FOR = {"road.kind": ("step", "cleat", "iso8608", "texture")}
 
 
 def refuse_later(raw: dict[str, Any], error: Where) -> None:
@@ -36,8 +31,7 @@ def refuse_later(raw: dict[str, Any], error: Where) -> None:
         here: Any = raw
         for part in path:
             here = here.get(part) if isinstance(here, dict) else None
-        asked = ASKED_FOR.get(dotted)
-        if here is not None and here not in supported and (asked is None or here in asked):
+        if here is not None and here not in supported:
             raise error(path, f"= {described(here)}: {message}")
 
 
@@ -143,6 +137,10 @@ def _contact(scene: Scene, error: Where) -> None:
 
 def _road(scene: Scene, error: Where) -> None:
     road = scene.road
+    if road.kind == "cleat" and road.ramp >= road.length:
+        raise error(("road", "ramp"), f"must be less than length = {road.length:g} m")
+    if road.kind == "texture" and road.cut_off >= road.roll_off:
+        raise error(("road", "cut_off"), f"must be less than roll_off = {road.roll_off:g} m")
     if road.kind != "cobblestones":
         return
     for side in ("block_length", "block_width"):

@@ -176,10 +176,6 @@ def test_contradictions_need_both_sides(scene_file) -> None:
         "greens.residual=attachment",
         "output.vibration=true",
         "output.fields=true",
-        "road.kind=step",
-        "road.kind=cleat",
-        "road.kind=iso8608",
-        "road.kind=texture",
     ],
 )
 def test_what_this_version_lacks_is_refused(scene_file, item: str) -> None:
