@@ -47,7 +47,8 @@ def make_grid_patch(
 ) -> Patch:
     """Points at multiples of the spacing (m) with a static gap within reach (m), not yet settled.
 
-    `nodes`: the patch of the nodes for the same reach, which the grid covers. `gap` is the
+    One more row around them is the edge, which watches. `nodes`: the patch of the nodes for the same
+    reach, which the grid covers. `gap` is the
     surface's height over the road plane (m), negative where it sinks in between nodes that touch,
     and `force` still zero.
     """
@@ -69,9 +70,10 @@ def make_grid_patch(
     ring, arc, found = surface.locate(x, y)
     height = surface.at(ring, arc)[:, 2]
     near = found & (height - road_height <= reach)
-    grown = np.pad(near.reshape(shape), 1)
-    inside = grown[2:, 1:-1] & grown[:-2, 1:-1] & grown[1:-1, 2:] & grown[1:-1, :-2]
-    place = np.flatnonzero(near)
+    wide = np.pad(near.reshape(shape), 1)
+    taken = wide[2:, 1:-1] | wide[:-2, 1:-1] | wide[1:-1, 2:] | wide[1:-1, :-2]
+    taken = (taken.ravel() | near) & found
+    place = np.flatnonzero(taken)
     if len(place) == 0:
         raise InputError("contact.points: no grid point near the road; take a finer grid")
     weights = surface.weights(ring[place], arc[place])
@@ -82,7 +84,7 @@ def make_grid_patch(
         half_sizes=np.tile(np.array(spacing) / 2, (len(place), 1)),
         force=np.zeros(len(place)),
         gap=(height - road_height)[place],
-        edge=~inside.ravel()[place],
+        edge=~near[place],
         line=place % shape[1],
         weights=weights[:, used].tocsr(),
         places=GridPlaces(shape, spacing, place),

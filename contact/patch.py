@@ -17,7 +17,7 @@ class Patch:
 
     `index` (p,) into the outer face; `points` (c, 3) m deformed, `half_sizes` (c, 2) m of the
     rectangle of each, `force` (c,) N and `gap` (c,) m of the static state on a flat road, `edge`
-    (c,) marks points with a neighbour outside the patch. `weights` W (c, p) takes nodal values to
+    (c,) marks its outermost points, which should never touch. `weights` W (c, p) takes nodal values to
     the points; None: the points are the nodes. `places`: where they lie on a regular grid, or None.
     Points of equal `line` (c,) int follow each other in the rolling direction.
     """
@@ -44,7 +44,7 @@ class Patch:
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
     def check_edge(self, force: np.ndarray, time: float, reach: float) -> None:
-        """Raise ConvergenceError when a point on the edge touches: its neighbours may touch too."""
+        """Raise ConvergenceError when a point on the edge touches: those beyond it may touch too."""
         touching = np.flatnonzero(self.edge & (force > 0))
         if len(touching):
             x, y, _ = self.points[touching[0]]
@@ -64,18 +64,20 @@ def make_patch(
     shape: tuple[int, int],
     reach: float,
 ) -> Patch:
-    """The points of the outer face (s of them, as a ring of `shape`) with a static gap within reach (m)."""
+    """The points of the outer face (s of them, as a ring of `shape`) with a static gap within reach (m),
+    and one row more around them: the edge, which watches that nothing beyond it is missed.
+    """
     near = (gap <= reach).reshape(shape)
     # The beads are the end of the tread; around the axle it closes on itself.
-    grown = np.pad(near, ((0, 0), (1, 1)), constant_values=True)
-    inside = np.roll(near, 1, 0) & np.roll(near, -1, 0) & grown[:, 2:] & grown[:, :-2]
-    index = np.flatnonzero(near.ravel())
+    wide = np.pad(near, ((0, 0), (1, 1)))
+    taken = near | np.roll(near, 1, 0) | np.roll(near, -1, 0) | wide[:, 2:] | wide[:, :-2]
+    index = np.flatnonzero(taken.ravel())
     return Patch(
         index=index,
         points=positions[index],
         half_sizes=half_sizes[index],
         force=force[index],
         gap=gap[index],
-        edge=~inside.ravel()[index],
+        edge=~near.ravel()[index],
         line=index % shape[1],
     )

@@ -63,11 +63,13 @@ def roll(
     patch: Patch,
     drive: Drive,
     step: float,
-    steps: range,
+    steps: int,
     friction: Friction | None = None,
+    done: int = 0,
 ) -> Iterator[Instant]:
-    """Yield the state after each of `steps`, numbered from 1, of `step` seconds. Collective when the
-    tire is.
+    """Yield the state after each of `steps` steps of `step` seconds. Collective when the tire is.
+
+    `done` of them were taken before, and tire, solver and friction are as they were then.
 
     The solver was made for A + C~. Every process solves the same small contact problem on the same
     bits, so no process has to wait for another's answer. With `friction`, the tire's forces and
@@ -76,8 +78,9 @@ def roll(
     x, y = patch.points[:, 0], patch.points[:, 1]
     count = len(x)
     horizontal = np.zeros((count, 2))
-    touching = patch.force > 0 if steps.start == 1 else None
-    for k in steps:
+    # The first step starts from the static contact set, the others from the solver's last one.
+    touching = None if done else patch.force > 0
+    for k in range(done + 1, steps + 1):
         time = k * step
         free = tire.predict()
         road = drive.height(x + drive.speed * time, y) + drive.motion(time)
@@ -88,7 +91,7 @@ def roll(
         else:
             force, horizontal = friction.solve(solver, q, touching, patch.force, free[count:])
             change = np.concatenate([force - patch.force, *horizontal.T])
-        touching = None  # from now on the solver's own last set is the best guess
+        touching = None
         tire.advance(change)
         axle = -tire.inertia_force()
         axle += [*horizontal.sum(axis=0), force.sum()]

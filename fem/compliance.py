@@ -47,21 +47,21 @@ def compliance(
     `outputs` (r, 3 s) and `loads` (k, 3 s) weigh the nodes of the outer face, three dofs a node.
     Raises ConvergenceError when a solve leaves a relative residual above 1e-8.
     """
-    body = operators.body
-    columns = _on_own_rows(operators, loads).toarray()
-    rows = _on_own_rows(operators, outputs).T.tocsr()
-    pc = _factorise(stiffness)
-    factor = pc.getFactorMatrix()
-    result = np.zeros((outputs.shape[0], loads.shape[0]))
-    for start in range(0, loads.shape[0], _CHUNK):
-        chunk = np.asfortranarray(columns[:, start : start + _CHUNK])
-        solution = _solve(factor, stiffness, chunk)
-        result[:, start : start + _CHUNK] = body.comm.allreduce(rows @ solution)
+    rows = on_own_rows(operators, outputs).T.tocsr()
+    pc = factorise(stiffness)
+    solution = solve_columns(pc, stiffness, on_own_rows(operators, loads).toarray())
     pc.destroy()
-    return result
+    return operators.body.comm.allreduce(rows @ solution)
 
 
-def _on_own_rows(operators: Operators, probes: sparse.csr_matrix) -> sparse.csr_matrix:
+def solve_columns(pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray) -> np.ndarray:
+    """Own rows of matrix^-1 columns, (n, k), by the matrix's factorisation; checked. Collective."""
+    factor = pc.getFactorMatrix()
+    chunks = range(0, columns.shape[1], _CHUNK)
+    return np.hstack([_solve(factor, matrix, columns[:, k : k + _CHUNK]) for k in chunks])
+
+
+def on_own_rows(operators: Operators, probes: sparse.csr_matrix) -> sparse.csr_matrix:
     """The probes as columns over this process's free dofs, (n, k)."""
     body = operators.body
     face = body.surface
@@ -72,7 +72,8 @@ def _on_own_rows(operators: Operators, probes: sparse.csr_matrix) -> sparse.csr_
     return nodal[operators.free]
 
 
-def _factorise(stiffness: PETSc.Mat) -> PETSc.PC:
+def factorise(stiffness: PETSc.Mat) -> PETSc.PC:
+    """A direct factorisation by MUMPS: L D L^T where the matrix is marked symmetric. Collective."""
     known, symmetric = stiffness.isSymmetricKnown()
     pc = PETSc.PC().create(stiffness.comm)
     pc.setOperators(stiffness)
@@ -84,6 +85,7 @@ def _factorise(stiffness: PETSc.Mat) -> PETSc.PC:
 
 def _solve(factor: PETSc.Mat, stiffness: PETSc.Mat, loads: np.ndarray) -> np.ndarray:
     """Own rows of stiffness^-1 loads, checked. Collective."""
+    loads = np.asfortranarray(loads)
     rows, columns = loads.shape
     comm = stiffness.comm
     sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, columns))

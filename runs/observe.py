@@ -45,6 +45,16 @@ def log_to(path: Path) -> Iterator[None]:
             _State.log = None
 
 
+@contextmanager
+def quiet() -> Iterator[None]:
+    """While inside, nothing is shown."""
+    root, _State.root = _State.root, False
+    try:
+        yield
+    finally:
+        _State.root = root
+
+
 def log(text: str) -> None:
     """A line for the log only, e.g. the settings of a solver."""
     if _State.root and _State.log is not None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
+from contact.road import make_road
 from runs import observe, store
 from runs.disk import write_text
 from runs.folder import Summary
@@ -36,11 +37,14 @@ def run_scene(
     until: str | None,
     fresh: bool,
     petsc_options: list[str],
-) -> None:
-    """Run the stages a scene needs into the directory. Collective over `comm`."""
+) -> Session:
+    """Run the stages a scene needs into the directory; what they left in memory. Collective."""
     session = Session(scene, directory, comm)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", dumps(scene)))
+    if scene.road is not None:
+        # A road file that cannot be used should be told before hours of solving, not after.
+        on_root(comm, lambda: make_road(scene.road) and None)
     reasons = skipped(scene, until)
     if petsc_options:
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
@@ -55,6 +59,7 @@ def run_scene(
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))
     else:
         on_root(comm, lambda: _report(directory, summary))
+    return session
 
 
 def _run_stage(session: Session, stage: str, summary: Summary, fresh: bool) -> None:

@@ -42,7 +42,7 @@ def roads() -> Path:
     return folder
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def launch() -> Callable[..., subprocess.CompletedProcess]:
     """Run `python3 *arguments` on `processes` processes; the completed process with its texts."""
 

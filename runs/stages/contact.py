@@ -54,7 +54,7 @@ def compute(session: Session, path: Path) -> None:
         writer = _Writer(session, {"step": step, "scheme": scheme})
         on_root(session.comm, lambda: writer.open(stack, path))
         with record.timing("time loop"), observe.Progress("contact", steps) as bar:
-            for instant in roll(tire, solver, patch, drive, step, range(1, steps + 1), friction):
+            for instant in roll(tire, solver, patch, drive, step, steps, friction):
                 patch.check_edge(instant.force, instant.time, session.reach)
                 totals.add(instant)
                 writer.add(instant)
@@ -175,6 +175,10 @@ def _describe(session: Session, totals: _Totals, solver, step, steps, scheme) ->
         "largest penetration": (float(totals.penetration), "m"),
         "factorisations": (solver.factorisations, "-"),
     }
+    if session.scene.force:
+        record.warnings.append(
+            "the point forces of [[force]] act in response.h5 alone, not in the contact"
+        )
     if totals.least == 0:
         record.warnings.append("the tire lost contact with the road for a while")
 

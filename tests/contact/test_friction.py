@@ -36,7 +36,7 @@ def run(law, steps, speed=20.0, motion=lambda t: 0.0, tire=None, height=None):
     friction = Friction(brush, tire.same_step, None)
     drive = Drive(height or Flat().height, motion, speed)
     return (
-        list(roll(tire, solver, PATCH, drive, STEP, range(1, steps + 1), friction)),
+        list(roll(tire, solver, PATCH, drive, STEP, steps, friction)),
         friction,
         solver,
     )

@@ -14,13 +14,14 @@ def test_points_within_reach_and_their_border() -> None:
     force = np.where(away <= 1, 2.0, 0.0).ravel()
     halves = np.tile([0.005, 0.004], (around * along, 1))
     patch = make_patch(positions, halves, force, gap, (around, along), reach=4.5e-3)
-    assert np.array_equal(patch.index, np.flatnonzero(gap <= 4.5e-3))
+    assert np.array_equal(patch.index[~patch.edge], np.flatnonzero(gap <= 4.5e-3))
     assert patch.force.sum() == force.sum()
     assert np.allclose(patch.area, 8e-5)
-    # The centre has all its neighbours across the seam of the ring; distance 4 has not.
-    assert not patch.edge[patch.force > 0].any()
-    assert patch.edge[away.ravel()[patch.index] == 4].all()
-    assert patch.extent == (0.0, 0.11, 0.01, 0.05)
+    # One row more watches: the neighbours of distance 4 along the lattice, across its seam too.
+    beyond = away.ravel()[patch.index[patch.edge]]
+    assert set(beyond) == {5, 9}
+    assert (patch.index % along == patch.line).all()
+    assert patch.extent == (0.0, 0.11, 0.0, 0.06)
 
 
 def test_a_bead_is_no_border() -> None:
@@ -29,4 +30,4 @@ def test_a_bead_is_no_border() -> None:
     zeros = np.zeros((around * along, 3))
     halves = np.full((around * along, 2), 0.01)
     patch = make_patch(zeros, halves, 0 * gap, gap, (around, along), reach=0.5)
-    assert patch.edge.reshape(3, along).tolist() == [[True] * 3, [False] * 3, [True] * 3]
+    assert patch.edge.reshape(5, along).tolist() == [[False] * 3] * 3 + [[True] * 3] * 2
