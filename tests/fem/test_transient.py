@@ -95,7 +95,7 @@ def test_undamped_average_acceleration_keeps_its_energy(tire):
 
 def test_rate_of_momentum_belongs_to_the_end_of_the_step(tire):
     """Its integral is the momentum; the scheme's own acceleration would lag by a step."""
-    step, steps = 2e-4, 60
+    step, steps = 1e-4, 120
     operators, _, load = tire
     full = FullTire(operators, None, 0.0, DAMPING, step, load, load, spectral_radius=0.0)
     full.start(np.zeros(1))
