@@ -172,7 +172,6 @@ def test_contradictions_need_both_sides(scene_file) -> None:
     [
         "tire.mesh=tire.msh",
         "tire.section=car",
-        "rotation.method=full",
         "greens.residual=attachment",
         "contact.points={dx=0.002,dy=0.002}",
         "contact.brush_stiffness=2e5",
