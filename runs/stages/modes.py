@@ -49,6 +49,7 @@ def compute(session: Session, path: Path) -> None:
         nodal = operators.spread(modes.vectors)
         shape = session.body.surface(nodal).reshape(-1, len(modes.squares))
         labels = _labels(session, modes.vectors)
+    session.modes = modes
     session.modal = ModalBasis(modes.frequency, shape, projection)
     record.headline |= {
         "modes": (len(modes.squares), "-"),

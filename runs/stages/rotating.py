@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 
 import numpy as np
 
-from modal.campbell import critical_speed, growth, onset
+from modal.campbell import Campbell, critical_speed, growth, onset, sweep
 from modal.rotating import StateModes, checks, matrices, rotating
 from runs.mpi import on_root
 from runs.session import Session
@@ -34,6 +34,7 @@ def inputs(session: Session) -> dict:
         "damping": session.damping,
         "speed": session.speed,
         "inertia": wanted.inertia,
+        "campbell": asdict(wanted.campbell) if wanted.campbell else None,
         "full": wanted.count if wanted.method == "full" else None,
     }
 
@@ -55,7 +56,27 @@ def compute(session: Session, path: Path) -> None:
     _describe(session, critical_speed(projection, inertia))
     if modes.unstable:
         record.warnings.append(_growth(session, projection))
-    session.write(path, "rotating", lambda file: _fill(file, session))
+    lines = _campbell(session, projection)
+    session.write(path, "rotating", lambda file: _fill(file, session, lines))
+
+
+def _campbell(session: Session, projection) -> Campbell | None:
+    """Branches of eigenvalues over speed, where the scene asks for them. Collective."""
+    wanted = session.scene.rotation.campbell
+    if wanted is None:
+        return None
+    speeds = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
+    inertia = session.scene.rotation.inertia
+    with session.record.timing("campbell"):
+        lines = on_root(
+            session.comm,
+            lambda: sweep(projection, session.damping, inertia, speeds, wanted.branches),
+        )
+    session.record.indicators["least similarity along a branch"] = (
+        float(np.nanmin(lines.similarity)),
+        "-",
+    )
+    return lines
 
 
 def _describe(session: Session, critical: float) -> None:
@@ -93,7 +114,7 @@ def _growth(session: Session, projection) -> str:
     )
 
 
-def _fill(file, session: Session) -> None:
+def _fill(file, session: Session, lines: Campbell | None) -> None:
     modes = session.state_modes
     for name, unit in _UNITS.items():
         put(file, name, getattr(modes, name), unit)
@@ -101,6 +122,11 @@ def _fill(file, session: Session) -> None:
     if session.scene.rotation.method == "full":
         put(file, "basis/shape", session.modal.shape, "kg^-1/2")
         put(file, "basis/momentum", session.modal.projection.momentum, "kg^1/2")
+    if lines is not None:
+        put(file, "campbell/speed", lines.speed, "rad/s")
+        put(file, "campbell/eigenvalue", lines.eigenvalue, "1/s")
+        put(file, "campbell/frequency", lines.frequency, "Hz")
+        put(file, "campbell/similarity", lines.similarity, "-")
     file.attrs["speed"] = session.speed
     file.attrs["basis_condition"] = modes.condition
     file.attrs["first_unstable"] = modes.unstable
