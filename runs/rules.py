@@ -86,8 +86,15 @@ def _geometry(scene: Scene, error: Where) -> None:
             f"= {tire.half_angle:g} deg puts the beads at {bead:g} m from the axle:"
             " make it or minor_radius smaller",
         )
+    for number, region in enumerate(tire.region):
+        for key in ("arc", "depth"):
+            low, high = getattr(region, key)
+            if low >= high:
+                raise error(
+                    ("tire", "region", str(number), key), f"= [{low:g}, {high:g}] must ascend"
+                )
     free = free_unknowns(tire)
-    if scene.modal.count >= free:
+    if scene.modal.up_to is None and scene.modal.count >= free:
         raise error(
             ("modal", "count"),
             f"= {scene.modal.count} must be less than the {free} free unknowns of the mesh",

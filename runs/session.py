@@ -95,8 +95,14 @@ class Session:
         """The finite-element body, at the static state once that is known. Collective."""
         from fem.body import Body
         from fem.material import Material
+        from fem.wall import Region
 
-        body = Body(self.comm, self.section, Material(**vars(self.scene.tire.material)))
+        tire = self.scene.tire
+        regions = [
+            Region(Material(**vars(r.material)), tuple(np.radians(r.arc)), r.depth, r.side)
+            for r in tire.region
+        ]
+        body = Body(self.comm, self.section, Material(**vars(tire.material)), regions)
         if hasattr(self, "static"):
             body.set_displacement(self.static.displacement)
         return body

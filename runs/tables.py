@@ -66,6 +66,18 @@ class Material:
 
 
 @dataclass(frozen=True)
+class Region:
+    arc: tuple[float, float] = vector(
+        (0.0, 45.0), "deg", "from, to, measured from the crown", least=0, most=175
+    )
+    side: str = choice("both", ("both", "left", "right"), "of the crown; left: y < 0")
+    depth: tuple[float, float] = vector(
+        (0.0, 1.0), "-", "from, to, through the wall; 0: inner face", least=0, most=1
+    )
+    material: Material = table(Material, "what the region is made of")
+
+
+@dataclass(frozen=True)
 class Tire:
     section: str = choice("torus", ("torus",), "shape of the section")
     outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10)
@@ -81,6 +93,9 @@ class Tire:
         1.0, "-", "length of elements at the footprint, relative to ungraded", least=0.05, most=1
     )
     material: Material = table(Material, "what the wall is made of")
+    region: tuple[Region, ...] = tables(
+        Region, "a part of the section of another material; elements whose middle it holds"
+    )
 
 
 @dataclass(frozen=True)
@@ -98,7 +113,10 @@ class Static:
 
 @dataclass(frozen=True)
 class Modal:
-    count: int = integer(500, "modes wanted", least=1, most=100000)
+    count: int = integer(500, "lowest modes wanted", least=1, most=100000)
+    up_to: float | None = number(
+        None, "Hz", "all modes below it are wanted, instead of count", above=0, most=1e6
+    )
     rim: str = choice("fixed", ("fixed", "free"), "the two bead faces")
     road: str = choice("forces", ("forces", "held"), "after the static state: its forces, or held")
 

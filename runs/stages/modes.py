@@ -34,9 +34,15 @@ def compute(session: Session, path: Path) -> None:
     from modal import undamped
     from modal.basis import project
 
-    record, operators = session.record, session.operators
+    record, operators, wanted = session.record, session.operators, session.scene.modal
     with record.timing("eigensolver"):
-        modes = undamped.solve(operators.stiffness, operators.mass, session.scene.modal.count)
+        modes = undamped.solve(
+            operators.stiffness,
+            operators.mass,
+            None if wanted.up_to else wanted.count,
+            up_to=wanted.up_to or np.inf,
+            points=_points(session),
+        )
     rotation = session.rotation_matrices if session.speed else None
     with record.timing("projection"):
         projection = project(modes, rotation, operators.mass, session.comm)
@@ -48,14 +54,23 @@ def compute(session: Session, path: Path) -> None:
         "modes": (len(modes.squares), "-"),
         "lowest": (float(modes.frequency[0]), "Hz"),
         "highest": (float(modes.frequency[-1]), "Hz"),
+        "mirror planes": (len(modes.sectors).bit_length() - 1, "-"),
     }
     record.indicators |= {
         "worst residual": (float(modes.residual.max()), "-"),
         "orthonormality": (modes.orthonormality, "-"),
         "modes by inertia count": (modes.inertia_count, "-"),
         "counted below": (float(np.sqrt(modes.counted_below) / (2 * np.pi)), "Hz"),
+        "slices": (modes.slices, "-"),
+        "rigid modes": (modes.rigid, "-"),
     }
     session.write(path, "modes", lambda file: _fill(file, session, modes))
+
+
+def _points(session: Session) -> np.ndarray:
+    """Undeformed positions (n / 3, 3) m of this process's free nodes, where mirrors are looked for."""
+    body = session.body
+    return body.lattice.points(body.ids[session.operators.free_nodes])
 
 
 def _fill(file, session: Session, modes) -> None:
@@ -69,7 +84,7 @@ def _fill(file, session: Session, modes) -> None:
         if getattr(basis.projection, name) is not None:
             put(file, f"projected/{name}", getattr(basis.projection, name), unit)
     file.attrs["inertia_count"] = modes.inertia_count
-    file.attrs["rigid_modes"] = 0
+    file.attrs["rigid_modes"] = modes.rigid
 
 
 _UNITS = {

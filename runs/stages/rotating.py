@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from modal.rotating import StateModes, matrices, rotating
+from modal.campbell import critical_speed, onset
+from modal.rotating import StateModes, checks, matrices, rotating
 from runs.mpi import on_root
 from runs.session import Session
 from runs.store import put
@@ -42,27 +43,41 @@ def compute(session: Session, path: Path) -> None:
     with record.timing("eigensolver"):
         # One process solves: LAPACK on another could order repeated eigenvalues differently.
         modes = on_root(session.comm, lambda: rotating(*pencil))
+        figures = on_root(session.comm, lambda: checks(modes, *pencil))
     session.state_modes = modes
     oscillating = modes.eigenvalue[modes.eigenvalue.imag > 0]
     record.headline |= {
         "pairs": (len(oscillating), "-"),
         "speed": (session.speed, "rad/s"),
+        "critical speed": (critical_speed(session.modal.projection, inertia), "rad/s"),
     }
     if len(oscillating):
         record.headline["lowest"] = (float(oscillating.imag.min() / (2 * np.pi)), "Hz")
+    record.indicators |= {name: (figure, "-") for name, figure in figures.items()}
     record.indicators |= {
-        "worst residual": (float(modes.residual.max(initial=0.0)), "-"),
-        "worst left residual": (float(modes.left_residual.max(initial=0.0)), "-"),
         "basis condition": (modes.condition, "-"),
         "states in the near-defective block": (len(modes.block), "-"),
     }
     if modes.unstable:
-        fastest = modes.eigenvalue.real.max()
-        record.warnings.append(
-            f"{modes.unstable} motion(s) of the rolling tire grow by themselves, the fastest at "
-            f"{fastest:.3g} 1/s: the wheel turns beyond its critical speed"
-        )
+        record.warnings.append(_growth(session, modes))
     session.write(path, "rotating", lambda file: _fill(file, session))
+
+
+def _growth(session: Session, modes: StateModes) -> str:
+    """What to say of a tire whose motion grows. Collective."""
+    scene = session.scene
+
+    def first() -> float:
+        return onset(
+            session.modal.projection, session.damping, scene.rotation.inertia, session.speed
+        )
+
+    fastest = max([*modes.eigenvalue.real, *np.linalg.eigvals(modes.block).real])
+    return (
+        f"{modes.unstable} motion(s) of the rolling tire grow by themselves, the fastest at "
+        f"{fastest:.3g} 1/s; on this static state that begins at {on_root(session.comm, first):.4g} "
+        "rad/s: the wheel turns beyond its critical speed"
+    )
 
 
 def _fill(file, session: Session) -> None:
