@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from contact.complementarity import ContactSolver
+from contact.friction import Friction
 from contact.patch import Patch
 
 
@@ -33,10 +34,13 @@ class Tire(Protocol):
 
 @dataclass(frozen=True)
 class Instant:
-    """The state at the end of a step: (c,) arrays in N and m, `axle_force` (3,) N."""
+    """The state at the end of a step: (c,) arrays in N and m, `horizontal` (c, 2) N, `axle_force`
+    (3,) N.
+    """
 
     time: float
     force: np.ndarray
+    horizontal: np.ndarray
     gap: np.ndarray
     displacement: np.ndarray
     axle_force: np.ndarray
@@ -54,29 +58,49 @@ class Drive:
 
 
 def roll(
-    tire: Tire, solver: ContactSolver, patch: Patch, drive: Drive, step: float, steps: int
+    tire: Tire,
+    solver: ContactSolver,
+    patch: Patch,
+    drive: Drive,
+    step: float,
+    steps: int,
+    friction: Friction | None = None,
+    done: int = 0,
 ) -> Iterator[Instant]:
     """Yield the state after each of `steps` steps of `step` seconds. Collective when the tire is.
 
+    `done` of them were taken before, and tire, solver and friction are as they were then.
+
     The solver was made for A + C~. Every process solves the same small contact problem on the same
-    bits, so no process has to wait for another's answer.
+    bits, so no process has to wait for another's answer. With `friction`, the tire's forces and
+    displacements are three times as many: z, then x, then y of all points.
     """
     x, y = patch.points[:, 0], patch.points[:, 1]
-    solver.active = patch.force > 0  # the first step starts from the static contact set
-    for k in range(1, steps + 1):
+    count = len(x)
+    horizontal = np.zeros((count, 2))
+    # The first step starts from the static contact set, the others from the solver's last one.
+    touching = None if done else patch.force > 0
+    for k in range(done + 1, steps + 1):
         time = k * step
         free = tire.predict()
         road = drive.height(x + drive.speed * time, y) + drive.motion(time)
-        force = solver.solve(patch.gap + free - road, reference=patch.force)
-        change = force - patch.force
+        q = patch.gap + free[:count] - road
+        if friction is None:
+            force = solver.solve(q, touching, reference=patch.force)
+            change = force - patch.force
+        else:
+            force, horizontal = friction.solve(solver, q, touching, patch.force, free[count:])
+            change = np.concatenate([force - patch.force, *horizontal.T])
+        touching = None
         tire.advance(change)
         axle = -tire.inertia_force()
-        axle[2] += force.sum()
+        axle += [*horizontal.sum(axis=0), force.sum()]
         yield Instant(
             time,
             force,
+            horizontal,
             solver.gap,
-            free + tire.same_step @ change,
+            (free + tire.same_step @ change)[:count],
             axle,
             solver.residual,
             int(np.count_nonzero(force)),

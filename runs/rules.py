@@ -18,17 +18,9 @@ LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "rotation.method": (("projected",), 'only "projected" is supported in this version'),
     "modal.rim": (("fixed",), 'only "fixed" is supported in this version'),
     "modal.road": (("forces",), 'only "forces" is supported in this version'),
-    "contact.points": (("nodes",), 'only "nodes" is supported in this version'),
-    "contact.brush_stiffness": ((), "horizontal contact forces are not in this version: leave it"),
-    "contact.friction": ((), "friction is not in this version: leave it"),
-    "road.kind": (
-        ("flat", "sine", "cobblestones", "grid", "crg"),
-        "flat, sine, cobblestones, grid and crg are supported in this version",
-    ),
     "output.vibration": ((False,), "only false is supported in this version"),
     "output.fields": ((False,), "only false is supported in this version"),
 }
-ASKED_FOR = {"road.kind": ("step", "cleat", "iso8608", "texture")}
 
 
 def refuse_later(raw: dict[str, Any], error: Where) -> None:
@@ -38,8 +30,7 @@ def refuse_later(raw: dict[str, Any], error: Where) -> None:
         here: Any = raw
         for part in path:
             here = here.get(part) if isinstance(here, dict) else None
-        asked = ASKED_FOR.get(dotted)
-        if here is not None and here not in supported and (asked is None or here in asked):
+        if here is not None and here not in supported:
             raise error(path, f"= {described(here)}: {message}")
 
 
@@ -142,10 +133,20 @@ def _contact(scene: Scene, error: Where) -> None:
         raise error(("contact",), "needs a time to run: add [time] with duration")
     if static.load is None and static.deflection is None and static.road_height is None:
         raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
+    contact = scene.contact
+    if contact.brush_stiffness is None and contact.friction is not None:
+        raise error(("contact", "friction"), "needs brush_stiffness (N/m), which carries it")
+    standing = scene.rotation is None or scene.rotation.speed == 0
+    if any(contact.slip) and (contact.brush_stiffness is None or standing):
+        raise error(("contact", "slip"), "needs brush_stiffness (N/m) and a rolling tire")
 
 
 def _road(scene: Scene, error: Where) -> None:
     road = scene.road
+    if road.kind == "cleat" and road.ramp >= road.length:
+        raise error(("road", "ramp"), f"must be less than length = {road.length:g} m")
+    if road.kind == "texture" and road.cut_off >= road.roll_off:
+        raise error(("road", "cut_off"), f"must be less than roll_off = {road.roll_off:g} m")
     if road.kind != "cobblestones":
         return
     for side in ("block_length", "block_width"):

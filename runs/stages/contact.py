@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from contact.complementarity import make_solver
+from contact.brush import Brush, BrushLaw
+from contact.friction import Friction
+from contact.grid_patch import OnPoints, settle
+from contact.model import solver_name, step_solver
 from contact.rolling import Drive, roll
-from contact.tread import half_space_compliance, no_tread, winkler_compliance
 from greens.convolution import Convolution
 from greens.recursion import Recursion
 from greens.response import Response
@@ -39,18 +41,20 @@ def inputs(session: Session) -> dict:
 
 def compute(session: Session, path: Path) -> None:
     """The time loop, written block by block. Collective."""
-    scene, patch, record = session.scene, session.patch, session.record
+    record = session.record
     shortest = _shortest_period(session)
     tire, step, steps, scheme = integration(session, session.contact_response, shortest)
     with record.timing("tread and solver"):
-        solver = make_solver(scene.contact.solver, tire.same_step + tread(session))
+        _settled(session)
+        tire, solver, friction = _on_points(session, tire, step)
+    patch = session.patch
     drive = Drive(session.road.height, session.motion, session.road_speed)
     totals = _Totals()
     with ExitStack() as stack:
         writer = _Writer(session, {"step": step, "scheme": scheme})
         on_root(session.comm, lambda: writer.open(stack, path))
         with record.timing("time loop"), observe.Progress("contact", steps) as bar:
-            for instant in roll(tire, solver, patch, drive, step, steps):
+            for instant in roll(tire, solver, patch, drive, step, steps, friction):
                 patch.check_edge(instant.force, instant.time, session.reach)
                 totals.add(instant)
                 writer.add(instant)
@@ -95,16 +99,46 @@ def _shortest_period(session: Session) -> float:
     return min(passing, 1 / motion.frequency) if motion.kind == "sine" else passing
 
 
-def tread(session: Session) -> np.ndarray:
-    """Compliance of the tread, (c, c) m/N."""
-    contact, patch = session.scene.contact, session.patch
-    if contact.tread == "half-space":
-        return half_space_compliance(
-            patch.points[:, :2], patch.half_sizes, contact.youngs_modulus, contact.poisson_ratio
-        )
-    if contact.tread == "winkler":
-        return winkler_compliance(patch.area, contact.winkler_stiffness)
-    return no_tread(len(patch.index))
+def _settled(session: Session) -> None:
+    """A grid of points takes up the static load that the finite elements gave to nodes."""
+    patch = session.patch
+    if patch.weights is None:
+        return
+    response = session.contact_response
+    p = len(patch.index)
+    flexibility = (response.static() + response.residual)[:p, :p]
+    nodal = session.static.force[patch.index]
+    solver = step_solver(session.scene.contact, patch, flexibility)
+    session.patch, rise = settle(patch, solver, flexibility, nodal)
+    session.record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
+
+
+def _on_points(session: Session, tire, step: float):
+    """(tire as seen at the patch's points, normal solver, friction or None); the choice is shown."""
+    spec, patch = session.scene.contact, session.patch
+    p = len(patch.index)
+    solver = step_solver(spec, patch, tire.same_step[:p, :p])
+    observe.say(
+        f"  {len(patch.points)} contact points on {p} nodes, tread {spec.tread}, "
+        f"solver {solver_name(spec, patch)}"
+    )
+    friction = None
+    if spec.brush_stiffness is not None:
+        friction = _friction(session, tire, step)
+        limit = friction.largest_unique(patch.force > 0, solver)
+        session.record.indicators["friction up to which a step has one answer"] = (limit, "-")
+    if patch.weights is not None:
+        tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
+    return tire, solver, friction
+
+
+def _friction(session: Session, tire, step: float) -> Friction:
+    """The brush of the scene, at rest."""
+    spec, patch = session.scene.contact, session.patch
+    law = BrushLaw(spec.brush_stiffness, spec.friction, spec.slip, spec.brush)
+    brush = Brush(law, patch.points[:, 0], patch.line, session.road_speed, step)
+    brush.begin(patch.force > 0)
+    return Friction(brush, tire.same_step, patch.weights)
 
 
 class _Totals:
@@ -168,7 +202,7 @@ class _Writer:
         provenance = self._session.provenance("contact")
         self._file = stack.enter_context(store.writing(path, provenance))
         patch = self._session.patch
-        c = len(patch.index)
+        c = len(patch.points)
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
         for name, (shape, unit) in _LAYOUT.items():
@@ -220,12 +254,13 @@ _LAYOUT: dict[str, tuple[tuple, str]] = {
 def _columns(instants: list) -> dict[str, np.ndarray]:
     """The datasets' next rows from a block of instants."""
     force = np.stack([i.force for i in instants])
-    zeros = np.zeros(len(instants))
+    horizontal = np.stack([i.horizontal for i in instants])
+    sums = np.concatenate([horizontal.sum(axis=1), force.sum(axis=1)[:, None]], axis=1)
     return {
         "time": np.array([i.time for i in instants]),
         "normal_force": force,
-        "horizontal_force": np.zeros((*force.shape, 2)),
-        "total_force": np.stack([zeros, zeros, force.sum(axis=1)], axis=-1),
+        "horizontal_force": horizontal,
+        "total_force": sums,
         "displacement": np.stack([i.displacement for i in instants]),
         "gap": np.stack([i.gap for i in instants]),
         "axle_force": np.stack([i.axle_force for i in instants]),

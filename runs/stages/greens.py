@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
+from contact.grid_patch import make_grid_patch
 from contact.motion import make_motion
 from contact.patch import Patch, make_patch
 from contact.road import make_road
@@ -31,7 +32,14 @@ def inputs(session: Session) -> dict:
         "greens": asdict(scene.greens),
         "forces": [asdict(force) for force in scene.force],
         "points": session.patch.index.tolist() if scene.contact else [],
+        "pitch": scene.contact.points if scene.contact else None,
+        "components": _components(session) if scene.contact else (),
     }
+
+
+def _components(session: Session) -> tuple[int, ...]:
+    """Directions of the contact forces: z, and with a brush x and y after it."""
+    return (2,) if session.scene.contact.brush_stiffness is None else (2, 0, 1)
 
 
 def prepare(session: Session) -> None:
@@ -53,13 +61,26 @@ def _prepare_contact(session: Session) -> None:
     session.motion = make_motion(motion.kind, motion.amplitude, motion.frequency, motion.duration)
     road = make_road(scene.road)
     session.reach = scene.contact.reach or _reach(session, road)
-    session.patch = _patch(session, session.reach)
+    session.patch = _points(session)
     session.road = _under(session, road, session.patch)
 
 
 def _patch(session: Session, reach: float) -> Patch:
     state = session.static
     return make_patch(state.positions, state.half_sizes, state.force, state.gap, state.shape, reach)
+
+
+def _points(session: Session) -> Patch:
+    """The patch of the scene's points: the nodes, or a grid among them."""
+    nodes, wanted = _patch(session, session.reach), session.scene.contact.points
+    if wanted == "nodes":
+        return nodes
+    from fem.tread_surface import TreadSurface
+
+    state = session.static
+    surface = TreadSurface(session.lattice, state.positions)
+    spacing = wanted.dx, wanted.dy
+    return make_grid_patch(surface, state.road_height, nodes, spacing, session.reach)
 
 
 def _under(session: Session, road, patch: Patch):
@@ -127,7 +148,9 @@ def _probes(session: Session) -> dict[str, tuple]:
 
     out = {}
     if session.scene.contact:
-        points = nodes(session.patch.index, len(session.static.points))
+        count = len(session.static.points)
+        parts = [nodes(session.patch.index, count, part) for part in _components(session)]
+        points = sparse.vstack(parts, format="csr")
         out["contact"] = points, points
     if session.scene.force:
         out["force"] = session.readings, session.loads
@@ -147,7 +170,8 @@ def _describe(session: Session, responses: dict[str, Response]) -> None:
     if session.scene.contact:
         response = session.contact_response
         record.headline |= {
-            "contact points": (len(session.patch.index), "-"),
+            "contact points": (len(session.patch.points), "-"),
+            "nodes that carry them": (len(session.patch.index), "-"),
             "reach of the patch": (session.reach, "m"),
             "rolling speed": (session.road_speed, "m/s"),
         }
