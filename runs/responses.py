@@ -60,12 +60,14 @@ def chosen(session: Session, response: Response) -> Response:
 
 def _band(session: Session) -> float:
     """Frequencies that matter, Hz: as given, or up to half the highest mode."""
-    return session.scene.greens.band or session.modal.frequency[-1] / 2
+    return session.scene.greens.band or _cutoff(session).circular / (4 * np.pi)
 
 
 def _cutoff(session: Session) -> Cutoff:
-    """The highest mode and the damping of those beyond it."""
+    """The highest mode, or state of the full problem, and the damping of those beyond it."""
     circular = 2 * np.pi * session.modal.frequency[-1]
+    if session.speed and session.scene.rotation.method == "full":
+        circular = np.abs(session.state_modes.eigenvalue.imag).max()
     return Cutoff(circular, session.damping[0] + session.damping[1] * circular**2)
 
 
