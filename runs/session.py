@@ -134,11 +134,10 @@ class Session:
     def modes(self):
         """The modes on all unknowns: as the stage computed them, or once more where it was reused.
         Collective."""
-        from modal import undamped
+        from runs.stages.modes import solve
 
         with self.record.timing("modes once more"):
-            operators = self.operators
-            return undamped.solve(operators.stiffness, operators.mass, self.scene.modal.count)
+            return solve(self)
 
     @property
     def basis(self):
