@@ -31,6 +31,10 @@ class Tire(Protocol):
 
     def inertia_force(self) -> np.ndarray: ...
 
+    def snapshot(self) -> dict[str, np.ndarray]: ...
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None: ...
+
 
 @dataclass(frozen=True)
 class Instant:
@@ -55,6 +59,27 @@ class Drive:
     height: Callable[[np.ndarray, np.ndarray], np.ndarray]
     motion: Callable[[float], float]
     speed: float
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The parts of a time loop that have a past: what a checkpoint has to keep."""
+
+    tire: Tire
+    solver: ContactSolver
+    friction: Friction | None = None
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Arrays by name, between two steps. Collective when the tire is."""
+        friction = self.friction.state() if self.friction else {}
+        return self.tire.snapshot() | self.solver.state() | friction
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on as if nothing had happened: the same bits on the same number of processes."""
+        self.tire.restore(kept)
+        self.solver.set_state(kept)
+        if self.friction:
+            self.friction.set_state(kept)
 
 
 def roll(
