@@ -39,7 +39,8 @@ class Tire(Protocol):
 @dataclass(frozen=True)
 class Instant:
     """The state at the end of a step: (c,) arrays in N and m, `horizontal` (c, 2) N, `axle_force`
-    (3,) N.
+    (3,) N; `change` and `moved`, what the tire feels and does beyond the static state, all
+    components.
     """
 
     time: float
@@ -50,6 +51,8 @@ class Instant:
     axle_force: np.ndarray
     residual: float
     active: int
+    change: np.ndarray
+    moved: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,7 @@ def roll(
             change = np.concatenate([force - patch.force, *horizontal.T])
         touching = None
         tire.advance(change)
+        moved = free + tire.same_step @ change
         axle = -tire.inertia_force()
         axle += [*horizontal.sum(axis=0), force.sum()]
         yield Instant(
@@ -125,8 +129,10 @@ def roll(
             force,
             horizontal,
             solver.gap,
-            (free + tire.same_step @ change)[:count],
+            moved[:count],
             axle,
             solver.residual,
             int(np.count_nonzero(force)),
+            change,
+            moved,
         )

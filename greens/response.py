@@ -75,12 +75,16 @@ class Response:
             static -= self.block_output @ np.linalg.solve(self.block, self.block_input)
         return static
 
+    def slow(self, step: float, limit: float = 1.0) -> np.ndarray:
+        """Which poles (q,) `resolved` keeps."""
+        return np.abs(self.eigenvalue) * step <= limit
+
     def resolved(self, step: float, limit: float = 1.0) -> Response:
         """Poles with |s| step above the limit leave the dynamics and follow the force statically.
 
         Integrating them over so long a step gains nothing and can gain energy.
         """
-        keep = np.abs(self.eigenvalue) * step <= limit
+        keep = self.slow(step, limit)
         if keep.all():
             return self
         fast = (self.output[:, ~keep] / self.eigenvalue[~keep]) @ self.input[~keep]

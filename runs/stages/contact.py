@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from contact.brush import Brush, BrushLaw
+from contact.energy import Work
 from contact.friction import Friction
 from contact.grid_patch import OnPoints, settle
 from contact.model import solver_name, step_solver
@@ -18,6 +19,7 @@ from greens.convolution import Convolution
 from greens.recursion import Recursion
 from greens.response import Response
 from runs import observe, store
+from runs.contact_balance import balance
 from runs.contact_file import ContactFile
 from runs.mpi import Deferred, Stopped
 from runs.session import Session
@@ -53,17 +55,25 @@ def compute(session: Session, path: Path) -> None:
     with ExitStack() as stack, record.timing("time loop"):
         file = ContactFile(session, {"step": step, "scheme": scheme})
         kept = file.open(stack, path)
+        work = Work()
         if kept is not None:
             loop.restore(kept)
+            work.set_state(kept)
             totals = _Totals(**{name: kept[name].item() for name in vars(totals)})
             observe.say(f"  goes on from the checkpoint at t = {totals.steps * step:.6g} s")
-        _run(session, loop, file, totals, step, steps)
+        _run(session, loop, file, (totals, work), step, steps)
         file.finish()
     _describe(session, totals, loop.solver, step, steps, scheme)
+    if scheme != "convolution":
+        balance(session, loop, work, step)
 
 
-def _run(session: Session, loop: Loop, file: ContactFile, totals: _Totals, step, steps) -> None:
-    """Take the steps that are left; stop between two of them when asked to. Collective."""
+def _run(session: Session, loop: Loop, file: ContactFile, counts, step, steps) -> None:
+    """Take the steps that are left; stop between two of them when asked to. Collective.
+
+    `counts`: the running figures and the work.
+    """
+    totals, work = counts
     drive = Drive(session.road.height, session.motion, session.road_speed)
     instants = roll(
         loop.tire, loop.solver, session.patch, drive, step, steps, loop.friction, totals.steps
@@ -74,11 +84,12 @@ def _run(session: Session, loop: Loop, file: ContactFile, totals: _Totals, step,
         for instant in instants:
             session.patch.check_edge(instant.force, instant.time, session.reach)
             totals.add(instant)
+            work.add(instant)
             file.add(instant)
             bar.advance()
             stop, due = watch(deferred.asked)
             if stop or due:
-                file.checkpoint(loop.snapshot() | vars(totals))
+                file.checkpoint(loop.snapshot() | vars(totals) | work.state())
             if stop:
                 raise Stopped(stop)
 
