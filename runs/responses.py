@@ -16,6 +16,9 @@ from runs.store import put
 # Points and frequencies at which the truncation is estimated: enough for its size.
 _SAMPLE = 40
 _FREQUENCIES = 25
+# Residual states faster than this many times the highest mode follow statically: they would set the
+# automatic step and change the receptance up to half the highest mode by 0.001 at most (measured).
+_FASTEST = 3.0
 
 _UNITS = {
     "eigenvalue": "1/s",
@@ -38,7 +41,12 @@ def make(session: Session, outputs, loads) -> Response:
         return basis.couple(outputs, loads)
     modes = session.modes if option == "attachment" else None
     with session.record.timing("residual flexibility"):
-        return session.wheel.respond(basis, modes, outputs, loads, option)
+        response = session.wheel.respond(basis, modes, outputs, loads, option)
+    if option in ("static", "dirac"):
+        return response
+    cutoff = _cutoff(session)
+    limit = _FASTEST * max(cutoff.circular, cutoff.rate)
+    return response.keeping(np.abs(response.eigenvalue) <= limit)
 
 
 def chosen(session: Session, response: Response) -> Response:
@@ -52,7 +60,15 @@ def chosen(session: Session, response: Response) -> Response:
 
 def _band(session: Session) -> float:
     """Frequencies that matter, Hz: as given, or up to half the highest mode."""
-    return session.scene.greens.band or session.modal.frequency[-1] / 2
+    return session.scene.greens.band or _cutoff(session).circular / (4 * np.pi)
+
+
+def _cutoff(session: Session) -> Cutoff:
+    """The highest mode, or state of the full problem, and the damping of those beyond it."""
+    circular = 2 * np.pi * session.modal.frequency[-1]
+    if session.speed and session.scene.rotation.method == "full":
+        circular = np.abs(session.state_modes.eigenvalue.imag).max()
+    return Cutoff(circular, session.damping[0] + session.damping[1] * circular**2)
 
 
 def judge(session: Session, name: str, whole: Response, response: Response) -> None:
@@ -61,9 +77,7 @@ def judge(session: Session, name: str, whole: Response, response: Response) -> N
     some = [slice(None, None, -(-n // _SAMPLE)) for n in whole.residual.shape]
     whole, response = whole.between(*some), response.between(*some)
     frequency = np.linspace(0, band, _FREQUENCIES)
-    fastest = 2 * np.pi * session.modal.frequency[-1]
-    rate = session.damping[0] + session.damping[1] * fastest**2
-    off = estimate(whole, session.scene.greens.residual, Cutoff(fastest, rate), frequency)
+    off = estimate(whole, session.scene.greens.residual, _cutoff(session), frequency)
     label = f"up to {band:.4g} Hz, {name}"
     record.indicators[f"estimated truncation error {label}"] = (float(off.max()), "-")
     if session.scene.greens.dynamic is not None:

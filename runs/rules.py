@@ -49,6 +49,7 @@ def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     if scene.contact is not None:
         _contact(scene, error)
     _force(scene, error)
+    _greens(scene, error)
     if scene.road is not None:
         _road(scene, error)
     _time(scene, error)
@@ -134,6 +135,16 @@ def _force(scene: Scene, error: Where) -> None:
                 ("force", str(number), "arc"),
                 f"= {force.arc:g} deg lies beyond the bead at {scene.tire.half_angle:g} deg",
             )
+
+
+def _greens(scene: Scene, error: Where) -> None:
+    rotation, residual = scene.rotation, scene.greens.residual
+    full = rotation is not None and rotation.speed > 0 and rotation.method == "full"
+    if full and residual in ("second-order", "attachment"):
+        raise error(
+            ("greens", "residual"),
+            f'= "{residual}" completes the modes: it needs rotation.method = "projected"',
+        )
 
 
 def _contact(scene: Scene, error: Where) -> None:

@@ -52,8 +52,8 @@ class Session:
     `patch` and so on; the finite-element model is made when a stage first asks for it.
     """
 
-    def __init__(self, scene: Scene, directory: Path, comm: MPI.Comm):
-        self.scene, self.directory, self.comm = scene, directory, comm
+    def __init__(self, scene: Scene, directory: Path, comm: MPI.Comm, fresh: bool = False):
+        self.scene, self.directory, self.comm, self.fresh = scene, directory, comm, fresh
         self.hashes: dict[str, str] = {}
         self.record = Record()
 
@@ -134,11 +134,10 @@ class Session:
     def modes(self):
         """The modes on all unknowns: as the stage computed them, or once more where it was reused.
         Collective."""
-        from modal import undamped
+        from runs.stages.modes import solve
 
         with self.record.timing("modes once more"):
-            operators = self.operators
-            return undamped.solve(operators.stiffness, operators.mass, self.scene.modal.count)
+            return solve(self)
 
     @property
     def basis(self):

@@ -31,18 +31,11 @@ def inputs(session: Session) -> dict:
 
 def compute(session: Session, path: Path) -> None:
     """Solve, project and store. Collective."""
-    from modal import undamped
     from modal.basis import project
 
-    record, operators, wanted = session.record, session.operators, session.scene.modal
+    record, operators = session.record, session.operators
     with record.timing("eigensolver"):
-        modes = undamped.solve(
-            operators.stiffness,
-            operators.mass,
-            None if wanted.up_to else wanted.count,
-            up_to=wanted.up_to or np.inf,
-            points=_points(session),
-        )
+        modes = solve(session)
     rotation = session.rotation_matrices if session.speed else None
     with record.timing("projection"):
         projection = project(modes, rotation, operators.mass, session.comm)
@@ -66,6 +59,20 @@ def compute(session: Session, path: Path) -> None:
         "rigid modes": (modes.rigid, "-"),
     }
     session.write(path, "modes", lambda file: _fill(file, session, modes, labels))
+
+
+def solve(session: Session):
+    """The modes the scene wants, on all unknowns. Collective."""
+    from modal import undamped
+
+    operators, wanted = session.operators, session.scene.modal
+    return undamped.solve(
+        operators.stiffness,
+        operators.mass,
+        None if wanted.up_to else wanted.count,
+        up_to=wanted.up_to or np.inf,
+        points=_points(session),
+    )
 
 
 def _points(session: Session) -> np.ndarray:
