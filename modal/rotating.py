@@ -161,30 +161,43 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
     scale = np.sqrt(np.abs(np.diag(stiffness)).mean())
     companion = np.block([[np.zeros((m, m)), scale * np.eye(m)], [-stiffness / scale, -drag]])
     values, vectors = linalg.eig(companion)
-    vectors /= np.linalg.norm(vectors, axis=0)
-    inverse = np.linalg.inv(vectors)
+    upper = values.imag >= 0
+    values, vectors = values[upper], vectors[:, upper] / np.linalg.norm(vectors[:, upper], axis=0)
+    block, block_vectors = np.zeros((0, 0)), np.zeros((2 * m, 0))
+    inverse, _ = _inverse(values, vectors, block_vectors)
     condition = np.linalg.norm(inverse, axis=1)
     good = condition <= DEFECTIVE
-    block, block_vectors = np.zeros((0, 0)), np.zeros((2 * m, 0))
+    block_inverse = block_vectors.T
     if not good.all():
         block, block_vectors = _invariant(companion, values[~good])
-        inverse = np.linalg.inv(np.hstack([vectors[:, good], block_vectors]))
         values, vectors = values[good], vectors[:, good]
-    keep = np.flatnonzero(values.imag >= 0)
-    values = values[keep]
-    weight = np.where(values.imag > 0, 2.0, 1.0)
-    right, left = vectors[:m, keep], inverse[keep, m:] / scale
+        inverse, block_inverse = _inverse(values, vectors, block_vectors)
+    right, left = vectors[:m], inverse[:, m:] / scale
     return StateModes(
         values,
-        right * weight,
+        right * np.where(values.imag > 0, 2.0, 1.0),
         left,
         block,
-        block_vectors[:m].real,
-        inverse[len(inverse) - len(block) :, m:].real / scale,
+        block_vectors[:m],
+        block_inverse[:, m:] / scale,
         _quadratic_residual(drag, stiffness, values, right),
         _quadratic_residual(drag.T, stiffness.T, values, left.T),
         float(condition[good].max(initial=1.0)),
     )
+
+
+def _inverse(values, vectors, block_vectors) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of the inverse of [vectors, their conjugates, block vectors] for the first and the last.
+
+    Through [Re v, Im v] in real arithmetic, a quarter of the work of the complex matrix.
+    """
+    pairs = values.imag > 0
+    real = np.hstack([vectors.real, vectors.imag[:, pairs], block_vectors])
+    inverse = np.linalg.inv(real)
+    count, waves = len(values), int(pairs.sum())
+    rows = inverse[:count].astype(complex)
+    rows[pairs] = (inverse[:count][pairs] - 1j * inverse[count : count + waves]) / 2
+    return rows, inverse[count + waves :]
 
 
 def _invariant(companion: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -203,6 +216,10 @@ def _invariant(companion: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, n
 
 def _quadratic_residual(drag, stiffness, values, vectors) -> np.ndarray:
     """||(s^2 + s D + K) u|| over the sum of its terms' norms, column by column."""
-    terms = (vectors * values**2, drag @ vectors * values, stiffness @ vectors)
+
+    def times(matrix):  # real by complex, without a complex copy of the matrix
+        return matrix @ vectors.real + 1j * (matrix @ vectors.imag)
+
+    terms = (vectors * values**2, times(drag) * values, times(stiffness))
     size = sum(np.linalg.norm(term, axis=0) for term in terms)
     return np.linalg.norm(sum(terms), axis=0) / size

@@ -18,6 +18,7 @@ ORTHONORMALITY_TOLERANCE = 1e-10
 _REPAIR = (
     1e-12  # vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product
 )
+_CHUNK = 64  # columns a matrix product: no second copy of all vectors
 
 
 @dataclass(frozen=True)
@@ -197,20 +198,27 @@ def _orthonormalise(comm: MPI.Comm, vectors: np.ndarray, matrix: np.ndarray) -> 
 def _residuals(
     scaled: PETSc.Mat, values: np.ndarray, vectors: np.ndarray, least: float
 ) -> np.ndarray:
-    defect = multiply(scaled, vectors) - vectors * values
-    squares = scaled.comm.tompi4py().allreduce((defect**2).sum(axis=0))
+    squares = np.empty(len(values))
+    for start in range(0, len(values), _CHUNK):
+        some = slice(start, start + _CHUNK)
+        defect = multiply(scaled, vectors[:, some]) - vectors[:, some] * values[some]
+        squares[some] = (defect**2).sum(axis=0)
+    squares = scaled.comm.tompi4py().allreduce(squares)
     return np.sqrt(squares) / np.maximum(values, least)
 
 
 def multiply(matrix: PETSc.Mat, vectors: np.ndarray) -> np.ndarray:
     """This process's rows of matrix @ vectors, vectors given by rows (n, m). Collective."""
     rows, columns = vectors.shape
-    sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, columns))
-    dense = PETSc.Mat().createDense(sizes, array=np.asfortranarray(vectors), comm=matrix.comm)
-    product = matrix.matMult(dense)
-    out = product.getDenseArray().copy()
-    product.destroy()
-    dense.destroy()
+    out = np.empty((rows, columns), order="F")
+    for start in range(0, columns, _CHUNK):
+        some = np.asfortranarray(vectors[:, start : start + _CHUNK])
+        sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, some.shape[1]))
+        dense = PETSc.Mat().createDense(sizes, array=some, comm=matrix.comm)
+        product = matrix.matMult(dense)
+        out[:, start : start + _CHUNK] = product.getDenseArray()
+        product.destroy()
+        dense.destroy()
     return out
 
 

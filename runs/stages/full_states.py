@@ -1,7 +1,7 @@
 """States of the rolling tire from the full finite-element matrices, in the place of the projected ones.
 
-Their fields take the place of the modes too: with U the right and W the left vectors (n, q), the basis
-is [Re U, Im U, Re W, Im W], on which the states' own coordinates are ones and i.
+Their fields take the place of the modes too: the basis is M-orthonormal, as that of the modes is, and
+spans [Re U, Im U, Re W, Im W], with U the right and W the left vectors (n, q).
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ from modal import quadratic
 from modal.basis import momentum
 from modal.quadratic import FullModes, truncation
 from modal.rotating import StateModes
+from modal.undamped import gram
 from runs.session import Session
+
+_ROUNDING = 1e-14  # of the largest squared length: directions below are the fields' rounding
 
 
 def compute(session: Session, projected: StateModes) -> StateModes:
@@ -31,15 +34,29 @@ def compute(session: Session, projected: StateModes) -> StateModes:
         found = quadratic.solve(operators.mass, drag, stiffness, wanted.count)
     drag.destroy()
     stiffness.destroy()
-    fields = np.hstack([found.right.real, found.right.imag, found.left.real, found.left.imag])
-    shape = session.body.surface(operators.spread(fields)).reshape(-1, fields.shape[1])
-    replace_basis(session, shape, momentum(session.comm, operators.mass, fields))
+    basis, coordinates = _orthonormal(session, found)
+    shape = session.body.surface(operators.spread(basis)).reshape(-1, basis.shape[1])
+    replace_basis(session, shape, momentum(session.comm, operators.mass, basis))
     _compare(session, found, projected)
-    return _states(found)
+    return _states(found, coordinates)
+
+
+def _orthonormal(session: Session, found: FullModes) -> tuple[np.ndarray, np.ndarray]:
+    """An M-orthonormal basis (own rows n, p) of all fields, and their coordinates (p, 4 q). Collective."""
+    comm, mass = session.comm, session.operators.mass[:, None]
+    fields = np.hstack([found.right.real, found.right.imag, found.left.real, found.left.imag])
+    lengths = np.sqrt(comm.allreduce((mass * fields**2).sum(axis=0)))
+    lengths[lengths == 0] = 1.0  # the imaginary part of a real state
+    products = gram(comm, fields / lengths, mass * fields / lengths)
+    sizes, directions = np.linalg.eigh(products)
+    kept = sizes > _ROUNDING * sizes.max()
+    turn = directions[:, kept] / np.sqrt(sizes[kept])
+    coordinates = (directions[:, kept] * np.sqrt(sizes[kept])).T * lengths
+    return fields / lengths @ turn, coordinates
 
 
 def replace_basis(session: Session, shape: np.ndarray, momenta: np.ndarray) -> None:
-    """Later stages read the traces (3 s, 4 q) and momenta (3, 4 q) of the fields, not those of the modes."""
+    """Later stages read the traces (3 s, p) and momenta (3, p) of this basis, not those of the modes."""
     modal = session.modal
     session.modal = replace(
         modal, shape=shape, projection=replace(modal.projection, momentum=momenta)
@@ -61,17 +78,17 @@ def _drag(session: Session):
     return drag
 
 
-def _states(found: FullModes) -> StateModes:
-    s = found.eigenvalue
-    one, none = np.eye(len(s)), np.zeros((len(s),) * 2)
+def _states(found: FullModes, coordinates: np.ndarray) -> StateModes:
+    s, size = found.eigenvalue, len(coordinates)
+    real, imaginary, left_real, left_imaginary = np.split(coordinates, 4, axis=1)
     weight = np.where(s.imag > 0, 2.0, 1.0)
     return StateModes(
         s,
-        np.vstack([one, 1j * one, none, none]) * weight,
-        np.hstack([none, none, one, 1j * one]),
+        (real + 1j * imaginary) * weight,
+        (left_real + 1j * left_imaginary).T,
         np.zeros((0, 0)),
-        np.zeros((4 * len(s), 0)),
-        np.zeros((0, 4 * len(s))),
+        np.zeros((size, 0)),
+        np.zeros((0, size)),
         found.residual,
         found.left_residual,
         found.condition,
