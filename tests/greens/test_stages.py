@@ -30,6 +30,7 @@ frequency = 0.0
 duration = 0.02
 step = 5e-5
 [output]
+impulse = true
 velocity = true
 acceleration = true
 receptance = { to = 80.0, step = 20.0, direct = 2 }
@@ -93,6 +94,17 @@ def test_velocity_and_acceleration_are_the_rates(run) -> None:
         slope = (value[2:] - value[:-2]) / (2 * step)
         # From the second step on: the constant force is switched on at t = 0.
         assert np.abs(slope - rate[1:-1])[1:].max() < 0.02 * np.abs(rate).max()
+
+
+def test_impulse_response_is_that_of_the_stored_states(run) -> None:
+    """Starts from nothing, and its transform at 0 Hz is the static flexibility of the states."""
+    out, _ = run("--set", "greens.residual=none", "--until", "response")
+    with h5py.File(out / "response.h5") as file:
+        g, receptance = file["impulse"][:], file["receptance"][0]
+        step = file["time"][1]
+    assert g.shape[1:] == (2, 2)
+    assert np.abs(g[0]).max() < 1e-9 * np.abs(g).max()
+    assert np.abs(g.sum(axis=0) * step - receptance).max() < 0.05 * np.abs(receptance).max()
 
 
 def test_states_made_static_are_told(run) -> None:
