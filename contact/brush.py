@@ -70,7 +70,7 @@ class Brush:
         self._moved, self._touched = moved, touching
 
     def state(self) -> dict[str, Array]:
-        """What a checkpoint keeps."""
+        """What a checkpoint keeps of the brush."""
         return {"deflection": self.deflection, "moved": self._moved, "touched": self._touched}
 
     def set_state(self, kept: dict[str, Array]) -> None:

@@ -43,6 +43,10 @@ class ContactSolver(Protocol):
 
     def block(self, index: NDArray[np.intp]) -> Array: ...
 
+    def state(self) -> dict[str, Array]: ...
+
+    def set_state(self, kept: dict[str, Array]) -> None: ...
+
 
 class ActiveSet:
     """Semismooth Newton (primal-dual active set), made safe as block principal pivoting.
@@ -108,6 +112,14 @@ class ActiveSet:
             "close to singular or far from symmetric: add tread compliance or a residual "
             'flexibility, or take solver = "snes-vi"'
         )
+
+    def state(self) -> dict[str, Array]:
+        """What the next solve starts from."""
+        return {"active": self.active}
+
+    def set_state(self, kept: dict[str, Array]) -> None:
+        """Go on from `state`."""
+        self.active = np.asarray(kept["active"], dtype=bool)
 
     def block(self, index: NDArray[np.intp]) -> Array:
         """A between the points `index`, (a, a) m/N."""

@@ -50,6 +50,15 @@ class Friction:
         coupling = np.linalg.solve(own, w @ (w2 @ self._zh.T).T)
         return 1.0 / max(float(np.linalg.norm(coupling, 2)), 1e-300)
 
+    def state(self) -> dict[str, Array]:
+        """What a checkpoint keeps."""
+        return self._brush.state() | {"horizontal": self.horizontal}
+
+    def set_state(self, kept: dict[str, Array]) -> None:
+        """Go on from `state`."""
+        self.horizontal = kept["horizontal"]
+        self._brush.set_state(kept)
+
     def solve(
         self, normal: ContactSolver, q: Array, guess: Array | None, static: Array, free: Array
     ) -> tuple[Array, Array]:

@@ -147,6 +147,7 @@ class OnPoints:
         count = self._weights.shape[0]
         self.same_step = LinearOperator((count, count), matvec=self._answer, dtype=float)
         self.inertia_force = tire.inertia_force
+        self.snapshot, self.restore = tire.snapshot, tire.restore
 
     def predict(self) -> np.ndarray:
         """Displacement (c,) m at the end of the step with no new force."""

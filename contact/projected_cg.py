@@ -80,6 +80,15 @@ class ProjectedCG:
             '"active-set", or a softer tread'
         )
 
+    def state(self) -> dict[str, Array]:
+        """What the next solve starts from."""
+        kept = {"last": self._last, "before": self._before}
+        return {name: value for name, value in kept.items() if value is not None}
+
+    def set_state(self, kept: dict[str, Array]) -> None:
+        """Go on from `state`."""
+        self._last, self._before = kept.get("last"), kept.get("before")
+
     def block(self, index: NDArray[np.intp]) -> Array:
         """A between the points `index`, (a, a) m/N."""
         return self._compliance.block(index)

@@ -31,11 +31,16 @@ class Tire(Protocol):
 
     def inertia_force(self) -> np.ndarray: ...
 
+    def snapshot(self) -> dict[str, np.ndarray]: ...
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None: ...
+
 
 @dataclass(frozen=True)
 class Instant:
     """The state at the end of a step: (c,) arrays in N and m, `horizontal` (c, 2) N, `axle_force`
-    (3,) N.
+    (3,) N; `change` and `moved`, what the tire feels and does beyond the static state, all
+    components.
     """
 
     time: float
@@ -46,6 +51,8 @@ class Instant:
     axle_force: np.ndarray
     residual: float
     active: int
+    change: np.ndarray
+    moved: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,27 @@ class Drive:
     height: Callable[[np.ndarray, np.ndarray], np.ndarray]
     motion: Callable[[float], float]
     speed: float
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The parts of a time loop that have a past: what a checkpoint has to keep."""
+
+    tire: Tire
+    solver: ContactSolver
+    friction: Friction | None = None
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Arrays by name, between two steps. Collective when the tire is."""
+        friction = self.friction.state() if self.friction else {}
+        return self.tire.snapshot() | self.solver.state() | friction
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on as if nothing had happened: the same bits on the same number of processes."""
+        self.tire.restore(kept)
+        self.solver.set_state(kept)
+        if self.friction:
+            self.friction.set_state(kept)
 
 
 def roll(
@@ -93,6 +121,7 @@ def roll(
             change = np.concatenate([force - patch.force, *horizontal.T])
         touching = None
         tire.advance(change)
+        moved = free + tire.same_step @ change
         axle = -tire.inertia_force()
         axle += [*horizontal.sum(axis=0), force.sum()]
         yield Instant(
@@ -100,8 +129,10 @@ def roll(
             force,
             horizontal,
             solver.gap,
-            (free + tire.same_step @ change)[:count],
+            moved[:count],
             axle,
             solver.residual,
             int(np.count_nonzero(force)),
+            change,
+            moved,
         )

@@ -97,6 +97,14 @@ class SnesVI:
         self.factorisations += self.iterations
         return self._finish(length)
 
+    def state(self) -> dict[str, Array]:
+        """What the next solve starts from."""
+        return {"scaled": self._force.array_r.copy()}
+
+    def set_state(self, kept: dict[str, Array]) -> None:
+        """Go on from `state`."""
+        self._force.array[:] = kept["scaled"]
+
     def block(self, index: NDArray[np.intp]) -> Array:
         """A between the points `index`, (a, a) m/N."""
         return self._matrix[np.ix_(index, index)]

@@ -90,6 +90,26 @@ class Recursion:
         if self._block:
             self._block.advance(force)
 
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """All states in the order of the response, the same for any number of processes. Collective."""
+        kept = {"state": self._gathered(self.state), "push": self._gathered(self._push)}
+        block = self._block.snapshot() if self._block else None
+        return kept | self.comm.bcast(block)
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on from a snapshot, between `advance` and `predict`."""
+        mine = slice(self.comm.rank, None, self.comm.size)
+        self.state, self._push = kept["state"][mine].copy(), kept["push"][mine].copy()
+        if self._block:
+            self._block.restore(kept)
+
+    def _gathered(self, values: np.ndarray) -> np.ndarray:
+        parts = self.comm.allgather(values)
+        out = np.empty(sum(map(len, parts)), complex)
+        for rank, part in enumerate(parts):
+            out[rank :: self.comm.size] = part
+        return out
+
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N: sum_k (int rho phi_k) eta_k''. Collective."""
         rate = self._s * (self._s * self.state + self._push)
@@ -132,6 +152,12 @@ class _Block:
     def advance(self, force: np.ndarray) -> None:
         self._force = force
         self.state = self._free + self._new @ force
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        return {"block_state": self.state, "block_force": self._force}
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        self.state, self._force = kept["block_state"], kept["block_force"]
 
     def inertia_force(self) -> np.ndarray:
         block = self._response.block

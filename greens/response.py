@@ -100,12 +100,16 @@ class Response:
             residual=self.residual - gone.real,
         )
 
+    def slow(self, step: float, limit: float = 1.0) -> np.ndarray:
+        """Which poles (q,) `resolved` keeps."""
+        return np.abs(self.eigenvalue) * step <= limit
+
     def resolved(self, step: float, limit: float = 1.0) -> Response:
         """Poles with |s| step above the limit leave the dynamics and follow the force statically.
 
         Integrating them over so long a step gains nothing and can gain energy.
         """
-        return self.keeping(np.abs(self.eigenvalue) * step <= limit)
+        return self.keeping(self.slow(step, limit))
 
     def rate(self) -> Response:
         """The velocities at the outputs: g' for g, i omega H for H.

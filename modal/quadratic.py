@@ -71,7 +71,7 @@ def solve(mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -
 
 def _pairing(comm, mass, drag, s, u, w) -> np.ndarray:
     """w_i^T [(s_i + s_j) M + D] u_j: diagonal but for clusters, where its inverse makes w biorthogonal."""
-    moved = multiply(drag, u.real) + 1j * multiply(drag, u.imag)
+    moved = _times(drag, u)
     near = comm.allreduce(w.T @ (mass[:, None] * u))
     return s[:, None] * near + near * s + comm.allreduce(w.T @ moved)
 
@@ -105,10 +105,11 @@ def _states(mass, drag, stiffness, wanted: int):
             "Lower rotation.count, or give PETSc options such as -rotating_pep_max_it 1000."
         )
     s, vectors = _read(pep, stiffness, found)
-    for thing in (pep, inertia, weight):
-        thing.destroy()
     order = _up_to_a_gap(s, wanted)
     s, vectors = s[order], vectors[:, order]
+    vectors = _polished(ksp.getPC().getFactorMatrix(), mass, drag, s, vectors)
+    for thing in (pep, inertia, weight):
+        thing.destroy()
     residual = _residuals(mass, drag, stiffness, s, vectors)
     if not residual.max() <= RESIDUAL_TOLERANCE:
         raise ConvergenceError(
@@ -130,6 +131,29 @@ def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, found: int) -> tuple[np.ndarray, np
     return s, vectors
 
 
+def _polished(factor: PETSc.Mat, mass, drag, s, vectors) -> np.ndarray:
+    """u = -K^-1 (s^2 M + s D) u once more, with the factorised K: it takes out what the Krylov basis
+    carries in the stiffest directions, which is little in u and much in K u. Collective.
+    """
+    right = mass[:, None] * vectors * s**2 + _times(drag, vectors) * s
+    rows, columns = right.shape
+    sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, 2 * columns))
+    stacked = np.asfortranarray(np.hstack([right.real, right.imag]))
+    block = PETSc.Mat().createDense(sizes, array=stacked, comm=factor.comm)
+    answer = block.duplicate()
+    factor.matSolve(block, answer)
+    real, imaginary = np.split(answer.getDenseArray(), 2, axis=1)
+    better = real + 1j * imaginary
+    block.destroy()
+    answer.destroy()
+    size = factor.comm.tompi4py().allreduce((np.abs(better) ** 2).sum(axis=0))
+    return better / np.sqrt(size)
+
+
+def _times(matrix: PETSc.Mat, vectors: np.ndarray) -> np.ndarray:
+    return multiply(matrix, vectors.real) + 1j * multiply(matrix, vectors.imag)
+
+
 def _up_to_a_gap(s: np.ndarray, wanted: int) -> np.ndarray:
     """Indices by |s|, ending at the widest gap after the wanted ones: conjugates stay together."""
     order = np.argsort(np.abs(s), kind="stable")
@@ -143,12 +167,8 @@ def _up_to_a_gap(s: np.ndarray, wanted: int) -> np.ndarray:
 
 def _residuals(mass, drag, stiffness, s, vectors) -> np.ndarray:
     """||(s^2 M + s D + K) u|| over the sum of its terms' norms, column by column. Collective."""
-
-    def product(matrix):
-        return multiply(matrix, vectors.real) + 1j * multiply(matrix, vectors.imag)
-
     comm = stiffness.comm.tompi4py()
-    terms = [mass[:, None] * vectors * s**2, product(drag) * s, product(stiffness)]
+    terms = [mass[:, None] * vectors * s**2, _times(drag, vectors) * s, _times(stiffness, vectors)]
 
     def norm(field):
         return np.sqrt(comm.allreduce((np.abs(field) ** 2).sum(axis=0)))

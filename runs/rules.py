@@ -15,7 +15,6 @@ Where = Callable[[tuple[str, ...], str], InputError]
 LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "tire.mesh": ((), 'only section = "torus" is supported in this version'),
     "tire.section": (("torus",), 'only "torus" is supported in this version'),
-    "rotation.method": (("projected",), 'only "projected" is supported in this version'),
     "modal.rim": (("fixed",), 'only "fixed" is supported in this version'),
     "modal.road": (("forces",), 'only "forces" is supported in this version'),
     "output.vibration": ((False,), "only false is supported in this version"),

@@ -52,8 +52,8 @@ class Session:
     `patch` and so on; the finite-element model is made when a stage first asks for it.
     """
 
-    def __init__(self, scene: Scene, directory: Path, comm: MPI.Comm):
-        self.scene, self.directory, self.comm = scene, directory, comm
+    def __init__(self, scene: Scene, directory: Path, comm: MPI.Comm, fresh: bool = False):
+        self.scene, self.directory, self.comm, self.fresh = scene, directory, comm, fresh
         self.hashes: dict[str, str] = {}
         self.record = Record()
 

@@ -125,6 +125,13 @@ class Damping:
 
 
 @dataclass(frozen=True)
+class Campbell:
+    to: float = number(200.0, "rad/s", "highest speed", above=0, most=2000)
+    step: float = number(10.0, "rad/s", "between two speeds", above=0, most=2000)
+    branches: int = integer(20, "followed, from the lowest", least=1, most=1000)
+
+
+@dataclass(frozen=True)
 class Rotation:
     speed: float = number(100.0, "rad/s", "of the wheel; 0: standing", least=0, most=2000)
     inertia: str = choice("full", ("full", "doppler"), "doppler: without Coriolis, centrifugal")
@@ -132,6 +139,9 @@ class Rotation:
     count: int = integer(40, "pairs wanted of method full", least=1, most=10000)
     rolling_radius: float | None = number(
         None, "m", "effective; absent: from the static state", above=0, most=10
+    )
+    campbell: Campbell | None = table(
+        Campbell, "eigenvalues over speed, on the modes of this one static state", optional=True
     )
 
 

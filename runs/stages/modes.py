@@ -41,6 +41,7 @@ def compute(session: Session, path: Path) -> None:
         projection = project(modes, rotation, operators.mass, session.comm)
         nodal = operators.spread(modes.vectors)
         shape = session.body.surface(nodal).reshape(-1, len(modes.squares))
+        labels = _labels(session, modes.vectors)
     session.modes = modes
     session.modal = ModalBasis(modes.frequency, shape, projection)
     record.headline |= {
@@ -57,7 +58,7 @@ def compute(session: Session, path: Path) -> None:
         "slices": (modes.slices, "-"),
         "rigid modes": (modes.rigid, "-"),
     }
-    session.write(path, "modes", lambda file: _fill(file, session, modes))
+    session.write(path, "modes", lambda file: _fill(file, session, modes, labels))
 
 
 def solve(session: Session):
@@ -80,13 +81,31 @@ def _points(session: Session) -> np.ndarray:
     return body.lattice.points(body.ids[session.operators.free_nodes])
 
 
-def _fill(file, session: Session, modes) -> None:
+def _labels(session: Session, vectors: np.ndarray):
+    """Wave and section numbers of the modes without a road; None with one. Collective."""
+    from modal.waves import label
+
+    if session.static.road_height is not None:
+        return None
+    body, operators = session.body, session.operators
+    _, wall, along = np.unravel_index(body.ids[operators.free_nodes], body.lattice.shape)
+    circles = wall * body.lattice.shape[2] + along
+    every = np.unique(np.concatenate(session.comm.allgather(circles)))
+    ring = np.searchsorted(every, circles)
+    return label(session.comm, _points(session), ring, operators.mass, vectors)
+
+
+def _fill(file, session: Session, modes, labels) -> None:
     basis = session.modal
     m = len(basis.frequency)
     put(file, "frequency", basis.frequency, "Hz")
     put(file, "residual", modes.residual, "-")
     put(file, "surface/points", session.static.points, "m")
     put(file, "surface/shape", basis.shape.T.reshape(m, -1, 3), "kg^-1/2")
+    if labels is not None:
+        put(file, "wave_number", labels.wave, "-")
+        put(file, "section_mode", labels.section, "-")
+        put(file, "wave_share", labels.share, "-")
     for name, unit in _UNITS.items():
         if getattr(basis.projection, name) is not None:
             put(file, f"projected/{name}", getattr(basis.projection, name), unit)

@@ -6,9 +6,11 @@ from mpi4py import MPI
 
 from contact.brush import Brush, BrushLaw, upstream
 from contact.complementarity import ActiveSet
+from contact.compliance import MatrixCompliance
 from contact.flat import Flat
 from contact.friction import Friction
-from contact.rolling import Drive, roll
+from contact.projected_cg import ProjectedCG
+from contact.rolling import Drive, Loop, roll
 from contact.synthetic import Strip, oval_patch
 from contact.tangential import stick_slip
 from contact.tread import half_space_compliance, rectangle_potential
@@ -174,3 +176,34 @@ def test_friction_beyond_any_answer_is_refused() -> None:
     tire.same_step[:c, c : 2 * c] = 100 * np.diag(TREAD.diagonal())
     with pytest.raises(ConvergenceError, match="friction"):
         run(BrushLaw(3e7, 2.0, (0.1, 0.0)), 50, tire=tire)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("iterative", [False, True])
+def test_a_loop_goes_on_with_the_same_bits(iterative: bool) -> None:
+    """Stopped after 40 steps and taken up by new objects: as if nothing had happened."""
+    count, steps = len(PATCH.points), 80
+    drive = Drive(wavy, lambda t: 0.0, 20.0)
+    response = Strip(speed=20.0).horizontal_response(PATCH.points, 3, 2, 1e3)
+
+    def loop() -> Loop:
+        tire = Recursion(response, STEP, "linear", MPI.COMM_WORLD)
+        matrix = tire.same_step[:count, :count] + TREAD
+        solver = ProjectedCG(MatrixCompliance(matrix)) if iterative else ActiveSet(matrix)
+        brush = Brush(BrushLaw(1e5, 0.5, (0.02, 0.0)), PATCH.points[:, 0], PATCH.line, 20.0, STEP)
+        brush.begin(PATCH.force > 0)
+        return Loop(tire, solver, Friction(brush, tire.same_step, None))
+
+    def go(loop: Loop, until: int, done: int = 0) -> list:
+        parts = loop.tire, loop.solver, PATCH, drive, STEP, until, loop.friction, done
+        return list(roll(*parts))
+
+    unbroken = go(loop(), steps)
+    first, second = loop(), loop()
+    go(first, 40)
+    second.restore({name: np.array(value) for name, value in first.snapshot().items()})
+    for one, other in zip(unbroken[40:], go(second, steps, 40), strict=True):
+        assert one.time == other.time
+        assert np.array_equal(one.force, other.force)
+        assert np.array_equal(one.horizontal, other.horizontal)
+        assert np.array_equal(one.axle_force, other.axle_force)

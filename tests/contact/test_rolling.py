@@ -5,6 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.complementarity import ActiveSet
+from contact.energy import Work
 from contact.flat import Flat
 from contact.rolling import Drive, roll
 from contact.synthetic import Strip, oval_patch
@@ -147,3 +148,21 @@ def test_axle_carries_the_contact_force_in_the_end() -> None:
     last = run(response, 2e-4, 1000, "linear", motion=raised, speed=0.0)[0][-1]
     assert last.force.sum() > 1.02 * PATCH.force.sum()
     assert last.axle_force[2] == pytest.approx(last.force.sum(), rel=1e-6)
+
+
+def test_work_of_contact_is_the_energy_of_an_undamped_tire() -> None:
+    """Waves and residual springs hold what the road put in, to second order in the step."""
+    strip = Strip(damping=0.0)
+    response = strip.response(PATCH.points, 4, 2, residual=6)
+    errors = []
+    for steps in (200, 400):
+        work = Work()
+        instants, tire, _ = run(response, 0.02 / steps, steps, "linear", speed=0.0)
+        for instant in instants:
+            work.add(instant)
+        change = instants[-1].change
+        held = (np.abs(tire.state) ** 2).sum() / strip.mass
+        held += 0.5 * change @ response.residual @ change
+        errors.append(abs(work.total - held) / max(i.change @ i.moved for i in instants))
+    assert errors[1] < 1e-3
+    assert errors[1] < 0.35 * errors[0]

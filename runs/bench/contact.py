@@ -1,0 +1,219 @@
+"""What a step of the contact loop costs, against its floor, against convolution, and with friction."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.brush import Brush, BrushLaw
+from contact.complementarity import ActiveSet
+from contact.compliance import SpreadCompliance
+from contact.flat import Flat
+from contact.friction import Friction
+from contact.kernel import GridPlaces, KernelTread
+from contact.projected_cg import ProjectedCG
+from contact.rolling import Drive, roll
+from contact.synthetic import Strip, oval_patch
+from contact.texture import Texture
+from contact.tread import half_space_compliance, half_space_influence
+from greens.convolution import Convolution
+from greens.recursion import Recursion
+from runs.tabulate import Table
+
+ABOUT = (
+    "cost of a contact step: memory floor, convolution, 100 x 100 points, friction, road at rest"
+)
+STEP = 1e-4
+ELASTIC = 5e6, 0.45
+
+
+def run() -> list[Table]:
+    """The tables; ratios are of times measured in one run."""
+    return [_step(), _convolution(), _large(), _rough()]
+
+
+def _best(function: Callable[[], object], repeats: int) -> float:
+    """Shortest of several runs, s."""
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - began)
+    return min(times)
+
+
+def _parts(shape: tuple[int, int], modes: int, horizontal: bool = False):
+    """Patch, tire with `modes` complex states, tread; 500 N on an oval of a tenth of a metre."""
+    patch = oval_patch(shape, (0.15 / shape[0], 0.12 / shape[1]), 500.0)
+    around = max(modes // 20, 2)
+    strip = Strip(speed=20.0)
+    if horizontal:
+        response = strip.horizontal_response(patch.points, around // 2, 10, 1e2)
+    else:
+        response = strip.response(patch.points, around, 10)
+    tire = Recursion(response, STEP, "linear", MPI.COMM_SELF)
+    tread = half_space_compliance(patch.points[:, :2], patch.half_sizes, *ELASTIC)
+    return patch, tire, tread, response
+
+
+def _wavy(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return 2e-4 * np.minimum(np.maximum(x, 0) / 0.3, 1.0) ** 3 * np.sin(80 * x + 10 * y)
+
+
+def _loop(shape, modes: int, height, friction: bool = False, steps: int = 1000):
+    """(seconds a step, factorisations, states, touching at most) of the loop alone."""
+    patch, tire, tread, response = _parts(shape, modes, friction)
+    count = len(patch.points)
+    solver = ActiveSet(tire.same_step[:count, :count] + tread)
+    coupling = None
+    if friction:
+        law = BrushLaw(2e4, 0.8, (0.02, 0.01))
+        brush = Brush(law, patch.points[:, 0], patch.line, 20.0, STEP)
+        brush.begin(patch.force > 0)
+        coupling = Friction(brush, tire.same_step, None)
+    drive = Drive(height, lambda t: 0.0, 20.0)
+    began = time.perf_counter()
+    most = max(i.active for i in roll(tire, solver, patch, drive, STEP, steps, coupling))
+    seconds = (time.perf_counter() - began) / steps
+    return seconds, solver.factorisations, len(response.eigenvalue), most
+
+
+def _step() -> Table:
+    flat, count, states, _ = _loop((25, 20), 500, Flat().height)
+    rolling, turns, _, most = _loop((25, 20), 500, _wavy)
+    matrices = np.ones((2, 500, 2 * states))
+    vector = np.ones(2 * states)
+    floor = _best(lambda: (matrices[0] @ vector, matrices[1] @ vector), 50)
+    plain = _loop((12, 9), 200, _wavy)[0]
+    rubbing, _, _, _ = _loop((12, 9), 200, _wavy, friction=True, steps=200)
+    rows = [
+        ["flat road at rest", 500, states, flat * 1e6, flat / floor, count],
+        ["wavy road", 500, states, rolling * 1e6, rolling / floor, turns],
+        ["one pass over the matrices", 500, states, floor * 1e6, 1.0, 0],
+        ["wavy road, 108 points", 108, 200, plain * 1e6, plain / rubbing, 0],
+        ["the same with friction", 108, 200, rubbing * 1e6, 1.0, 0],
+    ]
+    columns = [("case", ""), ("points", "-"), ("states", "-"), ("time a step", "us"),
+               ("ratio", "-"), ("factorisations", "-")]  # fmt: skip
+    notes = [
+        f"Ratio: to one pass (first three), to the step with friction (last two). At most {most} of "
+        "500 points touched. Targets: 2 passes; 0.4; one factorisation at rest.",
+    ]
+    return Table("One step", columns, rows, notes)
+
+
+def _convolution() -> Table:
+    """Prescribed forces, the same in both; the convolution is timed at the end of 200 steps and at
+    4,000 by its cost, which grows with their number.
+    """
+    shape, rows = (10, 6), []
+    patch = oval_patch(shape, (0.015, 0.02), 500.0)
+    strip = Strip(speed=20.0)
+    response = strip.response(patch.points, 12, 5)
+    duration = 0.02
+    for steps in (200, 400, 800, 1600):
+        h = duration / steps
+        one = Recursion(response, h, "linear", MPI.COMM_SELF)
+        other = Convolution(response, h, steps)
+        times, worst, size = np.zeros(2), 0.0, 0.0
+        for k in range(1, steps + 1):
+            force = patch.force * np.sin(300 * k * h) ** 2
+            moved = []
+            for i, tire in enumerate((one, other)):
+                began = time.perf_counter()
+                u = tire.predict()
+                tire.advance(force)
+                times[i] += time.perf_counter() - began
+                moved.append(u + tire.same_step @ force)
+            worst = max(worst, np.abs(moved[0] - moved[1]).max())
+            size = max(size, np.abs(moved[0]).max())
+        rows.append([steps, times[0], times[1], times[1] / times[0], worst / size])
+    columns = [("steps", "-"), ("recursion", "s"), ("convolution", "s"), ("ratio", "-"),
+               ("difference", "-")]  # fmt: skip
+    return Table(
+        f"Recursion against direct convolution, {len(patch.points)} points, "
+        f"{len(response.eigenvalue)} states, the same forces",
+        columns,
+        rows,
+        [
+            "The convolution's cost grows with the square of the steps, and its rectangle rule errs with "
+            "the step. Target: 300 at 4,000 steps."
+        ],  # fmt: skip
+        {"x": "steps", "y": ["recursion", "convolution"], "log": "xy", "by": None},
+    )
+
+
+def _grid_case(n: int):
+    """A sphere-like gap on n x n points of 0.1 m, a soft tire under it."""
+    pitch = 0.1 / n
+    x, y = (a.ravel() for a in np.meshgrid(*2 * [(np.arange(n) - (n - 1) / 2) * pitch]))
+    places = GridPlaces((n, n), (pitch, pitch), np.arange(n * n))
+    kernel = KernelTread(places, lambda *where: half_space_influence(*where, *ELASTIC))
+    return x, y, kernel
+
+
+def _large() -> Table:
+    from scipy import sparse
+
+    rows = []
+    for n in (32, 64, 100):
+        x, y, kernel = _grid_case(n)
+        line = np.linspace(-0.05, 0.05, 12)
+
+        def hats(p, line=line):
+            return np.maximum(1 - np.abs(p[:, None] - line) / (line[1] - line[0]), 0)
+
+        weights = sparse.csr_matrix((hats(x)[:, :, None] * hats(y)[:, None, :]).reshape(n * n, -1))
+        nodes = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+        away = ((nodes[:, None] - nodes) ** 2).sum(axis=-1)
+        tire = 1e-6 * (np.exp(-away / 0.0018) + 0.01 * np.eye(len(nodes)))
+        road = Texture(2e-4, 0.8, 0.05, 0.004, seed=1)
+        for solver in (
+            ActiveSet(SpreadCompliance(tire, weights, kernel)),
+            ProjectedCG(SpreadCompliance(tire, weights, kernel)),
+        ):
+            seconds, most = [], 0
+            for k in range(12):
+                q = (x**2 + y**2) / 0.6 - 2e-3 - road.height(x + 2e-3 * k, y)
+                began = time.perf_counter()
+                solver.solve(q)
+                seconds.append(time.perf_counter() - began)
+                most = max(most, int(solver.active.sum()))
+            rows.append([f"{n} x {n}", type(solver).__name__, most, 1e3 * np.median(seconds[2:])])
+    columns = [("points", ""), ("solver", ""), ("touching", "-"), ("time a step", "ms")]
+    return Table(
+        "Many points: a textured road that moves 2 mm a step", columns, rows,
+        ["Each step to a complementarity residual of 1e-9. Target: 100 x 100 points under 60 ms."],
+    )  # fmt: skip
+
+
+def _rough() -> Table:
+    n = 128
+    x, y, kernel = _grid_case(n)
+    road = Texture(2e-4, 0.8, 0.05, 0.004, seed=2)
+    q = -2e-4 - road.height(x, y)
+    weights, tire = _none(n * n)
+    compliance = SpreadCompliance(tire, weights, kernel)
+    solver = ProjectedCG(compliance)
+    seconds = _best(lambda: ProjectedCG(compliance).solve(q), 3)
+    force = solver.solve(q)
+    rows = [["projected conjugate gradients", seconds * 1e3, solver.iterations, solver.residual,
+             float(force.sum())]]  # fmt: skip
+    columns = [
+        ("solver", ""),
+        ("time", "ms"),
+        ("iterations", "-"),
+        ("residual", "-"),
+        ("load", "N"),
+    ]
+    return Table("Static rough contact, 128 x 128 points, from nothing", columns, rows)
+
+
+def _none(count: int):
+    """A tire that does not give way."""
+    from scipy import sparse
+
+    return sparse.csr_matrix((count, 1)), np.zeros((1, 1))
