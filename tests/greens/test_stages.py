@@ -115,3 +115,16 @@ def test_states_made_static_are_told(run) -> None:
     assert 0 < lost < 0.2
     with h5py.File(out / "greens.h5") as file:
         assert file["force/eigenvalue"].shape == (15,)
+
+
+def test_states_of_the_full_problem_take_the_static_residual_only(run, launch, tmp_path) -> None:
+    """Its own states complete with K_Omega^-1; residuals that complete the modes are refused."""
+    full = "--set", "rotation.method=full", "--set", "rotation.count=20", "--until", "response"
+    _, stages = run("--set", "greens.residual=static", *full)
+    assert off(stages) < 0.2
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE)
+    options = "--set", "greens.residual=attachment", "--set", "rotation.method=full"
+    done = launch("-m", "runs", "check", scene, *options)
+    assert done.returncode == 2
+    assert 'rotation.method = "projected"' in done.stdout + done.stderr
