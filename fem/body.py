@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -11,21 +13,28 @@ from fem import compat
 from fem.material import Material
 from fem.mesh import INNER, RIM, TREAD, Torus, build
 from fem.surface import Gather, outer_face
+from fem.wall import Region, Wall
 
 
 class Body:
-    """A section made of one material, with its displacement `u` about the undeformed shape.
+    """A section and what it is made of, with its displacement `u` about the undeformed shape.
 
     Collective to make. `ids` are the lattice ids of this process's owned nodes; `rim` and `tread`
     its blocked dofs there (ghosts included in `rim`, as boundary conditions want them).
     """
 
-    def __init__(self, comm: MPI.Comm, section: Torus, material: Material):
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        section: Torus,
+        material: Material,
+        regions: Sequence[Region] = (),
+    ):
         self.comm = comm
-        self.material = material
         self.tire = build(comm, section)
         self.mesh, self.lattice = self.tire.mesh, self.tire.lattice
         self.space = compat.vector_space(self.mesh, section.order)
+        self.wall = Wall(self.tire, self.space, material, regions)
         self.u = fem.Function(self.space)
         self.nodes = self.space.dofmap.index_map.size_local
         self.ids = self.lattice.ids(self.space.tabulate_dof_coordinates()[: self.nodes])
@@ -35,6 +44,9 @@ class Body:
         # 2 x order integrates the quadratic form of an affine element exactly: full integration.
         measure = {"metadata": {"quadrature_degree": 2 * section.order}}
         self.dx = ufl.Measure("dx", domain=self.mesh, **measure)
+        # One Gauss point a direction less: what the dilatation is integrated with (static_residual).
+        reduced = {"quadrature_degree": 2 * section.order - 1}
+        self.reduced_dx = ufl.Measure("dx", domain=self.mesh, metadata=reduced)
         self.inner_ds = ufl.Measure(
             "ds", domain=self.mesh, subdomain_data=self.tire.facets, **measure
         )(INNER)

@@ -6,6 +6,8 @@ Debian 12 ships dolfinx 0.5.2 and Debian 13 ships 0.9; no other file of the prog
 from __future__ import annotations
 
 import inspect
+import logging
+import warnings
 
 import basix
 import dolfinx.fem.petsc  # noqa: F401  (newer releases do not import it by themselves)
@@ -67,6 +69,13 @@ def vector_space(mesh, degree: int):
     return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
+def cell_space(mesh):
+    """Scalars that are constant in each cell."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("DG", 0))
+    return fem.FunctionSpace(mesh, ("DG", 0))
+
+
 def petsc_vector(function: fem.Function) -> PETSc.Vec:
     """The ghosted PETSc vector behind a function."""
     return function.x.petsc_vec if hasattr(function.x, "petsc_vec") else function.vector
@@ -74,7 +83,14 @@ def petsc_vector(function: fem.Function) -> PETSc.Vec:
 
 def form(expression):
     """Compile a UFL form with the program's compiler flags. Collective."""
-    return fem.form(expression, **{_JIT_KEY: JIT})
+    before = logging.root.manager.disable
+    logging.disable(logging.INFO)  # setuptools shows the compiler's command line
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResourceWarning)  # FFCx leaves its lock file open
+            return fem.form(expression, **{_JIT_KEY: JIT})
+    finally:
+        logging.disable(before)
 
 
 def meshtags(mesh, dim: int, entities: np.ndarray, values: np.ndarray):

@@ -1,11 +1,14 @@
 """Static equilibrium under inflation, steady rolling and a flat, frictionless road.
 
-F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u = f_contact, with the road as a
-bound z + u_z >= z_road on the tread dofs, f_contact >= 0 where it is active.
+F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u = f, with f >= 0 on the tread dofs,
+z + u_z >= z_road and one of both zero.
 """
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,18 +16,13 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
-from fem import compat, kinematics, material
+from fem import compat, kinematics
 from fem.body import Body
+from fem.virtual_work import AT_REST, Rolling, static_residual, stress_prediction, tangent
 
-TOUCH = 1e-15  # m above its bound up to which a dof touches the road: rounding, nothing else
-
-
-@dataclass(frozen=True)
-class Rolling:
-    """Steady rolling: speed Omega in rad/s, damping gamma1 in 1/s. At speed 0 nothing is added."""
-
-    speed: float = 0.0
-    damping: float = 0.0
+MOST_STEPS = 25  # Newton steps; a load step that needs more is better halved
+TOLERANCE = 1e-12  # of the force scale
+_DIVERGED = 1e8  # times the force scale: nothing comes back from there
 
 
 @dataclass(frozen=True)
@@ -38,38 +36,41 @@ class Step:
 
 
 class Equilibrium:
-    """The nonlinear problem of one body. Forms, matrix and SNES are made once. Collective.
+    """The nonlinear problem of one body. Forms, matrix and solver are made once. Collective.
 
     `inflation` (Pa) may be changed between solves; `solve` starts from the body's displacement and
-    puts it back when it does not converge.
+    puts it back when it does not converge. `cost`: seconds by part.
     """
 
-    def __init__(self, body: Body, rolling: Rolling = Rolling()):
+    def __init__(self, body: Body, rolling: Rolling = AT_REST):
         self.body = body
+        self.cost: dict[str, float] = {}
         self.pressure = fem.Constant(body.mesh, 0.0)
+        self._before = fem.Function(body.space)
         residual = static_residual(body, self.pressure, rolling)
         self._residual = compat.form(residual)
-        self._tangent = compat.form(ufl.derivative(residual, body.u))
+        self._tangent = compat.form(tangent(body, residual) + stress_prediction(body, self._before))
+        self._inverted = compat.form(_inverted_volume(body))
         self._clamp = [body.clamp()]
         self.matrix = fem.petsc.create_matrix(self._tangent)
+        self.matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
         self._work = fem.petsc.create_vector(self._residual)
-        self._lower = self._work.duplicate()
-        self._upper = self._work.duplicate()
-        self._upper.set(PETSc.INFINITY)
+        self._right, self._change = self._work.duplicate(), self._work.duplicate()
+        rim = body.rim[body.rim < body.nodes]
+        self._rim = (3 * rim[:, None] + np.arange(3)).ravel()
+        self._tread_z = body.space.tabulate_dof_coordinates()[body.tread, 2]
+        self._vertical = 3 * body.tread + 2  # owned dofs that can meet the road
+        self._bound = np.full(len(body.tread), -np.inf)
+        self._active = np.zeros(len(body.tread), dtype=bool)
+        self._force = np.zeros(len(body.tread))
         symmetric = rolling.speed * rolling.damping == 0.0
-        self._snes = self._make_snes("cholesky" if symmetric else "lu")
-        self._scale: float | None = None
+        self._ksp = self._make_solver("cholesky" if symmetric else "lu")
+        self._scale, self._stiffness = self._yardsticks()
 
-    def _make_snes(self, factorisation: str) -> PETSc.SNES:
+    def _make_solver(self, factorisation: str) -> PETSc.KSP:
         prefix = "static_"
         options = PETSc.Options(prefix)
         defaults = {
-            "snes_type": "vinewtonrsls",
-            # PETSc takes a dof within 1e-8 (metres, here) of its bound as touching; only contact is.
-            "snes_vi_zero_tolerance": TOUCH,
-            "snes_max_it": 25,
-            "snes_rtol": 0.0,
-            "snes_stol": 0.0,
             "ksp_type": "preonly",
             "pc_type": factorisation,
             "pc_factor_mat_solver_type": "mumps",
@@ -77,122 +78,141 @@ class Equilibrium:
         for key, value in defaults.items():
             if not options.hasName(key):
                 options[key] = value
-        snes = PETSc.SNES().create(self.body.comm)
-        snes.setOptionsPrefix(prefix)
-        snes.setFunction(self._assemble_residual, self._work.duplicate())
-        snes.setJacobian(self._assemble_tangent, self.matrix)
-        snes.setFromOptions()
-        return snes
+        ksp = PETSc.KSP().create(self.body.comm)
+        ksp.setOptionsPrefix(prefix)
+        ksp.setOperators(self.matrix)
+        ksp.setFromOptions()
+        return ksp
 
     def solve(self, road_height: float | None = None) -> Step:
-        """Equilibrium with the road plane at the given height (m), or without a road. Collective."""
+        """Equilibrium with the road plane at the given height (m), or without a road. Collective.
+
+        Newton's method and the active set of the road in one loop: a dof is held where
+        f - c gap > 0, with c the dof's own stiffness; that is the complementarity condition for any
+        c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Held dofs are put on
+        the road by the linearised step: lifting them first strains the wall beyond any sense.
+        """
         body = self.body
-        start = body.owned(body.u.x.array).copy()
-        x = self._work.duplicate()
-        x.array[:] = start.ravel()
-        self._place_road(road_height, x)
-        self._snes.setTolerances(atol=1e-12 * self._force_scale(x), rtol=0.0, stol=0.0)
-        self._snes.solve(None, x)
-        reason = self._snes.getConvergedReason()
-        step = Step(
-            reason > 0,
-            self._snes.getIterationNumber(),
-            self._snes.getFunctionNorm() / self._scale,
-            _reason_name(reason),
-        )
-        self._take(x if step.converged else start)
-        x.destroy()
-        return step
+        kept = body.u.x.array.copy(), self._active.copy(), self._force.copy()
+        height = -np.inf if road_height is None else road_height
+        self._bound = height - self._tread_z
+        reason = f"no convergence in {MOST_STEPS} Newton steps"
+        for iteration in range(MOST_STEPS + 1):
+            changed = self._choose_active()
+            error = self._error()
+            if not error < _DIVERGED:
+                reason = "the residual grows without bound"
+                break
+            if error <= TOLERANCE and not changed:
+                if not self._inside_out():
+                    return Step(True, iteration, error, "converged")
+                reason = "an element is inside out"
+                break
+            if iteration < MOST_STEPS:
+                self._newton_step(first=iteration == 0)
+        body.u.x.array[:], self._active, self._force = kept
+        return Step(False, iteration, error, reason)
+
+    def _choose_active(self) -> bool:
+        """Take the active set of the present state; whether it is another one on any process."""
+        wanted = self._force > self._stiffness * self._gap()
+        changed = bool((wanted != self._active).any())
+        self._active = wanted
+        self._force[~wanted] = 0.0
+        return self.body.comm.allreduce(changed)
+
+    def _gap(self) -> np.ndarray:
+        """Height of the owned tread dofs above the road, m; infinite without one."""
+        return self.body.u.x.array[self._vertical] - self._bound
+
+    def _error(self) -> float:
+        """Norm of what is out of balance over the force scale, distance to the road as the dof's force."""
+        with self._timing("assembly"):
+            out = self._assemble_residual().copy()
+        out[self._vertical] -= self._force
+        distance = (self._stiffness * self._gap())[self._active]
+        square = self.body.comm.allreduce(out @ out + distance @ distance)
+        return float(np.sqrt(square)) / self._scale
+
+    def _newton_step(self, first: bool) -> None:
+        """One linearised step to balance, with the held dofs on the road. Collective.
+
+        The road's force is the reaction of the linearised problem; what the new state is out of
+        balance is no force of the road (seen: held dofs let go and caught again for ever).
+        """
+        field, held = self.body.u.x, self._vertical[self._active]
+        if first:
+            self._before.x.array[:] = field.array
+        with self._timing("assembly"):
+            self._assemble_tangent()
+        rows = (held + self._work.getOwnershipRange()[0]).astype(PETSc.IntType)
+        own = PETSc.IS().createGeneral(rows, comm=self.body.comm)
+        reaction = self.matrix.createSubMatrix(own, None)
+        self._right.array[:] = -self._work.array
+        self._change.set(0.0)
+        self._change.array[held] = -self._gap()[self._active]
+        self.matrix.zeroRowsColumns(rows, 1.0, self._change, self._right)
+        with self._timing("factorisation"):
+            self._ksp.solve(self._right, self._change)
+        force = reaction.createVecLeft()
+        reaction.mult(self._change, force)
+        self._force[self._active] = force.array + self._work.array[held]
+        self._before.x.array[:] = field.array
+        field.array[: len(self._change.array)] += self._change.array
+        # To the last bit on the road: rounding of the solve would leave a gap or a penetration.
+        field.array[held] = self._bound[self._active]
+        field.scatter_forward()
+        for made in (own, reaction, force):
+            made.destroy()
 
     def contact_force(self) -> np.ndarray:
-        """Vertical force of the road on the owned nodes (nodes,), N: the residual where the bound acts."""
-        body = self.body
-        x = self._work.duplicate()
-        x.array[:] = body.owned(body.u.x.array).ravel()
-        out = self._work.duplicate()
-        self._assemble_residual(None, x, out)
-        force = np.zeros(body.nodes)
-        vertical = out.array.reshape(-1, 3)[body.tread, 2]
-        bound = self._lower.array.reshape(-1, 3)[body.tread, 2]
-        at_road = x.array.reshape(-1, 3)[body.tread, 2] <= bound + TOUCH
-        force[body.tread] = np.where(at_road, vertical, 0.0)
-        x.destroy()
-        out.destroy()
+        """Vertical force of the road on the owned nodes (nodes,), N; not negative. Not collective."""
+        force = np.zeros(self.body.nodes)
+        force[self.body.tread] = self._force
         return force
 
     def tread_height(self) -> np.ndarray:
         """Height z + u_z of the owned tread nodes, m, in the order of `body.tread`."""
-        return self._tread_z + self.body.owned(self.body.u.x.array)[self.body.tread, 2]
+        return self._tread_z + self.body.u.x.array[self._vertical]
 
-    @property
-    def _tread_z(self) -> np.ndarray:
-        return self.body.space.tabulate_dof_coordinates()[self.body.tread, 2]
+    def _yardsticks(self) -> tuple[float, np.ndarray]:
+        """Force scale, N, and stiffness of each owned tread dof, N/m, of the undeformed body.
 
-    def _place_road(self, road_height: float | None, x: PETSc.Vec) -> None:
-        """Set the bound and lift what is below it: the reduced-space Newton starts feasible."""
-        self._lower.set(-PETSc.INFINITY)
-        if road_height is not None:
-            bound = road_height - self._tread_z
-            self._lower.array.reshape(-1, 3)[self.body.tread, 2] = bound
-            x.array[:] = np.maximum(x.array, self._lower.array)
-        self._snes.setVariableBounds(self._lower, self._upper)
-
-    def _force_scale(self, x: PETSc.Vec) -> float:
-        """N: stiffness of a dof times the wall, so that 1e-12 of it is far below any load of interest.
-
-        Once per problem: the tangent at the first state is stiff enough a yardstick for all.
+        The scale is the typical stiffness of a dof times the wall, so that 1e-12 of it is far below
+        any load of interest.
         """
-        if self._scale is None:
-            self._assemble_tangent(None, x, self.matrix, self.matrix)
-            diagonal = self.matrix.getDiagonal()
-            self._scale = (
-                self.body.tire.section.thickness * diagonal.norm() / np.sqrt(diagonal.size)
-            )
-        return self._scale
+        self._before.x.array[:] = self.body.u.x.array
+        self._assemble_tangent()
+        diagonal = self.matrix.getDiagonal()
+        typical = diagonal.norm() / np.sqrt(diagonal.size)
+        return self.body.tire.section.thickness * typical, diagonal.array[self._vertical].copy()
 
-    def _take(self, x: PETSc.Vec | np.ndarray) -> None:
-        """Make x the body's displacement."""
-        values = x.array_r if isinstance(x, PETSc.Vec) else x
-        self.body.owned(self.body.u.x.array)[:] = values.reshape(-1, 3)
-        self.body.u.x.scatter_forward()
-
-    def _assemble_residual(self, _snes, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        self._take(x)
+    def _assemble_residual(self) -> np.ndarray:
+        """Forces out of balance at the owned dofs, N; on the rim 0, where the wheel takes them."""
         with self._work.localForm() as local:
             local.set(0.0)
         fem.petsc.assemble_vector(self._work, self._residual)
         self._work.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        out.array[:] = self._work.array
-        rim = self.body.rim[self.body.rim < self.body.nodes]
-        out.array.reshape(-1, 3)[rim] = x.array_r.reshape(-1, 3)[rim]
+        self._work.array[self._rim] = 0.0
+        return self._work.array_r
 
-    def _assemble_tangent(self, _snes, x: PETSc.Vec, matrix: PETSc.Mat, _p: PETSc.Mat) -> None:
-        self._take(x)
-        matrix.zeroEntries()
-        fem.petsc.assemble_matrix(matrix, self._tangent, bcs=self._clamp)
-        matrix.assemble()
+    @contextmanager
+    def _timing(self, part: str) -> Iterator[None]:
+        began = time.perf_counter()
+        yield
+        self.cost[part] = self.cost.get(part, 0.0) + time.perf_counter() - began
 
+    def _assemble_tangent(self) -> None:
+        self.matrix.zeroEntries()
+        fem.petsc.assemble_matrix(self.matrix, self._tangent, bcs=self._clamp)
+        self.matrix.assemble()
 
-def static_residual(body: Body, pressure, rolling: Rolling):
-    """The virtual work of everything but the road, as a UFL form in the body's displacement."""
-    u, v = body.u, ufl.TestFunction(body.space)
-    F = ufl.variable(kinematics.deformation_gradient(u))
-    stress = ufl.diff(material.energy(F.T * F, body.material), F)
-    work = ufl.inner(stress, ufl.grad(v)) * body.dx
-    normal = ufl.FacetNormal(body.mesh)
-    work += pressure * kinematics.pressure_virtual_work(u, v, normal) * body.inner_ds
-    if rolling.speed:
-        w = kinematics.wheel_velocity(body.mesh)
-        rate, test_rate = w + kinematics.convective(u, w), kinematics.convective(v, w)
-        density = body.material.density
-        work -= density * rolling.speed**2 * ufl.inner(rate, test_rate) * body.dx
-        if rolling.damping:
-            drag = density * rolling.speed * rolling.damping
-            work += drag * ufl.inner(kinematics.body_rate(u, w), v) * body.dx
-    return work
+    def _inside_out(self) -> bool:
+        """Whether the wall is turned inside out in some Gauss point; no energy tells J from -J."""
+        return self.body.comm.allreduce(fem.assemble_scalar(self._inverted)) > 0
 
 
-def _reason_name(reason: int) -> str:
-    """PETSc's name of a converged or diverged reason."""
-    names = vars(PETSc.SNES.ConvergedReason)
-    return next((n for n, v in names.items() if v == reason and not n.startswith("_")), str(reason))
+def _inverted_volume(body: Body):
+    """Volume in which det F is not positive, m3, in UFL."""
+    J = ufl.det(kinematics.deformation_gradient(body.u))
+    return ufl.conditional(ufl.le(J, 0.0), 1.0, 0.0) * body.dx

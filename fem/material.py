@@ -1,7 +1,8 @@
 """Strain energies per undeformed volume, each a function of the right Cauchy-Green tensor C alone.
 
-Compressible laws share the volumetric term kappa/2 (J - 1)^2, the form Abaqus and CalculiX use.
-A new material is one more function and one more line in `energy`.
+An energy comes in two parts, (distortion, dilatation), because they are integrated by different rules
+(fem.equilibrium). Compressible laws share the dilatation kappa/2 (J - 1)^2, the form Abaqus and
+CalculiX use. A new material is one more function and one more line in `LAWS`.
 """
 
 from __future__ import annotations
@@ -31,6 +32,10 @@ class Material:
     c30: float = 0.0
     bulk_modulus: float = 0.0
 
+    def __post_init__(self):
+        if self.model not in LAWS:
+            raise InputError(f"material model {self.model!r}: known are {', '.join(LAWS)}")
+
     @property
     def shear(self) -> float:
         """Shear modulus at zero strain, Pa."""
@@ -46,50 +51,54 @@ class Material:
         return self.bulk_modulus
 
 
-def linear(C, material: Material):
+def linear(C, shear, bulk):
     """Hooke's law between Green-Lagrange strain and second Piola-Kirchhoff stress."""
     E = (C - ufl.Identity(3)) / 2
-    lame = material.bulk - 2 * material.shear / 3
-    return material.shear * ufl.inner(E, E) + lame / 2 * ufl.tr(E) ** 2
+    return shear * ufl.inner(ufl.dev(E), ufl.dev(E)), bulk / 2 * ufl.tr(E) ** 2
 
 
-def neo_hookean(C, material: Material):
-    """mu/2 (J^(-2/3) tr C - 3) + kappa/2 (J - 1)^2."""
-    first, _, volumetric = _split(C, material)
-    return material.shear / 2 * (first - 3) + volumetric
+def neo_hookean(C, shear, bulk):
+    """mu/2 (J^(-2/3) tr C - 3) and kappa/2 (J - 1)^2."""
+    first, _ = _isochoric(C)
+    return shear / 2 * (first - 3), _dilatation(C, bulk)
 
 
-def mooney_rivlin(C, material: Material):
-    """c10 (I1 - 3) + c01 (I2 - 3) of the isochoric part, and the volumetric term."""
-    first, second, volumetric = _split(C, material)
-    return material.c10 * (first - 3) + material.c01 * (second - 3) + volumetric
+def mooney_rivlin(C, c10, c01, bulk):
+    """c10 (I1 - 3) + c01 (I2 - 3) of the isochoric part, and the common dilatation."""
+    first, second = _isochoric(C)
+    return c10 * (first - 3) + c01 * (second - 3), _dilatation(C, bulk)
 
 
-def yeoh(C, material: Material):
-    """c10 (I1 - 3) + c20 (I1 - 3)^2 + c30 (I1 - 3)^3 of the isochoric part, and the volumetric term."""
-    first, _, volumetric = _split(C, material)
-    terms = (material.c10, material.c20, material.c30)
-    return sum(c * (first - 3) ** (i + 1) for i, c in enumerate(terms)) + volumetric
+def yeoh(C, c10, c20, c30, bulk):
+    """c10 (I1 - 3) + c20 (I1 - 3)^2 + c30 (I1 - 3)^3 of the isochoric part, and the common dilatation."""
+    first, _ = _isochoric(C)
+    terms = (c * (first - 3) ** (i + 1) for i, c in enumerate((c10, c20, c30)))
+    return sum(terms), _dilatation(C, bulk)
 
 
-def _split(C, material: Material):
-    """Isochoric invariants I1, I2 and the volumetric energy."""
+def _isochoric(C):
+    """Invariants I1 and I2 of J^(-2/3) C."""
     J = ufl.sqrt(ufl.det(C))
     first = ufl.tr(C)
     second = (first**2 - ufl.tr(C * C)) / 2
-    return J ** (-2 / 3) * first, J ** (-4 / 3) * second, material.bulk / 2 * (J - 1) ** 2
+    return J ** (-2 / 3) * first, J ** (-4 / 3) * second
 
 
-_LAWS: dict[str, Callable] = {
-    "linear": linear,
-    "neo-hookean": neo_hookean,
-    "mooney-rivlin": mooney_rivlin,
-    "yeoh": yeoh,
+def _dilatation(C, bulk):
+    return bulk / 2 * (ufl.sqrt(ufl.det(C)) - 1) ** 2
+
+
+@dataclass(frozen=True)
+class Law:
+    """An energy as a function of C and of coefficients, named as attributes of `Material`."""
+
+    energy: Callable
+    coefficients: tuple[str, ...]
+
+
+LAWS = {
+    "linear": Law(linear, ("shear", "bulk")),
+    "neo-hookean": Law(neo_hookean, ("shear", "bulk")),
+    "mooney-rivlin": Law(mooney_rivlin, ("c10", "c01", "bulk")),
+    "yeoh": Law(yeoh, ("c10", "c20", "c30", "bulk")),
 }
-
-
-def energy(C, material: Material):
-    """Strain energy density of the material's law, J/m3."""
-    if material.model not in _LAWS:
-        raise InputError(f"material model {material.model!r}: known are {', '.join(_LAWS)}")
-    return _LAWS[material.model](C, material)

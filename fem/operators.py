@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from fem import compat, kinematics
 from fem.body import Body
-from fem.equilibrium import Rolling, static_residual
+from fem.virtual_work import AT_REST, static_residual, tangent
 
 
 @dataclass(frozen=True)
@@ -54,14 +54,14 @@ class Operators:
 
     def _tangent(self, inflation: float):
         pressure = fem.Constant(self.body.mesh, inflation)
-        return ufl.derivative(static_residual(self.body, pressure, Rolling()), self.body.u)
+        return tangent(self.body, static_residual(self.body, pressure, AT_REST))
 
     def rotation(self) -> Rotation:
         """The matrices of the rotating frame. Collective."""
         body = self.body
         u, v = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
         w = kinematics.wheel_velocity(body.mesh)
-        rho = body.material.density
+        rho = body.wall.density
         convect = kinematics.convective
         skew = (ufl.inner(v, convect(u, w)) - ufl.inner(convect(v, w), u)) / 2
         rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
@@ -72,6 +72,12 @@ class Operators:
             -ufl.inner(test_rate, rate),
         )
         return Rotation(*(self._assemble(rho * form * body.dx) for form in forms))
+
+    def consistent_mass(self) -> PETSc.Mat:
+        """int rho phi_i . phi_j by full integration, kg: what the diagonal `mass` is compared to. Collective."""
+        body = self.body
+        u, v = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
+        return self._assemble(body.material.density * ufl.inner(u, v) * body.dx)
 
     def _assemble(self, form) -> PETSc.Mat:
         matrix = fem.petsc.assemble_matrix(compat.form(form))
@@ -87,9 +93,8 @@ class Operators:
         lobatto = {"quadrature_rule": "GLL", "quadrature_degree": 2 * order - 1}
         v = ufl.TestFunction(body.space)
         ones = ufl.as_vector((1.0, 1.0, 1.0))
-        density = fem.Constant(body.mesh, body.material.density)
         dx = ufl.Measure("dx", domain=body.mesh, metadata=lobatto)
-        vector = fem.petsc.assemble_vector(compat.form(density * ufl.inner(v, ones) * dx))
+        vector = fem.petsc.assemble_vector(compat.form(body.wall.density * ufl.inner(v, ones) * dx))
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         return vector.array[self.free].copy()
 

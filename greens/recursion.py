@@ -44,6 +44,12 @@ class Recursion:
         self.state = np.zeros(self._q, complex)
         self._push = np.zeros(self._q, complex)  # P f of the step before
         self.same_step = response.residual + self._reduce(self._direct())
+        self._late = np.zeros_like(response.residual)
+        if response.pulse and scheme == "linear":
+            # A pulse one step long answers the mean of a linear force over the step.
+            self._late = response.residual / 2
+            self.same_step -= self._late
+        self._force = np.zeros(response.residual.shape[1])
 
     def _direct(self) -> np.ndarray:
         """Displacement at the end of a step per unit force there, of this process's states."""
@@ -63,6 +69,7 @@ class Recursion:
 
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
+        self._force = force
         self._push = self._complex(self._input @ force)
         if self._block:
             self._block.start(force)
@@ -73,10 +80,11 @@ class Recursion:
         out = self._output @ np.concatenate([self._free.real, self._free.imag])
         if self._block:
             out += self._block.predict()
-        return self._reduce(out)
+        return self._reduce(out) + self._late @ self._force
 
     def advance(self, force: np.ndarray) -> None:
         """Take the force (k,) N at the end of the step; after `predict`. Local to each process."""
+        self._force = force
         self._push = self._complex(self._input @ force)
         self.state = self._free + self._new * self._push
         if self._block:

@@ -15,10 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
+from fem.errors import ConvergenceError
 from modal.basis import Projection
 
 # Above this condition an eigenvector loses ten of sixteen digits; such eigenvalues go to the block.
 DEFECTIVE = 1e6
+GROWS = 1e-9  # of the largest |s|: a growth rate below is rounding
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class StateModes:
         """Eigenvalues with a growing motion, beyond rounding."""
         rates = np.concatenate([self.eigenvalue.real, np.linalg.eigvals(self.block).real])
         fastest = np.abs(self.eigenvalue).max(initial=1.0)
-        return int((rates > 1e-9 * fastest).sum())
+        return int((rates > GROWS * fastest).sum())
 
 
 def matrices(
@@ -71,7 +73,8 @@ def standing(projection: Projection, damping: tuple[float, float]) -> StateModes
     half = (damping[0] + damping[1] * squares) / 2
     root = np.sqrt(half.astype(complex) ** 2 - squares)
     # Condition of the eigenvectors of one mode's companion matrix is about omega / |root|.
-    condition = np.sqrt(squares) / np.maximum(np.abs(root), np.finfo(float).tiny)
+    size = np.maximum(np.maximum(np.sqrt(np.abs(squares)), half), np.finfo(float).tiny)
+    condition = 1 / np.maximum(np.abs(root) / size, np.finfo(float).eps ** 2)
     defective = np.flatnonzero(condition > DEFECTIVE)
     paired = np.flatnonzero((root.imag != 0) & (condition <= DEFECTIVE))
     real = np.flatnonzero((root.imag == 0) & (condition <= DEFECTIVE))
@@ -89,6 +92,52 @@ def standing(projection: Projection, damping: tuple[float, float]) -> StateModes
     none = np.zeros(len(mode))
     worst = float(condition[np.r_[paired, real]].max(initial=1.0))
     return StateModes(eigenvalue, right, left, block, block_right, block_left, none, none, worst)
+
+
+def checks(modes: StateModes, drag: np.ndarray, stiffness: np.ndarray) -> dict[str, float]:
+    """How far the decoupled equations are from the problem they came from, relative figures by name.
+
+    Over all 2m states  sum u w^T / a = 0,  sum s u w^T / a = 1,  sum -u w^T / (a s) = K~^-1,  and
+    w_i^T [(s_i + s_j) + D~] u_j = a_i delta_ij among states with vectors. Raises ConvergenceError when
+    a residual exceeds 1e-8 or an identity 1e-6.
+    """
+    m = len(drag)
+    s, block = modes.eigenvalue, modes.block
+    displacement = (modes.right @ modes.left).real + modes.block_right @ modes.block_left
+    rate = (modes.right * s @ modes.left).real + modes.block_right @ block @ modes.block_left
+    compliance = -(modes.right / s @ modes.left).real
+    if len(block):
+        compliance -= modes.block_right @ np.linalg.solve(block, modes.block_left)
+    # A displacement per velocity is a time: the slowest state's is the yardstick.
+    slowest = np.abs(s).min(initial=np.inf) if len(s) else 1.0
+    figures = {
+        "worst residual": float(modes.residual.max(initial=0.0)),
+        "worst left residual": float(modes.left_residual.max(initial=0.0)),
+        "sum identity 0": float(np.abs(displacement).max() * slowest),
+        "sum identity 1": float(np.abs(rate - np.eye(m)).max()),
+        "sum identity K^-1": float(np.abs(stiffness @ compliance - np.eye(m)).max()),
+        "biorthogonality": float(
+            np.abs(overlap(modes, modes, drag) - np.eye(len(s))).max(initial=0.0)
+        ),
+    }
+    for name, figure in figures.items():
+        if not figure <= (1e-8 if "residual" in name else 1e-6):
+            raise ConvergenceError(
+                f"rotating: {name} is {figure:.1e}: the second eigenproblem is too far from normal "
+                "for the number of digits. Take fewer modes, a lower speed or less damping."
+            )
+    return figures
+
+
+def overlap(one: StateModes, other: StateModes, drag: np.ndarray) -> np.ndarray:
+    """(q, q') share of the states of `other` in those of `one`: 1 on the diagonal for the same problem.
+
+    w_i^T [(s_i + s'_j) + D~] u'_j / a_i: the left vectors of the companion matrix on its right ones.
+    """
+    weight = np.where(other.eigenvalue.imag > 0, 2.0, 1.0)
+    right = other.right / weight
+    near = one.left @ right
+    return one.eigenvalue[:, None] * near + near * other.eigenvalue + one.left @ (drag @ right)
 
 
 def _companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m: int):
@@ -127,8 +176,8 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
     right, left = vectors[:m, keep], inverse[keep, m:] / scale
     return StateModes(
         values,
-        right * weight * 1.0,
-        left * 1.0,
+        right * weight,
+        left,
         block,
         block_vectors[:m].real,
         inverse[len(inverse) - len(block) :, m:].real / scale,

@@ -15,8 +15,6 @@ Where = Callable[[tuple[str, ...], str], InputError]
 LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "tire.mesh": ((), 'only section = "torus" is supported in this version'),
     "tire.section": (("torus",), 'only "torus" is supported in this version'),
-    "rotation.method": (("projected",), 'only "projected" is supported in this version'),
-    "greens.residual": (("none", "static"), '"none" and "static" are supported in this version'),
     "modal.rim": (("fixed",), 'only "fixed" is supported in this version'),
     "modal.road": (("forces",), 'only "forces" is supported in this version'),
     "output.vibration": ((False,), "only false is supported in this version"),
@@ -50,6 +48,7 @@ def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     if scene.contact is not None:
         _contact(scene, error)
     _force(scene, error)
+    _greens(scene, error)
     if scene.road is not None:
         _road(scene, error)
     _time(scene, error)
@@ -78,8 +77,15 @@ def _geometry(scene: Scene, error: Where) -> None:
             f"= {tire.half_angle:g} deg puts the beads at {bead:g} m from the axle:"
             " make it or minor_radius smaller",
         )
+    for number, region in enumerate(tire.region):
+        for key in ("arc", "depth"):
+            low, high = getattr(region, key)
+            if low >= high:
+                raise error(
+                    ("tire", "region", str(number), key), f"= [{low:g}, {high:g}] must ascend"
+                )
     free = free_unknowns(tire)
-    if scene.modal.count >= free:
+    if scene.modal.up_to is None and scene.modal.count >= free:
         raise error(
             ("modal", "count"),
             f"= {scene.modal.count} must be less than the {free} free unknowns of the mesh",
@@ -117,6 +123,16 @@ def _force(scene: Scene, error: Where) -> None:
                 ("force", str(number), "arc"),
                 f"= {force.arc:g} deg lies beyond the bead at {scene.tire.half_angle:g} deg",
             )
+
+
+def _greens(scene: Scene, error: Where) -> None:
+    rotation, residual = scene.rotation, scene.greens.residual
+    full = rotation is not None and rotation.speed > 0 and rotation.method == "full"
+    if full and residual in ("second-order", "attachment"):
+        raise error(
+            ("greens", "residual"),
+            f'= "{residual}" completes the modes: it needs rotation.method = "projected"',
+        )
 
 
 def _contact(scene: Scene, error: Where) -> None:

@@ -114,7 +114,7 @@ def number(
     return _make(Key(read, unit, doc, allowed, default is None, only_for), default)
 
 
-def integer(default: int, doc: str, *, least: int, most: int, only_for=None) -> Any:
+def integer(default: int | None, doc: str, *, least: int, most: int, only_for=None) -> Any:
     """A whole number between least and most."""
     check, words = _limits(least, None, most, None)
 
@@ -124,7 +124,7 @@ def integer(default: int, doc: str, *, least: int, most: int, only_for=None) -> 
         check(value, "-")
         return value
 
-    return _make(Key(read, "-", doc, words, False, only_for), default)
+    return _make(Key(read, "-", doc, words, default is None, only_for), default)
 
 
 def flag(default: bool, doc: str, *, only_for=None) -> Any:

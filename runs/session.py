@@ -95,8 +95,14 @@ class Session:
         """The finite-element body, at the static state once that is known. Collective."""
         from fem.body import Body
         from fem.material import Material
+        from fem.wall import Region
 
-        body = Body(self.comm, self.section, Material(**vars(self.scene.tire.material)))
+        tire = self.scene.tire
+        regions = [
+            Region(Material(**vars(r.material)), tuple(np.radians(r.arc)), r.depth, r.side)
+            for r in tire.region
+        ]
+        body = Body(self.comm, self.section, Material(**vars(tire.material)), regions)
         if hasattr(self, "static"):
             body.set_displacement(self.static.displacement)
         return body
@@ -114,6 +120,31 @@ class Session:
         """The matrices of the rotating frame. Collective."""
         with self.record.timing("rotation matrices"):
             return self.operators.rotation()
+
+    @cached_property
+    def wheel(self):
+        """The full matrices as the wheel turns. Collective."""
+        from runs.coupling import Wheel
+
+        rotation = self.rotation_matrices if self.speed else None
+        inertia = self.scene.rotation.inertia if self.speed else "full"
+        return Wheel(self.operators, rotation, self.speed, self.damping, inertia)
+
+    @cached_property
+    def modes(self):
+        """The modes on all unknowns: as the stage computed them, or once more where it was reused.
+        Collective."""
+        from runs.stages.modes import solve
+
+        with self.record.timing("modes once more"):
+            return solve(self)
+
+    @property
+    def basis(self):
+        """The modes on the outer face with what the stages made of them."""
+        from runs.coupling import Basis
+
+        return Basis(self.modal.shape, self.modal.projection, self.state_modes)
 
     def write(self, path: Path, stage: str, fill) -> None:
         """Write a stage's file by `fill(file)` on the root process. Collective."""

@@ -63,6 +63,18 @@ class Material:
 
 
 @dataclass(frozen=True)
+class Region:
+    arc: tuple[float, float] = vector(
+        (0.0, 45.0), "deg", "from, to, measured from the crown", least=0, most=175
+    )
+    side: str = choice("both", ("both", "left", "right"), "of the crown; left: y < 0")
+    depth: tuple[float, float] = vector(
+        (0.0, 1.0), "-", "from, to, through the wall; 0: inner face", least=0, most=1
+    )
+    material: Material = table(Material, "what the region is made of")
+
+
+@dataclass(frozen=True)
 class Tire:
     section: str = choice("torus", ("torus",), "shape of the section")
     outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10)
@@ -78,6 +90,9 @@ class Tire:
         1.0, "-", "length of elements at the footprint, relative to ungraded", least=0.05, most=1
     )
     material: Material = table(Material, "what the wall is made of")
+    region: tuple[Region, ...] = tables(
+        Region, "a part of the section of another material; elements whose middle it holds"
+    )
 
 
 @dataclass(frozen=True)
@@ -95,7 +110,10 @@ class Static:
 
 @dataclass(frozen=True)
 class Modal:
-    count: int = integer(500, "modes wanted", least=1, most=100000)
+    count: int = integer(500, "lowest modes wanted", least=1, most=100000)
+    up_to: float | None = number(
+        None, "Hz", "all modes below it are wanted, instead of count", above=0, most=1e6
+    )
     rim: str = choice("fixed", ("fixed", "free"), "the two bead faces")
     road: str = choice("forces", ("forces", "held"), "after the static state: its forces, or held")
 
@@ -107,6 +125,13 @@ class Damping:
 
 
 @dataclass(frozen=True)
+class Campbell:
+    to: float = number(200.0, "rad/s", "highest speed", above=0, most=2000)
+    step: float = number(10.0, "rad/s", "between two speeds", above=0, most=2000)
+    branches: int = integer(20, "followed, from the lowest", least=1, most=1000)
+
+
+@dataclass(frozen=True)
 class Rotation:
     speed: float = number(100.0, "rad/s", "of the wheel; 0: standing", least=0, most=2000)
     inertia: str = choice("full", ("full", "doppler"), "doppler: without Coriolis, centrifugal")
@@ -115,12 +140,28 @@ class Rotation:
     rolling_radius: float | None = number(
         None, "m", "effective; absent: from the static state", above=0, most=10
     )
+    campbell: Campbell | None = table(
+        Campbell, "eigenvalues over speed, on the modes of this one static state", optional=True
+    )
 
 
 @dataclass(frozen=True)
 class Greens:
     residual: str = choice(
-        "static", ("none", "dirac", "static", "attachment"), "flexibility of the modes left out"
+        "static",
+        ("none", "dirac", "static", "second-order", "attachment"),
+        "flexibility of the modes left out",
+    )
+    dynamic: int | None = integer(
+        None, "states kept dynamic, the others follow statically; absent: all", least=1, most=200000
+    )
+    choice: str = choice(
+        "participation",
+        ("participation", "frequency"),
+        "of the dynamic states: in the band, or the slowest",
+    )
+    band: float | None = number(
+        None, "Hz", "that matters; absent: up to half the highest mode", above=0, most=1e6
     )
 
 
@@ -191,12 +232,17 @@ class Time:
 class Receptance:
     to: float = number(500.0, "Hz", "highest frequency", above=0, most=1e6)
     step: float = number(2.0, "Hz", "between two frequencies", above=0, most=1e6)
+    direct: int = integer(
+        0, "frequencies also solved on the full matrices, as a check", least=0, most=1000
+    )
 
 
 @dataclass(frozen=True)
 class Output:
     spectra: bool = flag(True, "of contact and axle force")
     axle_force: bool = flag(True, "from momentum")
+    velocity: bool = flag(False, "of the driven points")
+    acceleration: bool = flag(False, "of the driven points")
     vibration: bool = flag(False, "u(ω) on the whole tire")
     fields: bool = flag(False, "XDMF of every kept step")
     receptance: Receptance | None = table(Receptance, "of the driven points", optional=True)

@@ -12,8 +12,9 @@ from contact.grid_patch import make_grid_patch
 from contact.motion import make_motion
 from contact.patch import Patch, make_patch
 from contact.road import make_road
-from greens.response import Response, couple
+from greens.response import Response
 from modal.rotating import standing
+from runs.responses import chosen, fill_response, judge, make, read_responses
 from runs.session import Session
 from runs.store import put
 
@@ -28,7 +29,7 @@ def inputs(session: Session) -> dict:
     return {
         "modes": session.hashes.get("rotating", session.hashes["modes"]),
         "damping": session.damping,
-        "residual": scene.greens.residual,
+        "greens": asdict(scene.greens),
         "forces": [asdict(force) for force in scene.force],
         "points": session.patch.index.tolist() if scene.contact else [],
         "pitch": scene.contact.points if scene.contact else None,
@@ -123,66 +124,47 @@ def _prepare_forces(session: Session) -> None:
 
 
 def compute(session: Session, path: Path) -> None:
-    """Static flexibilities, responses, and their file. Collective."""
-    scene = session.scene
-    flexibility: dict[str, np.ndarray] = {}
-    if scene.greens.residual == "static":
-        flexibility = _flexibilities(session)
-    _couple(session, flexibility)
-    _describe(session)
+    """Responses with their residual, the choice of dynamic states, and their file. Collective."""
+    responses = {}
+    for name, (outputs, loads) in _probes(session).items():
+        whole = make(session, outputs, loads)
+        responses[name] = chosen(session, whole)
+        judge(session, name, whole, responses[name])
+    _take(session, responses)
+    _describe(session, responses)
 
     def fill(file) -> None:
-        for name, values in flexibility.items():
-            put(file, f"{name}/static_flexibility", values, "m/N")
-        if scene.contact:
+        for name, response in responses.items():
+            fill_response(file, name, response)
+        if session.scene.contact:
             put(file, "contact/index", session.patch.index, "-")
 
     session.write(path, "greens", fill)
 
 
-def _flexibilities(session: Session) -> dict[str, np.ndarray]:
-    """Exact static flexibility of the contact points and of the driven ones. Collective."""
-    from fem.compliance import compliance, rotating_stiffness
+def _probes(session: Session) -> dict[str, tuple]:
+    """(outputs, loads) on the outer face of the contact patch and of the prescribed forces."""
     from fem.probe import nodes
 
-    operators = session.operators
-    rotation = session.rotation_matrices if session.speed else None
-    inertia = session.scene.rotation.inertia if session.speed else "full"
-    stiffness = rotating_stiffness(operators, rotation, session.speed, session.damping, inertia)
     out = {}
-    with session.record.timing("static flexibility"):
-        if session.scene.contact:
-            count = len(session.static.points)
-            points = sparse.vstack(
-                [nodes(session.patch.index, count, part) for part in _components(session)],
-                format="csr",
-            )
-            out["contact"] = compliance(operators, stiffness, points, points)
-        if session.scene.force:
-            out["force"] = compliance(operators, stiffness, session.readings, session.loads)
-    stiffness.destroy()
+    if session.scene.contact:
+        count = len(session.static.points)
+        parts = [nodes(session.patch.index, count, part) for part in _components(session)]
+        points = sparse.vstack(parts, format="csr")
+        out["contact"] = points, points
+    if session.scene.force:
+        out["force"] = session.readings, session.loads
     return out
 
 
-def _couple(session: Session, flexibility: dict[str, np.ndarray]) -> None:
-    """Responses from the state modes, the residual where its flexibility is given."""
-    modal, modes = session.modal, session.state_modes
-    momentum = modal.projection.momentum
-    if session.scene.contact:
-        rows = [3 * session.patch.index + part for part in _components(session)]
-        shape = modal.shape[np.concatenate(rows)]
-        session.contact_response = couple(modes, shape, shape, momentum, flexibility.get("contact"))
-    if session.scene.force:
-        session.force_response = couple(
-            modes,
-            session.readings @ modal.shape,
-            session.loads @ modal.shape,
-            momentum,
-            flexibility.get("force"),
-        )
+def _take(session: Session, responses: dict[str, Response]) -> None:
+    if "contact" in responses:
+        session.contact_response = responses["contact"]
+    if "force" in responses:
+        session.force_response = responses["force"]
 
 
-def _describe(session: Session) -> None:
+def _describe(session: Session, responses: dict[str, Response]) -> None:
     record = session.record
     record.headline["residual flexibility"] = (session.scene.greens.residual, "-")
     if session.scene.contact:
@@ -196,6 +178,9 @@ def _describe(session: Session) -> None:
         _share_of_residual(record, "contact points", response)
     if session.scene.force:
         record.headline["driven points"] = (len(session.scene.force), "-")
+    for name, response in responses.items():
+        states = len(response.eigenvalue) + len(response.block)
+        record.headline[f"states, {name}"] = (states, "-")
 
 
 def _share_of_residual(record, where: str, response: Response) -> None:
@@ -209,13 +194,6 @@ def _share_of_residual(record, where: str, response: Response) -> None:
 
 
 def reuse(session: Session, path: Path) -> None:
-    """Couple again from the stored flexibilities. Collective."""
-    stored = session.read(
-        path,
-        lambda file: {
-            name: group["static_flexibility"][:]
-            for name, group in file.items()
-            if "static_flexibility" in group
-        },
-    )
-    _couple(session, stored)
+    """Read the responses back. Collective."""
+    pulse = session.scene.greens.residual == "dirac"
+    _take(session, session.read(path, lambda file: read_responses(file, pulse)))

@@ -31,18 +31,18 @@ def _rolling(session: Session) -> tuple[float, float]:
 
 def compute(session: Session, path: Path) -> None:
     """Solve and store. Collective."""
-    from fem.equilibrium import Equilibrium, Rolling
+    from fem.equilibrium import Equilibrium
     from fem.loading import Loader
     from fem.state import static_state
+    from fem.virtual_work import Rolling
 
     record, wanted = session.record, session.scene.static
     with record.timing("mesh and forms"):
         equilibrium = Equilibrium(session.body, Rolling(*_rolling(session)))
     loader = Loader(equilibrium, _show)
-    with record.timing("inflation"):
-        loader.inflate(wanted.inflation)
-    with record.timing("road"):
-        road = _place(loader, wanted)
+    loader.inflate(wanted.inflation)
+    road = _place(loader, wanted)
+    record.cost |= equilibrium.cost
     state = static_state(equilibrium, loader.touch, road)
     session.static = state
     _describe(session, loader)

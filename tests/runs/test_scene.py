@@ -172,8 +172,6 @@ def test_contradictions_need_both_sides(scene_file) -> None:
     [
         "tire.mesh=tire.msh",
         "tire.section=car",
-        "rotation.method=full",
-        "greens.residual=attachment",
         "output.vibration=true",
         "output.fields=true",
     ],

@@ -1,0 +1,39 @@
+"""Small tires for the tests of the finite elements."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy import sparse
+
+from fem.body import Body
+from fem.material import Material
+from fem.mesh import Torus
+
+RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
+
+
+@pytest.fixture
+def make_body() -> Callable[..., Body]:
+    """A torus on this process alone, or on those of `comm`."""
+
+    def make(order=2, segments=12, arc=6, layers=1, comm=MPI.COMM_SELF, free=False, **more):
+        material, regions = more.pop("material", RUBBER), more.pop("regions", ())
+        section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, layers, order, **more)
+        body = Body(comm, section, material, regions)
+        if free:
+            body.rim = np.array([], dtype=np.int32)
+        return body
+
+    return make
+
+
+@pytest.fixture
+def csr() -> Callable[..., sparse.csr_matrix]:
+    """A serial PETSc matrix in SciPy."""
+
+    def convert(matrix) -> sparse.csr_matrix:
+        return sparse.csr_matrix(matrix.getValuesCSR()[::-1], shape=matrix.getSize())
+
+    return convert
