@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from contact.energy import Work, stored
 from contact.rolling import Loop
 from modal.rotating import matrices
@@ -12,21 +14,18 @@ from runs.session import Session
 def balance(session: Session, loop: Loop, work: Work, step: float) -> None:
     """Work of contact, energy left in the tire, and the rest: lost, less what the drive put in.
 
+    Of other states than the modes' own (residual dynamics, attachment modes) only the work is told.
     Collective.
     """
-    modes, kept = session.state_modes, loop.tire.snapshot()
-    state, push = kept["state"], kept["push"]
-    slow = session.contact_response.slow(step)
-    right = modes.right[:, slow]
-    coordinates = (right @ state).real + modes.block_right @ kept["block_state"]
-    rates = (right @ (modes.eigenvalue[slow] * state + push)).real
-    rates += modes.block_right @ (modes.block @ kept["block_state"])
-    inertia = session.scene.rotation.inertia if session.speed else "full"
-    projection = session.modal.projection
-    _, stiffness = matrices(projection, session.speed, session.damping, inertia)
-    left = stored(coordinates, rates, stiffness)
+    kept = loop.tire.snapshot()
+    session.record.indicators["work of contact on the tire"] = (work.total, "J")
+    response, modes = session.contact_response, session.state_modes
+    own = np.array_equal(response.eigenvalue, modes.eigenvalue)
+    if not own or len(modes.block) != len(kept["block_state"]):
+        observe.say(f"  energy: contact put {work.total:.4g} J into the tire")
+        return
+    left = _left(session, kept, response.slow(step))
     session.record.indicators |= {
-        "work of contact on the tire": (work.total, "J"),
         "energy left in the modes": (left, "J"),
         "lost, less the work of the drive": (work.total - left, "J"),
     }
@@ -38,3 +37,16 @@ def balance(session: Session, loop: Loop, work: Work, step: float) -> None:
             "the standing tire holds more energy than contact put in: take a smaller time.step, or "
             'time.scheme = "constant"'
         )
+
+
+def _left(session: Session, kept: dict[str, np.ndarray], slow: np.ndarray) -> float:
+    """Energy (J) of the states of a snapshot; `slow` (q,) marks the modes that it holds."""
+    modes, state = session.state_modes, kept["state"]
+    right = modes.right[:, slow]
+    coordinates = (right @ state).real + modes.block_right @ kept["block_state"]
+    rates = (right @ (modes.eigenvalue[slow] * state + kept["push"])).real
+    rates += modes.block_right @ (modes.block @ kept["block_state"])
+    inertia = session.scene.rotation.inertia if session.speed else "full"
+    projection = session.modal.projection
+    _, stiffness = matrices(projection, session.speed, session.damping, inertia)
+    return stored(coordinates, rates, stiffness)
