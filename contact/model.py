@@ -25,9 +25,9 @@ Array = NDArray[np.float64]
 
 # Up to here the matrix is kept (8 MB); beyond, the tread is a convolution.
 DENSE_POINTS = 1000
-# As many touching points are factorised in the time of a whole step of projected conjugate
-# gradients (100 x 100 points: 30 ms); few of them in far less.
-MOST_TOUCHING = 800
+# As many touching points are factorised in the time of a step of projected conjugate gradients
+# (15 to 30 ms on a soft tread, more on a stiff one); 160 of them in a tenth of that.
+MOST_TOUCHING = 500
 MOST_DENSE = 6000  # 0.3 GB a matrix
 
 

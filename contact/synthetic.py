@@ -80,17 +80,22 @@ class Strip:
         along = 2 * np.pi * n / self.length
         sideways = j * np.pi / self.width
         omega = np.sqrt(self.lowest**2 + self.wave_speed**2 * (along**2 + sideways**2))
-        damped = np.sqrt(omega**2 - self.damping**2 / 4)
+        # Im of one pole of a pair stands for both; overdamped modes have two real ones.
+        root = np.sqrt(self.damping**2 / 4 - omega.astype(complex) ** 2)
+        over = np.flatnonzero(root.real > 0)
+        pick = np.concatenate([np.arange(len(n)), over])
+        sign = np.where(np.arange(len(pick)) < len(n), 1, -1)
+        weight = sign / np.where(root.real > 0, 2 * root, root)[pick]
+        n, j, along, sideways = n[pick], j[pick], along[pick], sideways[pick]
         shape = np.sin(np.outer(points[:, 1] + self.width / 2, sideways))
         wave = np.exp(1j * np.outer(points[:, 0], along))
-        output = -1j * shape * wave * (2 / self.mass / damped)
         even = np.where(n == 0, 2 * (j % 2) / (np.pi * j), 0.0)  # mean of the shape
         momentum = np.zeros((3, len(n)), complex)
-        momentum[2] = -2j * even / damped
+        momentum[2] = 2 * even * weight
         count = len(points)
         return Response(
-            eigenvalue=-self.damping / 2 + 1j * (damped + along * self.speed),
-            output=output,
+            eigenvalue=-self.damping / 2 + sign * root[pick] + 1j * along * self.speed,
+            output=shape * wave * (2 / self.mass * weight),
             input=(shape * wave.conj()).T.astype(complex),
             block=np.zeros((0, 0)),
             block_output=np.zeros((count, 0)),

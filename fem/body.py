@@ -8,6 +8,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from fem import compat
 from fem.material import Material
@@ -60,6 +61,19 @@ class Body:
     def clamp(self):
         """Boundary condition: all components zero on the rim."""
         return fem.dirichletbc(np.zeros(3), self.rim, self.space)
+
+    def nodal_mass(self) -> np.ndarray:
+        """Owned entries (3 nodes,) of int rho phi_i . (1, 1, 1) by the rule whose points are the nodes.
+
+        kg; positive, rim included. Collective.
+        """
+        lobatto = {"quadrature_rule": "GLL", "quadrature_degree": 2 * self.tire.section.order - 1}
+        dx = ufl.Measure("dx", domain=self.mesh, metadata=lobatto)
+        ones = ufl.as_vector((1.0, 1.0, 1.0))
+        weight = self.wall.density * ufl.inner(ufl.TestFunction(self.space), ones) * dx
+        vector = fem.petsc.assemble_vector(compat.form(weight))
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return vector.array_r.copy()
 
     def owned(self, vector: np.ndarray) -> np.ndarray:
         """The owned part of a dof array as (nodes, 3)."""

@@ -1,6 +1,6 @@
 """Static equilibrium under inflation, steady rolling and a flat, frictionless road.
 
-F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u = f, with f >= 0 on the tread dofs,
+F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f, with f >= 0 on the tread dofs,
 z + u_z >= z_road and one of both zero.
 """
 
@@ -18,6 +18,7 @@ from petsc4py import PETSc
 
 from fem import compat, kinematics
 from fem.body import Body
+from fem.shape_damping import ShapeDamping
 from fem.virtual_work import AT_REST, Rolling, static_residual, stress_prediction, tangent
 
 MOST_STEPS = 25  # Newton steps; a load step that needs more is better halved
@@ -39,21 +40,27 @@ class Equilibrium:
     """The nonlinear problem of one body. Forms, matrix and solver are made once. Collective.
 
     `inflation` (Pa) may be changed between solves; `solve` starts from the body's displacement and
-    puts it back when it does not converge. `cost`: seconds by part.
+    puts it back when it does not converge. `road_height` (m) is that of the last state that did;
+    `cost`: seconds by part.
     """
 
     def __init__(self, body: Body, rolling: Rolling = AT_REST):
         self.body = body
         self.cost: dict[str, float] = {}
+        self.road_height: float | None = None
         self.pressure = fem.Constant(body.mesh, 0.0)
         self._before = fem.Function(body.space)
         residual = static_residual(body, self.pressure, rolling)
+        self._damping: ShapeDamping | None = None
+        if rolling.speed * rolling.stiffness_damping:
+            self._damping = ShapeDamping(body, self.pressure, rolling)
+            residual += self._damping.work
         self._residual = compat.form(residual)
         self._tangent = compat.form(tangent(body, residual) + stress_prediction(body, self._before))
         self._inverted = compat.form(_inverted_volume(body))
         self._clamp = [body.clamp()]
-        self.matrix = fem.petsc.create_matrix(self._tangent)
-        self.matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        self._local_tangent = fem.petsc.create_matrix(self._tangent)
+        self.matrix = self._local_tangent
         self._work = fem.petsc.create_vector(self._residual)
         self._right, self._change = self._work.duplicate(), self._work.duplicate()
         rim = body.rim[body.rim < body.nodes]
@@ -63,9 +70,14 @@ class Equilibrium:
         self._bound = np.full(len(body.tread), -np.inf)
         self._active = np.zeros(len(body.tread), dtype=bool)
         self._force = np.zeros(len(body.tread))
-        symmetric = rolling.speed * rolling.damping == 0.0
-        self._ksp = self._make_solver("cholesky" if symmetric else "lu")
         self._scale, self._stiffness = self._yardsticks()
+        damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
+        self._ksp = self._make_solver("lu" if damped else "cholesky")
+
+    @property
+    def rounding(self) -> float:
+        """Force below which nothing is balanced, N."""
+        return TOLERANCE * self._scale
 
     def _make_solver(self, factorisation: str) -> PETSc.KSP:
         prefix = "static_"
@@ -80,6 +92,7 @@ class Equilibrium:
                 options[key] = value
         ksp = PETSc.KSP().create(self.body.comm)
         ksp.setOptionsPrefix(prefix)
+        self.matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
         ksp.setOperators(self.matrix)
         ksp.setFromOptions()
         return ksp
@@ -105,6 +118,7 @@ class Equilibrium:
                 break
             if error <= TOLERANCE and not changed:
                 if not self._inside_out():
+                    self.road_height = road_height
                     return Step(True, iteration, error, "converged")
                 reason = "an element is inside out"
                 break
@@ -189,6 +203,8 @@ class Equilibrium:
 
     def _assemble_residual(self) -> np.ndarray:
         """Forces out of balance at the owned dofs, N; on the rim 0, where the wheel takes them."""
+        if self._damping:
+            self._damping.update()
         with self._work.localForm() as local:
             local.set(0.0)
         fem.petsc.assemble_vector(self._work, self._residual)
@@ -203,9 +219,11 @@ class Equilibrium:
         self.cost[part] = self.cost.get(part, 0.0) + time.perf_counter() - began
 
     def _assemble_tangent(self) -> None:
-        self.matrix.zeroEntries()
-        fem.petsc.assemble_matrix(self.matrix, self._tangent, bcs=self._clamp)
-        self.matrix.assemble()
+        self._local_tangent.zeroEntries()
+        fem.petsc.assemble_matrix(self._local_tangent, self._tangent, bcs=self._clamp)
+        self._local_tangent.assemble()
+        if self._damping:
+            self.matrix = self._damping.added_to(self._local_tangent)
 
     def _inside_out(self) -> bool:
         """Whether the wall is turned inside out in some Gauss point; no energy tells J from -J."""

@@ -17,7 +17,8 @@ from fem.errors import ConvergenceError, InputError
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
 _SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
-_EASY = 8  # Newton steps up to which the next load step may grow
+_LARGEST = 4  # times the first step
+_EASY = 6  # Newton steps up to which the next load step may grow
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,13 @@ class Loader:
             return self.equilibrium.solve()
 
         self._march(attempt, 0.0, 1.0, 1.0, "inflation", pressure, "Pa")
+        self.touch = self.lowest()
+
+    def lowest(self) -> float:
+        """Height of the lowest tread node, m. Collective."""
         # Through comm.allreduce every process has the same bits, so all take the same steps.
         lowest = self.equilibrium.tread_height().min(initial=float("inf"))
-        self.touch = self.body.comm.allreduce(lowest, op=MPI.MIN)
+        return self.body.comm.allreduce(lowest, op=MPI.MIN)
 
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
@@ -76,7 +81,7 @@ class Loader:
         for _ in range(60):
             self._try_deflection(trial, known)
             known.append(_Known(trial, self.load(), self.body.u.x.array.copy()))
-            if abs(known[-1].load - load) <= LOAD_TOLERANCE * load:
+            if abs(known[-1].load - load) <= max(LOAD_TOLERANCE * load, self.equilibrium.rounding):
                 return trial
             trial = self._next_deflection(known, load)
         nearest = min(known, key=lambda k: abs(k.load - load))
@@ -107,7 +112,8 @@ class Loader:
         below = max((k for k in known if k.load <= load), key=lambda k: k.deflection)
         above = [k.deflection for k in known if k.load > load]
         far, near = sorted(known, key=lambda k: -abs(k.load - load))[-2:]
-        slope = (near.load - far.load) / (near.deflection - far.deflection)
+        rise, run = near.load - far.load, near.deflection - far.deflection
+        slope = rise / run if run else 0.0
         secant = near.deflection + (load - near.load) / slope if slope > 0 else np.inf
         if above:
             low, high = below.deflection, min(above)
@@ -133,7 +139,7 @@ class Loader:
         self._march(attempt, start, end, largest, "deflection", 1.0, "m")
 
     def _march(self, attempt, start, end, first, what, scale, unit) -> None:
-        """From a converged `start` to `end` in steps of at most `first`, cut back on failure."""
+        """From a converged `start` to `end` in steps from `first` on: grown when easy, cut back on failure."""
         done, size = start, first
         while True:
             target = end if abs(end - done) <= size * (1 + 1e-12) else done + size
@@ -144,7 +150,7 @@ class Loader:
                 done = target
                 if done == end:
                     return
-                size = min(first, 2 * size) if step.iterations <= _EASY else size
+                size = min(_LARGEST * first, 2 * size) if step.iterations <= _EASY else size
                 continue
             size = 0.5 * min(size, abs(target - done))
             if size < _SMALLEST * first:

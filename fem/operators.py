@@ -19,7 +19,7 @@ from petsc4py import PETSc
 
 from fem import compat, kinematics
 from fem.body import Body
-from fem.virtual_work import AT_REST, static_residual, tangent
+from fem.virtual_work import AT_REST, body_rate_form, convection_form, static_residual, tangent
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Operators:
         self._rows = PETSc.IS().createGeneral(
             (self.free + 3 * first).astype(PETSc.IntType), comm=body.comm
         )
-        self.mass = self._lobatto_mass()
+        self.mass = body.nodal_mass()[self.free]
         self.stiffness = self._assemble(self._tangent(inflation))
         self.stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
@@ -61,17 +61,15 @@ class Operators:
         body = self.body
         u, v = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
         w = kinematics.wheel_velocity(body.mesh)
-        rho = body.wall.density
-        convect = kinematics.convective
-        skew = (ufl.inner(v, convect(u, w)) - ufl.inner(convect(v, w), u)) / 2
+        density, convect = body.wall.density, kinematics.convective
         rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
         forms = (
-            skew,
-            -ufl.inner(convect(v, w), convect(u, w)),
-            skew - ufl.inner(v, kinematics.turn(u)),
-            -ufl.inner(test_rate, rate),
+            convection_form(body),
+            -density * ufl.inner(convect(v, w), convect(u, w)) * body.dx,
+            body_rate_form(body),
+            -density * ufl.inner(test_rate, rate) * body.dx,
         )
-        return Rotation(*(self._assemble(rho * form * body.dx) for form in forms))
+        return Rotation(*(self._assemble(form) for form in forms))
 
     def consistent_mass(self) -> PETSc.Mat:
         """int rho phi_i . phi_j by full integration, kg: what the diagonal `mass` is compared to. Collective."""
@@ -85,18 +83,6 @@ class Operators:
         reduced = matrix.createSubMatrix(self._rows, self._rows)
         matrix.destroy()
         return reduced
-
-    def _lobatto_mass(self) -> np.ndarray:
-        """Owned free entries of int rho phi_i . (1, 1, 1) by the rule whose points are the nodes."""
-        body = self.body
-        order = body.tire.section.order
-        lobatto = {"quadrature_rule": "GLL", "quadrature_degree": 2 * order - 1}
-        v = ufl.TestFunction(body.space)
-        ones = ufl.as_vector((1.0, 1.0, 1.0))
-        dx = ufl.Measure("dx", domain=body.mesh, metadata=lobatto)
-        vector = fem.petsc.assemble_vector(compat.form(body.wall.density * ufl.inner(v, ones) * dx))
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        return vector.array[self.free].copy()
 
     def spread(self, free: np.ndarray) -> np.ndarray:
         """Owned nodal values (nodes, 3, ...) with zeros on the rim from values at the free dofs."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.equilibrium import Equilibrium
+from fem.footprint import Footprint, footprint, nodal_area
 from fem.mesh import Lattice
 from fem.surface import outer_face
 
@@ -17,7 +18,7 @@ class StaticState:
 
     `displacement` (n, 3) m of all lattice nodes; of the outer face, in the order of its ids:
     `points` (s, 3) m undeformed, `moved` (s, 3) m displacement, `force` (s,) N of the road on the
-    tire, `half_sizes` (s, 2) m of the deformed rectangle each node stands for (x and y),
+    tire, `area` (s,) m2 that a uniform pressure is shared out by, `half_sizes` (s, 2) m of the deformed rectangle each node stands for (x and y),
     `ring_rate` (s,) m/rad the derivative of the deformed x by the angle around the axle.
     `road_height` (m) is None without a road.
     """
@@ -26,6 +27,7 @@ class StaticState:
     points: np.ndarray
     moved: np.ndarray
     force: np.ndarray
+    area: np.ndarray
     half_sizes: np.ndarray
     ring_rate: np.ndarray
     shape: tuple[int, int]
@@ -59,21 +61,22 @@ class StaticState:
         crown = np.argmin(self.positions[:, 2])
         return float(self.ring_rate[crown])
 
-    def footprint(self) -> tuple[float, float]:
-        """Length (x) and width (y), m, of the rectangles that carry force; zeros without contact."""
-        active = self.force > 0
-        if not active.any():
-            return 0.0, 0.0
-        low = (self.positions[active, :2] - self.half_sizes[active]).min(axis=0)
-        high = (self.positions[active, :2] + self.half_sizes[active]).max(axis=0)
-        return tuple(float(size) for size in high - low)
+    @property
+    def pressure(self) -> np.ndarray:
+        """Contact pressure, (s,) Pa."""
+        touching = self.force > 0
+        return np.divide(self.force, self.area, out=np.zeros_like(self.force), where=touching)
+
+    def footprint(self) -> Footprint:
+        """Extent of the contact; zeros without a road."""
+        if self.road_height is None:
+            return Footprint(0.0, 0.0, 0.0)
+        return footprint(self.shape, self.positions, self.pressure, self.gap, self.area)
 
 
-def static_state(
-    equilibrium: Equilibrium, touch_height: float, road_height: float | None
-) -> StaticState:
+def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
     """Collect the converged state on every process. Collective."""
-    body = equilibrium.body
+    body, road_height = equilibrium.body, equilibrium.road_height
     displacement = body.displacement()
     face = outer_face(body.lattice)
     points = body.lattice.points(face)
@@ -88,6 +91,7 @@ def static_state(
         points,
         moved,
         force,
+        nodal_area(body.lattice, points + moved),
         *_surface_metric(body.lattice, points + moved),
         touch_height=touch_height,
         road_height=road_height,

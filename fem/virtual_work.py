@@ -13,10 +13,14 @@ from fem.body import Body
 
 @dataclass(frozen=True)
 class Rolling:
-    """Steady rolling: speed Omega in rad/s, damping gamma1 in 1/s. At speed 0 nothing is added."""
+    """Steady rolling: speed Omega in rad/s, damping gamma1 in 1/s, stiffness_damping gamma2 in s.
+
+    At speed 0 nothing is added.
+    """
 
     speed: float = 0.0
     damping: float = 0.0
+    stiffness_damping: float = 0.0
 
 
 AT_REST = Rolling()
@@ -56,6 +60,22 @@ def _rolling_work(body: Body, rolling: Rolling):
     drag = fem.Constant(body.mesh, float(rolling.speed * rolling.damping))
     work = -inertia * body.wall.density * ufl.inner(rate, test_rate) * body.dx
     return work + drag * body.wall.density * ufl.inner(kinematics.body_rate(u, w), v) * body.dx
+
+
+def convection_form(body: Body):
+    """G: the skew part of int rho v . (grad u w), in trial and test functions."""
+    u, v = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
+    w = kinematics.wheel_velocity(body.mesh)
+    convect = kinematics.convective
+    skew = (ufl.inner(v, convect(u, w)) - ufl.inner(convect(v, w), u)) / 2
+    return body.wall.density * skew * body.dx
+
+
+def body_rate_form(body: Body):
+    """B = G - Q, Q = int rho v . (e_y x u)."""
+    u, v = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
+    turning = body.wall.density * ufl.inner(v, kinematics.turn(u)) * body.dx
+    return convection_form(body) - turning
 
 
 def tangent(body: Body, residual):

@@ -96,12 +96,6 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
     if len(given) > 1:
         raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
-    rolling = scene.rotation is not None and scene.rotation.speed > 0
-    if rolling and scene.static.steady_rolling and scene.damping.stiffness > 0:
-        raise error(
-            ("damping", "stiffness"),
-            "> 0 is not part of the steady rolling state: set static.steady_rolling = false",
-        )
 
 
 def _force(scene: Scene, error: Where) -> None:

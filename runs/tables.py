@@ -241,6 +241,7 @@ class Receptance:
 class Output:
     spectra: bool = flag(True, "of contact and axle force")
     axle_force: bool = flag(True, "from momentum")
+    impulse: bool = flag(False, "Green's functions between the driven points, over [time]")
     velocity: bool = flag(False, "of the driven points")
     acceleration: bool = flag(False, "of the driven points")
     vibration: bool = flag(False, "u(ω) on the whole tire")

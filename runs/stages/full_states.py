@@ -22,18 +22,14 @@ _ROUNDING = 1e-14  # of the largest squared length: directions below are the fie
 
 def compute(session: Session, projected: StateModes) -> StateModes:
     """Solve, put the fields into `session.modal`, and say how far the projected states are off. Collective."""
-    from fem.compliance import rotating_stiffness
-
-    operators, rotation = session.operators, session.rotation_matrices
-    wanted = session.scene.rotation
-    stiffness = rotating_stiffness(
-        operators, rotation, session.speed, session.damping, wanted.inertia
-    )
-    drag = _drag(session)
+    operators, wheel = session.operators, session.wheel
     with session.record.timing("full eigensolver"):
-        found = quadratic.solve(operators.mass, drag, stiffness, wanted.count)
-    drag.destroy()
-    stiffness.destroy()
+        found = quadratic.solve(
+            operators.mass,
+            wheel.rotating_damping,
+            wheel.rotating_stiffness,
+            session.scene.rotation.count,
+        )
     basis, coordinates = _orthonormal(session, found)
     shape = session.body.surface(operators.spread(basis)).reshape(-1, basis.shape[1])
     replace_basis(session, shape, momentum(session.comm, operators.mass, basis))
@@ -61,21 +57,6 @@ def replace_basis(session: Session, shape: np.ndarray, momenta: np.ndarray) -> N
     session.modal = replace(
         modal, shape=shape, projection=replace(modal.projection, momentum=momenta)
     )
-
-
-def _drag(session: Session):
-    """D = gamma1 M + gamma2 K + 2 Omega G (doppler: B), kg/s. Collective."""
-    operators, rotation = session.operators, session.rotation_matrices
-    full = session.scene.rotation.inertia == "full"
-    drag = operators.stiffness.copy()
-    drag.scale(session.damping[1])
-    different = type(drag).Structure.DIFFERENT_NONZERO_PATTERN
-    drag.axpy(2 * session.speed, rotation.gyroscopic if full else rotation.body, different)
-    diagonal = drag.getDiagonal()
-    diagonal.array[:] += session.damping[0] * operators.mass
-    drag.setDiagonal(diagonal)
-    drag.setOption(type(drag).Option.SYMMETRIC, False)
-    return drag
 
 
 def _states(found: FullModes, coordinates: np.ndarray) -> StateModes:

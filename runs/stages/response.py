@@ -23,7 +23,7 @@ def inputs(session: Session) -> dict:
         "forces": [asdict(force) for force in scene.force],
         "time": asdict(scene.time) if scene.time else None,
         "receptance": asdict(scene.output.receptance) if scene.output.receptance else None,
-        "rates": [scene.output.velocity, scene.output.acceleration],
+        "also": [scene.output.velocity, scene.output.acceleration, scene.output.impulse],
     }
 
 
@@ -32,6 +32,8 @@ def compute(session: Session, path: Path) -> None:
     out: dict[str, tuple[np.ndarray, str]] = {}
     if session.scene.time:
         out |= _in_time(session)
+        if session.scene.output.impulse:
+            out["impulse"] = _impulse(session, out["time"][0]), "m/(N s)"
     if session.scene.output.receptance:
         out |= _in_frequency(session)
 
@@ -96,6 +98,12 @@ def _rates(session: Session, time: np.ndarray, step: float, scheme: str) -> dict
     return {name: (v.reshape(len(time), -1, 3), unit) for name, (v, unit) in out.items()}
 
 
+def _impulse(session: Session, time: np.ndarray) -> np.ndarray:
+    """g (nt, k, k) along the forces, without the residual's delta at t = 0."""
+    with session.record.timing("impulse responses"):
+        return _along(session.force_response.impulse(time), session.scene.force)
+
+
 def _march(session: Session, response: Response, step: float, scheme: str, force) -> np.ndarray:
     """Readings (nt, r) under forces (nt, k) from rest. Collective."""
     tire = Recursion(response, step, scheme, session.comm)
@@ -137,7 +145,7 @@ def _in_frequency(session: Session) -> dict:
 
 
 def _along(full: np.ndarray, forces) -> np.ndarray:
-    """Each point's displacement along its own force, (f, k, k), from its components (f, 3 k, k)."""
+    """Each point's displacement along its own force, (n, k, k), from its components (n, 3 k, k)."""
     components = full.reshape(len(full), len(forces), 3, len(forces))
     return np.einsum("frdk,rd->frk", components, _directions(forces))
 

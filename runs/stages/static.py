@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from fem.errors import ConvergenceError
 from runs import observe
+from runs.mpi import on_root
 from runs.session import Session
 from runs.store import put
 
@@ -22,11 +24,11 @@ def inputs(session: Session) -> dict:
     }
 
 
-def _rolling(session: Session) -> tuple[float, float]:
+def _rolling(session: Session) -> tuple[float, float, float]:
     """Speed and damping of the steady-rolling state; zeros at rest."""
     if not session.scene.static.steady_rolling or session.speed == 0:
-        return 0.0, 0.0
-    return session.speed, session.damping[0]
+        return 0.0, 0.0, 0.0
+    return session.speed, *session.damping
 
 
 def compute(session: Session, path: Path) -> None:
@@ -40,25 +42,29 @@ def compute(session: Session, path: Path) -> None:
     with record.timing("mesh and forms"):
         equilibrium = Equilibrium(session.body, Rolling(*_rolling(session)))
     loader = Loader(equilibrium, _show)
-    loader.inflate(wanted.inflation)
-    road = _place(loader, wanted)
+    last = path.with_name("static_last.h5")
+    try:
+        loader.inflate(wanted.inflation)
+        _place(loader, wanted)
+    except ConvergenceError as error:
+        session.static = static_state(equilibrium, loader.lowest())
+        session.write(last, "static", lambda file: _fill(file, session, equilibrium))
+        raise ConvergenceError(f"{error} The last state that converged is in {last}.") from None
     record.cost |= equilibrium.cost
-    state = static_state(equilibrium, loader.touch, road)
-    session.static = state
+    session.static = static_state(equilibrium, loader.touch)
     _describe(session, loader)
-    session.write(path, "static", lambda file: _fill(file, session))
+    session.write(path, "static", lambda file: _fill(file, session, equilibrium))
+    on_root(session.comm, lambda: last.unlink(missing_ok=True))
 
 
-def _place(loader, wanted) -> float | None:
-    """Height of the road plane, m, after pressing the tire on it. Collective."""
+def _place(loader, wanted) -> None:
+    """Press the tire on the road. Collective."""
     if wanted.load is not None:
-        return loader.touch + loader.carry(wanted.load)
-    if wanted.deflection is not None:
+        loader.carry(wanted.load)
+    elif wanted.deflection is not None:
         loader.deflect(wanted.deflection)
-        return loader.touch + wanted.deflection
-    if wanted.road_height is not None:
+    elif wanted.road_height is not None:
         loader.deflect(wanted.road_height - loader.touch)
-    return wanted.road_height
 
 
 def _show(progress) -> None:
@@ -74,12 +80,13 @@ def _describe(session: Session, loader) -> None:
     free = 3 * len(state.displacement)
     record.headline["unknowns"] = (free, "-")
     if state.road_height is not None:
-        length, width = state.footprint()
+        extent = state.footprint()
         record.headline |= {
             "load": (state.load, "N"),
             "deflection": (state.road_height - state.touch_height, "m"),
-            "footprint length": (length, "m"),
-            "footprint width": (width, "m"),
+            "footprint length": (extent.length, "m"),
+            "footprint width": (extent.width, "m"),
+            "footprint area": (extent.area, "m2"),
             "contact points": (int((state.force > 0).sum()), "-"),
         }
         record.indicators["least contact force"] = (float(state.force.min()), "N")
@@ -93,7 +100,7 @@ def _describe(session: Session, loader) -> None:
         )
 
 
-def _fill(file, session: Session) -> None:
+def _fill(file, session: Session, equilibrium) -> None:
     state, lattice = session.static, session.body.lattice
     put(file, "mesh/points", lattice.points(np.arange(lattice.size)), "m")
     put(file, "mesh/cells", lattice.cells(), "-")
@@ -102,10 +109,11 @@ def _fill(file, session: Session) -> None:
     put(file, "surface/displacement", state.moved, "m")
     put(file, "surface/quads", lattice.quads(), "-")
     put(file, "surface/force", state.force, "N")
+    put(file, "surface/area", state.area, "m2")
     put(file, "surface/half_sizes", state.half_sizes, "m")
     put(file, "surface/ring_rate", state.ring_rate, "m/rad")
     file.attrs["touch_height"] = state.touch_height
-    file.attrs["inflation"] = session.scene.static.inflation
+    file.attrs["inflation"] = float(equilibrium.pressure.value)
     file.attrs["load"] = state.load
     file.attrs["rolling_radius"] = state.rolling_radius()
     if state.road_height is None:
@@ -117,10 +125,12 @@ def _fill(file, session: Session) -> None:
     put(file, "contact/points", state.positions[near], "m")
     put(file, "contact/force", force, "N")
     put(file, "contact/gap", state.gap[near], "m")
-    put(file, "contact/area", 4 * state.half_sizes[near].prod(axis=1), "m2")
+    put(file, "contact/area", state.area[near], "m2")
+    put(file, "contact/pressure", state.pressure[near], "Pa")
     file.attrs["road_height"] = state.road_height
     file.attrs["deflection"] = state.road_height - state.touch_height
-    file.attrs["footprint_length"], file.attrs["footprint_width"] = state.footprint()
+    for name, value in asdict(state.footprint()).items():
+        file.attrs[f"footprint_{name}"] = value
 
 
 def reuse(session: Session, path: Path) -> None:
@@ -136,6 +146,7 @@ def reuse(session: Session, path: Path) -> None:
             surface["points"][:],
             surface["displacement"][:],
             surface["force"][:],
+            surface["area"][:],
             surface["half_sizes"][:],
             surface["ring_rate"][:],
             shape=(len(surface["points"]) // along, along),

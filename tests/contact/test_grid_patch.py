@@ -102,6 +102,12 @@ def test_nodes_and_points_exchange_the_same_work(tread) -> None:
         def inertia_force(self):
             return np.zeros(3)
 
+        def snapshot(self):
+            return {}
+
+        def restore(self, kept):
+            pass
+
     tire = Tire()
     on = OnPoints(tire, patch.weights)
     force = np.random.default_rng(0).random(len(patch.points))

@@ -101,8 +101,8 @@ def loaded(make_body, load=400.0, comm=MPI.COMM_SELF, rolling=None, **more):
     steps = []
     loader = Loader(equilibrium, steps.append)
     loader.inflate(2e5)
-    deflection = loader.carry(load)
-    return static_state(equilibrium, loader.touch, loader.touch + deflection), steps, loader
+    loader.carry(load)
+    return static_state(equilibrium, loader.touch), steps, loader
 
 
 def test_the_road_carries_the_load_and_only_pushes(make_body):
@@ -166,6 +166,33 @@ def test_no_load_below_zero(make_body):
         loader.carry(-1.0)
 
 
+def test_damping_by_the_stiffness_has_a_full_tangent(make_body, csr):
+    """Speed 100 rad/s, gamma2 = 1e-4 s: a hundredth of the stiffness of a strain per radian."""
+    body = make_body(segments=8, arc=4)
+    direction = deformed(body)
+    rim = (3 * body.rim[:, None] + np.arange(3)).ravel()
+    body.u.x.array[rim] = direction[rim] = 0.0
+    found = {}
+    for damping in (1e-4, 0.0):
+        equilibrium = Equilibrium(body, Rolling(100.0, 0.0, damping))
+        equilibrium._assemble_residual()
+        exact = csr(fresh(equilibrium)) @ direction
+        numeric = central(
+            body, lambda e=equilibrium: e._assemble_residual().copy(), direction, 1e-7
+        )
+        free = np.setdiff1d(np.arange(len(direction)), rim)
+        scale = np.linalg.norm(numeric[free])
+        assert np.linalg.norm((exact - numeric)[free]) < 1e-6 * scale
+        found[damping] = exact
+    assert np.linalg.norm(found[1e-4] - found[0.0]) > 1e-3 * scale
+
+
+def fresh(equilibrium):
+    equilibrium._before.x.array[:] = equilibrium.body.u.x.array
+    equilibrium._assemble_tangent()
+    return equilibrium.matrix
+
+
 @pytest.mark.parametrize("ratio", [0.3, 0.49, 0.4995])
 def test_newton_steps_do_not_grow_towards_incompressibility(make_body, ratio):
     rubber = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=ratio)
@@ -174,7 +201,7 @@ def test_newton_steps_do_not_grow_towards_incompressibility(make_body, ratio):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("rolling", [Rolling(), Rolling(60.0, 500.0)])
+@pytest.mark.parametrize("rolling", [Rolling(), Rolling(60.0, 500.0), Rolling(60.0, 0.0, 1e-4)])
 def test_the_same_state_on_any_number_of_processes(make_body, rolling):
     alone, *_ = loaded(make_body, rolling=rolling)
     shared, *_ = loaded(make_body, comm=MPI.COMM_WORLD, rolling=rolling)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import make
 
 from greens.choice import keep, participation
 from greens.truncation import Cutoff, estimate
@@ -15,7 +16,7 @@ def error(found, exact, frequency) -> np.ndarray:
 
 
 @pytest.fixture
-def uneven(make):
+def uneven():
     """Every second mode hardly moves the points: a tire's antisymmetric modes under its middle."""
     system = make(m=30, damping=10.0, speed=0.0)
     shape = system.shape * np.where(np.arange(30) % 2, 1.0, 0.02)
@@ -48,7 +49,7 @@ def test_static_limit_stays_and_all_states_are_nothing_new(uneven) -> None:
 
 
 @pytest.mark.parametrize("damping", [0.0, 20.0, 300.0])
-def test_estimate_bounds_the_error_of_the_static_residual(make, damping) -> None:
+def test_estimate_bounds_the_error_of_the_static_residual(damping) -> None:
     """Standing it is a bound, and not an empty one."""
     whole = make(m=30, points=6, speed=0.0, damping=damping).response()
     slow = np.argsort(np.abs(whole.eigenvalue.imag))
@@ -61,7 +62,7 @@ def test_estimate_bounds_the_error_of_the_static_residual(make, damping) -> None
     assert estimated.max() < 20 * true.max()
 
 
-def test_estimate_without_residual_is_of_the_right_size(make) -> None:
+def test_estimate_without_residual_is_of_the_right_size() -> None:
     whole = make(m=60, points=6, speed=0.0, damping=20.0).response()
     kept = whole.keeping(np.abs(whole.eigenvalue) < 400)
     kept = type(kept)(**{**vars(kept), "residual": 0 * kept.residual})

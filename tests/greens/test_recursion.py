@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from scipy import linalg
+from systems import make
 
 from fem.errors import InputError
 from greens.convolution import Convolution
@@ -47,7 +48,7 @@ def some_force(points: int, seed: int = 1) -> np.ndarray:
 
 @pytest.mark.parametrize("scheme", ["linear", "constant"])
 @pytest.mark.parametrize("step", [1e-5, 1e-3, 5e-2])
-def test_recursion_is_exact_for_its_kind_of_force(make, scheme, step) -> None:
+def test_recursion_is_exact_for_its_kind_of_force(scheme, step) -> None:
     system = make(speed=60.0)
     force = some_force(4)
     if scheme == "constant":
@@ -57,7 +58,7 @@ def test_recursion_is_exact_for_its_kind_of_force(make, scheme, step) -> None:
     assert np.abs(found - exact).max() < 1e-9 * np.abs(exact).max()
 
 
-def test_residual_acts_at_once(make) -> None:
+def test_residual_acts_at_once() -> None:
     system = make()
     whole = system.shape @ np.linalg.solve(system.stiffness, system.shape.T) + np.eye(4) * 1e-4
     force = some_force(4)
@@ -69,7 +70,7 @@ def test_residual_acts_at_once(make) -> None:
     assert np.abs(extra).max() > 1e-5
 
 
-def test_steady_force_ends_at_the_static_answer(make) -> None:
+def test_steady_force_ends_at_the_static_answer() -> None:
     system = make(damping=80.0)
     static = system.shape @ np.linalg.solve(system.stiffness, system.shape.T)
     force = np.tile([1.0, -2.0, 0.5, 3.0], (STEPS + 1, 1))
@@ -77,7 +78,7 @@ def test_steady_force_ends_at_the_static_answer(make) -> None:
     assert np.abs(found - static @ force[0]).max() < 1e-9 * np.abs(found).max()
 
 
-def test_linear_scheme_is_of_second_order_and_constant_of_first(make) -> None:
+def test_linear_scheme_is_of_second_order_and_constant_of_first() -> None:
     system = make()
     response = system.response()
 
@@ -94,7 +95,7 @@ def test_linear_scheme_is_of_second_order_and_constant_of_first(make) -> None:
         assert errors[-1] < cap * np.abs(exact).max()
 
 
-def test_convolution_comes_to_the_recursion_at_first_order(make) -> None:
+def test_convolution_comes_to_the_recursion_at_first_order() -> None:
     system = make()
     response = system.response(
         compliance=system.shape @ np.linalg.solve(system.stiffness, system.shape.T) + 1e-4
@@ -111,7 +112,7 @@ def test_convolution_comes_to_the_recursion_at_first_order(make) -> None:
     assert errors[-1] < 2e-2
 
 
-def test_inertia_force_is_the_rate_of_momentum(make) -> None:
+def test_inertia_force_is_the_rate_of_momentum() -> None:
     """Sum p eta'' of the recursion is the second difference of Sum p eta, as linear pieces have it."""
     system = make()
     m = len(system.drag)
@@ -131,14 +132,14 @@ def test_inertia_force_is_the_rate_of_momentum(make) -> None:
     assert np.abs(mean - second).max() < 1e-5 * np.abs(second).max()
 
 
-def test_too_long_a_convolution_is_refused(make) -> None:
+def test_too_long_a_convolution_is_refused() -> None:
     with pytest.raises(InputError, match="needs no history"):
         Convolution(make().response(), 1e-6, 10**8)
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("scheme", ["linear", "constant"])
-def test_the_same_on_any_number_of_processes(make, scheme) -> None:
+def test_the_same_on_any_number_of_processes(scheme) -> None:
     system = make(m=11)
     force = some_force(4)
     response = system.response()
@@ -148,7 +149,7 @@ def test_the_same_on_any_number_of_processes(make, scheme) -> None:
     assert np.abs(alone.inertia_force() - spread.inertia_force()).max() < 1e-10
 
 
-def test_dirac_residual_answers_with_a_pulse_of_one_step(make) -> None:
+def test_dirac_residual_answers_with_a_pulse_of_one_step() -> None:
     """Thesis (C.4): G_res / step for one step is the mean force over it; in the end the same."""
     system = make(damping=80.0)
     whole = system.shape @ np.linalg.solve(system.stiffness, system.shape.T) + np.eye(4) * 1e-4

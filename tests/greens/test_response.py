@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy import linalg
+from systems import make
 
 TIMES = np.array([0.0, 1e-4, 3e-3, 0.02, 0.1])
 
@@ -14,7 +15,7 @@ def matrix_exponential(system, times):
 
 
 @pytest.mark.parametrize("speed", [0.0, 30.0, 90.0])
-def test_impulse_is_the_matrix_exponential(make, speed) -> None:
+def test_impulse_is_the_matrix_exponential(speed) -> None:
     system = make(speed=speed)
     exact = matrix_exponential(system, TIMES)
     g = system.response().impulse(TIMES)
@@ -22,7 +23,7 @@ def test_impulse_is_the_matrix_exponential(make, speed) -> None:
     assert np.abs(g[0]).max() < 1e-12 * np.abs(exact).max()
 
 
-def test_impulse_is_reciprocal_under_reversed_rotation(make) -> None:
+def test_impulse_is_reciprocal_under_reversed_rotation() -> None:
     """g_ij(Omega) = g_ji(-Omega); at one Omega alone the wheel is not reciprocal."""
     system = make(speed=60.0)
     forth = system.response().impulse(TIMES)
@@ -32,7 +33,7 @@ def test_impulse_is_reciprocal_under_reversed_rotation(make) -> None:
     assert np.abs(forth - forth.transpose(0, 2, 1)).max() > 1e-3 * size
 
 
-def test_impulse_is_the_inverse_transform_of_the_receptance(make) -> None:
+def test_impulse_is_the_inverse_transform_of_the_receptance() -> None:
     """Agreement to 1e-4 away from t = 0, and at t = 0 as far as the band goes.
 
     What is left has one reason: H falls as g'(0) / (i omega)^2, and the samples end at the Nyquist
@@ -50,7 +51,7 @@ def test_impulse_is_the_inverse_transform_of_the_receptance(make) -> None:
     assert np.abs(transformed[0] - tail).max() < 0.05 * np.abs(tail).max()
 
 
-def test_receptance_inverts_the_dynamic_stiffness(make) -> None:
+def test_receptance_inverts_the_dynamic_stiffness() -> None:
     system = make(speed=60.0)
     frequency = np.array([0.0, 10.0, 40.0, 200.0])
     H = system.response().receptance(frequency)
@@ -60,7 +61,7 @@ def test_receptance_inverts_the_dynamic_stiffness(make) -> None:
         assert np.abs(found - exact).max() < 1e-11 * np.abs(exact).max()
 
 
-def test_static_limit_with_residual_is_exact(make) -> None:
+def test_static_limit_with_residual_is_exact() -> None:
     """The modes left out are in the residual: H(0) is the given compliance to 1e-9."""
     system = make(m=12)
     whole = system.shape @ np.linalg.solve(system.stiffness, system.shape.T)
@@ -70,7 +71,7 @@ def test_static_limit_with_residual_is_exact(make) -> None:
     assert np.abs(response.residual).max() > 1e-3 * np.abs(whole).max()
 
 
-def test_resolved_keeps_the_static_limit_and_the_slow_modes(make) -> None:
+def test_resolved_keeps_the_static_limit_and_the_slow_modes() -> None:
     system = make(damping=8.0)
     response = system.response()
     step = 1 / np.median(np.abs(response.eigenvalue))
@@ -85,7 +86,7 @@ def test_resolved_keeps_the_static_limit_and_the_slow_modes(make) -> None:
     assert response.resolved(1e-12) is response
 
 
-def test_momentum_of_an_impulse(make) -> None:
+def test_momentum_of_an_impulse() -> None:
     """The rate of momentum after an impulse is that of Sum_k p_k eta_k''."""
     system = make()
     m = len(system.drag)
@@ -100,7 +101,7 @@ def test_momentum_of_an_impulse(make) -> None:
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_velocity_and_acceleration_of_an_impulse(make, order) -> None:
+def test_velocity_and_acceleration_of_an_impulse(order) -> None:
     """g' and g'' from the companion matrix; g'(0) is the inverse mass seen at the points."""
     system = make(speed=60.0)
     rate = system.response().rate()
@@ -119,7 +120,7 @@ def test_velocity_and_acceleration_of_an_impulse(make, order) -> None:
     assert np.abs(wanted.impulse(TIMES) - exact).max() < 1e-9 * np.abs(exact).max()
 
 
-def test_mobility_is_i_omega_times_receptance(make) -> None:
+def test_mobility_is_i_omega_times_receptance() -> None:
     response = make().response()
     frequency = np.array([3.0, 40.0, 300.0])
     H = response.receptance(frequency)

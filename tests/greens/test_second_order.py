@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import make
 
 from greens.response import couple
 from greens.second_order import Moments, second_order
@@ -44,7 +45,7 @@ def error(system, option: str, frequency: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("speed", "damping"), [(0.0, 0.0), (0.0, 100.0), (15.0, 100.0)])
-def test_each_option_is_better_than_the_one_before(make, speed, damping) -> None:
+def test_each_option_is_better_than_the_one_before(speed, damping) -> None:
     """Over the band up to half the highest kept frequency, and exact at 0 Hz.
 
     Rolling faster or with sharper resonances, what is left is the Coriolis coupling between kept
@@ -59,7 +60,7 @@ def test_each_option_is_better_than_the_one_before(make, speed, damping) -> None
     assert second.max() < static.max() / 3
 
 
-def test_heavy_damping_spoils_the_static_residual_and_not_the_second_order(make) -> None:
+def test_heavy_damping_spoils_the_static_residual_and_not_the_second_order() -> None:
     """Modes so overdamped that they do not follow statically within the band: physics, not numerics."""
     system = make(m=40, points=5, speed=0.0, damping=3e3)
     none, static, second = (
@@ -69,7 +70,7 @@ def test_heavy_damping_spoils_the_static_residual_and_not_the_second_order(make)
     assert second.max() < none.max() / 3
 
 
-def test_the_slope_at_rest_is_exact_when_rolling(make) -> None:
+def test_the_slope_at_rest_is_exact_when_rolling() -> None:
     """H'(0), where damping and Coriolis forces of the modes left out first show."""
     system = make(m=40, points=5, speed=60.0, damping=50.0)
     response = reduced(system, "second-order")
@@ -81,7 +82,7 @@ def test_the_slope_at_rest_is_exact_when_rolling(make) -> None:
 
 @pytest.mark.parametrize("speed", [0.0, 30.0, 150.0])
 @pytest.mark.parametrize("damping", [0.0, 8.0, 3e3])
-def test_residual_states_never_grow(make, speed, damping) -> None:
+def test_residual_states_never_grow(speed, damping) -> None:
     system = make(m=40, points=5, speed=speed, damping=damping)
     response = reduced(system, "second-order")
     fastest = np.abs(response.eigenvalue).max()
@@ -89,7 +90,7 @@ def test_residual_states_never_grow(make, speed, damping) -> None:
     assert len(response.eigenvalue) > KEPT
 
 
-def test_nothing_is_left_when_no_mode_is_missing(make) -> None:
+def test_nothing_is_left_when_no_mode_is_missing() -> None:
     """A complete basis: the moments are rounding, and no state is made from it."""
     system = make(m=KEPT, points=5)
     response = reduced(system, "second-order")
@@ -97,7 +98,7 @@ def test_nothing_is_left_when_no_mode_is_missing(make) -> None:
     assert np.abs(response.residual).max() < 1e-12 * np.abs(response.static()).max()
 
 
-def test_momentum_of_the_residual_states(make) -> None:
+def test_momentum_of_the_residual_states() -> None:
     """Together with the kept states they carry what the full tire carries under a slow force."""
     system = make(m=40, points=5, speed=30.0)
     response = reduced(system, "second-order")

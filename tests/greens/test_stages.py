@@ -30,6 +30,7 @@ frequency = 0.0
 duration = 0.02
 step = 5e-5
 [output]
+impulse = true
 velocity = true
 acceleration = true
 receptance = { to = 80.0, step = 20.0, direct = 2 }
@@ -95,6 +96,17 @@ def test_velocity_and_acceleration_are_the_rates(run) -> None:
         assert np.abs(slope - rate[1:-1])[1:].max() < 0.02 * np.abs(rate).max()
 
 
+def test_impulse_response_is_that_of_the_stored_states(run) -> None:
+    """Starts from nothing, and its transform at 0 Hz is the static flexibility of the states."""
+    out, _ = run("--set", "greens.residual=none", "--until", "response")
+    with h5py.File(out / "response.h5") as file:
+        g, receptance = file["impulse"][:], file["receptance"][0]
+        step = file["time"][1]
+    assert g.shape[1:] == (2, 2)
+    assert np.abs(g[0]).max() < 1e-9 * np.abs(g).max()
+    assert np.abs(g.sum(axis=0) * step - receptance).max() < 0.05 * np.abs(receptance).max()
+
+
 def test_states_made_static_are_told(run) -> None:
     few = "--set", "greens.dynamic=15", "--set", "greens.band=60"
     out, stages = run("--set", "greens.residual=static", *few, "--until", "response")
@@ -103,3 +115,16 @@ def test_states_made_static_are_told(run) -> None:
     assert 0 < lost < 0.2
     with h5py.File(out / "greens.h5") as file:
         assert file["force/eigenvalue"].shape == (15,)
+
+
+def test_states_of_the_full_problem_take_the_static_residual_only(run, launch, tmp_path) -> None:
+    """Its own states complete with K_Omega^-1; residuals that complete the modes are refused."""
+    full = "--set", "rotation.method=full", "--set", "rotation.count=20", "--until", "response"
+    _, stages = run("--set", "greens.residual=static", *full)
+    assert off(stages) < 0.2
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE)
+    options = "--set", "greens.residual=attachment", "--set", "rotation.method=full"
+    done = launch("-m", "runs", "check", scene, *options)
+    assert done.returncode == 2
+    assert 'rotation.method = "projected"' in done.stdout + done.stderr

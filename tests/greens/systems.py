@@ -1,10 +1,8 @@
 """Small tires made of random matrices: no mesh, no solver, every eigenvalue known."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import pytest
 
 from greens.response import Response, couple
 from modal.rotating import rotating
@@ -43,18 +41,15 @@ class System:
         return couple(modes, self.shape, self.shape, np.ones((3, m)), **options)
 
 
-@pytest.fixture(scope="session")
-def make() -> Callable[..., System]:
-    """make(seed, m, points, speed, damping): a rolling system with gyroscopic and circulatory terms."""
-
-    def build(seed: int = 0, m: int = 8, points: int = 4, speed: float = 30.0, damping=8.0):
-        rng = np.random.default_rng(seed)
-        squares = np.linspace(80.0, 900.0, m) ** 2
-        skew = [a - a.T for a in rng.normal(size=(2, m, m)) / m]
-        convective = rng.normal(size=(m, m)) / m
-        drag = damping * np.eye(m) + 2 * speed * skew[0]
-        stiffness = np.diag(squares) - speed**2 * convective @ convective.T
-        stiffness += damping * speed * skew[1]
-        return System(drag, stiffness, rng.normal(size=(points, m)))
-
-    return build
+def make(
+    seed: int = 0, m: int = 8, points: int = 4, speed: float = 30.0, damping: float = 8.0
+) -> System:
+    """A rolling system of m modes with gyroscopic and circulatory terms."""
+    rng = np.random.default_rng(seed)
+    squares = np.linspace(80.0, 900.0, m) ** 2
+    skew = [a - a.T for a in rng.normal(size=(2, m, m)) / m]
+    convective = rng.normal(size=(m, m)) / m
+    drag = damping * np.eye(m) + 2 * speed * skew[0]
+    stiffness = np.diag(squares) - speed**2 * convective @ convective.T
+    stiffness += damping * speed * skew[1]
+    return System(drag, stiffness, rng.normal(size=(points, m)))

@@ -1,0 +1,77 @@
+"""Pressure and extent of the contact, from forces put on the nodes by a known pressure."""
+
+import numpy as np
+import pytest
+
+from fem.compat import field_nodes
+from fem.footprint import Footprint, footprint, nodal_area
+from fem.mesh import Lattice, Torus, _edge
+
+A, B = 0.03, 0.02  # m, half axes of the known footprint
+
+
+@pytest.fixture
+def plane():
+    """A lattice whose outer face is laid out flat: x around, y along."""
+
+    def make(order, segments, arc):
+        section = Torus(0.32, 0.1, 0.01, 1.0, segments, arc, 1, order, "uniform")
+        lattice = Lattice(section, _edge(field_nodes(order)))
+        x = 0.05 * (np.where(lattice.ring > np.pi, lattice.ring - 2 * np.pi, lattice.ring))
+        grid = np.stack(np.meshgrid(x, 0.05 * lattice.arc, [0.0], indexing="ij"), axis=-1)
+        return lattice, grid.reshape(-1, 3)
+
+    return make
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_areas_are_positive_and_cover_the_plane(plane, order):
+    lattice, points = plane(order, 16, 8)
+    area = nodal_area(lattice, points)
+    assert area.min() > 0
+    inside = area.reshape(lattice.shape[0], -1)[order : 5 * order + 1].sum()
+    ends = area.reshape(lattice.shape[0], -1)[[order, 5 * order]].sum()
+    width = 0.05 * 2 * np.pi / 16
+    assert inside - ends / 2 == pytest.approx(4 * width * 0.1, rel=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_extent_of_an_ellipse_converges(plane, order):
+    errors = []
+    for segments in (40, 80):
+        lattice, points = plane(order, segments, segments // 4)
+        q = (points[:, 0] / A) ** 2 + (points[:, 1] / B) ** 2
+        pressure, gap = np.sqrt(np.maximum(1 - q, 0)), 1e-3 * np.maximum(q - 1, 0) ** 1.5
+        area = nodal_area(lattice, points)
+        shape = (lattice.shape[0], lattice.shape[2])
+        found = footprint(shape, points, pressure, gap, area)
+        assert (area * pressure).sum() == pytest.approx(2 / 3 * np.pi * A * B, rel=0.1)
+        errors.append(
+            max(
+                abs(found.length / (2 * A) - 1),
+                abs(found.width / (2 * B) - 1),
+                abs(found.area / (np.pi * A * B) - 1),
+            )
+        )
+    assert errors[0] < 0.25
+    assert errors[1] < 0.1
+
+
+def test_no_pressure_no_footprint(plane):
+    lattice, points = plane(2, 16, 4)
+    nothing = np.zeros(len(points))
+    shape = (lattice.shape[0], lattice.shape[2])
+    assert footprint(shape, points, nothing, nothing + 1, nothing) == Footprint(0, 0, 0)
+
+
+def test_extent_grows_with_the_load_without_jumps(plane):
+    lattice, points = plane(2, 40, 10)
+    shape, area = (lattice.shape[0], lattice.shape[2]), nodal_area(lattice, points)
+    lengths = []
+    for half in np.linspace(0.02, 0.03, 41):
+        q = (points[:, 0] / half) ** 2 + (points[:, 1] / B) ** 2
+        pressure, gap = np.sqrt(np.maximum(1 - q, 0)), 1e-3 * np.maximum(q - 1, 0) ** 1.5
+        lengths.append(footprint(shape, points, pressure, gap, area).length)
+    rise = np.diff(lengths)
+    assert rise.min() > -1e-12
+    assert rise.max() < 0.3 * (lengths[-1] - lengths[0])
