@@ -5,15 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 
+from contact.kernel import GridPlaces
 from fem.errors import ConvergenceError
 
 
 @dataclass(frozen=True)
 class Patch:
-    """c points: `index` (c,) into the outer face, `points` (c, 3) m deformed, `half_sizes` (c, 2) m of
-    the rectangle of each, `force` (c,) N and `gap` (c,) m of the static state on a flat road,
-    `edge` (c,) marks its outermost points, which should never touch.
+    """c points on p nodes of the outer face.
+
+    `index` (p,) into the outer face; `points` (c, 3) m deformed, `half_sizes` (c, 2) m of the
+    rectangle of each, `force` (c,) N and `gap` (c,) m of the static state on a flat road, `edge`
+    (c,) marks its outermost points, which should never touch. `weights` W (c, p) takes nodal values to
+    the points; None: the points are the nodes. `places`: where they lie on a regular grid, or None.
+    Points of equal `line` (c,) int follow each other in the rolling direction.
     """
 
     index: np.ndarray
@@ -22,6 +28,9 @@ class Patch:
     force: np.ndarray
     gap: np.ndarray
     edge: np.ndarray
+    line: np.ndarray
+    weights: sparse.csr_matrix | None = None
+    places: GridPlaces | None = None
 
     @property
     def area(self) -> np.ndarray:
@@ -64,5 +73,11 @@ def make_patch(
     taken = near | np.roll(near, 1, 0) | np.roll(near, -1, 0) | wide[:, 2:] | wide[:, :-2]
     index = np.flatnonzero(taken.ravel())
     return Patch(
-        index, positions[index], half_sizes[index], force[index], gap[index], ~near.ravel()[index]
+        index=index,
+        points=positions[index],
+        half_sizes=half_sizes[index],
+        force=force[index],
+        gap=gap[index],
+        edge=~near.ravel()[index],
+        line=index % shape[1],
     )

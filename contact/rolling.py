@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from contact.complementarity import ContactSolver
+from contact.friction import Friction
 from contact.patch import Patch
 
 
@@ -30,18 +31,28 @@ class Tire(Protocol):
 
     def inertia_force(self) -> np.ndarray: ...
 
+    def snapshot(self) -> dict[str, np.ndarray]: ...
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None: ...
+
 
 @dataclass(frozen=True)
 class Instant:
-    """The state at the end of a step: (c,) arrays in N and m, `axle_force` (3,) N."""
+    """The state at the end of a step: (c,) arrays in N and m, `horizontal` (c, 2) N, `axle_force`
+    (3,) N; `change` and `moved`, what the tire feels and does beyond the static state, all
+    components.
+    """
 
     time: float
     force: np.ndarray
+    horizontal: np.ndarray
     gap: np.ndarray
     displacement: np.ndarray
     axle_force: np.ndarray
     residual: float
     active: int
+    change: np.ndarray
+    moved: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -53,31 +64,75 @@ class Drive:
     speed: float
 
 
+@dataclass(frozen=True)
+class Loop:
+    """The parts of a time loop that have a past: what a checkpoint has to keep."""
+
+    tire: Tire
+    solver: ContactSolver
+    friction: Friction | None = None
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Arrays by name, between two steps. Collective when the tire is."""
+        friction = self.friction.state() if self.friction else {}
+        return self.tire.snapshot() | self.solver.state() | friction
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on as if nothing had happened: the same bits on the same number of processes."""
+        self.tire.restore(kept)
+        self.solver.set_state(kept)
+        if self.friction:
+            self.friction.set_state(kept)
+
+
 def roll(
-    tire: Tire, solver: ContactSolver, patch: Patch, drive: Drive, step: float, steps: int
+    tire: Tire,
+    solver: ContactSolver,
+    patch: Patch,
+    drive: Drive,
+    step: float,
+    steps: int,
+    friction: Friction | None = None,
+    done: int = 0,
 ) -> Iterator[Instant]:
     """Yield the state after each of `steps` steps of `step` seconds. Collective when the tire is.
 
+    `done` of them were taken before, and tire, solver and friction are as they were then.
+
     The solver was made for A + C~. Every process solves the same small contact problem on the same
-    bits, so no process has to wait for another's answer.
+    bits, so no process has to wait for another's answer. With `friction`, the tire's forces and
+    displacements are three times as many: z, then x, then y of all points.
     """
     x, y = patch.points[:, 0], patch.points[:, 1]
-    solver.active = patch.force > 0  # the first step starts from the static contact set
-    for k in range(1, steps + 1):
+    count = len(x)
+    horizontal = np.zeros((count, 2))
+    # The first step starts from the static contact set, the others from the solver's last one.
+    touching = None if done else patch.force > 0
+    for k in range(done + 1, steps + 1):
         time = k * step
         free = tire.predict()
         road = drive.height(x + drive.speed * time, y) + drive.motion(time)
-        force = solver.solve(patch.gap + free - road, reference=patch.force)
-        change = force - patch.force
+        q = patch.gap + free[:count] - road
+        if friction is None:
+            force = solver.solve(q, touching, reference=patch.force)
+            change = force - patch.force
+        else:
+            force, horizontal = friction.solve(solver, q, touching, patch.force, free[count:])
+            change = np.concatenate([force - patch.force, *horizontal.T])
+        touching = None
         tire.advance(change)
+        moved = free + tire.same_step @ change
         axle = -tire.inertia_force()
-        axle[2] += force.sum()
+        axle += [*horizontal.sum(axis=0), force.sum()]
         yield Instant(
             time,
             force,
+            horizontal,
             solver.gap,
-            free + tire.same_step @ change,
+            moved[:count],
             axle,
             solver.residual,
             int(np.count_nonzero(force)),
+            change,
+            moved,
         )

@@ -97,6 +97,18 @@ class SnesVI:
         self.factorisations += self.iterations
         return self._finish(length)
 
+    def state(self) -> dict[str, Array]:
+        """What the next solve starts from."""
+        return {"scaled": self._force.array_r.copy()}
+
+    def set_state(self, kept: dict[str, Array]) -> None:
+        """Go on from `state`."""
+        self._force.array[:] = kept["scaled"]
+
+    def block(self, index: NDArray[np.intp]) -> Array:
+        """A between the points `index`, (a, a) m/N."""
+        return self._matrix[np.ix_(index, index)]
+
     def _finish(self, length: float) -> Array:
         """Back to newtons and metres, and the residual by the same measure as ActiveSet's."""
         force = np.maximum(self._force.array_r, 0.0)

@@ -4,12 +4,16 @@ Each function returns a dense (n, n) array in m/N: entry (i, j) is the approach 
 carcass when a unit force presses on point j. None of them is collective.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fem.errors import InputError
 
 Array = NDArray[np.float64]
+# m/N at offsets x, y (m) from rectangles of half sizes a, b (m), under a unit force.
+Influence = Callable[[Array, Array, Array, Array], Array]
 
 # Love's primitive cancels as eps * (r / half size)^2, a 6-point Gauss rule errs as (half size /
 # r)^12: they cross near r = 10 half sizes, where both are below 1e-12.
@@ -32,14 +36,31 @@ def half_space_compliance(
     unequal or overlapping that the symmetric matrix is indefinite. Source: Love (1929); Johnson,
     Contact Mechanics, (3.25).
     """
+    check_half_space(points, half_sizes, youngs_modulus, poisson_ratio)
+
+    def influence(x: Array, y: Array, a: Array, b: Array) -> Array:
+        return half_space_influence(x, y, a, b, youngs_modulus, poisson_ratio)
+
+    return dense_compliance(points, half_sizes, influence)
+
+
+def half_space_influence(
+    x: Array, y: Array, a: Array, b: Array, youngs_modulus: float, poisson_ratio: float
+) -> Array:
+    """Approach (m/N) at offsets x, y (m) from a rectangle 2a x 2b (m) under a unit force."""
+    modulus = youngs_modulus / (1.0 - poisson_ratio**2)
+    return rectangle_potential(x, y, a, b) / (np.pi * modulus * 4.0 * a * b)
+
+
+def dense_compliance(points: Array, half_sizes: Array, influence: Influence) -> Array:
+    """Symmetric (n, n) m/N of an influence function between points (n, 2) m.
+
+    InputError when it is not positive definite.
+    """
     points, half_sizes = np.asarray(points, dtype=float), np.asarray(half_sizes, dtype=float)
-    _check_half_space(points, half_sizes, youngs_modulus, poisson_ratio)
-    a, b = half_sizes[:, 0], half_sizes[:, 1]
     x = points[:, None, 0] - points[None, :, 0]
     y = points[:, None, 1] - points[None, :, 1]
-    integral = rectangle_potential(x, y, a[None, :], b[None, :])
-    modulus = youngs_modulus / (1.0 - poisson_ratio**2)
-    compliance = integral / (np.pi * modulus * 4.0 * a * b)
+    compliance = influence(x, y, half_sizes[None, :, 0], half_sizes[None, :, 1])
     compliance = 0.5 * (compliance + compliance.T)
     _check_positive_definite(compliance)
     return compliance
@@ -112,22 +133,21 @@ def _far_potential(x: Array, y: Array, a: Array, b: Array) -> Array:
     return total * a * b
 
 
-def _check_half_space(points: Array, half_sizes: Array, youngs_modulus: float, nu: float) -> None:
+def check_half_space(points: Array, half_sizes: Array, youngs_modulus: float, nu: float) -> None:
+    """InputError for points (n, 2) m, half sizes (n, 2) m, a modulus or ratio out of range."""
+    points, half_sizes = np.asarray(points, dtype=float), np.asarray(half_sizes, dtype=float)
     if points.ndim != 2 or points.shape[1] != 2 or half_sizes.shape != points.shape:
         raise InputError(
-            f"half-space tread: points {points.shape} and half sizes {half_sizes.shape} "
-            "must both be (n, 2)"
+            f"tread: points {points.shape} and half sizes {half_sizes.shape} must both be (n, 2)"
         )
     if not (np.all(np.isfinite(points)) and np.all(np.isfinite(half_sizes))):
-        raise InputError("half-space tread: a point or half size is not finite (m)")
+        raise InputError("tread: a point or half size is not finite (m)")
     if not np.all(half_sizes > 0.0):
-        raise InputError("half-space tread: every half size must be positive (m)")
+        raise InputError("tread: every half size must be positive (m)")
     if not (np.isfinite(youngs_modulus) and youngs_modulus > 0.0):
-        raise InputError(
-            f"half-space tread: Young's modulus {youngs_modulus:g} Pa must be positive"
-        )
+        raise InputError(f"tread: Young's modulus {youngs_modulus:g} Pa must be positive")
     if not -1.0 < nu <= 0.5:
-        raise InputError(f"half-space tread: Poisson ratio {nu:g} must lie in (-1, 0.5]")
+        raise InputError(f"tread: Poisson ratio {nu:g} must lie in (-1, 0.5]")
 
 
 def _check_positive_definite(compliance: Array) -> None:
@@ -136,7 +156,7 @@ def _check_positive_definite(compliance: Array) -> None:
     except np.linalg.LinAlgError:
         eigenvalues = np.linalg.eigvalsh(compliance)
         raise InputError(
-            "half-space tread: the contact points' rectangles overlap or differ so much in size "
+            "tread: the contact points' rectangles overlap or differ so much in size "
             f"that the compliance is not positive definite (smallest eigenvalue "
             f"{eigenvalues[0]:.3g} m/N, "
             f'largest {eigenvalues[-1]:.3g}); use a more even contact grid, or tread = "winkler"'

@@ -71,6 +71,12 @@ class Operators:
         )
         return Rotation(*(self._assemble(form) for form in forms))
 
+    def consistent_mass(self) -> PETSc.Mat:
+        """int rho phi_i . phi_j by full integration, kg: what the diagonal `mass` is compared to. Collective."""
+        body = self.body
+        u, v = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
+        return self._assemble(body.material.density * ufl.inner(u, v) * body.dx)
+
     def _assemble(self, form) -> PETSc.Mat:
         matrix = fem.petsc.assemble_matrix(compat.form(form))
         matrix.assemble()

@@ -59,12 +59,22 @@ def _line_rule(corners: np.ndarray, centre: float, half: float) -> tuple[np.ndar
 
 def _shape(corners: np.ndarray, edge: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Lagrange shape functions of all nodes on a line of elements at the points, (points, nodes)."""
+    first, values = line_shape(corners, edge, points)
+    order = len(edge) - 1
+    out = np.zeros((len(points), order * (len(corners) - 1) + 1))
+    out[np.arange(len(points))[:, None], first[:, None] + np.arange(order + 1)] = values
+    return out
+
+
+def line_shape(
+    corners: np.ndarray, edge: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """First node (k,) of each point's element on a line, and its shape functions (k, order + 1)."""
     order = len(edge) - 1
     element = np.clip(np.searchsorted(corners, points, side="right") - 1, 0, len(corners) - 2)
     local = (points - corners[element]) / np.diff(corners)[element]
-    out = np.zeros((len(points), order * (len(corners) - 1) + 1))
+    values = np.empty((len(points), order + 1))
     for a in range(order + 1):
         others = np.delete(edge, a)
-        value = np.prod((local[:, None] - others) / (edge[a] - others), axis=1)
-        out[np.arange(len(points)), order * element + a] = value
-    return out
+        values[:, a] = np.prod((local[:, None] - others) / (edge[a] - others), axis=1)
+    return order * element, values

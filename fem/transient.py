@@ -57,7 +57,7 @@ class FullTire:
         self._answer = solve_columns(self._solver, system, columns)
         self.same_step = self._comm.allreduce(self._outputs @ self._answer)
         n = len(self._mass)
-        self.displacement, self.velocity, self.acceleration = np.zeros((3, n))
+        self.displacement, self.velocity, self.acceleration, self._balanced = np.zeros((4, n))
         self._columns = columns
         self._vectors = system.createVecs()
 
@@ -67,7 +67,7 @@ class FullTire:
 
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
-        self.acceleration = self._columns @ force / self._mass
+        self.acceleration = self._balanced = self._columns @ force / self._mass
 
     def predict(self) -> np.ndarray:
         """Displacement (r,) m at the end of the step with no new force."""
@@ -98,11 +98,13 @@ class FullTire:
         moved = new - self.displacement - h * self.velocity
         acceleration = moved / (beta * h**2) - (0.5 / beta - 1) * self.acceleration
         self.velocity += h * ((1 - gamma) * self.acceleration + gamma * acceleration)
+        # The scheme's own unknown lags: this is the mean that balances the forces at the step's end.
+        self._balanced = (1 - self._a) * acceleration + self._a * self.acceleration
         self.displacement, self.acceleration = new, acceleration
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N: the convective parts cancel around the ring."""
-        rate = (self._mass * self.acceleration).reshape(-1, 3).sum(axis=0)
+        rate = (self._mass * self._balanced).reshape(-1, 3).sum(axis=0)
         return self._comm.allreduce(rate)
 
 

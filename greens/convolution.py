@@ -49,6 +49,15 @@ class Convolution:
         """Take the force (k,) N at the end of the step."""
         self._history[self._n] = force
 
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """The forces so far."""
+        return {"history": self._history[: self._n + 1]}
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on from a snapshot."""
+        self._n = len(kept["history"]) - 1
+        self._history[: self._n + 1] = kept["history"]
+
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N."""
         past = _convolve(self._momentum[: self._n], self._history[: self._n])

@@ -44,6 +44,12 @@ class Recursion:
         self.state = np.zeros(self._q, complex)
         self._push = np.zeros(self._q, complex)  # P f of the step before
         self.same_step = response.residual + self._reduce(self._direct())
+        self._late = np.zeros_like(response.residual)
+        if response.pulse and scheme == "linear":
+            # A pulse one step long answers the mean of a linear force over the step.
+            self._late = response.residual / 2
+            self.same_step -= self._late
+        self._force = np.zeros(response.residual.shape[1])
 
     def _direct(self) -> np.ndarray:
         """Displacement at the end of a step per unit force there, of this process's states."""
@@ -63,6 +69,7 @@ class Recursion:
 
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
+        self._force = force
         self._push = self._complex(self._input @ force)
         if self._block:
             self._block.start(force)
@@ -73,14 +80,35 @@ class Recursion:
         out = self._output @ np.concatenate([self._free.real, self._free.imag])
         if self._block:
             out += self._block.predict()
-        return self._reduce(out)
+        return self._reduce(out) + self._late @ self._force
 
     def advance(self, force: np.ndarray) -> None:
         """Take the force (k,) N at the end of the step; after `predict`. Local to each process."""
+        self._force = force
         self._push = self._complex(self._input @ force)
         self.state = self._free + self._new * self._push
         if self._block:
             self._block.advance(force)
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """All states in the order of the response, the same for any number of processes. Collective."""
+        kept = {"state": self._gathered(self.state), "push": self._gathered(self._push)}
+        block = self._block.snapshot() if self._block else None
+        return kept | self.comm.bcast(block)
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on from a snapshot, between `advance` and `predict`."""
+        mine = slice(self.comm.rank, None, self.comm.size)
+        self.state, self._push = kept["state"][mine].copy(), kept["push"][mine].copy()
+        if self._block:
+            self._block.restore(kept)
+
+    def _gathered(self, values: np.ndarray) -> np.ndarray:
+        parts = self.comm.allgather(values)
+        out = np.empty(sum(map(len, parts)), complex)
+        for rank, part in enumerate(parts):
+            out[rank :: self.comm.size] = part
+        return out
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N: sum_k (int rho phi_k) eta_k''. Collective."""
@@ -124,6 +152,12 @@ class _Block:
     def advance(self, force: np.ndarray) -> None:
         self._force = force
         self.state = self._free + self._new @ force
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        return {"block_state": self.state, "block_force": self._force}
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        self.state, self._force = kept["block_state"], kept["block_force"]
 
     def inertia_force(self) -> np.ndarray:
         block = self._response.block

@@ -22,7 +22,9 @@ class Response:
 
     `eigenvalue` (q,) 1/s, `output` (r, q) and `input` (q, k) complex, `block` (b, b) with its
     `block_output` (r, b) and `block_input` (b, k), `residual` (r, k) m/N; `momentum` (3, q) and
-    `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries.
+    `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries. With `pulse` the
+    residual answers not at once but with a pulse 1/step high and one step long in place of its
+    delta(t) (thesis (C.4)).
     """
 
     eigenvalue: np.ndarray
@@ -34,6 +36,7 @@ class Response:
     residual: np.ndarray
     momentum: np.ndarray
     block_momentum: np.ndarray
+    pulse: bool = False
 
     def impulse(self, times: np.ndarray) -> np.ndarray:
         """Green's functions g (t, r, k), m/(N s), without the residual's delta at t = 0."""
@@ -75,22 +78,77 @@ class Response:
             static -= self.block_output @ np.linalg.solve(self.block, self.block_input)
         return static
 
-    def resolved(self, step: float, limit: float = 1.0) -> Response:
-        """Poles with |s| step above the limit leave the dynamics and follow the force statically.
+    def spectral_moment(self) -> np.ndarray:
+        """-dH/ds (r, k) at s = 0, m s/N: what damping adds to a slow force's displacement."""
+        first = ((self.output / self.eigenvalue**2) @ self.input).real
+        if len(self.block):
+            twice = np.linalg.solve(self.block, np.linalg.solve(self.block, self.block_input))
+            first += self.block_output @ twice
+        return first
 
-        Integrating them over so long a step gains nothing and can gain energy.
-        """
-        keep = np.abs(self.eigenvalue) * step <= limit
+    def keeping(self, keep: np.ndarray) -> Response:
+        """The poles where `keep` (q,) is true; the others follow the force statically."""
         if keep.all():
             return self
-        fast = (self.output[:, ~keep] / self.eigenvalue[~keep]) @ self.input[~keep]
+        gone = (self.output[:, ~keep] / self.eigenvalue[~keep]) @ self.input[~keep]
         return replace(
             self,
             eigenvalue=self.eigenvalue[keep],
             output=self.output[:, keep],
             input=self.input[keep],
             momentum=self.momentum[:, keep],
-            residual=self.residual - fast.real,
+            residual=self.residual - gone.real,
+        )
+
+    def slow(self, step: float, limit: float = 1.0) -> np.ndarray:
+        """Which poles (q,) `resolved` keeps."""
+        return np.abs(self.eigenvalue) * step <= limit
+
+    def resolved(self, step: float, limit: float = 1.0) -> Response:
+        """Poles with |s| step above the limit leave the dynamics and follow the force statically.
+
+        Integrating them over so long a step gains nothing and can gain energy.
+        """
+        return self.keeping(self.slow(step, limit))
+
+    def rate(self) -> Response:
+        """The velocities at the outputs: g' for g, i omega H for H.
+
+        The poles' own jump at an impulse, Re[C P], is the new residual: zero for a complete set of
+        states. G_res f' of the residual is left out: it needs the rate of the force.
+        """
+        return replace(
+            self,
+            output=self.output * self.eigenvalue,
+            block_output=self.block_output @ self.block,
+            residual=(self.output @ self.input).real + self.block_output @ self.block_input,
+            pulse=False,
+        )
+
+    def between(self, outputs: slice, forces: slice) -> Response:
+        """The same for some of the outputs and forces."""
+        return replace(
+            self,
+            output=self.output[outputs],
+            input=self.input[:, forces],
+            block_output=self.block_output[outputs],
+            block_input=self.block_input[:, forces],
+            residual=self.residual[outputs, forces],
+        )
+
+    def joined(self, other: Response) -> Response:
+        """Both sets of states between the same outputs and forces; the residuals add up."""
+        return Response(
+            np.concatenate([self.eigenvalue, other.eigenvalue]),
+            np.hstack([self.output, other.output]),
+            np.vstack([self.input, other.input]),
+            linalg.block_diag(self.block, other.block),
+            np.hstack([self.block_output, other.block_output]),
+            np.vstack([self.block_input, other.block_input]),
+            self.residual + other.residual,
+            np.hstack([self.momentum, other.momentum]),
+            np.hstack([self.block_momentum, other.block_momentum]),
+            self.pulse,
         )
 
 

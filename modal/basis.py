@@ -39,15 +39,20 @@ def project(modes: Modes, rotation, mass: np.ndarray, comm) -> Projection:
     def symmetric(matrix):
         return (matrix + matrix.T) / 2
 
-    weighted = mass[:, None] * vectors
-    momentum = comm.allreduce(np.stack([weighted[d::3].sum(axis=0) for d in range(3)]))
+    moved = momentum(comm, mass, vectors)
     if rotation is None:
-        return Projection(modes.squares, momentum)
+        return Projection(modes.squares, moved)
     return Projection(
         modes.squares,
-        momentum,
+        moved,
         skew(reduced(rotation.gyroscopic)),
         symmetric(reduced(rotation.convective)),
         skew(reduced(rotation.body)),
         symmetric(reduced(rotation.body_convective)),
     )
+
+
+def momentum(comm, mass: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """int rho phi_k (3, m) of fields given by own rows (n, m), with the diagonal mass. Collective."""
+    weighted = mass[:, None] * vectors
+    return comm.allreduce(np.stack([weighted[d::3].sum(axis=0) for d in range(3)]))

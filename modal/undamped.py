@@ -7,20 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
-from slepc4py import SLEPc
+from scipy import sparse
 
 from fem.errors import ConvergenceError
+from modal.spectrum import Bottom, Slice, Spectrum
+from modal.symmetry import sectors
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
-ORTHONORMALITY_TOLERANCE = 1e-9
-_EXTRA = 6  # pairs beyond the wanted ones, to find a gap in which to count
+ORTHONORMALITY_TOLERANCE = 1e-10
+_REPAIR = (
+    1e-12  # vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product
+)
+_CHUNK = 64  # columns a matrix product: no second copy of all vectors
 
 
 @dataclass(frozen=True)
 class Modes:
     """The lowest m modes. `squares` omega^2 (m,) 1/s2 ascending; `vectors` this process's rows (n, m)
     of the mass-normalised shapes, kg^-1/2; `residual` (m,) ||K phi - lambda M phi|| / ||lambda M phi||;
-    `inertia_count` eigenvalues below `counted_below` (1/s2) by Sylvester's law, equal to the number found.
+    `inertia_count` eigenvalues below `counted_below` (1/s2) by Sylvester's law, equal to the number
+    found there; `rigid` modes without stiffness among them; `sectors` sizes of the independent problems
+    that mirror planes split it into, `slices` intervals solved.
     """
 
     squares: np.ndarray
@@ -29,56 +36,101 @@ class Modes:
     orthonormality: float
     inertia_count: int
     counted_below: float
-    iterations: int
+    rigid: int
+    sectors: tuple[int, ...]
+    slices: int
 
     @property
     def frequency(self) -> np.ndarray:
-        """Natural frequencies (m,), Hz."""
-        return np.sqrt(self.squares) / (2 * np.pi)
+        """Natural frequencies (m,), Hz; 0 for rigid modes."""
+        return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * np.pi)
 
 
-def solve(stiffness: PETSc.Mat, mass: np.ndarray, count: int) -> Modes:
-    """The `count` lowest modes of a stiffness (n, n) in N/m and a diagonal mass (own rows) in kg.
+def solve(
+    stiffness: PETSc.Mat,
+    mass: np.ndarray,
+    count: int | None = None,
+    *,
+    up_to: float = np.inf,
+    points: np.ndarray | None = None,
+) -> Modes:
+    """The `count` lowest modes, or all below `up_to` (Hz), of a stiffness (n, n) in N/m and a diagonal
+    mass (own rows) in kg; at least one of the two is given.
 
-    The diagonal mass turns the pencil into the standard problem M^-1/2 K M^-1/2: no mass product
-    in the Krylov space. Shift-and-invert at zero; then one factorisation above the last mode counts
-    them all. Raises ConvergenceError when a mode is missing, not converged, or unstable. Collective.
+    The diagonal mass turns the pencil into the standard problem of A = M^-1/2 K M^-1/2. With the
+    `points` (own n / 3, 3) of its dofs, mirror planes that A has split it (modal.symmetry); each part
+    is sliced by inertia (modal.spectrum) and solved by block Lanczos (modal.lanczos). Every process
+    holds a copy of A. Raises ConvergenceError when a mode is missing, inaccurate or unstable.
+    Collective.
     """
     comm = stiffness.comm.tompi4py()
     size = stiffness.getSize()[0]
-    count = min(count, size)
     scaled = _scaled(stiffness, mass)
-    eps = _krylov(scaled, min(count + _EXTRA, size))
-    found = eps.getConverged()
-    if found < count:
-        raise ConvergenceError(
-            f"modes: {found} of {count} modes converged in {eps.getIterationNumber()} restarts. "
-            "Ask for fewer modes, or give PETSc options such as -modal_eps_max_it 500."
-        )
-    values, vectors = _pairs(eps, found, len(mass))
-    _polish(eps, scaled, values, vectors)
-    iterations = eps.getIterationNumber()
-    eps.destroy()
-    _check_stable(values)
-    below, wanted = _gap_above(values[: count + _EXTRA], count)
-    inertia = _count_below(scaled, below)
-    if inertia != wanted:
-        raise ConvergenceError(
-            f"modes: {wanted} modes found below {np.sqrt(below) / (2 * np.pi):.3f} Hz, but the inertia "
-            f"of K - sigma M counts {inertia}: {inertia - wanted} are missing. "
-            "Give -modal_eps_ncv a larger value."
-        )
-    residual = _residuals(scaled, values[:count], vectors[:, :count])
+    whole = _everywhere(scaled)
+    bases = [sparse.identity(size, format="csr")]
+    if points is not None:
+        bases = sectors(whole, np.concatenate(comm.allgather(points)))
+    modes = _solve(scaled, whole, bases, mass, min(count or size, size), (2 * np.pi * up_to) ** 2)
+    if len(bases) > 1 and modes.residual.max(initial=0.0) > RESIDUAL_TOLERANCE:
+        # Mirror symmetric to the tolerance, and yet too coarsely for the lowest modes: do not split.
+        whole_basis = [sparse.identity(size, format="csr")]
+        modes = _solve(scaled, whole, whole_basis, mass, len(modes.squares), np.inf)
     scaled.destroy()
-    worst = float(residual.max())
-    if worst > RESIDUAL_TOLERANCE:
+    return _checked(modes)
+
+
+def _solve(scaled, whole, bases, mass, count: int, limit: float) -> Modes:
+    comm = scaled.comm.tompi4py()
+    spectrum = Spectrum(comm, [(basis.T @ whole @ basis).tocsr() for basis in bases])
+    bottom = spectrum.bottom()
+    _check_stable(bottom)
+    boundaries = spectrum.boundaries(bottom, count, limit)
+    top, inertia = boundaries[-1][0], int(boundaries[-1][1].sum())
+    if inertia == 0:
         raise ConvergenceError(
-            f"modes: worst relative residual {worst:.1e}, allowed {RESIDUAL_TOLERANCE:.0e}. "
-            "Give -modal_eps_tol a smaller value."
+            f"modes: the tire has no mode below {np.sqrt(top) / (2 * np.pi):.4g} Hz. Raise modal.up_to."
         )
-    shapes = vectors[:, :count] / np.sqrt(mass)[:, None]
-    defect = _orthonormality(comm, vectors[:, :count])
-    return Modes(values[:count], shapes, residual, defect, inertia, below, iterations)
+    found = spectrum.slices(boundaries)
+    values = np.concatenate([one.values for one in found])
+    order = np.argsort(values, kind="stable")[:count]
+    vectors = _collect(scaled, bases, found, order)
+    matrix = np.concatenate([np.full(len(one.values), one.matrix) for one in found])[order]
+    defect = _orthonormalise(comm, vectors, matrix)
+    squares = values[order]
+    rigid = int((squares <= bottom.zero).sum())
+    scale = squares[
+        min(rigid, len(squares) - 1)
+    ]  # a rigid mode is measured by the first flexible one
+    residual = _residuals(scaled, squares, vectors, max(scale, bottom.zero))
+    vectors /= np.sqrt(mass)[:, None]
+    parts = tuple(basis.shape[1] for basis in bases)
+    return Modes(squares, vectors, residual, defect, inertia, top, rigid, parts, len(found))
+
+
+def _checked(modes: Modes) -> Modes:
+    worst = float(modes.residual.max())
+    if not worst <= RESIDUAL_TOLERANCE:
+        raise ConvergenceError(
+            f"modes: worst relative residual {worst:.1e}, allowed {RESIDUAL_TOLERANCE:.0e}: the lowest "
+            "mode is too soft against the stiffest element for the number of digits. Use elements of "
+            "more equal size."
+        )
+    if not modes.orthonormality <= ORTHONORMALITY_TOLERANCE:
+        raise ConvergenceError(
+            f"modes: orthonormality is lost ({modes.orthonormality:.1e}, allowed "
+            f"{ORTHONORMALITY_TOLERANCE:.0e}). Use elements of more equal size."
+        )
+    return modes
+
+
+def _check_stable(bottom: Bottom) -> None:
+    if bottom.negative:
+        growth = np.sqrt(-min(bottom.near[0], -bottom.zero))
+        raise ConvergenceError(
+            f"modes: the tangent stiffness has {bottom.negative} negative eigenvalue(s) (growth rate "
+            f"about {growth:.3g} 1/s): the state is unstable once the road is replaced by its "
+            "forces, the tire buckles. Lower the load, raise the inflation or stiffen the wall."
+        )
 
 
 def _scaled(stiffness: PETSc.Mat, mass: np.ndarray) -> PETSc.Mat:
@@ -91,125 +143,82 @@ def _scaled(stiffness: PETSc.Mat, mass: np.ndarray) -> PETSc.Mat:
     return scaled
 
 
-def _krylov(scaled: PETSc.Mat, wanted: int) -> SLEPc.EPS:
-    eps = SLEPc.EPS().create(scaled.comm)
-    eps.setOptionsPrefix("modal_")
-    eps.setOperators(scaled)
-    eps.setProblemType(SLEPc.EPS.ProblemType.HEP)
-    eps.setDimensions(wanted)
-    eps.setTolerances(1e-11, 200)
-    eps.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-    eps.setTarget(0.0)
-    transform = eps.getST()
-    transform.setType(SLEPc.ST.Type.SINVERT)
-    _direct(transform.getKSP())
-    eps.setFromOptions()
-    eps.solve()
-    return eps
+def _everywhere(matrix: PETSc.Mat) -> sparse.csr_matrix:
+    """The whole matrix on every process. Collective."""
+    size = matrix.getSize()[0]
+    every = PETSc.IS().createStride(size, first=0, step=1, comm=PETSc.COMM_SELF)
+    (whole,) = matrix.createSubMatrices(every, every)
+    rows, columns, values = whole.getValuesCSR()
+    every.destroy()
+    whole.destroy()
+    return sparse.csr_matrix((values, columns, rows), (size, size))
 
 
-def _direct(ksp: PETSc.KSP) -> None:
-    """A MUMPS L D L^T factorisation and nothing else."""
-    ksp.setType(PETSc.KSP.Type.PREONLY)
-    pc = ksp.getPC()
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType("mumps")
+def _collect(matrix: PETSc.Mat, bases, found: list[Slice], order: np.ndarray) -> np.ndarray:
+    """This process's rows of the vectors in the given order, each slice sent by its owner. Collective."""
+    comm = matrix.comm.tompi4py()
+    ranges = matrix.getOwnershipRanges()
+    column = np.full(sum(len(one.values) for one in found), -1)
+    column[order] = np.arange(len(order))
+    vectors = np.empty((ranges[comm.rank + 1] - ranges[comm.rank], len(order)), order="F")
+    start = 0
+    for one in found:
+        place = column[start : start + len(one.values)]
+        start += len(one.values)
+        wanted = place >= 0
+        if not wanted.any():
+            continue
+        parts = None
+        if one.owner == comm.rank:
+            full = bases[one.matrix] @ one.vectors[:, wanted]
+            parts = [full[low:high] for low, high in zip(ranges, ranges[1:], strict=False)]
+        vectors[:, place[wanted]] = comm.scatter(parts, root=one.owner)
+    return vectors
 
 
-def _pairs(eps: SLEPc.EPS, found: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues ascending, and this process's rows of their vectors."""
-    vector, _ = eps.getOperators()[0].createVecs()
-    values = np.empty(found)
-    vectors = np.empty((rows, found), order="F")
-    for k in range(found):
-        values[k] = eps.getEigenpair(k, vector).real
-        vectors[:, k] = vector.array_r
-    vector.destroy()
-    order = np.argsort(values, kind="stable")
-    return values[order], vectors[:, order]
+def _orthonormalise(comm: MPI.Comm, vectors: np.ndarray, matrix: np.ndarray) -> float:
+    """Worst entry of V^T V - 1 after a correction where slices meet, in place. Collective.
 
-
-def _polish(eps: SLEPc.EPS, scaled: PETSc.Mat, values: np.ndarray, vectors: np.ndarray) -> None:
-    """One step of inverse iteration where the residual is not yet small, in place. Collective.
-
-    A Krylov basis carries noise in the stiffest directions, which K multiplies by up to 1e7 times
-    the lowest eigenvalue: the lowest modes are good in the inverse norm and not in the residual's.
+    One Newton-Schulz step V (3 - V^T V) / 2 squares the defect and turns no vector further than it.
+    Vectors of different sectors are orthogonal by their making.
     """
-    transform = eps.getST()
-    before, after = scaled.createVecs()
-    for k in np.flatnonzero(_residuals(scaled, values, vectors) > RESIDUAL_TOLERANCE / 10):
-        before.array[:] = vectors[:, k]
-        transform.apply(before, after)
-        after.normalize()
-        vectors[:, k] = after.array_r
-    before.destroy()
-    after.destroy()
+    worst = 0.0
+    for one in np.unique(matrix):
+        columns = np.flatnonzero(matrix == one)
+        part = vectors[:, columns]
+        defect = gram(comm, part, part) - np.eye(len(columns))
+        if np.abs(defect).max() > _REPAIR:
+            part -= part @ (defect / 2)
+            vectors[:, columns] = part
+            defect = gram(comm, part, part) - np.eye(len(columns))
+        worst = max(worst, float(np.abs(defect).max()))
+    return worst
 
 
-def _check_stable(values: np.ndarray) -> None:
-    if values[0] <= 0:
-        growth = np.sqrt(-values[0]) / (2 * np.pi)
-        raise ConvergenceError(
-            f"modes: the tangent stiffness has {int((values <= 0).sum())} negative eigenvalue(s) "
-            f"(growth rate {growth:.3g} Hz): the state is unstable once the road is replaced by its "
-            "forces, the tire buckles. Lower the load, raise the inflation or stiffen the wall."
-        )
-
-
-def _gap_above(values: np.ndarray, count: int) -> tuple[float, int]:
-    """A value in the widest relative gap at or above the wanted modes, and how many lie below it."""
-    if len(values) == count:
-        return values[-1] * (1 + 1e-6), count
-    gaps = np.diff(values[count - 1 :]) / values[count - 1 : -1]
-    k = count + int(np.argmax(gaps))
-    return (values[k - 1] + values[k]) / 2, k
-
-
-def _count_below(scaled: PETSc.Mat, shift: float) -> int:
-    """Eigenvalues below the shift: negative pivots of the factorised shifted matrix. Collective."""
-    shifted = scaled.copy()
-    shifted.shift(-shift)
-    shifted.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    pc = PETSc.PC().create(scaled.comm)
-    pc.setOperators(shifted)
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType("mumps")
-    pc.setFactorSetUpSolverType()
-    # Null pivots found, and the root front on one process: only then are MUMPS's pivots all counted.
-    pc.getFactorMatrix().setMumpsIcntl(24, 1)
-    pc.getFactorMatrix().setMumpsIcntl(13, 1)
-    pc.setUp()
-    negative = pc.getFactorMatrix().getInertia()[0]
-    pc.destroy()
-    shifted.destroy()
-    return negative
-
-
-def _residuals(scaled: PETSc.Mat, values: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    defect = multiply(scaled, vectors) - vectors * values
-    squares = scaled.comm.tompi4py().allreduce((defect**2).sum(axis=0))
-    return np.sqrt(squares) / values
-
-
-def _orthonormality(comm: MPI.Comm, vectors: np.ndarray) -> float:
-    defect = float(np.abs(gram(comm, vectors, vectors) - np.eye(vectors.shape[1])).max())
-    if defect > ORTHONORMALITY_TOLERANCE:
-        raise ConvergenceError(
-            f"modes: orthonormality is lost ({defect:.1e}, allowed {ORTHONORMALITY_TOLERANCE:.0e}). "
-            "Give -modal_eps_tol a smaller value."
-        )
-    return defect
+def _residuals(
+    scaled: PETSc.Mat, values: np.ndarray, vectors: np.ndarray, least: float
+) -> np.ndarray:
+    squares = np.empty(len(values))
+    for start in range(0, len(values), _CHUNK):
+        some = slice(start, start + _CHUNK)
+        defect = multiply(scaled, vectors[:, some]) - vectors[:, some] * values[some]
+        squares[some] = (defect**2).sum(axis=0)
+    squares = scaled.comm.tompi4py().allreduce(squares)
+    return np.sqrt(squares) / np.maximum(values, least)
 
 
 def multiply(matrix: PETSc.Mat, vectors: np.ndarray) -> np.ndarray:
     """This process's rows of matrix @ vectors, vectors given by rows (n, m). Collective."""
     rows, columns = vectors.shape
-    sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, columns))
-    dense = PETSc.Mat().createDense(sizes, array=np.asfortranarray(vectors), comm=matrix.comm)
-    product = matrix.matMult(dense)
-    out = product.getDenseArray().copy()
-    product.destroy()
-    dense.destroy()
+    out = np.empty((rows, columns), order="F")
+    for start in range(0, columns, _CHUNK):
+        some = np.asfortranarray(vectors[:, start : start + _CHUNK])
+        sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, some.shape[1]))
+        dense = PETSc.Mat().createDense(sizes, array=some, comm=matrix.comm)
+        product = matrix.matMult(dense)
+        out[:, start : start + _CHUNK] = product.getDenseArray()
+        product.destroy()
+        dense.destroy()
     return out
 
 

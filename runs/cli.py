@@ -18,7 +18,7 @@ exit status:
   0  done
   2  the input is wrong: one message, nothing written over
   3  a solver gave up: what, where, what to try; finished stages are kept
-  4  stopped on request (SIGINT, SIGTERM); the same command goes on
+  4  stopped on request (SIGINT, SIGTERM); the same command, or resume, goes on
   anything else is a bug
 """
 ABOUT = """\
@@ -67,6 +67,11 @@ def parser() -> argparse.ArgumentParser:
             RUN,
             f"{PROGRAM} run SCENE.toml [options] [-- PETSc options]",
         )
+    )
+    resume = command("resume", "go on from the last checkpoint of a result folder")
+    resume.add_argument("directory", type=Path, metavar="DIR")
+    resume.add_argument(
+        "-n", type=int, metavar="N", dest="processes", help="MPI processes (the launcher's)"
     )
     check = command("check", "validate a scene; show it resolved, its stages, its memory")
     check.add_argument("scene", type=Path, metavar="SCENE.toml")
@@ -160,6 +165,13 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
             raise
 
 
+def _resumed(args: argparse.Namespace) -> argparse.Namespace:
+    """`resume DIR` as the run of the scene that DIR keeps."""
+    args.command, args.scene, args.out = "run", args.directory / "scene.toml", args.directory
+    args.set, args.until, args.fresh = [], None, False
+    return args
+
+
 def _check(args: argparse.Namespace) -> None:
     from runs.check import explain
     from runs.scene import load
@@ -245,6 +257,8 @@ def main(argv: list[str]) -> int:
             args = parser().parse_args(argv)
     except SystemExit as ending:
         return mpi.handed_over(int(ending.code or 0))
+    if args.command == "resume":
+        args = _resumed(args)
     if args.command == "run":
         return mpi.handed_over(_run(args, options))
     try:

@@ -151,6 +151,18 @@ def nominal(centre: NDArray) -> NDArray:
 
 
 @styled
+def campbell(speed: NDArray, frequency: NDArray) -> str:
+    """Branches (v, b) over speed; behind them the lines n Omega / 2 pi, n = 1, 2, ..., of a standing road."""
+    figure, ((axes,),) = canvas(7.0, 3.6)
+    highest = 1.05 * np.nanmax(frequency)
+    for n in range(1, 9):
+        axes.plot(speed, n * speed / (2 * np.pi), color=MUTED, linewidth=0.6, linestyle="--")
+    axes.plot(speed, frequency, color=COLOURS[0])
+    axes.set(xlabel="speed / (rad/s)", ylabel="frequency / Hz", ylim=(0.0, highest))
+    return encode(figure)
+
+
+@styled
 def eigenvalues(eigenvalue: NDArray) -> str:
     """Growth rate Re s over frequency Im s / 2π of eigenvalues (n) 1/s, from 0 Hz up."""
     figure, axes = canvas(9.5, 3.0)

@@ -30,11 +30,34 @@ class ToldByRoot(RuntimeError):
     """The root process failed unexpectedly and says so; the others end without a word."""
 
 
+class Deferred:
+    """While one is entered, the first stop signal is only noted: `asked` is its name, or "".
+
+    A loop that can be gone on with looks at it after each step, stops where its state is whole, and
+    raises `Stopped` itself. A second signal stops at once.
+    """
+
+    _current: "Deferred | None" = None
+
+    def __init__(self) -> None:
+        self.asked = ""
+
+    def __enter__(self) -> "Deferred":
+        Deferred._current = self
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        Deferred._current = None
+
+
 def stop_on_signals() -> None:
-    """Turn the stop signals into `Stopped`."""
+    """Turn the stop signals into `Stopped`, or into a note where they are deferred."""
 
     def stop(number: int, _frame: Any) -> None:
-        raise Stopped(signal.Signals(number).name)
+        name, current = signal.Signals(number).name, Deferred._current
+        if current is None or current.asked:
+            raise Stopped(name)
+        current.asked = name
 
     for number in STOP_SIGNALS:
         signal.signal(number, stop)
@@ -104,7 +127,10 @@ def judged(function: Callable[[], None]) -> tuple[int, str]:
     except ConvergenceError as error:
         return GAVE_UP, f"error: {error}"
     except Stopped as stop:
-        return STOPPED, f"stopped by {stop}: finished stages are kept, the same command goes on"
+        return (
+            STOPPED,
+            f"stopped by {stop}: what was finished is kept, the same command or resume goes on",
+        )
     except MemoryError as error:
         return GAVE_UP, f"error: out of memory ({error}): use a coarser mesh, fewer modes or points"
     except ToldByRoot:

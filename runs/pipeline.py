@@ -39,7 +39,7 @@ def run_scene(
     petsc_options: list[str],
 ) -> Session:
     """Run the stages a scene needs into the directory; what they left in memory. Collective."""
-    session = Session(scene, directory, comm)
+    session = Session(scene, directory, comm, fresh)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", dumps(scene)))
     if scene.road is not None:

@@ -5,7 +5,7 @@ from dataclasses import fields
 from typing import Any
 
 from runs.scene import applies
-from runs.schema import Key, key_of, table_of
+from runs.schema import Key, Pitch, key_of, table_of
 from runs.tables import Scene
 from runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
@@ -21,6 +21,8 @@ def literal(value: Any) -> str:
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, tuple):
         return f"[{', '.join(literal(part) for part in value)}]"
+    if isinstance(value, Pitch):
+        return f"{{ dx = {literal(value.dx)}, dy = {literal(value.dy)} }}"
     if isinstance(value, float):
         text = repr(value)
         return text if "." in text or "e" in text else f"{text}.0"

@@ -15,21 +15,11 @@ Where = Callable[[tuple[str, ...], str], InputError]
 LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "tire.mesh": ((), 'only section = "torus" is supported in this version'),
     "tire.section": (("torus",), 'only "torus" is supported in this version'),
-    "rotation.method": (("projected",), 'only "projected" is supported in this version'),
-    "greens.residual": (("none", "static"), '"none" and "static" are supported in this version'),
     "modal.rim": (("fixed",), 'only "fixed" is supported in this version'),
     "modal.road": (("forces",), 'only "forces" is supported in this version'),
-    "contact.points": (("nodes",), 'only "nodes" is supported in this version'),
-    "contact.brush_stiffness": ((), "horizontal contact forces are not in this version: leave it"),
-    "contact.friction": ((), "friction is not in this version: leave it"),
-    "road.kind": (
-        ("flat", "sine", "cobblestones", "grid", "crg"),
-        "flat, sine, cobblestones, grid and crg are supported in this version",
-    ),
     "output.vibration": ((False,), "only false is supported in this version"),
     "output.fields": ((False,), "only false is supported in this version"),
 }
-ASKED_FOR = {"road.kind": ("step", "cleat", "iso8608", "texture")}
 
 
 def refuse_later(raw: dict[str, Any], error: Where) -> None:
@@ -39,8 +29,7 @@ def refuse_later(raw: dict[str, Any], error: Where) -> None:
         here: Any = raw
         for part in path:
             here = here.get(part) if isinstance(here, dict) else None
-        asked = ASKED_FOR.get(dotted)
-        if here is not None and here not in supported and (asked is None or here in asked):
+        if here is not None and here not in supported:
             raise error(path, f"= {described(here)}: {message}")
 
 
@@ -56,9 +45,11 @@ def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise InputError for the first contradiction between keys or tables."""
     _geometry(scene, error)
     _static(scene, raw, error)
+    _rotation(scene, error)
     if scene.contact is not None:
         _contact(scene, error)
     _force(scene, error)
+    _greens(scene, error)
     if scene.road is not None:
         _road(scene, error)
     _time(scene, error)
@@ -95,7 +86,7 @@ def _geometry(scene: Scene, error: Where) -> None:
                     ("tire", "region", str(number), key), f"= [{low:g}, {high:g}] must ascend"
                 )
     free = free_unknowns(tire)
-    if scene.modal.count >= free:
+    if scene.modal.up_to is None and scene.modal.count >= free:
         raise error(
             ("modal", "count"),
             f"= {scene.modal.count} must be less than the {free} free unknowns of the mesh",
@@ -106,6 +97,17 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
     if len(given) > 1:
         raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
+
+
+def _rotation(scene: Scene, error: Where) -> None:
+    if scene.rotation is None:
+        return
+    if scene.rotation.method == "full" and scene.greens.residual == "attachment":
+        raise error(
+            ("greens", "residual"),
+            '= "attachment" adds to a basis of modes, which rotation.method = "full" does without:'
+            ' take "static" or "second-order"',
+        )
 
 
 def _force(scene: Scene, error: Where) -> None:
@@ -129,6 +131,16 @@ def _force(scene: Scene, error: Where) -> None:
             )
 
 
+def _greens(scene: Scene, error: Where) -> None:
+    rotation, residual = scene.rotation, scene.greens.residual
+    full = rotation is not None and rotation.speed > 0 and rotation.method == "full"
+    if full and residual in ("second-order", "attachment"):
+        raise error(
+            ("greens", "residual"),
+            f'= "{residual}" completes the modes: it needs rotation.method = "projected"',
+        )
+
+
 def _contact(scene: Scene, error: Where) -> None:
     static = scene.static
     if scene.road is None:
@@ -137,10 +149,20 @@ def _contact(scene: Scene, error: Where) -> None:
         raise error(("contact",), "needs a time to run: add [time] with duration")
     if static.load is None and static.deflection is None and static.road_height is None:
         raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
+    contact = scene.contact
+    if contact.brush_stiffness is None and contact.friction is not None:
+        raise error(("contact", "friction"), "needs brush_stiffness (N/m), which carries it")
+    standing = scene.rotation is None or scene.rotation.speed == 0
+    if any(contact.slip) and (contact.brush_stiffness is None or standing):
+        raise error(("contact", "slip"), "needs brush_stiffness (N/m) and a rolling tire")
 
 
 def _road(scene: Scene, error: Where) -> None:
     road = scene.road
+    if road.kind == "cleat" and road.ramp >= road.length:
+        raise error(("road", "ramp"), f"must be less than length = {road.length:g} m")
+    if road.kind == "texture" and road.cut_off >= road.roll_off:
+        raise error(("road", "cut_off"), f"must be less than roll_off = {road.roll_off:g} m")
     if road.kind != "cobblestones":
         return
     for side in ("block_length", "block_width"):

@@ -1,7 +1,7 @@
 """What a key of a scene may hold: its type, unit, range and choices, and how a value is checked.
 
 A table of a scene is a frozen dataclass whose fields are made by `number`, `integer`, `flag`,
-`choice`, `text`, `vector`, `table` and `tables`. Those fields are the only description of the
+`choice`, `text`, `vector`, `points`, `table` and `tables`. Those fields are the only description of the
 scene: reading, writing, `check` and the error messages all come from them.
 """
 
@@ -114,7 +114,7 @@ def number(
     return _make(Key(read, unit, doc, allowed, default is None, only_for), default)
 
 
-def integer(default: int, doc: str, *, least: int, most: int, only_for=None) -> Any:
+def integer(default: int | None, doc: str, *, least: int, most: int, only_for=None) -> Any:
     """A whole number between least and most."""
     check, words = _limits(least, None, most, None)
 
@@ -124,7 +124,7 @@ def integer(default: int, doc: str, *, least: int, most: int, only_for=None) -> 
         check(value, "-")
         return value
 
-    return _make(Key(read, "-", doc, words, False, only_for), default)
+    return _make(Key(read, "-", doc, words, default is None, only_for), default)
 
 
 def flag(default: bool, doc: str, *, only_for=None) -> Any:
@@ -175,6 +175,33 @@ def vector(default: tuple[float, ...], unit: str, doc: str, *, least=None, most=
         return result
 
     return _make(Key(read, unit, doc, f"{size} numbers, {words}", False, None), default)
+
+
+@dataclass(frozen=True)
+class Pitch:
+    """Distances (m) between the points of a regular grid, along x and along y."""
+
+    dx: float
+    dy: float
+
+
+def points(doc: str, *, above: float, most: float) -> Any:
+    """ "nodes", or the pitch { dx = ..., dy = ... } of a grid in m."""
+    check, words = _limits(None, above, most, None)
+
+    def read(value: Any) -> str | Pitch:
+        if value == "nodes":
+            return "nodes"
+        if not isinstance(value, dict) or set(value) != {"dx", "dy"}:
+            raise ValueError(
+                f'must be "nodes" or {{ dx = 0.002, dy = 0.002 }}, not {described(value)}'
+            )
+        pitch = Pitch(_finite(value["dx"]), _finite(value["dy"]))
+        check(pitch.dx, "m")
+        check(pitch.dy, "m")
+        return pitch
+
+    return _make(Key(read, "m", doc, f'"nodes" or {{dx, dy}}, {words}', False, None), "nodes")
 
 
 def table(of: type, doc: str, *, optional: bool = False) -> Any:

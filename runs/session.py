@@ -52,8 +52,8 @@ class Session:
     `patch` and so on; the finite-element model is made when a stage first asks for it.
     """
 
-    def __init__(self, scene: Scene, directory: Path, comm: MPI.Comm):
-        self.scene, self.directory, self.comm = scene, directory, comm
+    def __init__(self, scene: Scene, directory: Path, comm: MPI.Comm, fresh: bool = False):
+        self.scene, self.directory, self.comm, self.fresh = scene, directory, comm, fresh
         self.hashes: dict[str, str] = {}
         self.record = Record()
 
@@ -120,6 +120,31 @@ class Session:
         """The matrices of the rotating frame. Collective."""
         with self.record.timing("rotation matrices"):
             return self.operators.rotation()
+
+    @cached_property
+    def wheel(self):
+        """The full matrices as the wheel turns. Collective."""
+        from runs.coupling import Wheel
+
+        rotation = self.rotation_matrices if self.speed else None
+        inertia = self.scene.rotation.inertia if self.speed else "full"
+        return Wheel(self.operators, rotation, self.speed, self.damping, inertia)
+
+    @cached_property
+    def modes(self):
+        """The modes on all unknowns: as the stage computed them, or once more where it was reused.
+        Collective."""
+        from runs.stages.modes import solve
+
+        with self.record.timing("modes once more"):
+            return solve(self)
+
+    @property
+    def basis(self):
+        """The modes on the outer face with what the stages made of them."""
+        from runs.coupling import Basis
+
+        return Basis(self.modal.shape, self.modal.projection, self.state_modes)
 
     def write(self, path: Path, stage: str, fill) -> None:
         """Write a stage's file by `fill(file)` on the root process. Collective."""

@@ -7,6 +7,7 @@ the resolved scene, the hash of what it was computed from, program, library vers
 import hashlib
 import io
 import json
+import shutil
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -112,15 +113,18 @@ class _Disk(io.RawIOBase):
 
 
 @contextmanager
-def writing(path: Path, provenance: Provenance) -> Iterator[h5py.File]:
+def writing(path: Path, provenance: Provenance, begin: Path | None = None) -> Iterator[h5py.File]:
     """An HDF5 file open for writing; it appears as `path`, whole, when the block ends well.
 
+    It is empty at first, or a copy of the file `begin`.
     Root process only. Raises InputError when the disk is full or the folder not writable.
     """
     with replacing(path) as part:
-        disk = _Disk(part.open("w+b", buffering=0))
+        if begin is not None:
+            shutil.copyfile(begin, part)
+        disk = _Disk(part.open("r+b" if begin else "w+b", buffering=0))
         try:
-            file = h5py.File(disk, "w")
+            file = h5py.File(disk, "r+" if begin else "w")
             try:
                 for name, value in provenance.attributes().items():
                     file.attrs[name] = value

@@ -2,13 +2,10 @@
 
 from dataclasses import dataclass
 
-from runs.schema import choice, flag, integer, number, table, tables, text, vector
+from runs.road_tables import Road
+from runs.schema import Pitch, choice, flag, integer, number, points, table, tables, text, vector
 
 LINEAR = ("model", ("linear", "neo-hookean"))
-SINE = ("kind", ("sine",))
-STONES = ("kind", ("cobblestones",))
-UNEVEN = ("kind", ("cobblestones", "grid", "crg"))
-MEASURED = ("kind", ("grid", "crg"))
 
 
 @dataclass(frozen=True)
@@ -113,7 +110,10 @@ class Static:
 
 @dataclass(frozen=True)
 class Modal:
-    count: int = integer(500, "modes wanted", least=1, most=100000)
+    count: int = integer(500, "lowest modes wanted", least=1, most=100000)
+    up_to: float | None = number(
+        None, "Hz", "all modes below it are wanted, instead of count", above=0, most=1e6
+    )
     rim: str = choice("fixed", ("fixed", "free"), "the two bead faces")
     road: str = choice("forces", ("forces", "held"), "after the static state: its forces, or held")
 
@@ -125,6 +125,13 @@ class Damping:
 
 
 @dataclass(frozen=True)
+class Campbell:
+    to: float = number(200.0, "rad/s", "highest speed", above=0, most=2000)
+    step: float = number(10.0, "rad/s", "between two speeds", above=0, most=2000)
+    branches: int = integer(20, "followed, from the lowest", least=1, most=1000)
+
+
+@dataclass(frozen=True)
 class Rotation:
     speed: float = number(100.0, "rad/s", "of the wheel; 0: standing", least=0, most=2000)
     inertia: str = choice("full", ("full", "doppler"), "doppler: without Coriolis, centrifugal")
@@ -133,12 +140,28 @@ class Rotation:
     rolling_radius: float | None = number(
         None, "m", "effective; absent: from the static state", above=0, most=10
     )
+    campbell: Campbell | None = table(
+        Campbell, "eigenvalues over speed, on the modes of this one static state", optional=True
+    )
 
 
 @dataclass(frozen=True)
 class Greens:
     residual: str = choice(
-        "static", ("none", "dirac", "static", "attachment"), "flexibility of the modes left out"
+        "static",
+        ("none", "dirac", "static", "second-order", "attachment"),
+        "flexibility of the modes left out",
+    )
+    dynamic: int | None = integer(
+        None, "states kept dynamic, the others follow statically; absent: all", least=1, most=200000
+    )
+    choice: str = choice(
+        "participation",
+        ("participation", "frequency"),
+        "of the dynamic states: in the band, or the slowest",
+    )
+    band: float | None = number(
+        None, "Hz", "that matters; absent: up to half the highest mode", above=0, most=1e6
     )
 
 
@@ -160,74 +183,39 @@ class PointForce:
 
 @dataclass(frozen=True)
 class Contact:
-    tread: str = choice("half-space", ("half-space", "winkler", "none"), "local compliance")
-    youngs_modulus: float = number(3.4e8, "Pa", "of the half-space", above=0, most=1e13)
-    poisson_ratio: float = number(0.49, "-", "of the half-space", above=-1, most=0.5)
+    tread: str = choice(
+        "half-space", ("half-space", "layer", "winkler", "none"), "local compliance"
+    )
+    youngs_modulus: float = number(3.4e8, "Pa", "of the half-space or layer", above=0, most=1e13)
+    poisson_ratio: float = number(0.49, "-", "of the half-space or layer", above=-1, most=0.5)
+    thickness: float = number(
+        0.010,
+        "m",
+        "of the layer on its stiff base",
+        above=0,
+        most=1,
+        only_for=("tread", ("layer",)),
+    )
     winkler_stiffness: float = number(2.0e8, "N/m³", "of the winkler tread", above=0, most=1e15)
-    points: str = choice("nodes", ("nodes",), "contact points")
+    points: str | Pitch = points("contact points: the nodes, or a grid of pitch", above=0, most=1)
     brush_stiffness: float | None = number(
         None, "N/m", "per point; absent: no horizontal forces", above=0, most=1e12
     )
+    brush: str = choice(
+        "rolling", ("rolling", "spring"), "transported through the patch, or the thesis's spring"
+    )
     friction: float | None = number(None, "-", "absent: never slips", least=0, most=10)
-    solver: str = choice("active-set", ("active-set", "snes-vi"), "of the complementarity problem")
+    slip: tuple[float, float] = vector(
+        (0.0, 0.0), "-", "of the rolling tire: longitudinal (> 0 drives), lateral", least=-1, most=1
+    )
+    solver: str = choice(
+        "auto",
+        ("auto", "active-set", "projected-cg", "snes-vi"),
+        "of the complementarity problem",
+    )
     reach: float | None = number(
         None, "m", "gap up to which points take part; absent: from the road", above=0, most=1
     )
-
-
-@dataclass(frozen=True)
-class Motion:
-    kind: str = choice("none", ("none", "ramp", "sine"), "vertical motion of the whole road")
-    amplitude: float = number(1.0e-3, "m", "upwards", least=-1, most=1)
-    frequency: float = number(
-        50.0, "Hz", "of the sine", above=0, most=1e6, only_for=("kind", ("none", "sine"))
-    )
-    duration: float = number(
-        0.01, "s", "of the ramp", above=0, most=1e5, only_for=("kind", ("none", "ramp"))
-    )
-
-
-@dataclass(frozen=True)
-class Road:
-    kind: str = choice("flat", ("flat", "sine", "cobblestones", "grid", "crg"), "of road")
-    run_in: float = number(0.1, "m", "over which the road grows from flat", least=0, most=1e4)
-    lateral: float = number(0.0, "m", "road y under the tire's middle", least=-1e4, most=1e4)
-    start: float = number(0.0, "m", "road x under the axle at t = 0", least=-1e6, most=1e6)
-    offset: float = number(0.0, "m", "added to all heights", least=-10, most=10)
-    datum: str = choice(
-        "mean", ("mean", "zero"), "road height laid on the static road plane", only_for=UNEVEN
-    )
-    longest_wave: float | None = number(
-        None,
-        "m",
-        "longer waves are taken out: the axle follows them; absent: all stay",
-        above=0,
-        most=1e4,
-        only_for=UNEVEN,
-    )
-    amplitude: float = number(1.0e-3, "m", "of the waves", least=0, most=1, only_for=SINE)
-    wavelength: float = number(0.1, "m", "of the waves", above=0, most=1e4, only_for=SINE)
-    phase: float = number(
-        0.0, "deg", "of the waves at the start", least=-360, most=360, only_for=SINE
-    )
-    block_length: float = number(0.14, "m", "pitch along x", above=0, most=10, only_for=STONES)
-    block_width: float = number(0.12, "m", "pitch along y", above=0, most=10, only_for=STONES)
-    joint_width: float = number(0.012, "m", "between two blocks", above=0, most=10, only_for=STONES)
-    joint_depth: float = number(0.006, "m", "below the blocks", least=0, most=1, only_for=STONES)
-    edge_radius: float = number(
-        0.006, "m", "of the rounded edges", least=0, most=1, only_for=STONES
-    )
-    height_scatter: float = number(
-        0.001, "m", "standard deviation of the blocks' heights", least=0, most=1, only_for=STONES
-    )
-    stagger: bool = flag(True, "every second row is shifted by half a block", only_for=STONES)
-    seed: int = integer(0, "of the scatter", least=0, most=2**31 - 1, only_for=STONES)
-    file: str | None = text(None, "of the measured road; relative: to the scene", only_for=MEASURED)
-    holes: str = choice("refuse", ("refuse", "fill"), "in the measured road", only_for=MEASURED)
-    end: str = choice(
-        "refuse", ("refuse", "mirror"), "when the run is longer than the road", only_for=MEASURED
-    )
-    motion: Motion = table(Motion, "of the whole road, vertical")
 
 
 @dataclass(frozen=True)
@@ -244,12 +232,18 @@ class Time:
 class Receptance:
     to: float = number(500.0, "Hz", "highest frequency", above=0, most=1e6)
     step: float = number(2.0, "Hz", "between two frequencies", above=0, most=1e6)
+    direct: int = integer(
+        0, "frequencies also solved on the full matrices, as a check", least=0, most=1000
+    )
 
 
 @dataclass(frozen=True)
 class Output:
     spectra: bool = flag(True, "of contact and axle force")
     axle_force: bool = flag(True, "from momentum")
+    impulse: bool = flag(False, "Green's functions between the driven points, over [time]")
+    velocity: bool = flag(False, "of the driven points")
+    acceleration: bool = flag(False, "of the driven points")
     vibration: bool = flag(False, "u(ω) on the whole tire")
     fields: bool = flag(False, "XDMF of every kept step")
     receptance: Receptance | None = table(Receptance, "of the driven points", optional=True)

@@ -144,4 +144,9 @@ def rotating(results: Results) -> Section:
         listed = f"The table lists {LISTED} of {len(rising)} pairs, by frequency."
         section.notes.append(listed)
     section.figures.append((figures.eigenvalues(value), "Eigenvalues with Im s ≥ 0."))
+    speed = results.optional(name, "campbell/speed")
+    if speed is not None:
+        lines = figures.campbell(speed, results.array(name, "campbell/frequency"))
+        text = "Branches followed over speed, on one static state; dashed: n Ω/2π, n = 1 to 8."
+        section.figures.append((lines, text))
     return section

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
-from contact.complementarity import make_solver
-from contact.rolling import Drive, roll
-from contact.tread import half_space_compliance, no_tread, winkler_compliance
+from contact.brush import Brush, BrushLaw
+from contact.energy import Work
+from contact.friction import Friction
+from contact.grid_patch import OnPoints, settle
+from contact.model import solver_name, step_solver
+from contact.rolling import Drive, Loop, roll
 from greens.convolution import Convolution
 from greens.recursion import Recursion
 from greens.response import Response
 from runs import observe, store
-from runs.mpi import on_root
+from runs.contact_balance import balance
+from runs.contact_file import ContactFile
+from runs.mpi import Deferred, Stopped
 from runs.session import Session
 
 # Radians a kept mode may turn in one automatic step: 0.3 leaves less than a percent in its phase.
 _TURN = 0.3
 _LEAST_STEPS = 200
-_BLOCK = 512  # steps kept in memory between two writes
+_TOGETHER = 8  # steps between two agreements of several processes on whether to stop
 
 
 def inputs(session: Session) -> dict:
@@ -38,25 +44,77 @@ def inputs(session: Session) -> dict:
 
 
 def compute(session: Session, path: Path) -> None:
-    """The time loop, written block by block. Collective."""
-    scene, patch, record = session.scene, session.patch, session.record
+    """The time loop, written block by block, from the last checkpoint where there is one. Collective."""
+    record = session.record
     shortest = _shortest_period(session)
     tire, step, steps, scheme = integration(session, session.contact_response, shortest)
     with record.timing("tread and solver"):
-        solver = make_solver(scene.contact.solver, tire.same_step + tread(session))
-    drive = Drive(session.road.height, session.motion, session.road_speed)
+        _settled(session)
+        loop = Loop(*_on_points(session, tire, step))
     totals = _Totals()
-    with ExitStack() as stack:
-        writer = _Writer(session, {"step": step, "scheme": scheme})
-        on_root(session.comm, lambda: writer.open(stack, path))
-        with record.timing("time loop"), observe.Progress("contact", steps) as bar:
-            for instant in roll(tire, solver, patch, drive, step, steps):
-                patch.check_edge(instant.force, instant.time, session.reach)
-                totals.add(instant)
-                writer.add(instant)
-                bar.advance()
-        on_root(session.comm, writer.flush)
-    _describe(session, totals, solver, step, steps, scheme)
+    with ExitStack() as stack, record.timing("time loop"):
+        file = ContactFile(session, {"step": step, "scheme": scheme})
+        kept = file.open(stack, path)
+        work = Work()
+        if kept is not None:
+            loop.restore(kept)
+            work.set_state(kept)
+            totals = _Totals(**{name: kept[name].item() for name in vars(totals)})
+            observe.say(f"  goes on from the checkpoint at t = {totals.steps * step:.6g} s")
+        _run(session, loop, file, (totals, work), step, steps)
+        file.finish()
+    _describe(session, totals, loop.solver, step, steps, scheme)
+    if scheme != "convolution":
+        balance(session, loop, work, step)
+
+
+def _run(session: Session, loop: Loop, file: ContactFile, counts, step, steps) -> None:
+    """Take the steps that are left; stop between two of them when asked to. Collective.
+
+    `counts`: the running figures and the work.
+    """
+    totals, work = counts
+    drive = Drive(session.road.height, session.motion, session.road_speed)
+    instants = roll(
+        loop.tire, loop.solver, session.patch, drive, step, steps, loop.friction, totals.steps
+    )
+    watch = _Watch(session)
+    with Deferred() as deferred, observe.Progress("contact", steps) as bar:
+        bar.advance(totals.steps)
+        for instant in instants:
+            session.patch.check_edge(instant.force, instant.time, session.reach)
+            totals.add(instant)
+            work.add(instant)
+            file.add(instant)
+            bar.advance()
+            stop, due = watch(deferred.asked)
+            if stop or due:
+                file.checkpoint(loop.snapshot() | vars(totals) | work.state())
+            if stop:
+                raise Stopped(stop)
+
+
+class _Watch:
+    """Whether to stop, and whether a checkpoint is due: the same answer on every process."""
+
+    def __init__(self, session: Session) -> None:
+        self._comm, self._every = session.comm, session.scene.time.checkpoint
+        self._last = time.monotonic()
+        self._count = 0
+
+    def __call__(self, asked: str) -> tuple[str, bool]:
+        """Collective every few steps."""
+        self._count += 1
+        if self._comm.size > 1 and self._count % _TOGETHER:
+            return "", False
+        due = time.monotonic() - self._last > self._every
+        if self._comm.size > 1:
+            answers = self._comm.allgather((asked, due))
+            asked = max(name for name, _ in answers)
+            due = answers[0][1]
+        if due:
+            self._last = time.monotonic()
+        return asked, due
 
 
 def integration(session: Session, response: Response, shortest: float):
@@ -95,25 +153,59 @@ def _shortest_period(session: Session) -> float:
     return min(passing, 1 / motion.frequency) if motion.kind == "sine" else passing
 
 
-def tread(session: Session) -> np.ndarray:
-    """Compliance of the tread, (c, c) m/N."""
-    contact, patch = session.scene.contact, session.patch
-    if contact.tread == "half-space":
-        return half_space_compliance(
-            patch.points[:, :2], patch.half_sizes, contact.youngs_modulus, contact.poisson_ratio
-        )
-    if contact.tread == "winkler":
-        return winkler_compliance(patch.area, contact.winkler_stiffness)
-    return no_tread(len(patch.index))
+def _settled(session: Session) -> None:
+    """A grid of points takes up the static load that the finite elements gave to nodes."""
+    patch = session.patch
+    if patch.weights is None:
+        return
+    response = session.contact_response
+    p = len(patch.index)
+    flexibility = (response.static() + response.residual)[:p, :p]
+    nodal = session.static.force[patch.index]
+    solver = step_solver(session.scene.contact, patch, flexibility)
+    session.patch, rise = settle(patch, solver, flexibility, nodal)
+    session.record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
 
 
+def _on_points(session: Session, tire, step: float):
+    """(tire as seen at the patch's points, normal solver, friction or None); the choice is shown."""
+    spec, patch = session.scene.contact, session.patch
+    p = len(patch.index)
+    solver = step_solver(spec, patch, tire.same_step[:p, :p])
+    observe.say(
+        f"  {len(patch.points)} contact points on {p} nodes, tread {spec.tread}, "
+        f"solver {solver_name(spec, patch)}"
+    )
+    friction = None
+    if spec.brush_stiffness is not None:
+        friction = _friction(session, tire, step)
+        limit = friction.largest_unique(patch.force > 0, solver)
+        session.record.indicators["friction up to which a step has one answer"] = (limit, "-")
+    if patch.weights is not None:
+        tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
+    return tire, solver, friction
+
+
+def _friction(session: Session, tire, step: float) -> Friction:
+    """The brush of the scene, at rest."""
+    spec, patch = session.scene.contact, session.patch
+    law = BrushLaw(spec.brush_stiffness, spec.friction, spec.slip, spec.brush)
+    brush = Brush(law, patch.points[:, 0], patch.line, session.road_speed, step)
+    brush.begin(patch.force > 0)
+    return Friction(brush, tire.same_step, patch.weights)
+
+
+@dataclass
 class _Totals:
     """Running figures of the loop."""
 
-    def __init__(self) -> None:
-        self.steps = 0
-        self.sum = self.residual = self.penetration = 0.0
-        self.least, self.most, self.most_active = np.inf, -np.inf, 0
+    steps: int = 0
+    sum: float = 0.0
+    residual: float = 0.0
+    penetration: float = 0.0
+    least: float = np.inf
+    most: float = -np.inf
+    most_active: int = 0
 
     def add(self, instant) -> None:
         load = instant.force.sum()
@@ -147,91 +239,6 @@ def _describe(session: Session, totals: _Totals, solver, step, steps, scheme) ->
         )
     if totals.least == 0:
         record.warnings.append("the tire lost contact with the road for a while")
-
-
-class _Writer:
-    """contact.h5 as the loop goes, on the root process: blocks of steps, compressed."""
-
-    def __init__(self, session: Session, attributes: dict):
-        self._session = session
-        self._attributes = attributes | {
-            "road": session.scene.road.kind,
-            "speed": session.speed,
-            "road_speed": session.road_speed,
-        }
-        self._stack: list = []
-        self._done = 0
-
-    def open(self, stack: ExitStack, path: Path) -> None:
-        """Make the temporary file with its growing datasets; the stack puts it in place at its end,
-        or removes it after an error. Root process only."""
-        provenance = self._session.provenance("contact")
-        self._file = stack.enter_context(store.writing(path, provenance))
-        patch = self._session.patch
-        c = len(patch.index)
-        store.put(self._file, "points", patch.points, "m")
-        store.put(self._file, "area", patch.area, "m2")
-        for name, (shape, unit) in _LAYOUT.items():
-            width = tuple(c if n is None else n for n in shape)
-            dataset = self._file.create_dataset(
-                name,
-                (0, *width),
-                maxshape=(None, *width),
-                chunks=(_BLOCK, *width),
-                compression="gzip" if width == (c,) else None,
-                compression_opts=1 if width == (c,) else None,
-                shuffle=width == (c,),
-            )
-            dataset.attrs["unit"] = unit
-        self._file.attrs.update(self._attributes)
-
-    def add(self, instant) -> None:
-        """Keep a step; write when a block is full. Collective every 512 steps."""
-        self._stack.append(instant)
-        if len(self._stack) == _BLOCK:
-            on_root(self._session.comm, self.flush)
-            self._stack.clear()
-
-    def flush(self) -> None:
-        """Write the steps kept so far. Root process only."""
-        if not self._stack:
-            return
-        end = self._done + len(self._stack)
-        for name, values in _columns(self._stack).items():
-            dataset = self._file[name]
-            dataset.resize(end, axis=0)
-            dataset[self._done :] = values
-        self._done = end
-
-
-_LAYOUT: dict[str, tuple[tuple, str]] = {
-    "time": ((), "s"),
-    "normal_force": ((None,), "N"),
-    "horizontal_force": ((None, 2), "N"),
-    "total_force": ((3,), "N"),
-    "displacement": ((None,), "m"),
-    "gap": ((None,), "m"),
-    "axle_force": ((3,), "N"),
-    "active": ((), "-"),
-    "residual": ((), "-"),
-}
-
-
-def _columns(instants: list) -> dict[str, np.ndarray]:
-    """The datasets' next rows from a block of instants."""
-    force = np.stack([i.force for i in instants])
-    zeros = np.zeros(len(instants))
-    return {
-        "time": np.array([i.time for i in instants]),
-        "normal_force": force,
-        "horizontal_force": np.zeros((*force.shape, 2)),
-        "total_force": np.stack([zeros, zeros, force.sum(axis=1)], axis=-1),
-        "displacement": np.stack([i.displacement for i in instants]),
-        "gap": np.stack([i.gap for i in instants]),
-        "axle_force": np.stack([i.axle_force for i in instants]),
-        "active": np.array([i.active for i in instants]),
-        "residual": np.array([i.residual for i in instants]),
-    }
 
 
 def reuse(session: Session, path: Path) -> None:

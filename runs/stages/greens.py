@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
+from contact.grid_patch import make_grid_patch
 from contact.motion import make_motion
 from contact.patch import Patch, make_patch
 from contact.road import make_road
-from greens.response import Response, couple
+from greens.response import Response
 from modal.rotating import standing
+from runs.responses import chosen, fill_response, judge, make, read_responses
 from runs.session import Session
 from runs.store import put
 
@@ -27,10 +29,17 @@ def inputs(session: Session) -> dict:
     return {
         "modes": session.hashes.get("rotating", session.hashes["modes"]),
         "damping": session.damping,
-        "residual": scene.greens.residual,
+        "greens": asdict(scene.greens),
         "forces": [asdict(force) for force in scene.force],
         "points": session.patch.index.tolist() if scene.contact else [],
+        "pitch": scene.contact.points if scene.contact else None,
+        "components": _components(session) if scene.contact else (),
     }
+
+
+def _components(session: Session) -> tuple[int, ...]:
+    """Directions of the contact forces: z, and with a brush x and y after it."""
+    return (2,) if session.scene.contact.brush_stiffness is None else (2, 0, 1)
 
 
 def prepare(session: Session) -> None:
@@ -52,13 +61,26 @@ def _prepare_contact(session: Session) -> None:
     session.motion = make_motion(motion.kind, motion.amplitude, motion.frequency, motion.duration)
     road = make_road(scene.road)
     session.reach = scene.contact.reach or _reach(session, road)
-    session.patch = _patch(session, session.reach)
+    session.patch = _points(session)
     session.road = _under(session, road, session.patch)
 
 
 def _patch(session: Session, reach: float) -> Patch:
     state = session.static
     return make_patch(state.positions, state.half_sizes, state.force, state.gap, state.shape, reach)
+
+
+def _points(session: Session) -> Patch:
+    """The patch of the scene's points: the nodes, or a grid among them."""
+    nodes, wanted = _patch(session, session.reach), session.scene.contact.points
+    if wanted == "nodes":
+        return nodes
+    from fem.tread_surface import TreadSurface
+
+    state = session.static
+    surface = TreadSurface(session.lattice, state.positions)
+    spacing = wanted.dx, wanted.dy
+    return make_grid_patch(surface, state.road_height, nodes, spacing, session.reach)
 
 
 def _under(session: Session, road, patch: Patch):
@@ -102,73 +124,63 @@ def _prepare_forces(session: Session) -> None:
 
 
 def compute(session: Session, path: Path) -> None:
-    """Static flexibilities, responses, and their file. Collective."""
-    scene = session.scene
-    flexibility: dict[str, np.ndarray] = {}
-    if scene.greens.residual == "static":
-        flexibility = _flexibilities(session)
-    _couple(session, flexibility)
-    _describe(session)
+    """Responses with their residual, the choice of dynamic states, and their file. Collective."""
+    responses = {}
+    for name, (outputs, loads) in _probes(session).items():
+        whole = make(session, outputs, loads)
+        responses[name] = chosen(session, whole)
+        judge(session, name, whole, responses[name])
+    _take(session, responses)
+    _describe(session, responses)
 
     def fill(file) -> None:
-        for name, values in flexibility.items():
-            put(file, f"{name}/static_flexibility", values, "m/N")
-        if scene.contact:
+        for name, response in responses.items():
+            fill_response(file, name, response)
+        if session.scene.contact:
             put(file, "contact/index", session.patch.index, "-")
 
     session.write(path, "greens", fill)
 
 
-def _flexibilities(session: Session) -> dict[str, np.ndarray]:
-    """Exact static flexibility of the contact points and of the driven ones. Collective."""
-    from fem.compliance import compliance, rotating_stiffness
+def _probes(session: Session) -> dict[str, tuple]:
+    """(outputs, loads) on the outer face of the contact patch and of the prescribed forces."""
     from fem.probe import nodes
 
-    operators = session.operators
-    rotation = session.rotation_matrices if session.speed else None
-    inertia = session.scene.rotation.inertia if session.speed else "full"
-    stiffness = rotating_stiffness(operators, rotation, session.speed, session.damping, inertia)
     out = {}
-    with session.record.timing("static flexibility"):
-        if session.scene.contact:
-            points = nodes(session.patch.index, len(session.static.points))
-            out["contact"] = compliance(operators, stiffness, points, points)
-        if session.scene.force:
-            out["force"] = compliance(operators, stiffness, session.readings, session.loads)
-    stiffness.destroy()
+    if session.scene.contact:
+        count = len(session.static.points)
+        parts = [nodes(session.patch.index, count, part) for part in _components(session)]
+        points = sparse.vstack(parts, format="csr")
+        out["contact"] = points, points
+    if session.scene.force:
+        out["force"] = session.readings, session.loads
     return out
 
 
-def _couple(session: Session, flexibility: dict[str, np.ndarray]) -> None:
-    """Responses from the state modes, the residual where its flexibility is given."""
-    modal, modes = session.modal, session.state_modes
-    momentum = modal.projection.momentum
-    if session.scene.contact:
-        shape = modal.shape[3 * session.patch.index + 2]
-        session.contact_response = couple(modes, shape, shape, momentum, flexibility.get("contact"))
-    if session.scene.force:
-        session.force_response = couple(
-            modes,
-            session.readings @ modal.shape,
-            session.loads @ modal.shape,
-            momentum,
-            flexibility.get("force"),
-        )
+def _take(session: Session, responses: dict[str, Response]) -> None:
+    if "contact" in responses:
+        session.contact_response = responses["contact"]
+    if "force" in responses:
+        session.force_response = responses["force"]
 
 
-def _describe(session: Session) -> None:
+def _describe(session: Session, responses: dict[str, Response]) -> None:
     record = session.record
     record.headline["residual flexibility"] = (session.scene.greens.residual, "-")
     if session.scene.contact:
         response = session.contact_response
         record.headline |= {
-            "contact points": (len(session.patch.index), "-"),
+            "contact points": (len(session.patch.points), "-"),
+            "nodes that carry them": (len(session.patch.index), "-"),
             "reach of the patch": (session.reach, "m"),
             "rolling speed": (session.road_speed, "m/s"),
         }
         _share_of_residual(record, "contact points", response)
     if session.scene.force:
         record.headline["driven points"] = (len(session.scene.force), "-")
+    for name, response in responses.items():
+        states = len(response.eigenvalue) + len(response.block)
+        record.headline[f"states, {name}"] = (states, "-")
 
 
 def _share_of_residual(record, where: str, response: Response) -> None:
@@ -182,13 +194,6 @@ def _share_of_residual(record, where: str, response: Response) -> None:
 
 
 def reuse(session: Session, path: Path) -> None:
-    """Couple again from the stored flexibilities. Collective."""
-    stored = session.read(
-        path,
-        lambda file: {
-            name: group["static_flexibility"][:]
-            for name, group in file.items()
-            if "static_flexibility" in group
-        },
-    )
-    _couple(session, stored)
+    """Read the responses back. Collective."""
+    pulse = session.scene.greens.residual == "dirac"
+    _take(session, session.read(path, lambda file: read_responses(file, pulse)))

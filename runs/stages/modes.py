@@ -31,44 +31,86 @@ def inputs(session: Session) -> dict:
 
 def compute(session: Session, path: Path) -> None:
     """Solve, project and store. Collective."""
-    from modal import undamped
     from modal.basis import project
 
     record, operators = session.record, session.operators
     with record.timing("eigensolver"):
-        modes = undamped.solve(operators.stiffness, operators.mass, session.scene.modal.count)
+        modes = solve(session)
     rotation = session.rotation_matrices if session.speed else None
     with record.timing("projection"):
         projection = project(modes, rotation, operators.mass, session.comm)
         nodal = operators.spread(modes.vectors)
         shape = session.body.surface(nodal).reshape(-1, len(modes.squares))
+        labels = _labels(session, modes.vectors)
+    session.modes = modes
     session.modal = ModalBasis(modes.frequency, shape, projection)
     record.headline |= {
         "modes": (len(modes.squares), "-"),
         "lowest": (float(modes.frequency[0]), "Hz"),
         "highest": (float(modes.frequency[-1]), "Hz"),
+        "mirror planes": (len(modes.sectors).bit_length() - 1, "-"),
     }
     record.indicators |= {
         "worst residual": (float(modes.residual.max()), "-"),
         "orthonormality": (modes.orthonormality, "-"),
         "modes by inertia count": (modes.inertia_count, "-"),
         "counted below": (float(np.sqrt(modes.counted_below) / (2 * np.pi)), "Hz"),
+        "slices": (modes.slices, "-"),
+        "rigid modes": (modes.rigid, "-"),
     }
-    session.write(path, "modes", lambda file: _fill(file, session, modes))
+    session.write(path, "modes", lambda file: _fill(file, session, modes, labels))
 
 
-def _fill(file, session: Session, modes) -> None:
+def solve(session: Session):
+    """The modes the scene wants, on all unknowns. Collective."""
+    from modal import undamped
+
+    operators, wanted = session.operators, session.scene.modal
+    return undamped.solve(
+        operators.stiffness,
+        operators.mass,
+        None if wanted.up_to else wanted.count,
+        up_to=wanted.up_to or np.inf,
+        points=_points(session),
+    )
+
+
+def _points(session: Session) -> np.ndarray:
+    """Undeformed positions (n / 3, 3) m of this process's free nodes, where mirrors are looked for."""
+    body = session.body
+    return body.lattice.points(body.ids[session.operators.free_nodes])
+
+
+def _labels(session: Session, vectors: np.ndarray):
+    """Wave and section numbers of the modes without a road; None with one. Collective."""
+    from modal.waves import label
+
+    if session.static.road_height is not None:
+        return None
+    body, operators = session.body, session.operators
+    _, wall, along = np.unravel_index(body.ids[operators.free_nodes], body.lattice.shape)
+    circles = wall * body.lattice.shape[2] + along
+    every = np.unique(np.concatenate(session.comm.allgather(circles)))
+    ring = np.searchsorted(every, circles)
+    return label(session.comm, _points(session), ring, operators.mass, vectors)
+
+
+def _fill(file, session: Session, modes, labels) -> None:
     basis = session.modal
     m = len(basis.frequency)
     put(file, "frequency", basis.frequency, "Hz")
     put(file, "residual", modes.residual, "-")
     put(file, "surface/points", session.static.points, "m")
     put(file, "surface/shape", basis.shape.T.reshape(m, -1, 3), "kg^-1/2")
+    if labels is not None:
+        put(file, "wave_number", labels.wave, "-")
+        put(file, "section_mode", labels.section, "-")
+        put(file, "wave_share", labels.share, "-")
     for name, unit in _UNITS.items():
         if getattr(basis.projection, name) is not None:
             put(file, f"projected/{name}", getattr(basis.projection, name), unit)
     file.attrs["inertia_count"] = modes.inertia_count
-    file.attrs["rigid_modes"] = 0
+    file.attrs["rigid_modes"] = modes.rigid
 
 
 _UNITS = {

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from greens.recursion import Recursion
+from greens.response import Response
 from runs import observe
 from runs.session import Session
 from runs.stages.contact import integration
@@ -21,6 +23,7 @@ def inputs(session: Session) -> dict:
         "forces": [asdict(force) for force in scene.force],
         "time": asdict(scene.time) if scene.time else None,
         "receptance": asdict(scene.output.receptance) if scene.output.receptance else None,
+        "also": [scene.output.velocity, scene.output.acceleration, scene.output.impulse],
     }
 
 
@@ -29,6 +32,8 @@ def compute(session: Session, path: Path) -> None:
     out: dict[str, tuple[np.ndarray, str]] = {}
     if session.scene.time:
         out |= _in_time(session)
+        if session.scene.output.impulse:
+            out["impulse"] = _impulse(session, out["time"][0]), "m/(N s)"
     if session.scene.output.receptance:
         out |= _in_frequency(session)
 
@@ -52,7 +57,8 @@ def _in_time(session: Session) -> dict:
     axle = np.zeros((steps + 1, 3))
     tire.start(force[0])
     axle[0] = force[0] @ direction - tire.inertia_force()
-    displacement[0] = session.force_response.residual @ force[0]
+    if not session.force_response.pulse:
+        displacement[0] = session.force_response.residual @ force[0]
     with session.record.timing("time loop"), observe.Progress("response", steps) as bar:
         for k in range(1, steps + 1):
             free = tire.predict()
@@ -70,7 +76,44 @@ def _in_time(session: Session) -> dict:
         "force": (force, "N"),
         "displacement": (displacement.reshape(steps + 1, -1, 3), "m"),
         "axle_force": (axle, "N"),
-    }
+    } | _rates(session, time, step, "linear" if scheme == "convolution" else scheme)
+
+
+def _rates(session: Session, time: np.ndarray, step: float, scheme: str) -> dict:
+    """Velocities and accelerations of the driven points, where wanted. Collective."""
+    output, response = session.scene.output, session.force_response.resolved(step)
+    velocity = response.rate()
+    forces = [
+        np.stack([_history(f, time, order) for f in session.scene.force], axis=-1)
+        for order in range(3)
+    ]
+    out = {}
+    if output.velocity:
+        moved = _march(session, velocity, step, scheme, forces[0])
+        out["velocity"] = moved + forces[1] @ response.residual.T, "m/s"
+    if output.acceleration:
+        moved = _march(session, velocity.rate(), step, scheme, forces[0])
+        moved += forces[1] @ velocity.residual.T + forces[2] @ response.residual.T
+        out["acceleration"] = moved, "m/s2"
+    return {name: (v.reshape(len(time), -1, 3), unit) for name, (v, unit) in out.items()}
+
+
+def _impulse(session: Session, time: np.ndarray) -> np.ndarray:
+    """g (nt, k, k) along the forces, without the residual's delta at t = 0."""
+    with session.record.timing("impulse responses"):
+        return _along(session.force_response.impulse(time), session.scene.force)
+
+
+def _march(session: Session, response: Response, step: float, scheme: str, force) -> np.ndarray:
+    """Readings (nt, r) under forces (nt, k) from rest. Collective."""
+    tire = Recursion(response, step, scheme, session.comm)
+    tire.start(force[0])
+    out = [response.residual @ force[0]]
+    for new in force[1:]:
+        free = tire.predict()
+        tire.advance(new)
+        out.append(free + tire.same_step @ new)
+    return np.stack(out)
 
 
 def _directions(forces) -> np.ndarray:
@@ -79,11 +122,12 @@ def _directions(forces) -> np.ndarray:
     return given / np.linalg.norm(given, axis=1, keepdims=True)
 
 
-def _history(force, time: np.ndarray) -> np.ndarray:
-    """amplitude sin(2 pi f t), or the constant amplitude from t = 0 on, N."""
+def _history(force, time: np.ndarray, order: int = 0) -> np.ndarray:
+    """amplitude sin(2 pi f t), or the constant amplitude from t = 0 on, N; or its order-th rate."""
     if force.frequency == 0:
-        return np.full(len(time), force.amplitude)
-    return force.amplitude * np.sin(2 * np.pi * force.frequency * time)
+        return np.full(len(time), force.amplitude if order == 0 else 0.0)
+    omega = 2 * np.pi * force.frequency
+    return force.amplitude * omega**order * np.sin(omega * time + order * np.pi / 2)
 
 
 def _in_frequency(session: Session) -> dict:
@@ -92,13 +136,34 @@ def _in_frequency(session: Session) -> dict:
     frequency = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
     with session.record.timing("receptance"):
         full = session.force_response.receptance(frequency)
-    direction = _directions(forces)
-    components = full.reshape(len(frequency), len(forces), 3, len(forces))
-    along = np.einsum("frdk,rd->frk", components, direction)
+    along = _along(full, forces)
     peak = int(np.abs(along[:, 0, 0]).argmax())
     session.record.headline["largest receptance"] = (float(np.abs(along[peak, 0, 0])), "m/N")
     session.record.headline["at"] = (float(frequency[peak]), "Hz")
-    return {"frequency": (frequency, "Hz"), "receptance": (along, "m/N")}
+    out = {"frequency": (frequency, "Hz"), "receptance": (along, "m/N")}
+    return out | (_direct(session) if wanted.direct else {})
+
+
+def _along(full: np.ndarray, forces) -> np.ndarray:
+    """Each point's displacement along its own force, (n, k, k), from its components (n, 3 k, k)."""
+    components = full.reshape(len(full), len(forces), 3, len(forces))
+    return np.einsum("frdk,rd->frk", components, _directions(forces))
+
+
+def _direct(session: Session) -> dict:
+    """The same receptances without modes, at a few frequencies, and how far the modes are off."""
+    wanted, forces = session.scene.output.receptance, session.scene.force
+    frequency = wanted.to * np.arange(1, wanted.direct + 1) / wanted.direct
+    with session.record.timing("receptance of the full matrices"):
+        full = session.wheel.receptance(session.readings, session.loads, frequency)
+    off = session.force_response.receptance(frequency) - full
+    share = np.linalg.norm(off, axis=(1, 2)) / np.linalg.norm(full, axis=(1, 2))
+    name = f"receptance off the full matrices' up to {wanted.to:.4g} Hz"
+    session.record.indicators[name] = (float(share.max()), "-")
+    return {
+        "direct/frequency": (frequency, "Hz"),
+        "direct/receptance": (_along(full, forces), "m/N"),
+    }
 
 
 def reuse(session: Session, path: Path) -> None:

@@ -184,11 +184,10 @@ def _full(session):
 
 
 def _history(session, tire, step: float) -> History:
-    from contact.complementarity import make_solver
+    from contact.model import step_solver
     from contact.rolling import Drive, roll
-    from runs.stages.contact import tread
 
-    solver = make_solver("active-set", tire.same_step + tread(session))
+    solver = step_solver(session.scene.contact, session.patch, tire.same_step)
     drive = Drive(session.road.height, session.motion, session.road_speed)
     steps = round(session.scene.time.duration / step)
     contact, axle = np.zeros((2, steps, 3))

@@ -7,8 +7,9 @@ import pytest
 
 from contact.grid import Grid
 from contact.motion import make_motion
-from contact.road import PreparedRoad, RoadUnderTire, make_road
+from contact.road import make_road
 from contact.sine import Sine
+from contact.strip import PreparedRoad, RoadUnderTire
 from fem.errors import InputError
 
 STRIP = (0.1, 5.0, -0.1, 0.1)

@@ -172,17 +172,8 @@ def test_contradictions_need_both_sides(scene_file) -> None:
     [
         "tire.mesh=tire.msh",
         "tire.section=car",
-        "rotation.method=full",
-        "greens.residual=attachment",
-        "contact.points={dx=0.002,dy=0.002}",
-        "contact.brush_stiffness=2e5",
-        "contact.friction=0.8",
         "output.vibration=true",
         "output.fields=true",
-        "road.kind=step",
-        "road.kind=cleat",
-        "road.kind=iso8608",
-        "road.kind=texture",
     ],
 )
 def test_what_this_version_lacks_is_refused(scene_file, item: str) -> None:

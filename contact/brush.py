@@ -1,0 +1,104 @@
+"""The bristles between tread and road: they carry the horizontal forces.
+
+A bristle is entered undeflected and goes through the patch with the material, at the road's speed v
+towards -x; its deflection e (base against tip) grows by the slip of its base,
+
+    De/Dt = Du/Dt + v (-s_x, s_y),   t = -K_b e on the tire,   |t| <= mu f,
+
+s_x > 0 driving, s_y > 0 the wheel drifting towards +y. Over one step, seen at the fixed points,
+
+    e+ = share u+ + past,   share_i = sum_j T_ij m_j,
+    past_i = sum_j T_ij m_j (e_j - u_j) + share_i v h (-s_x, s_y),
+
+T the interpolation at the place a step upstream, m_j = 1 where point j touched. Slip cuts e back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class BrushLaw:
+    """`stiffness` N/m a point; `friction` mu, None: never slips; `slip` (s_x, s_y); `kind`:
+    "rolling", or "spring", the thesis's spring to the point's own displacement, e = u.
+    """
+
+    stiffness: float
+    friction: float | None = None
+    slip: tuple[float, float] = (0.0, 0.0)
+    kind: str = "rolling"
+
+
+class Brush:
+    """The bristles at c points: deflections e (c, 2) m, and where the points were a step ago.
+
+    `x` (c,) m and `line` (c,) int: points of one line follow each other in the rolling direction.
+    """
+
+    def __init__(self, law: BrushLaw, x: Array, line: Array, speed: float, step: float) -> None:
+        self.law = law
+        self._way = speed * step
+        self._upstream = upstream(x, line, self._way)
+        self._slip = self._way * np.array([-law.slip[0], law.slip[1]])
+        self.deflection = np.zeros((len(x), 2))
+        self._moved = np.zeros((len(x), 2))
+        self._touched: Mask = np.zeros(len(x), dtype=bool)
+
+    def begin(self, touching: Mask) -> None:
+        """The points that touch in the static state, their bristles at rest."""
+        self._touched = touching.copy()
+
+    def offer(self) -> tuple[Array, Array]:
+        """(share (c,), past (c, 2) m) of the next step: e = share u + past."""
+        if self.law.kind == "spring":
+            return np.ones(len(self._touched)), np.zeros_like(self.deflection)
+        share = self._upstream @ self._touched.astype(float)
+        anchor = np.where(self._touched[:, None], self.deflection - self._moved, 0.0)
+        return share, self._upstream @ anchor + share[:, None] * self._slip
+
+    def take(self, force: Array, moved: Array, touching: Mask) -> None:
+        """The step's horizontal forces (c, 2) N, displacements (c, 2) m and touching points."""
+        self.deflection = -force / self.law.stiffness
+        self._moved, self._touched = moved, touching
+
+    def state(self) -> dict[str, Array]:
+        """What a checkpoint keeps of the brush."""
+        return {"deflection": self.deflection, "moved": self._moved, "touched": self._touched}
+
+    def set_state(self, kept: dict[str, Array]) -> None:
+        """Go on from `state`."""
+        self.deflection, self._moved = kept["deflection"], kept["moved"]
+        self._touched = np.asarray(kept["touched"], dtype=bool)
+
+
+def upstream(x: Array, line: Array, way: float) -> sparse.csr_matrix:
+    """Linear interpolation (c, c) at x + way (m) on each point's own line; no entry beyond its end."""
+    rows, columns, values = [], [], []
+    for one in np.unique(line):
+        members = np.flatnonzero(line == one)
+        members = members[np.argsort(x[members], kind="stable")]
+        place = x[members] + way
+        right = np.searchsorted(x[members], place, side="left")
+        inside = right < len(members)
+        right, ahead = right[inside], members[inside]
+        left = np.maximum(right - 1, 0)
+        gap = x[members[right]] - x[members[left]]
+        to_right = np.where(
+            gap > 0, (place[inside] - x[members[left]]) / np.where(gap > 0, gap, 1), 1
+        )
+        for ends, part in ((left, 1 - to_right), (right, to_right)):
+            rows.append(ahead)
+            columns.append(members[ends])
+            values.append(part)
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    matrix = sparse.csr_matrix(entries, shape=(len(x), len(x)))
+    matrix.eliminate_zeros()
+    return matrix

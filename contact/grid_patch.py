@@ -1,0 +1,161 @@
+"""Contact points on a regular grid of the road's own resolution, carried by the nodes around them.
+
+The finite elements found the static state with the road touching nodes only. On the grid it settles
+anew under the same load, about that state: f >= 0, g >= 0, f . g = 0 with
+
+    g = z_surface - z_road + delta + C~ f + W A_static (W^T f - f_nodes),  sum f = load,
+
+A_static the exact static flexibility between the nodes, delta the height by which the tire rises.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from scipy import sparse
+from scipy.optimize import brentq
+from scipy.sparse.linalg import LinearOperator
+
+from contact.complementarity import ContactSolver
+from contact.kernel import GridPlaces
+from contact.patch import Patch
+from fem.errors import ConvergenceError, InputError
+
+# Points of the largest grid that is laid out before the reach is known.
+MOST_POINTS = 1_000_000
+LOAD_TOLERANCE = 1e-7
+
+
+class Surface(Protocol):
+    """The deformed tread (fem.tread_surface.TreadSurface)."""
+
+    def weights(self, ring: np.ndarray, arc: np.ndarray) -> sparse.csr_matrix: ...
+
+    def at(self, ring: np.ndarray, arc: np.ndarray) -> np.ndarray: ...
+
+    def locate(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+
+
+def make_grid_patch(
+    surface: Surface,
+    road_height: float,
+    nodes: Patch,
+    spacing: tuple[float, float],
+    reach: float,
+) -> Patch:
+    """Points at multiples of the spacing (m) with a static gap within reach (m), not yet settled.
+
+    One more row around them is the edge, which watches. `nodes`: the patch of the nodes for the same
+    reach, which the grid covers. `gap` is the
+    surface's height over the road plane (m), negative where it sinks in between nodes that touch,
+    and `force` still zero.
+    """
+    x0, x1, y0, y1 = nodes.extent
+    margin = nodes.half_sizes.max(axis=0)
+    lines = []
+    for low, high, step in (
+        (x0 - margin[0], x1 + margin[0], spacing[0]),
+        (y0 - margin[1], y1 + margin[1], spacing[1]),
+    ):
+        lines.append(step * np.arange(np.ceil(low / step), np.floor(high / step) + 1))
+    shape = len(lines[0]), len(lines[1])
+    if shape[0] * shape[1] > MOST_POINTS:
+        raise InputError(
+            f"contact.points: {shape[0]} x {shape[1]} points are more than {MOST_POINTS}; take a "
+            "coarser grid or a smaller contact.reach"
+        )
+    x, y = (a.ravel() for a in np.meshgrid(*lines, indexing="ij"))
+    ring, arc, found = surface.locate(x, y)
+    height = surface.at(ring, arc)[:, 2]
+    near = found & (height - road_height <= reach)
+    wide = np.pad(near.reshape(shape), 1)
+    taken = wide[2:, 1:-1] | wide[:-2, 1:-1] | wide[1:-1, 2:] | wide[1:-1, :-2]
+    taken = (taken.ravel() | near) & found
+    place = np.flatnonzero(taken)
+    if len(place) == 0:
+        raise InputError("contact.points: no grid point near the road; take a finer grid")
+    weights = surface.weights(ring[place], arc[place])
+    used = np.union1d(weights.indices, nodes.index[nodes.force > 0])
+    return Patch(
+        index=used,
+        points=np.stack([x, y, height], axis=-1)[place],
+        half_sizes=np.tile(np.array(spacing) / 2, (len(place), 1)),
+        force=np.zeros(len(place)),
+        gap=(height - road_height)[place],
+        edge=~near[place],
+        line=place % shape[1],
+        weights=weights[:, used].tocsr(),
+        places=GridPlaces(shape, spacing, place),
+    )
+
+
+def settle(
+    patch: Patch, solver: ContactSolver, flexibility: np.ndarray, nodal_force: np.ndarray
+) -> tuple[Patch, float]:
+    """The patch in its static state, and the rise delta (m) of the tire.
+
+    `solver` is made for W A_static W^T + C~; `flexibility` A_static (p, p) m/N; `nodal_force` (p,) N
+    of the finite elements, whose sum is kept. ConvergenceError when no rise gives that load.
+    """
+    load = float(nodal_force.sum())
+    flat = patch.gap - patch.weights @ (flexibility @ nodal_force)
+
+    def excess(rise: float) -> float:
+        return float(solver.solve(flat + rise).sum()) / load - 1.0
+
+    low, high = _bracket(excess, 1e-4)
+    rise = brentq(excess, low, high, xtol=1e-16, rtol=1e-14)
+    force = solver.solve(flat + rise)
+    if not abs(force.sum() / load - 1.0) < LOAD_TOLERANCE:
+        raise ConvergenceError(
+            f"contact: the grid of points settles at {force.sum():.6g} N, not at {load:.6g} N; "
+            "take a finer grid"
+        )
+    gap = np.maximum(solver.gap, 0.0)
+    return replace(patch, force=force, gap=gap), rise
+
+
+def _bracket(excess, step: float) -> tuple[float, float]:
+    """Rises (m) with too much and too little load."""
+    low, high = 0.0, 0.0
+    for _ in range(20):
+        if excess(low) <= 0.0:
+            low -= step
+        elif excess(high) > 0.0:
+            high += step
+        else:
+            return low, high
+        step *= 2.0
+    raise ConvergenceError(
+        "contact: no height of the tire gives the static load on the grid of points; take a finer "
+        "grid, or a larger contact.reach"
+    )
+
+
+class OnPoints:
+    """A tire between nodes as seen at the points of a patch: W u, and W^T f into it.
+
+    `components` 1: vertical only; 3: z, then x, then y of all points.
+    """
+
+    def __init__(self, tire, weights: sparse.csr_matrix, components: int = 1) -> None:
+        self._tire = tire
+        self._weights = sparse.block_diag([weights] * components, format="csr")
+        self._transposed = self._weights.T.tocsr()
+        count = self._weights.shape[0]
+        self.same_step = LinearOperator((count, count), matvec=self._answer, dtype=float)
+        self.inertia_force = tire.inertia_force
+        self.snapshot, self.restore = tire.snapshot, tire.restore
+
+    def predict(self) -> np.ndarray:
+        """Displacement (c,) m at the end of the step with no new force."""
+        return self._weights @ self._tire.predict()
+
+    def advance(self, force: np.ndarray) -> None:
+        """Take the force (c,) N at the end of the step."""
+        self._tire.advance(self._transposed @ force)
+
+    def _answer(self, force: np.ndarray) -> np.ndarray:
+        return self._weights @ (self._tire.same_step @ (self._transposed @ force))

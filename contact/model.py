@@ -1,0 +1,113 @@
+"""A scene's tread law and solver on a patch: what the time loop asks for forces."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.complementarity import ActiveSet, ContactSolver, checked_compliance, make_solver
+from contact.compliance import Compliance, MatrixCompliance, SpreadCompliance
+from contact.kernel import KernelTread
+from contact.layer import LayerInfluence
+from contact.patch import Patch
+from contact.projected_cg import ProjectedCG
+from contact.tread import (
+    Influence,
+    check_half_space,
+    dense_compliance,
+    half_space_influence,
+    no_tread,
+    winkler_compliance,
+)
+from fem.errors import InputError
+
+Array = NDArray[np.float64]
+
+# Up to here the matrix is kept (8 MB); beyond, the tread is a convolution.
+DENSE_POINTS = 1000
+# As many touching points are factorised in the time of a step of projected conjugate gradients
+# (15 to 30 ms on a soft tread, more on a stiff one); 160 of them in a tenth of that.
+MOST_TOUCHING = 500
+MOST_DENSE = 6000  # 0.3 GB a matrix
+
+
+class Spec(Protocol):
+    """The table [contact] of a scene."""
+
+    tread: str
+    youngs_modulus: float
+    poisson_ratio: float
+    thickness: float
+    winkler_stiffness: float
+    solver: str
+
+
+def solver_name(spec: Spec, patch: Patch) -> str:
+    """The solver that `solver = "auto"` means on this patch: by the points that touch at rest."""
+    if spec.solver != "auto":
+        return spec.solver
+    many = np.count_nonzero(patch.gap <= 0.0) > MOST_TOUCHING
+    return "projected-cg" if many and patch.places is not None else "active-set"
+
+
+def step_solver(spec: Spec, patch: Patch, tire: Array) -> ContactSolver:
+    """The solver for A = W tire W^T + C~, `tire` (p, p) m/N between the patch's nodes.
+
+    InputError when the matrix of that many points is not affordable, or A not positive definite.
+    """
+    name, count = solver_name(spec, patch), len(patch.points)
+    solvers = {"active-set": ActiveSet, "projected-cg": ProjectedCG}
+    if patch.places is not None and count > DENSE_POINTS and name in solvers:
+        return solvers[name](_product(spec, patch, tire))
+    if count > MOST_DENSE:
+        raise InputError(
+            f'contact: solver "{name}" on these points keeps a matrix, which is for at most '
+            f"{MOST_DENSE} of them, here are {count}: take fewer points, or a grid of points with "
+            'solver = "auto"'
+        )
+    matrix = tire if patch.weights is None else patch.weights @ (patch.weights @ tire.T).T
+    matrix = matrix + tread_matrix(spec, patch)
+    if name == "projected-cg":
+        return ProjectedCG(MatrixCompliance(checked_compliance(matrix)))
+    return make_solver(name, matrix)
+
+
+def tread_matrix(spec: Spec, patch: Patch) -> Array:
+    """Compliance of the tread between the points, (c, c) m/N."""
+    points = patch.points[:, :2]
+    if spec.tread == "winkler":
+        return winkler_compliance(patch.area, spec.winkler_stiffness)
+    if spec.tread == "none":
+        return no_tread(len(points))
+    check_half_space(points, patch.half_sizes, spec.youngs_modulus, spec.poisson_ratio)
+    return dense_compliance(points, patch.half_sizes, _influence(spec, patch))
+
+
+def _product(spec: Spec, patch: Patch, tire: Array) -> Compliance:
+    """A as a product. A grid has more points than nodes: without a tread A would be singular."""
+    if spec.tread == "none":
+        raise InputError(
+            'contact.tread = "none" leaves a grid of points without compliance of its own: take a '
+            'tread, or points = "nodes"'
+        )
+    return SpreadCompliance(tire, patch.weights, KernelTread(patch.places, _influence(spec, patch)))
+
+
+def _influence(spec: Spec, patch: Patch) -> Influence:
+    elastic = spec.youngs_modulus, spec.poisson_ratio
+    if spec.tread == "layer":
+        x0, x1, y0, y1 = patch.extent
+        # The doubled grid of the convolution asks a step beyond the patch.
+        farthest = 2.1 * float(np.hypot(x1 - x0, y1 - y0)) + 4 * float(patch.half_sizes.max())
+        return LayerInfluence(*elastic, spec.thickness, farthest)
+    if spec.tread == "winkler":
+
+        def spring(x: Array, y: Array, a: Array, b: Array) -> Array:
+            return np.where((x == 0) & (y == 0), 1 / (4 * a * b * spec.winkler_stiffness), 0.0)
+
+        return spring
+
+    def half_space(x: Array, y: Array, a: Array, b: Array) -> Array:
+        return half_space_influence(x, y, a, b, *elastic)
+
+    return half_space

@@ -1,0 +1,96 @@
+"""Residual flexibility with inertia and damping: states that stand for the modes left out.
+
+The columns x = K_Omega^-1 b and the rows y = K_Omega^-T b of the probes, less what the kept modes have
+of them, are the residual attachment modes. Between them the full matrices leave
+
+    q'' M_r + q' E_r + q G_0 = G_0 f,   u_r = G_0 q,
+    G_0 = y^T K_Omega x - modal,  E_r = y^T (D + 2 Omega G) x - modal,  M_r = y^T M x - modal,
+
+whose receptance has the exact value and slope of what is missing at 0 Hz, and its leading inertia.
+Standing, M_r and G_0 are positive and the states cannot grow; rolling, a state that grows is made
+static. (MacNeal, Comput. Struct. 1 (1971) 581; Rubin, AIAA J. 13 (1975) 995; decoupled here.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from greens.response import Response, couple
+from modal.rotating import StateModes, rotating
+
+# Share of the largest static flexibility below which a direction is the solver's rounding.
+_ROUNDING = 1e-9
+# Directions a thousand times faster than the slowest stay massless: no step resolves them.
+_MASSLESS = 1e-6
+
+
+@dataclass(frozen=True)
+class Moments:
+    """y^T (K_Omega, D + 2 Omega G, M) x of p probes with themselves, (p, p): m/N, m s/N, m s2/N;
+    `momentum` (3, p) kg m/N: int rho x."""
+
+    compliance: np.ndarray
+    damping: np.ndarray
+    inertia: np.ndarray
+    momentum: np.ndarray
+
+
+def second_order(
+    response: Response, modes: StateModes, shape: np.ndarray, carried: np.ndarray, moments: Moments
+) -> Response:
+    """The response of p probes (outputs = forces) with residual states and an exact static limit.
+
+    `shape` (p, m) are the modal shapes at the probes and `carried` (3, m) the modes' momentum.
+    """
+    missing = _missing(response, modes, shape, carried, moments)
+    flexibility = missing.compliance
+    sizes, directions = np.linalg.eigh((flexibility + flexibility.T) / 2)
+    kept = sizes > _ROUNDING * np.abs(np.diag(moments.compliance)).max()
+    if not kept.any():
+        return replace(response, residual=flexibility)
+    basis = directions[:, kept] / np.sqrt(sizes[kept])
+    inertia = basis.T @ missing.inertia @ basis
+    sizes, directions = np.linalg.eigh((inertia + inertia.T) / 2)
+    kept = sizes > _MASSLESS * sizes.max()
+    basis = basis @ directions[:, kept] / np.sqrt(sizes[kept])
+    inverse = np.linalg.inv(basis.T @ missing.inertia @ basis)
+    states = rotating(
+        inverse @ (basis.T @ missing.damping @ basis), inverse @ (basis.T @ flexibility @ basis)
+    )
+    output = flexibility @ basis
+    forces = inverse @ (basis.T @ flexibility)
+    extra = couple(states, output, forces.T, missing.momentum @ basis)
+    whole = response.joined(extra.keeping(extra.eigenvalue.real <= 0))
+    return replace(whole, residual=moments.compliance - whole.static())
+
+
+def _missing(
+    response: Response, modes: StateModes, shape: np.ndarray, carried: np.ndarray, moments: Moments
+) -> Moments:
+    """The moments less the modes' share of them."""
+    x = _statics(modes, modes.left @ shape.T, modes.block_left @ shape.T)
+    y = _adjoints(modes, shape @ modes.right, shape @ modes.block_right)
+    return Moments(
+        moments.compliance - response.static(),
+        moments.damping - response.spectral_moment(),
+        moments.inertia - y @ x,
+        moments.momentum - carried @ x,
+    )
+
+
+def _statics(modes: StateModes, push: np.ndarray, block_push: np.ndarray) -> np.ndarray:
+    """K~^-1 Phi^T (m, p): the modal coordinates under constant unit forces."""
+    static = -((modes.right / modes.eigenvalue) @ push).real
+    if len(modes.block):
+        static -= modes.block_right @ np.linalg.solve(modes.block, block_push)
+    return static
+
+
+def _adjoints(modes: StateModes, reading: np.ndarray, block_reading: np.ndarray) -> np.ndarray:
+    """Phi K~^-1 (p, m)."""
+    static = -((reading / modes.eigenvalue) @ modes.left).real
+    if len(modes.block):
+        static -= block_reading @ np.linalg.solve(modes.block, modes.block_left)
+    return static

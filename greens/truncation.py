@@ -1,0 +1,54 @@
+"""How far the receptance may be off within a band, for what the modes leave out.
+
+Every mode left out is faster than the last one kept, w_c; with a rate of damping d, its static answer
+differs from its true one by at most the share  b(w) = |w^2 - i w d| / |w_c^2 - w^2 + i w d|.  So
+
+    none          |G_t| (1 + b) / |H|     G_t: what the upper half of the modes adds, the tail's size
+    dirac, static |G_res| b / |H|         a bound for a wheel that stands
+    attachment, second-order: |H_x(w) - H_x(0)| b / |H|  with H_x the states beyond w_c,
+
+Frobenius norms over all outputs and forces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from greens.response import Response
+
+
+@dataclass(frozen=True)
+class Cutoff:
+    """The highest kept mode, `circular` rad/s, and the damping rate of those beyond, `rate` 1/s."""
+
+    circular: float
+    rate: float
+
+    def share(self, frequency: np.ndarray) -> np.ndarray:
+        """b at the frequencies (f,) Hz; infinite at and beyond the cutoff."""
+        omega = 2 * np.pi * frequency
+        damped = 1j * omega * self.rate
+        b = np.abs(omega**2 - damped) / np.abs(self.circular**2 - omega**2 + damped)
+        return np.where(omega < self.circular, b, np.inf)
+
+
+def estimate(response: Response, option: str, cutoff: Cutoff, frequency: np.ndarray) -> np.ndarray:
+    """Estimated relative error (f,) of the receptance at the frequencies in Hz."""
+    H = response.receptance(frequency)
+    share = cutoff.share(frequency)
+    beyond = np.abs(response.eigenvalue) > cutoff.circular
+    if option == "none":
+        upper = np.abs(response.eigenvalue) > np.median(np.abs(response.eigenvalue))
+        off = _size(response.static() - response.keeping(~upper).static()) * (1 + share)
+    elif option in ("dirac", "static"):
+        off = _size(response.residual) * share
+    else:
+        lagging = H - response.keeping(~beyond).receptance(frequency)
+        off = (_size(lagging) + _size(response.residual)) * share
+    return off / _size(H)
+
+
+def _size(matrices: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(matrices, axis=(-2, -1))

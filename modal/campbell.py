@@ -1,0 +1,120 @@
+"""The second eigenproblem over speed: branches of eigenvalues, critical speed, onset of instability.
+
+One modal basis and one static state serve all speeds: only D~ and K~ change, as polynomials in Omega.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg, optimize
+
+from modal.basis import Projection
+from modal.rotating import GROWS, StateModes, matrices, overlap, rotating
+
+
+@dataclass(frozen=True)
+class Campbell:
+    """`speed` (v,) rad/s; `eigenvalue` (v, b) complex 1/s, one column a branch, NaN where a branch is in
+    a near-defective block or has left the oscillating states; `similarity` (v, b): the share of the
+    branch's state one speed before, 1 when nothing changes, low where branches veer.
+    """
+
+    speed: np.ndarray
+    eigenvalue: np.ndarray
+    similarity: np.ndarray
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """(v, b) Hz in the non-rotating frame."""
+        return self.eigenvalue.imag / (2 * np.pi)
+
+
+def sweep(
+    projection: Projection,
+    damping: tuple[float, float],
+    inertia: str,
+    speeds: np.ndarray,
+    branches: int,
+) -> Campbell:
+    """Follow the `branches` lowest oscillating states of the first speed through all others. Not collective.
+
+    A state at one speed goes on in the state at the next that shares most of it (modal.rotating.overlap),
+    each in one only: lines cross instead of being cut and joined by size.
+    """
+    eigenvalue = np.full((len(speeds), branches), np.nan + 0j)
+    similarity = np.full((len(speeds), branches), np.nan)
+    before, held = None, np.zeros(0, int)
+    for k, speed in enumerate(speeds):
+        drag, stiffness = matrices(projection, float(speed), damping, inertia)
+        now = rotating(drag, stiffness)
+        if before is None:
+            held = _lowest(now, branches)
+            share = np.ones(len(held))
+        else:
+            held, share = _continued(before, now, held, drag)
+        found = held >= 0
+        eigenvalue[k, : len(held)][found] = now.eigenvalue[held[found]]
+        similarity[k, : len(held)] = share
+        before = now
+    return Campbell(np.asarray(speeds, float), eigenvalue, similarity)
+
+
+def _lowest(modes: StateModes, count: int) -> np.ndarray:
+    """Indices of the oscillating states by frequency."""
+    waves = np.flatnonzero(modes.eigenvalue.imag > 0)
+    return waves[np.argsort(modes.eigenvalue.imag[waves], kind="stable")][:count]
+
+
+def _continued(before: StateModes, now: StateModes, held: np.ndarray, drag: np.ndarray):
+    """Indices at the present speed of the states held before (-1: lost), and the shares."""
+    alive = np.flatnonzero(held >= 0)
+    share = np.abs(overlap(before, now, drag))[held[alive]]
+    rows, columns = optimize.linear_sum_assignment(-np.minimum(share, 1.0))
+    out, similarity = np.full(len(held), -1), np.full(len(held), np.nan)
+    out[alive[rows]] = columns
+    similarity[alive[rows]] = share[rows, columns]
+    return out, similarity
+
+
+def critical_speed(projection: Projection, inertia: str) -> float:
+    """The least Omega (rad/s) at which a wave stands still in the non-rotating frame; inf if none does.
+
+    Undamped, K~ = Lambda + Omega^2 S is singular there: Omega^-2 is the largest eigenvalue of
+    Lambda^-1/2 (-S) Lambda^-1/2. A road that stands still to the axle excites such a wave without end.
+    """
+    convective = projection.convective if inertia == "full" else projection.body_convective
+    root = 1 / np.sqrt(projection.squares)
+    scaled = -convective * np.outer(root, root)
+    largest = linalg.eigvalsh(scaled, subset_by_index=[len(root) - 1] * 2)[0]
+    return float(1 / np.sqrt(largest)) if largest > 0 else np.inf
+
+
+def onset(
+    projection: Projection, damping: tuple[float, float], inertia: str, unstable: float
+) -> float:
+    """The speed (rad/s) at which a motion begins to grow, at or below one where it does; within 0.1 %.
+
+    By bisection from rest: of several windows of instability it finds the edge of one. Static state
+    and modes are those of the basis, whatever the speed.
+    """
+    stable = 0.0
+    while unstable - stable > 1e-3 * unstable:
+        middle = (stable + unstable) / 2
+        if growth(projection, middle, damping, inertia) > 0:
+            unstable = middle
+        else:
+            stable = middle
+    return unstable
+
+
+def growth(
+    projection: Projection, speed: float, damping: tuple[float, float], inertia: str
+) -> float:
+    """Largest Re s (1/s) at a speed; 0 when it is rounding."""
+    drag, stiffness = matrices(projection, speed, damping, inertia)
+    m = len(drag)
+    values = linalg.eigvals(np.block([[np.zeros((m, m)), np.eye(m)], [-stiffness, -drag]]))
+    rate = float(values.real.max())
+    return rate if rate > GROWS * np.abs(values).max() else 0.0

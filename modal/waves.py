@@ -1,0 +1,76 @@
+"""Modes of an axisymmetric state by name: circumferential wave number n and number in the section.
+
+    u(theta) = sum_n c_n e^{i n theta},   share of n = |c_n|^2 / sum |c|^2, in mass
+
+with u in the components along and across the ring, which turn with the angle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+PURE = 0.99  # least share of one wave number; a footprint or a coarse ring mixes several
+
+
+@dataclass(frozen=True)
+class Labels:
+    """`wave` (m,) the wave number n, `section` (m,) 0, 1, ... by frequency among those of the same n, the
+    two of a pair alike; both -1 where no wave number holds 99 % of the mode. `share` (m,) of that n.
+    """
+
+    wave: np.ndarray
+    section: np.ndarray
+    share: np.ndarray
+
+
+def label(
+    comm: MPI.Comm, points: np.ndarray, ring: np.ndarray, mass: np.ndarray, vectors: np.ndarray
+) -> Labels:
+    """Names of the modes `vectors` (own rows n, m), ascending in frequency, kg^-1/2.
+
+    `points` (own n / 3, 3) m, undeformed; `ring` (own n / 3,) the index of the circle each node is on,
+    counted over all processes; `mass` (own rows) kg. Collective.
+    """
+    angle = np.arctan2(points[:, 0], -points[:, 2])
+    moved = _along_ring(angle, vectors * np.sqrt(mass)[:, None])
+    nodal = np.sqrt(mass[::3])
+    circles = comm.allreduce(int(ring.max(initial=-1)), op=MPI.MAX) + 1
+    total = _on_circles(comm, ring, circles, nodal**2)
+    places = comm.allreduce(len(angle)) // circles
+    shares = np.stack(
+        [
+            _share(comm, ring, total, moved, nodal * np.exp(-1j * n * angle), n)
+            for n in range(places // 2)
+        ]
+    )
+    wave, share = shares.argmax(axis=0), shares.max(axis=0)
+    wave = np.where(share >= PURE, wave, -1)
+    section = np.full(len(wave), -1)
+    for n in np.unique(wave[wave >= 0]):
+        same = np.flatnonzero(wave == n)
+        section[same] = np.arange(len(same)) // (2 if n else 1)
+    return Labels(wave, section, share)
+
+
+def _along_ring(angle: np.ndarray, field: np.ndarray) -> np.ndarray:
+    """Components tangential, along the axle and radial, (nodes, 3, m)."""
+    x, y, z = field.reshape(len(angle), 3, -1).transpose(1, 0, 2)
+    sine, cosine = np.sin(angle)[:, None], np.cos(angle)[:, None]
+    return np.stack([cosine * x + sine * z, y, sine * x - cosine * z], axis=1)
+
+
+def _on_circles(comm: MPI.Comm, ring: np.ndarray, circles: int, values: np.ndarray) -> np.ndarray:
+    """Sums over the nodes of each circle. Collective."""
+    out = np.zeros((circles, *values.shape[1:]), values.dtype)
+    np.add.at(out, ring, values)
+    return comm.allreduce(out)
+
+
+def _share(comm, ring, total, moved, wave, n: int) -> np.ndarray:
+    """Part of each mode's mass norm (m,) that one wave number holds. Collective."""
+    amplitude = _on_circles(comm, ring, len(total), wave[:, None, None] * moved)
+    energy = (np.abs(amplitude) ** 2 / total[:, None, None]).sum(axis=(0, 1))
+    return energy * (2 if n else 1)

@@ -1,0 +1,133 @@
+"""Points on a regular grid of the deformed tread: interpolation, places, the state they settle in."""
+
+import numpy as np
+import pytest
+
+from contact.complementarity import ActiveSet
+from contact.grid_patch import OnPoints, make_grid_patch, settle
+from contact.model import step_solver
+from contact.patch import make_patch
+from contact.projected_cg import ProjectedCG
+from fem.errors import InputError
+from fem.mesh import Torus, field_lattice
+from fem.tread_surface import TreadSurface
+from runs.schema import Pitch
+from runs.tables import Contact
+
+SECTION = Torus(0.32, 0.10, 0.012, np.radians(120), 60, 16, 1, 2, "bead", 0.3)
+
+
+@pytest.fixture(scope="module")
+def tread():
+    """A torus flattened a little towards the road plane at z = -0.318 m: lattice, positions."""
+    lattice = field_lattice(SECTION)
+    from fem.surface import outer_face
+
+    points = lattice.points(outer_face(lattice))
+    road = -0.318
+    depth = np.maximum(road - points[:, 2], 0.0)
+    points = points + np.stack([0.1 * depth, -0.2 * depth, depth], axis=-1)
+    return lattice, points, road
+
+
+def patches(tread, reach: float, pitch: float):
+    lattice, points, road = tread
+    gap = np.maximum(points[:, 2] - road, 0.0)
+    force = np.where(gap == 0, 1.0, 0.0)
+    force *= 500 / force.sum()
+    halves = np.full((len(points), 2), 0.01)
+    shape = lattice.shape[0], lattice.shape[2]
+    nodes = make_patch(points, halves, force, gap, shape, reach)
+    surface = TreadSurface(lattice, points)
+    return force, surface, make_grid_patch(surface, road, nodes, (pitch, pitch), reach)
+
+
+def test_weights_hold_the_nodes_and_low_polynomials(tread) -> None:
+    lattice, points, _ = tread
+    surface = TreadSurface(lattice, points)
+    ring, arc = np.meshgrid(lattice.ring[:5], lattice.arc[3:8], indexing="ij")
+    weights = surface.weights(ring.ravel(), arc.ravel()).toarray()
+    assert np.abs(weights).max(axis=1) == pytest.approx(1.0)
+    assert np.abs(weights).sum(axis=1) == pytest.approx(1.0)
+    anywhere = surface.weights(np.array([-0.1, 0.003, 6.2]), np.array([0.1, -0.4, 0.0]))
+    assert anywhere.sum(axis=1) == pytest.approx(1.0)
+    every = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
+    assert anywhere[1] @ every[1].ravel() == pytest.approx(-0.4)
+    assert anywhere[1] @ every[0].ravel() ** 2 == pytest.approx(9e-6)
+
+
+def test_points_lie_where_they_were_asked(tread) -> None:
+    _, surface, patch = patches(tread, 3e-3, 0.004)
+    assert np.allclose(patch.points[:, :2] / 0.004, np.round(patch.points[:, :2] / 0.004))
+    assert np.allclose(patch.weights @ surface._positions[patch.index], patch.points, atol=1e-10)
+    assert np.array_equal(patch.edge, patch.gap > 3e-3)
+    assert 0 < np.count_nonzero(patch.edge) < len(patch.edge)
+    assert not patch.edge[patch.gap < 1e-3].any()
+    # Every grid point within reach is there: neighbours in x of inner points are 4 mm away.
+    found, _, _ = surface.locate(np.array([0.5]), np.array([0.0]))
+    assert not surface.locate(np.array([0.5]), np.array([0.0]))[2][0]
+
+
+@pytest.mark.parametrize("pitch", [0.004, 0.002])
+def test_settled_state_keeps_the_load(tread, pitch: float) -> None:
+    force, _, patch = patches(tread, 3e-3, pitch)
+    nodal = force[patch.index]
+    p = len(patch.index)
+    flexibility = 1e-5 * (np.eye(p) + 0.5)
+    spec = Contact(youngs_modulus=5e6, points=Pitch(pitch, pitch))
+    settled, rise = settle(patch, step_solver(spec, patch, flexibility), flexibility, nodal)
+    assert settled.force.sum() == pytest.approx(500.0, rel=1e-7)
+    assert settled.force.min() >= 0 and settled.gap.min() >= 0
+    assert not (settled.force * settled.gap).any()
+    assert abs(rise) < 2e-2
+    # Taken as the reference, it stays.
+    solver = step_solver(spec, settled, flexibility)
+    again = solver.solve(settled.gap, settled.force > 0, reference=settled.force)
+    assert np.array_equal(again, settled.force)
+
+
+def test_nodes_and_points_exchange_the_same_work(tread) -> None:
+    _, _, patch = patches(tread, 2e-3, 0.004)
+
+    class Tire:
+        same_step = 1e-5 * np.eye(len(patch.index))
+        force = None
+
+        def predict(self):
+            return np.linspace(0, 1, len(patch.index))
+
+        def advance(self, force):
+            self.force = force
+
+        def inertia_force(self):
+            return np.zeros(3)
+
+        def snapshot(self):
+            return {}
+
+        def restore(self, kept):
+            pass
+
+    tire = Tire()
+    on = OnPoints(tire, patch.weights)
+    force = np.random.default_rng(0).random(len(patch.points))
+    on.advance(force)
+    assert tire.force.sum() == pytest.approx(force.sum())
+    assert tire.force @ tire.predict() == pytest.approx(force @ on.predict())
+    assert np.allclose(on.same_step @ force, patch.weights @ (1e-5 * tire.force))
+
+
+def test_a_grid_needs_a_tread_and_a_sane_pitch(tread) -> None:
+    _, _, patch = patches(tread, 3e-3, 0.001)
+    flexibility = 1e-5 * np.eye(len(patch.index))
+    with pytest.raises(InputError, match="tread"):
+        step_solver(Contact(tread="none"), patch, flexibility)
+    with pytest.raises(InputError, match="coarser"):
+        patches(tread, 3e-3, 1e-6)
+
+
+def test_solver_by_the_number_of_touching_points(tread) -> None:
+    for pitch, solver in ((0.004, ActiveSet), (0.001, ProjectedCG)):
+        _, _, patch = patches(tread, 3e-3, pitch)
+        flexibility = 1e-5 * np.eye(len(patch.index))
+        assert isinstance(step_solver(Contact(), patch, flexibility), solver)

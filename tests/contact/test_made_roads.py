@@ -1,0 +1,94 @@
+"""Steps, cleats, ISO 8608 profiles and textures: heights, spectra, bounds, memory."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from contact.iso8608 import CHUNK, CLASSES, Iso8608
+from contact.obstacle import Obstacle
+from contact.road import make_road
+from contact.texture import Texture
+from fem.errors import InputError
+
+
+def test_cleat_and_step() -> None:
+    x = np.array([0.29, 0.31, 0.33, 0.35, 0.40, 0.41, 0.44])
+    zero = np.zeros(len(x))
+    cleat = make_road(kind="cleat", position=0.3, height=0.01, length=0.1, ramp=0.02, angle=0.0)
+    assert np.allclose(cleat.road.height(x, zero), [0, 0.005, 0.01, 0.01, 0.01, 0.005, 0])
+    step = make_road(kind="step", position=0.3, height=-0.02, ramp=0.0, angle=30.0)
+    assert np.allclose(step.road.height(x, zero) / -0.02, [0, 0, 0, 1, 1, 1, 1])
+    # At 30 degrees the edge is met 0.1 tan(30) later 0.1 m to the right.
+    edge = 0.3 / np.cos(np.pi / 6) + 0.1 * np.tan(np.pi / 6)
+    side = np.array([-0.1, -0.1])
+    assert np.array_equal(step.road.height(edge + np.array([-1e-9, 1e-9]), side), [0.0, -0.02])
+    assert (step.road.highest(0, 1, 0, 1), step.road.lowest(0, 1, 0, 1)) == (0.0, -0.02)
+    with pytest.raises(InputError, match="ramp"):
+        Obstacle(0.3, 0.01, 0.02, 0.03, 0.0)
+
+
+def test_iso8608_has_its_class_spectrum() -> None:
+    pitch = 0.05
+    x = pitch * np.arange(200_000)
+    z = Iso8608("C", 0.5, seed=3).height(x, 0 * x)
+    frequency, density = signal.welch(z, 1 / pitch, nperseg=8192)
+    for low, high in ((0.02, 0.1), (0.1, 0.5), (0.5, 1.8)):
+        band = (frequency >= low) & (frequency < high)
+        expected = CLASSES["C"] * (frequency[band] / 0.1) ** -2
+        assert (density[band] / expected).mean() == pytest.approx(1.0, abs=0.2)
+    assert density[frequency > 2.5].max() < 1e-6 * density.max()
+
+
+def test_iso8608_is_smooth_repeatable_and_bounded() -> None:
+    road, again = Iso8608("D", 0.1, 5), Iso8608("D", 0.1, 5)
+    seam = CHUNK * 0.1 / 16
+    x = seam + np.linspace(-1e-3, 1e-3, 2001)
+    z = road.height(x, 0 * x)
+    assert np.abs(np.diff(z, 2)).max() < 1e-9
+    exact = np.cos(np.outer(x, road._wavenumber) + road._phase) @ road._amplitude
+    assert np.abs(z - exact).max() < 1e-2 * road._amplitude[-1]
+    assert np.array_equal(z, again.height(x, 0 * x))
+    assert not np.allclose(z, Iso8608("D", 0.1, 6).height(x, 0 * x))
+    far = np.linspace(3.0, 40.0, 50001)
+    heights = road.height(far, 0 * far)
+    assert road.lowest(3, 40, 0, 0) <= heights.min() and heights.max() <= road.highest(3, 40, 0, 0)
+    assert road.highest(3, 40, 0, 0) < heights.max() + 1e-3
+
+
+def test_ten_kilometres_take_no_more_memory_than_ten_metres() -> None:
+    road = Iso8608("C", 0.5)
+    patch = np.linspace(-0.1, 0.1, 50)
+    road.height(patch, patch)
+    tracemalloc.start()
+    for way in np.arange(0.0, 10_000.0, 20.0):
+        road.height(way + patch, patch)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 60e6
+
+
+def test_texture_spectrum_and_tiling() -> None:
+    road = Texture(2e-4, 0.8, 0.02, 0.002, seed=1)
+    tile = road._z
+    assert tile.std() == pytest.approx(2e-4)
+    assert abs(tile.mean()) < 1e-12
+    power = np.abs(np.fft.fft2(tile)) ** 2
+    pitch = 0.0005
+    q = np.hypot(
+        *(
+            np.fft.fftfreq(n, pitch)[s]
+            for n, s in zip(tile.shape, ((slice(None), None), (None, slice(None))), strict=True)
+        )
+    )
+    inner, outer = (q > 60) & (q < 80), (q > 300) & (q < 400)
+    slope = np.log(power[outer].mean() / power[inner].mean()) / np.log(350 / 70)
+    assert slope == pytest.approx(-3.6, abs=0.15)
+    assert power[(q > 510) | ((q < 49) & (q > 0))].max() < 1e-20 * power.max()
+    x, y = np.random.default_rng(0).random((2, 50))
+    length, width = (n * pitch for n in tile.shape)
+    assert np.allclose(road.height(x + length, y - 2 * width), road.height(x, y), atol=1e-15)
+    assert np.allclose(road.height(np.array([3 * pitch]), np.array([5 * pitch])), tile[3, 5])
+    with pytest.raises(InputError, match="cut_off"):
+        Texture(1e-4, 0.8, 1.0, 1e-5)

@@ -1,0 +1,168 @@
+"""The time loop with a made-up tire: rest, orders of convergence, energy, processes, refusals."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.complementarity import ActiveSet
+from contact.energy import Work
+from contact.flat import Flat
+from contact.rolling import Drive, roll
+from contact.synthetic import Strip, oval_patch
+from contact.tread import half_space_compliance
+from fem.errors import ConvergenceError
+from greens.convolution import Convolution
+from greens.recursion import Recursion
+
+PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
+TREAD = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
+STRIP = Strip(speed=20.0)
+
+
+def shaken(t: float) -> float:
+    return 4e-4 * (1 - np.cos(2 * np.pi * 60.0 * t))
+
+
+def wavy(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return 5e-4 * np.minimum(x / 0.3, 1.0) ** 3 * np.sin(2 * np.pi * x / 0.25 + 10 * y) * (x > 0)
+
+
+def run(response, step, steps, scheme, height=None, motion=shaken, speed=20.0, comm=MPI.COMM_SELF):
+    tire = (
+        Convolution(response, step, steps)
+        if scheme == "convolution"
+        else Recursion(response, step, scheme, comm)
+    )
+    solver = ActiveSet(tire.same_step + TREAD)
+    drive = Drive(height or Flat().height, motion, speed)
+    return list(roll(tire, solver, PATCH, drive, step, steps)), tire, solver
+
+
+@pytest.mark.parametrize("scheme", ["linear", "constant", "convolution"])
+@pytest.mark.parametrize("speed", [0.0, 30.0])
+def test_flat_road_at_rest_stays_at_rest_bit_for_bit(scheme: str, speed: float) -> None:
+    response = Strip(speed=speed).response(PATCH.points, 6, 3, residual=4)
+    instants, _, solver = run(response, 1e-4, 200, scheme, motion=lambda t: 0.0, speed=speed)
+    for instant in instants:
+        assert np.array_equal(instant.force, PATCH.force)
+        assert np.array_equal(instant.gap, PATCH.gap)
+        assert not instant.displacement.any()
+    assert solver.factorisations == 1
+
+
+@pytest.mark.parametrize(("scheme", "order"), [("linear", 2.0), ("constant", 1.0)])
+def test_order_of_convergence_with_residual(scheme: str, order: float) -> None:
+    response = STRIP.response(PATCH.points, 5, 2, residual=6)
+    duration = 0.01
+
+    def forces(steps: int, scheme: str) -> np.ndarray:
+        instants, _, _ = run(response, duration / steps, steps, scheme, height=wavy)
+        every = steps // 25
+        return np.stack([i.force for i in instants[every - 1 :: every]])
+
+    exact = forces(6400, "linear")
+    errors = [
+        np.linalg.norm(forces(n, scheme) - exact) / np.linalg.norm(exact - PATCH.force)
+        for n in (100, 200, 400)
+    ]
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all(np.abs(rates - order) < 0.25), (errors, rates)
+    assert errors[-1] < (1e-3 if order == 2 else 5e-2)
+
+
+def test_convolution_agrees() -> None:
+    response = STRIP.response(PATCH.points, 5, 2, residual=6)
+    duration, differences = 0.008, []
+    for steps in (200, 400):
+        one, _, _ = run(response, duration / steps, steps, "linear")
+        other, _, _ = run(response, duration / steps, steps, "convolution")
+        change = np.stack([a.force - b.force for a, b in zip(one, other, strict=True)])
+        differences.append(np.abs(change).max() / PATCH.force.max())
+        axle = np.stack([a.axle_force - b.axle_force for a, b in zip(one, other, strict=True)])
+    assert differences[1] < 0.02
+    assert differences[1] < 0.6 * differences[0]
+    assert np.abs(axle).max() < 0.05 * PATCH.force.sum()
+
+
+def test_constant_scheme_never_gains_energy_undamped() -> None:
+    """Thrown up by a short rise of the road and left alone: waves, jumps and landings.
+
+    Waves |z|^2/m, springs (residual and tread), the load's height f_s . g: each step changes their
+    sum by -f . g(before) or less.
+    """
+    strip = Strip(damping=0.0)
+    response = strip.response(PATCH.points, 4, 2, residual=6)
+    step = 2e-4
+    tire = Recursion(response, step, "constant", MPI.COMM_SELF)
+    solver = ActiveSet(tire.same_step + TREAD)
+
+    def blow(t: float) -> float:
+        return 2e-2 if t < 2.5 * step else 0.0
+
+    energies, active = [], []
+    for instant in roll(tire, solver, PATCH, Drive(Flat().height, blow, 0.0), step, 3000):
+        change = instant.force - PATCH.force
+        waves = float((np.abs(tire.state) ** 2).sum()) / strip.mass
+        springs = 0.5 * change @ (response.residual + TREAD) @ change
+        energies.append(waves + springs + PATCH.force @ instant.gap)
+        active.append(instant.active)
+    left = np.array(energies[3:])
+    assert 0 in active and max(active[1500:]) > 0
+    assert left[0] > 0.05
+    assert np.diff(left).max() < 1e-12 * left[0]
+    assert 0 < left[-1] < left[0]
+
+
+def test_motion_without_bound_is_refused() -> None:
+    response = STRIP.response(PATCH.points, 3, 2)
+    with pytest.raises(ConvergenceError, match="not finite"):
+        run(response, 1e-4, 5, "linear", motion=lambda t: np.nan)
+
+
+def test_edge_of_the_patch_is_reported() -> None:
+    at_edge = PATCH.force.copy()
+    PATCH.check_edge(at_edge, 0.0, 1e-3)
+    at_edge[0] = 1.0
+    with pytest.raises(ConvergenceError, match="contact.reach"):
+        PATCH.check_edge(at_edge, 0.5, 1e-3)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("scheme", ["linear", "constant"])
+def test_same_answer_on_any_number_of_processes(scheme: str) -> None:
+    response = STRIP.response(PATCH.points, 5, 3, residual=4)
+    one, _, _ = run(response, 1e-4, 150, scheme, height=wavy)
+    spread, _, _ = run(response, 1e-4, 150, scheme, height=wavy, comm=MPI.COMM_WORLD)
+    for a, b in zip(one, spread, strict=True):
+        assert np.abs(a.force - b.force).max() < 1e-10 * PATCH.force.max()
+        assert np.abs(a.axle_force - b.axle_force).max() < 1e-10 * PATCH.force.sum()
+
+
+def test_axle_carries_the_contact_force_in_the_end() -> None:
+    """A held change of load: when all has died down, the axle feels what the road gives."""
+    response = Strip(damping=400.0).response(PATCH.points, 5, 3, residual=4)
+
+    def raised(t: float) -> float:
+        return 5e-4 * min(t / 0.02, 1.0)
+
+    last = run(response, 2e-4, 1000, "linear", motion=raised, speed=0.0)[0][-1]
+    assert last.force.sum() > 1.02 * PATCH.force.sum()
+    assert last.axle_force[2] == pytest.approx(last.force.sum(), rel=1e-6)
+
+
+def test_work_of_contact_is_the_energy_of_an_undamped_tire() -> None:
+    """Waves and residual springs hold what the road put in, to second order in the step."""
+    strip = Strip(damping=0.0)
+    response = strip.response(PATCH.points, 4, 2, residual=6)
+    errors = []
+    for steps in (200, 400):
+        work = Work()
+        instants, tire, _ = run(response, 0.02 / steps, steps, "linear", speed=0.0)
+        for instant in instants:
+            work.add(instant)
+        change = instants[-1].change
+        held = (np.abs(tire.state) ** 2).sum() / strip.mass
+        held += 0.5 * change @ response.residual @ change
+        errors.append(abs(work.total - held) / max(i.change @ i.moved for i in instants))
+    assert errors[1] < 1e-3
+    assert errors[1] < 0.35 * errors[0]

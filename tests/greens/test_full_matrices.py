@@ -1,0 +1,152 @@
+"""Residual options on a small finite-element tire, against its full matrices."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy import sparse
+
+from fem import probe
+from fem.body import Body
+from fem.equilibrium import Equilibrium
+from fem.loading import Loader
+from fem.material import Material
+from fem.mesh import Torus
+from fem.operators import Operators
+from greens.truncation import Cutoff, estimate
+from modal import undamped
+from modal.basis import project
+from runs.coupling import Basis, Wheel
+
+MATERIAL = {
+    "model": "neo-hookean",
+    "youngs_modulus": 4.8e7,
+    "poisson_ratio": 0.45,
+    "density": 1200.0,
+}
+COUNT = 60
+DAMPING = (500.0, 0.0)
+SPOTS = [(0.0, 0.0), (0.15, 0.1), (-0.2, -0.3), (1.0, 0.5)]
+
+
+@lru_cache(maxsize=1)
+def tire():
+    """An inflated soft torus of 2,112 free unknowns, its lowest modes, loads and readings."""
+    comm = MPI.COMM_WORLD
+    section = Torus(0.32, 0.10, 0.012, np.radians(120), 16, 6, 1, 2)
+    body = Body(comm, section, Material(**MATERIAL))
+    Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
+    operators = Operators(body, 2e5)
+    modes = undamped.solve(operators.stiffness, operators.mass, COUNT)
+    weights = [probe.spot(body.lattice, *spot) for spot in SPOTS]
+    loads = sparse.csr_matrix(np.stack([probe.directed(w, (0, 0, 1.0)) for w in weights]))
+    readings = [probe.directed(w, axis) for w in weights[:2] for axis in np.eye(3)]
+    return operators, operators.rotation(), modes, sparse.csr_matrix(np.stack(readings)), loads
+
+
+def wheel(speed: float, damping=DAMPING, inertia: str = "full") -> tuple[Wheel, Basis]:
+    operators, rotation, modes, _, _ = tire()
+    made = Wheel(operators, rotation if speed else None, speed, damping, inertia)
+    comm = operators.body.comm
+    projection = project(modes, made.rotation, operators.mass, comm)
+    shape = operators.body.surface(operators.spread(modes.vectors)).reshape(-1, COUNT)
+    return made, Basis(shape, projection, made.decouple(projection, comm))
+
+
+def response(made: Wheel, basis: Basis, option: str):
+    _, _, modes, readings, loads = tire()
+    if option == "none":
+        return basis.couple(readings, loads)
+    return made.respond(basis, modes, readings, loads, option)
+
+
+def off(found: np.ndarray, exact: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(found - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))
+
+
+OPTIONS = ("dirac", "static", "second-order", "attachment")
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("speed", "damping", "inertia"),
+    [
+        (0.0, DAMPING, "full"),
+        (60.0, DAMPING, "full"),
+        (60.0, DAMPING, "doppler"),
+        (60.0, (100.0, 1e-5), "full"),
+        (60.0, (0.0, 0.0), "full"),
+    ],
+)
+def test_static_limit_is_exact(speed, damping, inertia) -> None:
+    """H(0) is the full matrices' own, to 1e-9, with every residual option."""
+    made, basis = wheel(speed, damping, inertia)
+    _, _, _, readings, loads = tire()
+    exact = made.receptance(readings, loads, np.zeros(1))
+    for option in OPTIONS:
+        found = response(made, basis, option)
+        assert off(found.receptance(np.zeros(1)), exact)[0] < 1e-9, option
+        assert found.eigenvalue.real.max() <= 1e-9 * np.abs(found.eigenvalue).max(), option
+
+
+def test_hundredth_of_the_error_up_to_half_the_highest_mode() -> None:
+    """Standing and rolling: what each option leaves of the full matrices' receptance."""
+    operators, _, modes, readings, loads = tire()
+    frequency = np.linspace(0, modes.frequency[-1] / 2, 4)
+    most = {
+        0.0: {"static": 0.12, "second-order": 0.01, "attachment": 0.01},
+        60.0: {"static": 0.12, "second-order": 0.03, "attachment": 0.01},
+    }
+    for speed, allowed in most.items():
+        made, basis = wheel(speed)
+        exact = made.receptance(readings, loads, frequency)
+        error = {
+            o: off(response(made, basis, o).receptance(frequency), exact).max() for o in allowed
+        }
+        none = off(response(made, basis, "none").receptance(frequency), exact).max()
+        assert all(error[o] < allowed[o] for o in allowed), error
+        assert none > 0.3 and error["attachment"] < error["static"] / 5
+
+
+def test_estimates_are_of_the_size_of_the_errors() -> None:
+    """Within twelve times of the truth and not below a quarter of it."""
+    _, _, modes, readings, loads = tire()
+    made, basis = wheel(30.0)
+    frequency = np.linspace(0, modes.frequency[-1] / 2, 4)
+    exact = made.receptance(readings, loads, frequency)
+    cutoff = Cutoff(2 * np.pi * modes.frequency[-1], DAMPING[0])
+    for option in ("none", *OPTIONS):
+        found = response(made, basis, option)
+        true = off(found.receptance(frequency), exact).max()
+        estimated = estimate(found, option, cutoff, frequency).max()
+        assert true / 4 < estimated < 12 * true, option
+
+
+def test_attachments_keep_the_modes_and_the_orthonormality() -> None:
+    from fem.compliance import static_shapes
+    from greens.attachment import with_attachments
+
+    operators, _, modes, _, loads = tire()
+    made, _ = wheel(60.0)
+    shapes = static_shapes(operators, made.rotating_stiffness, made.rotating_damping, loads)
+    comm = operators.body.comm
+    grown = with_attachments(modes, operators.stiffness, operators.mass, shapes.columns, comm)
+    assert len(grown.squares) == COUNT + len(SPOTS)
+    assert grown.squares[COUNT:].min() > modes.squares[-1]
+    weighted = operators.mass[:, None] * grown.vectors
+    unit = undamped.gram(comm, grown.vectors, weighted)
+    assert np.abs(unit - np.eye(len(unit))).max() < 1e-10
+    product = undamped.multiply(operators.stiffness, grown.vectors)
+    energy = undamped.gram(comm, grown.vectors, product)
+    size = np.sqrt(np.outer(grown.squares, grown.squares))
+    assert np.abs((energy - np.diag(grown.squares)) / size).max() < 1e-7
+
+
+def test_direct_receptance_is_reciprocal_and_damped() -> None:
+    """H_ij(Omega) = H_ji of the same wheel only when it stands; power goes in, never out."""
+    made, _ = wheel(0.0)
+    loads = tire()[4]
+    H = made.receptance(loads, loads, np.array([30.0, 90.0]))
+    assert np.abs(H - H.transpose(0, 2, 1)).max() < 1e-10 * np.abs(H).max()
+    assert (np.linalg.eigvalsh(-(H - H.conj().transpose(0, 2, 1)) / 2j) > 0).all()

@@ -1,0 +1,165 @@
+"""The recursion against the matrix exponential, and against the direct convolution."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy import linalg
+from systems import make
+
+from fem.errors import InputError
+from greens.convolution import Convolution
+from greens.recursion import Recursion
+
+STEPS = 60
+
+
+def march(tire, force: np.ndarray) -> np.ndarray:
+    """Displacement after each step for forces (steps + 1, k)."""
+    tire.start(force[0])
+    out = []
+    for new in force[1:]:
+        free = tire.predict()
+        tire.advance(new)
+        out.append(free + tire.same_step @ new)
+    return np.stack(out)
+
+
+def exact_march(system, force: np.ndarray, step: float, scheme: str) -> np.ndarray:
+    """The companion system with the force held or linear: its exponential with the force's states."""
+    size, k = system.push.shape
+    wide = np.zeros((size + 2 * k, size + 2 * k))
+    wide[:size, :size] = system.companion
+    wide[:size, size : size + k] = system.push
+    wide[size : size + k, size + k :] = np.eye(k)
+    moved = linalg.expm(wide * step)[:size]
+    state, out = np.zeros(size), []
+    for old, new in zip(force[:-1], force[1:], strict=True):
+        begin, rate = (old, (new - old) / step) if scheme == "linear" else (new, 0 * new)
+        state = moved @ np.concatenate([state, begin, rate])
+        out.append(system.reading @ state)
+    return np.stack(out)
+
+
+def some_force(points: int, seed: int = 1) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=(STEPS + 1, points))
+
+
+@pytest.mark.parametrize("scheme", ["linear", "constant"])
+@pytest.mark.parametrize("step", [1e-5, 1e-3, 5e-2])
+def test_recursion_is_exact_for_its_kind_of_force(scheme, step) -> None:
+    system = make(speed=60.0)
+    force = some_force(4)
+    if scheme == "constant":
+        force[0] = 0
+    exact = exact_march(system, force, step, scheme)
+    found = march(Recursion(system.response(), step, scheme, MPI.COMM_SELF), force)
+    assert np.abs(found - exact).max() < 1e-9 * np.abs(exact).max()
+
+
+def test_residual_acts_at_once() -> None:
+    system = make()
+    whole = system.shape @ np.linalg.solve(system.stiffness, system.shape.T) + np.eye(4) * 1e-4
+    force = some_force(4)
+    plain = march(Recursion(system.response(), 1e-3, "linear", MPI.COMM_SELF), force)
+    with_residual = system.response(compliance=whole)
+    found = march(Recursion(with_residual, 1e-3, "linear", MPI.COMM_SELF), force)
+    extra = force[1:] @ with_residual.residual.T
+    assert np.abs(found - plain - extra).max() < 1e-13
+    assert np.abs(extra).max() > 1e-5
+
+
+def test_steady_force_ends_at_the_static_answer() -> None:
+    system = make(damping=80.0)
+    static = system.shape @ np.linalg.solve(system.stiffness, system.shape.T)
+    force = np.tile([1.0, -2.0, 0.5, 3.0], (STEPS + 1, 1))
+    found = march(Recursion(system.response(), 0.02, "linear", MPI.COMM_SELF), force)[-1]
+    assert np.abs(found - static @ force[0]).max() < 1e-9 * np.abs(found).max()
+
+
+def test_linear_scheme_is_of_second_order_and_constant_of_first() -> None:
+    system = make()
+    response = system.response()
+
+    def end(step, scheme):
+        times = step * np.arange(round(0.05 / step) + 1)
+        force = np.sin(2 * np.pi * 42 * times)[:, None] * np.ones(4)
+        return march(Recursion(response, step, scheme, MPI.COMM_SELF), force)[-1]
+
+    exact = end(0.05 / 6400, "linear")
+    for scheme, order, cap in (("linear", 2, 2e-3), ("constant", 1, 0.1)):
+        errors = [np.abs(end(0.05 / n, scheme) - exact).max() for n in (100, 200, 400)]
+        slopes = np.log2(np.array(errors[:-1]) / errors[1:])
+        assert slopes == pytest.approx(order, abs=0.1)
+        assert errors[-1] < cap * np.abs(exact).max()
+
+
+def test_convolution_comes_to_the_recursion_at_first_order() -> None:
+    system = make()
+    response = system.response(
+        compliance=system.shape @ np.linalg.solve(system.stiffness, system.shape.T) + 1e-4
+    )
+    errors = []
+    for n in (400, 800, 1600):
+        step = 0.05 / n
+        times = step * np.arange(n + 1)
+        force = (1 + np.sin(2 * np.pi * 40 * times))[:, None] * np.ones(4)
+        direct = march(Convolution(response, step, n), force)
+        found = march(Recursion(response, step, "linear", MPI.COMM_SELF), force)
+        errors.append(np.abs(direct - found).max() / np.abs(found).max())
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(1, abs=0.15)
+    assert errors[-1] < 2e-2
+
+
+def test_inertia_force_is_the_rate_of_momentum() -> None:
+    """Sum p eta'' of the recursion is the second difference of Sum p eta, as linear pieces have it."""
+    system = make()
+    m = len(system.drag)
+    momentum = type(system)(system.drag, system.stiffness, np.vstack([system.shape, np.ones(m)]))
+    step = 1e-5
+    force = np.zeros((STEPS + 1, 5))
+    force[:, :4] = np.linspace(0, 1, STEPS + 1)[:, None] ** 2
+    tire = Recursion(momentum.response(), step, "linear", MPI.COMM_SELF)
+    tire.start(force[0])
+    carried, rates = [], []
+    for new in force[1:]:
+        carried.append((tire.predict() + tire.same_step @ new)[-1])
+        tire.advance(new)
+        rates.append(tire.inertia_force())
+    rates, second = np.array(rates), np.diff(carried, 2)[:, None] / step**2
+    mean = (rates[:-2] + 4 * rates[1:-1] + rates[2:]) / 6
+    assert np.abs(mean - second).max() < 1e-5 * np.abs(second).max()
+
+
+def test_too_long_a_convolution_is_refused() -> None:
+    with pytest.raises(InputError, match="needs no history"):
+        Convolution(make().response(), 1e-6, 10**8)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("scheme", ["linear", "constant"])
+def test_the_same_on_any_number_of_processes(scheme) -> None:
+    system = make(m=11)
+    force = some_force(4)
+    response = system.response()
+    alone, spread = (Recursion(response, 1e-3, scheme, c) for c in (MPI.COMM_SELF, MPI.COMM_WORLD))
+    one, all_of_them = march(alone, force), march(spread, force)
+    assert np.abs(one - all_of_them).max() < 1e-12 * np.abs(one).max()
+    assert np.abs(alone.inertia_force() - spread.inertia_force()).max() < 1e-10
+
+
+def test_dirac_residual_answers_with_a_pulse_of_one_step() -> None:
+    """Thesis (C.4): G_res / step for one step is the mean force over it; in the end the same."""
+    system = make(damping=80.0)
+    whole = system.shape @ np.linalg.solve(system.stiffness, system.shape.T) + np.eye(4) * 1e-4
+    at_once = system.response(compliance=whole)
+    pulse = replace(at_once, pulse=True)
+    force = some_force(4)
+    first, second = (
+        march(Recursion(r, 1e-3, "linear", MPI.COMM_SELF), force) for r in (at_once, pulse)
+    )
+    late = (force[:-1] - force[1:]) @ at_once.residual.T / 2
+    assert np.abs(second - first - late).max() < 1e-13
+    held = [march(Recursion(r, 1e-3, "constant", MPI.COMM_SELF), force) for r in (at_once, pulse)]
+    assert np.array_equal(*held)

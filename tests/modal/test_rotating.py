@@ -1,0 +1,169 @@
+"""The second eigenproblem on rings with closed forms and on random matrices of a tire's structure."""
+
+import numpy as np
+import pytest
+from rings import inextensional_ring, random_tire, wave_ring
+
+from fem.errors import ConvergenceError
+from modal.campbell import critical_speed, growth, onset, sweep
+from modal.rotating import checks, matrices, rotating, standing
+
+WAVES = {0: 300.0, 1: 420.0, 2: 500.0, 3: 800.0, 4: 1300.0}
+
+
+def states(modes) -> np.ndarray:
+    """All 2m eigenvalues, those of the block included."""
+    pairs = modes.eigenvalue[modes.eigenvalue.imag > 0]
+    return np.concatenate([modes.eigenvalue, pairs.conj(), np.linalg.eigvals(modes.block)])
+
+
+def nearest(found: np.ndarray, exact: np.ndarray) -> float:
+    return max(np.abs(found - value).min() for value in exact)
+
+
+@pytest.mark.parametrize("speed", [0.0, 20.0, 100.0, 400.0])
+@pytest.mark.parametrize("damping", [0.0, 50.0])
+def test_doppler_shift_is_exact(speed, damping):
+    """s = -gamma/2 +- i sqrt(omega^2 - gamma^2/4) +- i n Omega, below and past the critical speed."""
+    drag, stiffness = matrices(wave_ring(WAVES), speed, (damping, 0.0), "doppler")
+    found = states(rotating(drag, stiffness))
+    assert len(found) == 20
+    exact = [
+        -damping / 2 + 1j * (sign * np.sqrt(w**2 - damping**2 / 4) + way * n * speed)
+        for n, w in WAVES.items()
+        for sign in (1, -1)
+        for way in (1, -1)
+    ]
+    assert nearest(found, np.array(exact)) < 1e-9 * 1300.0
+    assert nearest(np.array(exact), found) < 1e-9 * 1300.0
+
+
+@pytest.mark.parametrize("speed", [0.0, 100.0])
+def test_inextensional_ring_of_endo(speed):
+    """Both frames, against Endo's closed form and its figures for R = 0.3 m, h = 0.015 m."""
+    waves = [2, 3, 4]
+    bending = 4.8e8 * 0.015**2 / (12 * 1200.0 * 0.3**4)
+    projection = inextensional_ring(waves, bending, speed)
+    found = np.abs(states(rotating(*matrices(projection, speed, (0.0, 0.0), "full"))).imag)
+    n = np.array(waves)
+    root = np.sqrt(n**2 * (n**2 - 1) ** 2 / (n**2 + 1) * (bending + speed**2 / (n**2 + 1)))
+    turn = 2 * n * speed / (n**2 + 1)
+    fixed = np.concatenate([np.abs(turn + root - n * speed), np.abs(turn - root - n * speed)])
+    assert nearest(found, fixed) < 1e-9 * root.max()
+    printed = {
+        0.0: [12.995, 36.755, 70.475],
+        100.0: [42.199, 91.206, 146.295, 4.002, 14.812, 33.950],
+    }
+    assert nearest(found / (2 * np.pi), np.array(printed[speed])) < 6e-4
+
+
+@pytest.mark.parametrize("speed", [0.0, 30.0])
+@pytest.mark.parametrize("gamma", [0.0, 500.0, 3000.0, 1e5])
+def test_identities_and_residuals(speed, gamma):
+    """From undamped to all pairs overdamped; `checks` raises when an identity fails."""
+    drag, stiffness = matrices(random_tire(40), speed, (gamma, 0.0), "full")
+    modes = rotating(drag, stiffness)
+    figures = checks(modes, drag, stiffness)
+    assert figures["biorthogonality"] < 1e-9
+    assert figures["sum identity 0"] < 1e-9
+    assert figures["sum identity 1"] < 1e-9
+    assert len(states(modes)) == 80
+    if gamma == 1e5 and speed == 0:
+        assert (modes.eigenvalue.imag == 0).all()
+
+
+def test_checks_notice_a_wrong_left_vector():
+    drag, stiffness = matrices(random_tire(10), 30.0, (500.0, 0.0), "full")
+    modes = rotating(drag, stiffness)
+    modes.left[3] *= 1.001
+    with pytest.raises(ConvergenceError, match="sum identity"):
+        checks(modes, drag, stiffness)
+
+
+@pytest.mark.parametrize("inertia", ["full", "doppler"])
+def test_left_vectors_are_the_right_ones_of_the_other_turn(inertia):
+    """With gamma2 = 0 the transposed pencil is that of -Omega."""
+    projection = random_tire(30)
+    one = rotating(*matrices(projection, 40.0, (500.0, 0.0), inertia))
+    other = rotating(*matrices(projection, -40.0, (500.0, 0.0), inertia))
+    for k, s in enumerate(one.eigenvalue):
+        twin = np.argmin(np.abs(other.eigenvalue - s))
+        assert abs(other.eigenvalue[twin] - s) < 1e-9 * abs(s)
+        left, right = one.left[k], other.right[:, twin]
+        cosine = abs(left.conj() @ right) / np.linalg.norm(left) / np.linalg.norm(right)
+        assert cosine > 1 - 1e-9
+
+
+def test_slow_rotation_goes_over_into_standing():
+    """Two ways to one answer: the coupled problem at speed 0, and mode by mode."""
+    projection = random_tire(25)
+    coupled = rotating(*matrices(projection, 0.0, (900.0, 1e-5), "full"))
+    single = standing(projection, (900.0, 1e-5))
+    assert nearest(states(coupled), states(single)) < 1e-9 * 4000.0
+    one = (coupled.right / coupled.eigenvalue @ coupled.left).real
+    np.testing.assert_allclose(
+        one, (single.right / single.eigenvalue @ single.left).real, atol=1e-9 * np.abs(one).max()
+    )
+
+
+@pytest.mark.parametrize(("offset", "size"), [(0.0, 4), (1e-14, 4), (1e-9, 0)])
+def test_critical_damping_goes_into_a_block(offset, size):
+    """gamma = 2 omega: two eigenvalues meet in one vector, and beside it they are still apart."""
+    projection = wave_ring({0: 300.0, 2: 500.0})
+    gamma = 600.0 * (1 + offset)
+    drag, stiffness = matrices(projection, 0.0, (gamma, 0.0), "full")
+    for modes in (rotating(drag, stiffness), standing(projection, (gamma, 0.0))):
+        assert len(modes.block) == size
+        checks(modes, drag, stiffness)
+
+
+def test_exactly_repeated_eigenvalues_stay_biorthogonal():
+    """Eight equal rings: every eigenvalue sixteenfold at rest, eightfold when they turn."""
+    projection = wave_ring({2: 500.0, 3: 800.0}, repeats=8)
+    for speed in (0.0, 60.0):
+        drag, stiffness = matrices(projection, speed, (300.0, 0.0), "doppler")
+        figures = checks(rotating(drag, stiffness), drag, stiffness)
+        assert figures["biorthogonality"] < 1e-9
+
+
+def test_critical_speed_of_a_ring():
+    """omega_n = n Omega: the slowest wave of the ring is overtaken first."""
+    projection = wave_ring(WAVES)
+    exact = min(w / n for n, w in WAVES.items() if n)
+    assert critical_speed(projection, "doppler") == pytest.approx(exact, rel=1e-12)
+    _, stiffness = matrices(projection, exact, (0.0, 0.0), "doppler")
+    assert np.linalg.eigvalsh(stiffness)[0] == pytest.approx(0.0, abs=1e-9 * 1300.0**2)
+
+
+def test_onset_of_instability():
+    """A ring held by a stiffer spring at one side: stable at rest, growing past a speed found by onset."""
+    projection = wave_ring(WAVES)
+    extra = np.zeros((10, 10))
+    extra[2:6, 2:6] = 2e4  # couples n = 1 with n = 2, as a footprint does
+    squares, turn = np.linalg.eigh(np.diag(projection.squares) + extra)
+    rotated = {
+        name: turn.T @ getattr(projection, name) @ turn
+        for name in ("gyroscopic", "convective", "body", "body_convective")
+    }
+    tire = type(projection)(squares, projection.momentum, **rotated)
+    speeds = np.linspace(0.0, 600.0, 61)
+    rates = np.array([growth(tire, speed, (1.0, 0.0), "doppler") for speed in speeds])
+    assert rates[0] == 0.0
+    assert (rates > 0).any()
+    first = speeds[np.argmax(rates > 0)]
+    found = onset(tire, (1.0, 0.0), "doppler", float(first))
+    assert first - 10.0 <= found <= first
+    assert growth(tire, found, (1.0, 0.0), "doppler") > 0
+    assert growth(tire, 0.998 * found, (1.0, 0.0), "doppler") == 0
+
+
+def test_branches_go_straight_through_crossings():
+    """Lines omega_n +- n Omega cross many times; tracked by shape they stay straight."""
+    speeds = np.linspace(1.0, 101.0, 41)
+    lines = sweep(wave_ring(WAVES), (0.0, 0.0), "doppler", speeds, 10)
+    slope = np.diff(lines.eigenvalue.imag, axis=0) / np.diff(speeds)[:, None]
+    waves = np.rint(slope[0])
+    np.testing.assert_allclose(slope, np.broadcast_to(waves, slope.shape), atol=1e-6)
+    assert sorted(waves) == [-4, -3, -2, -1, 0, 0, 1, 2, 3, 4]
+    order = np.argsort(lines.frequency[-1])
+    assert (order != np.arange(10)).any(), "no crossing: the test tests nothing"

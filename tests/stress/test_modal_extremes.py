@@ -1,0 +1,69 @@
+"""All modes of a small tire, rolled at speeds from rest to far past critical, with damping from 0 to 1e5 1/s."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.body import Body
+from fem.equilibrium import Equilibrium
+from fem.loading import Loader
+from fem.material import Material
+from fem.mesh import Torus
+from fem.operators import Operators
+from modal import undamped
+from modal.basis import project
+from modal.campbell import critical_speed, growth, onset
+from modal.rotating import checks, matrices, rotating
+
+COMM = MPI.COMM_WORLD
+SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
+
+
+@pytest.fixture(scope="module")
+def operators() -> Operators:
+    section = Torus(0.32, 0.1, 0.012, np.radians(120), 8, 2, 1, 2)
+    body = Body(COMM, section, Material(**SOFT))
+    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader.inflate(2e5)
+    loader.deflect(0.003)
+    return Operators(body, 2e5)
+
+
+@pytest.fixture(scope="module")
+def modes(operators) -> undamped.Modes:
+    body = operators.body
+    points = body.lattice.points(body.ids[operators.free_nodes])
+    return undamped.solve(operators.stiffness, operators.mass, 10**6, points=points)
+
+
+def test_all_modes_are_the_dense_ones(operators, modes):
+    rows = operators.stiffness.getValuesCSR()
+    size = operators.stiffness.getSize()[0]
+    dense = np.zeros((size, size))
+    for k, (low, high) in enumerate(zip(rows[0], rows[0][1:], strict=False)):
+        dense[k, rows[1][low:high]] = rows[2][low:high]
+    root = np.sqrt(operators.mass)
+    exact = np.linalg.eigvalsh(dense / np.outer(root, root))
+    assert len(modes.squares) == modes.inertia_count == size
+    np.testing.assert_allclose(modes.squares, exact, rtol=1e-8)
+
+
+@pytest.mark.parametrize("gamma", [0.0, 500.0, 5000.0, 1e5])
+@pytest.mark.parametrize("inertia", ["full", "doppler"])
+def test_every_speed_and_damping_keeps_its_identities(operators, modes, inertia, gamma):
+    """Below, near and past the critical speed; overdamped pairs; `checks` raises what fails."""
+    projection = project(modes, operators.rotation(), operators.mass, COMM)
+    critical = critical_speed(projection, inertia)
+    for speed in (0.0, 0.3 * critical, 0.999 * critical, 1.3 * critical):
+        drag, stiffness = matrices(projection, speed, (gamma, 0.0), inertia)
+        checks(rotating(drag, stiffness), drag, stiffness)
+
+
+def test_growth_begins_where_onset_says(operators, modes):
+    """Far past critical the pressed tire is unstable; onset brackets the first speed."""
+    projection = project(modes, operators.rotation(), operators.mass, COMM)
+    high = 2 * critical_speed(projection, "full")
+    assert growth(projection, high, (50.0, 0.0), "full") > 0
+    first = onset(projection, (50.0, 0.0), "full", high)
+    assert growth(projection, first, (50.0, 0.0), "full") > 0
+    assert growth(projection, 0.99 * first, (50.0, 0.0), "full") == 0

@@ -1,0 +1,110 @@
+"""Modes of small finite-element tires: mirrors found, doppler shifts, the full quadratic problem, buckling."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fem.body import Body
+from fem.compliance import rotating_stiffness
+from fem.equilibrium import Equilibrium
+from fem.errors import ConvergenceError
+from fem.loading import Loader
+from fem.material import Material
+from fem.mesh import Torus
+from fem.operators import Operators
+from modal import quadratic, undamped
+from modal.basis import project
+from modal.rotating import checks, matrices, rotating
+
+COMM = MPI.COMM_WORLD
+INFLATION = 2e5
+SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
+
+
+def tire(deflection: float, segments: int = 16) -> Operators:
+    section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, 4, 1, 2)
+    body = Body(COMM, section, Material(**SOFT))
+    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader.inflate(INFLATION)
+    if deflection:
+        loader.deflect(deflection)
+    return Operators(body, INFLATION)
+
+
+def points(operators: Operators) -> np.ndarray:
+    body = operators.body
+    return body.lattice.points(body.ids[operators.free_nodes])
+
+
+@pytest.fixture(scope="module")
+def pressed() -> Operators:
+    return tire(0.004)
+
+
+@pytest.fixture(scope="module")
+def round_tire() -> Operators:
+    return tire(0.0)
+
+
+@pytest.mark.mpi
+def test_mirrors_of_a_pressed_tire(pressed):
+    """At rest without friction both planes are there; splitting changes no eigenvalue."""
+    split = undamped.solve(pressed.stiffness, pressed.mass, 40, points=points(pressed))
+    whole = undamped.solve(pressed.stiffness, pressed.mass, 40)
+    assert len(split.sectors) == 4
+    assert len(whole.sectors) == 1
+    np.testing.assert_allclose(split.squares, whole.squares, rtol=1e-9)
+    assert split.residual.max() < 1e-8
+    assert split.orthonormality < 1e-10
+
+
+@pytest.mark.mpi
+def test_round_tire_has_double_modes_and_doppler_shifts(round_tire):
+    """Eigenvalues of an axisymmetric tire, seen from the ground: those at rest shifted by +- i n Omega."""
+    operators, speed, gamma = round_tire, 30.0, 40.0
+    modes = undamped.solve(operators.stiffness, operators.mass, 120, points=points(operators))
+    projection = project(modes, operators.rotation(), operators.mass, COMM)
+    drag, stiffness = matrices(projection, speed, (gamma, 0.0), "doppler")
+    turning = rotating(drag, stiffness)
+    checks(turning, drag, stiffness)
+    root = np.sqrt(modes.squares[:12] - gamma**2 / 4)
+    shift = np.abs(turning.eigenvalue.imag[:, None] - root) / speed
+    # Each of the lowest lines has one of its two shifted states within the mesh's error of n Omega.
+    order = np.rint(shift)
+    near = np.abs(shift - order) < 0.02
+    assert near.any(axis=0).all()
+    np.testing.assert_allclose(turning.eigenvalue.real, -gamma / 2, atol=0.02 * gamma)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("inertia", ["full", "doppler"])
+def test_full_quadratic_problem_agrees_with_many_projected_modes(pressed, inertia):
+    """The truncation error falls with the number of modes, and is small with 400 of them."""
+    speed, damping = 40.0, (50.0, 0.0)
+    rotation = pressed.rotation()
+    stiffness = rotating_stiffness(pressed, rotation, speed, damping, inertia)
+    drag = (rotation.gyroscopic if inertia == "full" else rotation.body).copy()
+    drag.scale(2 * speed)
+    diagonal = drag.getDiagonal()
+    diagonal.array[:] += damping[0] * pressed.mass
+    drag.setDiagonal(diagonal)
+    full = quadratic.solve(pressed.mass, drag, stiffness, 8)
+    modes = undamped.solve(pressed.stiffness, pressed.mass, 400, points=points(pressed))
+    projection = project(modes, rotation, pressed.mass, COMM)
+    pencil = matrices(projection, speed, damping, inertia)
+    errors = [
+        quadratic.truncation(
+            full.eigenvalue, rotating(*(matrix[:m, :m] for matrix in pencil)).eigenvalue
+        ).max()
+        for m in (40, 400)
+    ]
+    assert errors[1] < 0.2 * errors[0]
+    assert errors[1] < 1e-4
+
+
+def test_buckled_state_is_named(round_tire):
+    """A tire under outer pressure: its stiffness turns negative, and the message says how often."""
+    body = round_tire.body
+    flat = Operators(body, -5e6)
+    with pytest.raises(ConvergenceError, match="negative eigenvalue.*buckles"):
+        undamped.solve(flat.stiffness, flat.mass, 10, points=points(flat))
