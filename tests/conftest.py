@@ -7,24 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).resolve().parent.parent
-
-MPIRUN = {
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_rmaps_base_oversubscribe": "1",
-    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-    "OMPI_MCA_orte_execute_quiet": "1",
-    "OMPI_MCA_btl": "self,vader",
-    "OMPI_MCA_odls_base_sigkill_timeout": "0",
-}
-"""What the launcher sets for mpirun, where pytest was started without it."""
-
-
-def environment(**extra: str) -> dict[str, str]:
-    """The environment of a started program; a copy, without what MPI puts into this process's."""
-    return {**MPIRUN, **os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", **extra}
+from started import ROOT, environment
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import environment
+from started import environment
 
 SCENE = "[static]\nload = 500\n"
 

@@ -6,8 +6,8 @@ import sys
 import time
 
 import pytest
-from conftest import environment
 from mpi4py import MPI
+from started import environment
 
 from fem.errors import ConvergenceError, InputError
 from runs import mpi
