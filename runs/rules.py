@@ -45,7 +45,6 @@ def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise InputError for the first contradiction between keys or tables."""
     _geometry(scene, error)
     _static(scene, raw, error)
-    _rotation(scene, error)
     if scene.contact is not None:
         _contact(scene, error)
     _force(scene, error)
@@ -97,17 +96,6 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
     if len(given) > 1:
         raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
-
-
-def _rotation(scene: Scene, error: Where) -> None:
-    if scene.rotation is None:
-        return
-    if scene.rotation.method == "full" and scene.greens.residual == "attachment":
-        raise error(
-            ("greens", "residual"),
-            '= "attachment" adds to a basis of modes, which rotation.method = "full" does without:'
-            ' take "static" or "second-order"',
-        )
 
 
 def _force(scene: Scene, error: Where) -> None:
