@@ -37,6 +37,9 @@ class Body:
         self.space = compat.vector_space(self.mesh, section.order)
         self.wall = Wall(self.tire, self.space, material, regions)
         self.u = fem.Function(self.space)
+        # One of each for all forms: UFL does not always take two of the same space for equal
+        # (seen with dolfinx 0.5.2, from one run to the next).
+        self.test, self.trial = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
         self.nodes = self.space.dofmap.index_map.size_local
         self.ids = self.lattice.ids(self.space.tabulate_dof_coordinates()[: self.nodes])
         self.rim = self._face_dofs(RIM)
@@ -70,7 +73,7 @@ class Body:
         lobatto = {"quadrature_rule": "GLL", "quadrature_degree": 2 * self.tire.section.order - 1}
         dx = ufl.Measure("dx", domain=self.mesh, metadata=lobatto)
         ones = ufl.as_vector((1.0, 1.0, 1.0))
-        weight = self.wall.density * ufl.inner(ufl.TestFunction(self.space), ones) * dx
+        weight = self.wall.density * ufl.inner(self.test, ones) * dx
         vector = fem.petsc.assemble_vector(compat.form(weight))
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         return vector.array_r.copy()

@@ -5,9 +5,11 @@ Debian 12 ships dolfinx 0.5.2 and Debian 13 ships 0.9; no other file of the prog
 
 from __future__ import annotations
 
+import functools
 import inspect
 import logging
 import warnings
+from collections.abc import Callable
 
 import basix
 import dolfinx.fem.petsc  # noqa: F401  (newer releases do not import it by themselves)
@@ -17,6 +19,24 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
+
+
+def _quietly(function: Callable) -> Callable:
+    """What compiles, without the compiler's command lines and FFCx's unclosed lock files."""
+
+    @functools.wraps(function)
+    def quiet(*arguments):
+        before = logging.root.manager.disable
+        logging.disable(logging.INFO)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", ResourceWarning)
+                return function(*arguments)
+        finally:
+            logging.disable(before)
+
+    return quiet
+
 
 try:
     import basix.ufl
@@ -50,6 +70,7 @@ def _nodes(degree: int, variant) -> np.ndarray:
     return basix.create_element(family, cell, degree, variant).points
 
 
+@_quietly
 def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, degree: int):
     """Distributed mesh of curved hexahedra from each process's share of cells and points. Collective."""
     if HAS_BASIX_UFL:
@@ -62,6 +83,7 @@ def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, degree: i
     return dmesh.create_mesh(comm, cells=cells, x=points, **keywords)
 
 
+@_quietly
 def vector_space(mesh, degree: int):
     """Continuous Lagrange space of displacement vectors."""
     if hasattr(fem, "functionspace"):
@@ -69,6 +91,7 @@ def vector_space(mesh, degree: int):
     return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
+@_quietly
 def cell_space(mesh):
     """Scalars that are constant in each cell."""
     if hasattr(fem, "functionspace"):
@@ -81,16 +104,10 @@ def petsc_vector(function: fem.Function) -> PETSc.Vec:
     return function.x.petsc_vec if hasattr(function.x, "petsc_vec") else function.vector
 
 
+@_quietly
 def form(expression):
     """Compile a UFL form with the program's compiler flags. Collective."""
-    before = logging.root.manager.disable
-    logging.disable(logging.INFO)  # setuptools shows the compiler's command line
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ResourceWarning)  # FFCx leaves its lock file open
-            return fem.form(expression, **{_JIT_KEY: JIT})
-    finally:
-        logging.disable(before)
+    return fem.form(expression, **{_JIT_KEY: JIT})
 
 
 def meshtags(mesh, dim: int, entities: np.ndarray, values: np.ndarray):

@@ -59,7 +59,7 @@ class Operators:
     def rotation(self) -> Rotation:
         """The matrices of the rotating frame. Collective."""
         body = self.body
-        u, v = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
+        u, v = body.trial, body.test
         w = kinematics.wheel_velocity(body.mesh)
         density, convect = body.wall.density, kinematics.convective
         rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)

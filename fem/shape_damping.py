@@ -33,7 +33,7 @@ class ShapeDamping:
         along = ufl.derivative(elastic, body.u, self._rate)
         self.work = factor * ufl.algorithms.expand_derivatives(along)
         self._clamp = [body.clamp()]
-        self._stiffness_form = compat.form(ufl.derivative(elastic, body.u))
+        self._stiffness_form = compat.form(ufl.derivative(elastic, body.u, body.trial))
         self._stiffness = fem.petsc.create_matrix(self._stiffness_form)
         # The rim turns as one with the wheel: it has no rate of its own, nor makes any.
         self._rate_matrix = fem.petsc.assemble_matrix(

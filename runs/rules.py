@@ -45,7 +45,6 @@ def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise InputError for the first contradiction between keys or tables."""
     _geometry(scene, error)
     _static(scene, raw, error)
-    _rotation(scene, error)
     if scene.contact is not None:
         _contact(scene, error)
     _force(scene, error)
@@ -99,17 +98,6 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
 
 
-def _rotation(scene: Scene, error: Where) -> None:
-    if scene.rotation is None:
-        return
-    if scene.rotation.method == "full" and scene.greens.residual == "attachment":
-        raise error(
-            ("greens", "residual"),
-            '= "attachment" adds to a basis of modes, which rotation.method = "full" does without:'
-            ' take "static" or "second-order"',
-        )
-
-
 def _force(scene: Scene, error: Where) -> None:
     receptance = scene.output.receptance
     if receptance is not None and not scene.force:
@@ -134,10 +122,10 @@ def _force(scene: Scene, error: Where) -> None:
 def _greens(scene: Scene, error: Where) -> None:
     rotation, residual = scene.rotation, scene.greens.residual
     full = rotation is not None and rotation.speed > 0 and rotation.method == "full"
-    if full and residual in ("second-order", "attachment"):
+    if full and residual == "attachment":
         raise error(
             ("greens", "residual"),
-            f'= "{residual}" completes the modes: it needs rotation.method = "projected"',
+            '= "attachment" completes the modes: it needs rotation.method = "projected"',
         )
 
 

@@ -71,6 +71,8 @@ CHOICES = (  # modes, residual, step in s
     (50, "static", 1e-4),
     (150, "none", 1e-4),
     (150, "static", 1e-4),
+    (100, "second-order", 1e-4),
+    (100, "attachment", 1e-4),
     (400, "static", 1e-4),
     (400, "static", 2.5e-5),
 )
