@@ -6,8 +6,10 @@ Debian 12 ships dolfinx 0.5.2 and Debian 13 ships 0.9; no other file of the prog
 from __future__ import annotations
 
 import functools
+import hashlib
 import inspect
 import logging
+import platform
 import warnings
 from collections.abc import Callable
 
@@ -19,6 +21,18 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
+
+
+def _cpu() -> str:
+    """A name for this kind of processor. In the compiler's flags it keeps what was compiled for one
+    kind out of the way of another that shares the cache, as the nodes of a cluster may.
+    """
+    try:
+        with open("/proc/cpuinfo") as file:
+            kind = {line for line in file if line.startswith(("model name", "flags", "Features"))}
+    except OSError:
+        kind = {platform.processor()}
+    return hashlib.sha256("".join(sorted(kind)).encode()).hexdigest()[:12]
 
 
 def _quietly(function: Callable) -> Callable:
@@ -47,7 +61,7 @@ else:
 
 # Newer FFCx vectorises better by itself; -O3 and the native instruction set halve the assembly
 # of a hyperelastic tangent on 27-node hexahedra either way.
-JIT = {"cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno"]}
+JIT = {"cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno", f"-DCPU_{_cpu()}"]}
 _JIT_KEY = (
     "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
 )
@@ -79,7 +93,10 @@ def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, degree: i
         key = "e" if "e" in names else "domain"
         keywords = {key: ufl.Mesh(element) if key == "domain" else element}
     else:
-        keywords = {"domain": ufl.Mesh(ufl.VectorElement("Lagrange", "hexahedron", degree))}
+        # FFCx writes this variant into the mesh of the first form it compiles, and not where the form
+        # is in its cache: left open, forms have another signature and compile again in the next run.
+        element = ufl.VectorElement("Lagrange", "hexahedron", degree, variant="equispaced")
+        keywords = {"domain": ufl.Mesh(element)}
     return dmesh.create_mesh(comm, cells=cells, x=points, **keywords)
 
 
