@@ -61,7 +61,10 @@ else:
 
 # Newer FFCx vectorises better by itself; -O3 and the native instruction set halve the assembly
 # of a hyperelastic tangent on 27-node hexahedra either way.
-JIT = {"cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno", f"-DCPU_{_cpu()}"]}
+JIT = {
+    "cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno", f"-DCPU_{_cpu()}"],
+    "timeout": 600,  # s that a second run waits for the first to compile; 10 s are too few
+}
 _JIT_KEY = (
     "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
 )

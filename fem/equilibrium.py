@@ -80,20 +80,13 @@ class Equilibrium:
         return TOLERANCE * self._scale
 
     def _make_solver(self, factorisation: str) -> PETSc.KSP:
-        prefix = "static_"
-        options = PETSc.Options(prefix)
-        defaults = {
-            "ksp_type": "preonly",
-            "pc_type": factorisation,
-            "pc_factor_mat_solver_type": "mumps",
-        }
-        for key, value in defaults.items():
-            if not options.hasName(key):
-                options[key] = value
         ksp = PETSc.KSP().create(self.body.comm)
-        ksp.setOptionsPrefix(prefix)
-        self.matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        ksp.setOptionsPrefix("static_")
         ksp.setOperators(self.matrix)
+        ksp.setType(PETSc.KSP.Type.PREONLY)
+        pc = ksp.getPC()
+        pc.setType(factorisation)
+        pc.setFactorSolverType("mumps")
         ksp.setFromOptions()
         return ksp
 

@@ -5,6 +5,7 @@ for ever in a collective call, they are ended together. Run as a module, this fi
 `python3 -m runs.testing FOLDER PROCESSES [pytest arguments]`.
 """
 
+import importlib.util
 import json
 import os
 import subprocess
@@ -85,7 +86,18 @@ def worker(folder: Path, processes: int, arguments: list[str]) -> int:
             target = os.open(folder / f"{processes}-{rank}.txt", os.O_WRONLY | os.O_CREAT)
             os.dup2(target, sys.stdout.fileno())
     recorder = Recorder(folder / f"{processes}-{rank}.json", comm)
+    if processes == 1:
+        arguments = [*_at_once(arguments), *arguments]
     return int(pytest.main(arguments, plugins=[recorder]))
+
+
+def _at_once(arguments: list[str]) -> list[str]:
+    """Tests of different files at once, where pytest-xdist is there and there is something to gain."""
+    alone = {"--collect-only", "--co", "--pdb", "-s", "-n", "-x"} & set(arguments)
+    cores = min(os.cpu_count() or 1, 8)
+    if alone or cores == 1 or importlib.util.find_spec("xdist") is None:
+        return []
+    return ["-n", str(cores), "--dist", "loadscope"]
 
 
 def _command(processes: int) -> list[str]:
