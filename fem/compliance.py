@@ -159,6 +159,8 @@ def factorise(stiffness: PETSc.Mat) -> PETSc.PC:
     pc.setOperators(stiffness)
     pc.setType(PETSc.PC.Type.CHOLESKY if _symmetric(stiffness) else PETSc.PC.Type.LU)
     pc.setFactorSolverType("mumps")
+    pc.setFactorSetUpSolverType()
+    pc.getFactorMatrix().setMumpsIcntl(14, 100)  # room for pivots that MUMPS did not foresee
     pc.setUp()
     return pc
 

@@ -87,6 +87,10 @@ class Equilibrium:
         pc = ksp.getPC()
         pc.setType(factorisation)
         pc.setFactorSolverType("mumps")
+        # Room for pivots that MUMPS did not foresee: a turning tire's tangent is not symmetric.
+        room = PETSc.Options("static_")
+        if not room.hasName("mat_mumps_icntl_14"):
+            room["mat_mumps_icntl_14"] = 100
         ksp.setFromOptions()
         return ksp
 
