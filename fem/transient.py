@@ -15,7 +15,13 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from fem.compliance import factorise, on_own_rows, rotating_stiffness, solve_columns
+from fem.compliance import (
+    factorise,
+    on_own_rows,
+    rotating_damping,
+    rotating_stiffness,
+    solve_columns,
+)
 from fem.operators import Operators, Rotation
 
 
@@ -42,7 +48,7 @@ class FullTire:
         self._operators, self._comm, self._step = operators, operators.body.comm, step
         self._mass = operators.mass
         self._outputs = on_own_rows(operators, outputs).T.tocsr()
-        self._drag = _drag(operators, rotation, speed, damping, inertia)
+        self._drag = rotating_damping(operators, rotation, speed, damping, inertia)
         stiffness = rotating_stiffness(operators, rotation, speed, damping, inertia)
         system = stiffness.copy()
         different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
@@ -106,22 +112,3 @@ class FullTire:
         """Rate of the tire's momentum (3,), N: the convective parts cancel around the ring."""
         rate = (self._mass * self._balanced).reshape(-1, 3).sum(axis=0)
         return self._comm.allreduce(rate)
-
-
-def _drag(
-    operators: Operators,
-    rotation: Rotation | None,
-    speed: float,
-    damping: tuple[float, float],
-    inertia: str,
-) -> PETSc.Mat:
-    """gamma1 M + gamma2 K + 2 Omega G (doppler: B for G)."""
-    drag = operators.stiffness.copy()
-    drag.scale(damping[1])
-    diagonal = drag.getDiagonal()
-    diagonal.array[:] += damping[0] * operators.mass
-    drag.setDiagonal(diagonal)
-    if speed:
-        turning = rotation.gyroscopic if inertia == "full" else rotation.body
-        drag.axpy(2 * speed, turning, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    return drag
