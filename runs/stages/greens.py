@@ -126,7 +126,7 @@ def _prepare_forces(session: Session) -> None:
 def compute(session: Session, path: Path) -> None:
     """Responses with their residual, the choice of dynamic states, and their file. Collective."""
     responses = {}
-    for name, (outputs, loads) in _probes(session).items():
+    for name, (outputs, loads) in probes(session).items():
         whole = make(session, outputs, loads)
         responses[name] = chosen(session, whole)
         judge(session, name, whole, responses[name])
@@ -142,7 +142,7 @@ def compute(session: Session, path: Path) -> None:
     session.write(path, "greens", fill)
 
 
-def _probes(session: Session) -> dict[str, tuple]:
+def probes(session: Session) -> dict[str, tuple]:
     """(outputs, loads) on the outer face of the contact patch and of the prescribed forces."""
     from fem.probe import nodes
 
