@@ -23,8 +23,8 @@ _MODULES = {
     "modes": modes,
     "rotating": rotating,
     "greens": greens,
-    "response": response,
     "contact": contact,
+    "response": response,
     "spectra": spectra,
 }
 
