@@ -18,12 +18,15 @@ import numpy as np
 from contact.complementarity import ContactSolver
 from contact.friction import Friction
 from contact.patch import Patch
+from greens.loaded import LoadedColumns
 
 
 class Tire(Protocol):
     """A linear tire between the patch's forces and displacements (greens.recursion, .convolution)."""
 
     same_step: np.ndarray
+
+    def start(self, force: np.ndarray) -> None: ...
 
     def predict(self) -> np.ndarray: ...
 
@@ -108,6 +111,9 @@ def roll(
     horizontal = np.zeros((count, 2))
     # The first step starts from the static contact set, the others from the solver's last one.
     touching = None if done else patch.force > 0
+    answer = (
+        LoadedColumns(tire.same_step) if isinstance(tire.same_step, np.ndarray) else tire.same_step
+    )
     for k in range(done + 1, steps + 1):
         time = k * step
         free = tire.predict()
@@ -121,7 +127,7 @@ def roll(
             change = np.concatenate([force - patch.force, *horizontal.T])
         touching = None
         tire.advance(change)
-        moved = free + tire.same_step @ change
+        moved = free + answer @ change
         axle = -tire.inertia_force()
         axle += [*horizontal.sum(axis=0), force.sum()]
         yield Instant(

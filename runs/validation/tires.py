@@ -72,7 +72,7 @@ class Tires:
         session.state_modes = session.wheel.decouple(session.modal.projection, session.comm)
         wanted = replace(session.scene.greens, residual=choice.residual)
         session.scene = replace(session.scene, greens=wanted)
-        (outputs, loads) = next(iter(greens.probes(session).values()))
+        _, outputs, loads = greens.probes(session)
         response = make(session, outputs, loads).resolved(choice.step)
         tire = Recursion(response, choice.step, "linear", session.comm)
         return tire, choice.step, time.perf_counter() - began
@@ -96,7 +96,7 @@ class Tires:
         """All degrees of freedom between the same points; step; set-up in s."""
         session = self.session
         rotation = session.rotation_matrices if session.speed else None
-        (outputs, loads) = next(iter(greens.probes(session).values()))
+        _, outputs, loads = greens.probes(session)
         began = time.perf_counter()
         tire = FullTire(
             session.operators, rotation, session.speed, session.damping, step, outputs, loads
