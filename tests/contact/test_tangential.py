@@ -47,7 +47,7 @@ def test_stiffness_through_nodes_is_the_matrix() -> None:
     assert through.norm() >= dense.norm() * (1 - 1e-12)
 
 
-@pytest.mark.parametrize("bound", [0.1, 0.5, np.inf])
+@pytest.mark.parametrize("bound", [0.5, 2.0, np.inf])
 def test_hundreds_of_points_balance(bound: float) -> None:
     rng = np.random.default_rng(3)
     through, dense = case(rng, 300, 40)
