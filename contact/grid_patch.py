@@ -151,6 +151,10 @@ class OnPoints:
         self.inertia_force = tire.inertia_force
         self.snapshot, self.restore = tire.snapshot, tire.restore
 
+    def start(self, force: np.ndarray) -> None:
+        """Begin with a force (c,) N that is already there at t = 0."""
+        self._tire.start(self._transposed @ force)
+
     def predict(self) -> np.ndarray:
         """Displacement (c,) m at the end of the step with no new force."""
         return self._weights @ self._tire.predict()

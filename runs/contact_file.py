@@ -29,6 +29,7 @@ _LAYOUT: dict[str, tuple[tuple, str]] = {
     "active": ((), "-"),
     "residual": ((), "-"),
 }
+DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, where a scene has them
 
 
 class ContactFile:
@@ -43,6 +44,7 @@ class ContactFile:
         }
         self._checkpoint = session.directory / CHECKPOINT
         self._stack: list = []
+        self._readings: list[np.ndarray] = []
         self._done = 0
 
     def open(self, stack: ExitStack, path: Path) -> dict[str, np.ndarray] | None:
@@ -72,7 +74,9 @@ class ContactFile:
         c = len(patch.points)
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
-        for name, (shape, unit) in _LAYOUT.items():
+        forces = len(self._session.scene.force)
+        driven = {DRIVEN: ((forces, 3), "m")} if forces else {}
+        for name, (shape, unit) in (_LAYOUT | driven).items():
             width = tuple(c if n is None else n for n in shape)
             packed = width[:1] == (c,)
             dataset = self._file.create_dataset(
@@ -88,9 +92,12 @@ class ContactFile:
             dataset.attrs["unit"] = unit
         self._file.attrs.update(self._attributes)
 
-    def add(self, instant) -> None:
-        """Keep a step; write when a block is full. Collective every block."""
+    def add(self, instant, reading: np.ndarray | None = None) -> None:
+        """Keep a step, with the driven points' displacement; write when a block is full. Collective
+        every block."""
         self._stack.append(instant)
+        if reading is not None:
+            self._readings.append(reading.reshape(-1, 3))
         if len(self._stack) == BLOCK:
             self.flush()
 
@@ -98,12 +105,14 @@ class ContactFile:
         """Write the steps kept so far. Collective."""
         on_root(self._session.comm, self._write)
         self._stack.clear()
+        self._readings.clear()
 
     def _write(self) -> None:
         if not self._stack:
             return
         end = self._done + len(self._stack)
-        for name, values in _columns(self._stack).items():
+        driven = {DRIVEN: np.stack(self._readings)} if self._readings else {}
+        for name, values in (_columns(self._stack) | driven).items():
             dataset = self._file[name]
             dataset.resize(end, axis=0)
             dataset[self._done :] = values

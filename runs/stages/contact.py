@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from contact.brush import Brush, BrushLaw
+from contact.driven import Driven
 from contact.energy import Work
 from contact.friction import Friction
 from contact.grid_patch import OnPoints, settle
@@ -22,6 +23,7 @@ from runs import observe, store
 from runs.contact_balance import balance
 from runs.contact_file import ContactFile
 from runs.mpi import Deferred, Stopped
+from runs.point_forces import directions, histories, shortest_period
 from runs.session import Session
 
 # Radians a kept mode may turn in one automatic step: 0.3 leaves less than a percent in its phase.
@@ -39,6 +41,7 @@ def inputs(session: Session) -> dict:
         "road": asdict(scene.road),
         "file": store.file_hash(scene.road.file) if scene.road.file else None,
         "speed": session.road_speed,
+        "forces": [asdict(force) for force in scene.force],
         "time": {k: v for k, v in asdict(scene.time).items() if k != "checkpoint"},
     }
 
@@ -50,7 +53,8 @@ def compute(session: Session, path: Path) -> None:
     tire, step, steps, scheme = integration(session, session.contact_response, shortest)
     with record.timing("tread and solver"):
         _settled(session)
-        loop = Loop(*_on_points(session, tire, step))
+        driven = _driven(session, tire, step, steps)
+        loop = Loop(*_on_points(session, driven or tire, step))
     totals = _Totals()
     with ExitStack() as stack, record.timing("time loop"):
         file = ContactFile(session, {"step": step, "scheme": scheme})
@@ -61,14 +65,22 @@ def compute(session: Session, path: Path) -> None:
             work.set_state(kept)
             totals = _Totals(**{name: kept[name].item() for name in vars(totals)})
             observe.say(f"  goes on from the checkpoint at t = {totals.steps * step:.6g} s")
-        _run(session, loop, file, (totals, work), step, steps)
+        _run(session, loop, driven, file, (totals, work), step, steps)
         file.finish()
     _describe(session, totals, loop.solver, step, steps, scheme)
     if scheme != "convolution":
-        balance(session, loop, work, step)
+        balance(session, loop, work.total, driven.work if driven else 0.0, step)
 
 
-def _run(session: Session, loop: Loop, file: ContactFile, counts, step, steps) -> None:
+def _driven(session: Session, tire, step: float, steps: int) -> Driven | None:
+    """The tire under the scene's prescribed forces, where there are any."""
+    forces = session.scene.force
+    if not forces:
+        return None
+    return Driven(tire, histories(forces, step * np.arange(steps + 1)), directions(forces))
+
+
+def _run(session: Session, loop: Loop, driven, file: ContactFile, counts, step, steps) -> None:
     """Take the steps that are left; stop between two of them when asked to. Collective.
 
     `counts`: the running figures and the work.
@@ -85,7 +97,7 @@ def _run(session: Session, loop: Loop, file: ContactFile, counts, step, steps) -
             session.patch.check_edge(instant.force, instant.time, session.reach)
             totals.add(instant)
             work.add(instant)
-            file.add(instant)
+            file.add(instant, driven.reading if driven else None)
             bar.advance()
             stop, due = watch(deferred.asked)
             if stop or due:
@@ -147,10 +159,11 @@ def integration(session: Session, response: Response, shortest: float):
 
 
 def _shortest_period(session: Session) -> float:
-    """Time in which the road's finest detail, or its motion, passes a point, s."""
+    """Time in which the road's finest detail, its motion, or a force's period passes, s."""
     motion, road = session.scene.road.motion, session.road
     passing = 2 * road.spacing / session.road_speed if session.road_speed else np.inf
-    return min(passing, 1 / motion.frequency) if motion.kind == "sine" else passing
+    moving = 1 / motion.frequency if motion.kind == "sine" else np.inf
+    return min(passing, moving, shortest_period(session.scene.force))
 
 
 def _settled(session: Session) -> None:
@@ -233,10 +246,6 @@ def _describe(session: Session, totals: _Totals, solver, step, steps, scheme) ->
         "largest penetration": (float(totals.penetration), "m"),
         "factorisations": (solver.factorisations, "-"),
     }
-    if session.scene.force:
-        record.warnings.append(
-            "the point forces of [[force]] act in response.h5 alone, not in the contact"
-        )
     if totals.least == 0:
         record.warnings.append("the tire lost contact with the road for a while")
 
