@@ -10,10 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from fem.equilibrium import Equilibrium, Step
 from fem.errors import ConvergenceError, InputError
+from fem.surface import outer_face
+from fem.tread_surface import TreadSurface
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
 _SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
@@ -64,10 +65,10 @@ class Loader:
         self.touch = self.lowest()
 
     def lowest(self) -> float:
-        """Height of the lowest tread node, m. Collective."""
-        # Through comm.allreduce every process has the same bits, so all take the same steps.
-        lowest = self.equilibrium.tread_height().min(initial=float("inf"))
-        return self.body.comm.allreduce(lowest, op=MPI.MIN)
+        """Height of the lowest point of the outer face between its nodes, m. Collective."""
+        lattice = self.body.lattice
+        moved = self.body.surface(self.body.owned(self.body.u.x.array))
+        return TreadSurface(lattice, lattice.points(outer_face(lattice)) + moved).lowest()
 
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
