@@ -22,6 +22,7 @@ from contact.complementarity import ContactSolver
 from contact.kernel import GridPlaces
 from contact.patch import Patch
 from fem.errors import ConvergenceError, InputError
+from greens.loaded import LoadedColumns
 
 # Points of the largest grid that is laid out before the reach is known.
 MOST_POINTS = 1_000_000
@@ -146,6 +147,7 @@ class OnPoints:
         self._transposed = self._weights.T.tocsr()
         count = self._weights.shape[0]
         self.same_step = LinearOperator((count, count), matvec=self._answer, dtype=float)
+        self._answers = LoadedColumns(tire.same_step)
         self.inertia_force = tire.inertia_force
         self.snapshot, self.restore = tire.snapshot, tire.restore
 
@@ -162,4 +164,4 @@ class OnPoints:
         self._tire.advance(self._transposed @ force)
 
     def _answer(self, force: np.ndarray) -> np.ndarray:
-        return self._weights @ (self._tire.same_step @ (self._transposed @ force))
+        return self._weights @ (self._answers @ (self._transposed @ force))
