@@ -22,6 +22,7 @@ from contact.complementarity import ContactSolver
 from contact.kernel import GridPlaces
 from contact.patch import Patch
 from fem.errors import ConvergenceError, InputError
+from greens.loaded import LoadedColumns
 
 # Points of the largest grid that is laid out before the reach is known.
 MOST_POINTS = 1_000_000
@@ -167,8 +168,9 @@ class OnPoints:
         weights, tire = self._weights, self._tire.same_step
         count = weights.shape[0]
         if count > MOST_DENSE:
+            self._answers = LoadedColumns(tire)
             return LinearOperator((count, count), matvec=self._answer, dtype=float)
         return weights @ (weights @ tire.T).T
 
     def _answer(self, force: np.ndarray) -> np.ndarray:
-        return self._weights @ (self._tire.same_step @ (self._transposed @ force))
+        return self._weights @ (self._answers @ (self._transposed @ force))

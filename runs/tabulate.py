@@ -66,7 +66,9 @@ def show(table: Table) -> None:
 
     grid = Grid(title=table.title, title_justify="left", header_style="bold")
     for name, unit in table.columns:
-        grid.add_column(name if unit in ("", "-") else f"{name} [{unit}]".replace("[", r"\["))
+        grid.add_column(
+            name if unit in ("", "-") else f"{name} [{unit}]".replace("[", r"\["), overflow="fold"
+        )
     for row in table.rows:
         grid.add_row(*(_shown(value) for value in row))
     text = io.StringIO()

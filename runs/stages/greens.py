@@ -125,7 +125,7 @@ def _prepare_forces(session: Session) -> None:
 
 def compute(session: Session, path: Path) -> None:
     """Responses with their residual, the choice of dynamic states, and their file. Collective."""
-    name, outputs, loads = _probes(session)
+    name, outputs, loads = probes(session)
     whole = make(session, outputs, loads)
     responses = {name: chosen(session, whole)}
     judge(session, name, whole, responses[name])
@@ -143,7 +143,7 @@ def compute(session: Session, path: Path) -> None:
     session.write(path, "greens", fill)
 
 
-def _probes(session: Session) -> tuple:
+def probes(session: Session) -> tuple:
     """(name, outputs, loads) on the outer face: of the contact patch with what prescribed forces add
     to it, or of the prescribed forces alone."""
     from fem.probe import nodes
