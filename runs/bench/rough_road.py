@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import copy
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from mpi4py import MPI
 
-from contact.grid_patch import OnPoints, settle
+from contact.grid_patch import settle
 from contact.model import step_solver
-from contact.rolling import Drive, roll
 from greens.recursion import Recursion
 from greens.response import Response
 from runs import observe
 from runs.session import Session
+from runs.validation.histories import History, distance, follow
 
 BAND = 500.0  # Hz, up to which errors are told
 SPEED = 100.0  # rad/s
@@ -127,61 +125,16 @@ def fewer_modes(session: Session, count: int, residual: str) -> Response:
     return make(few, points, points)
 
 
-@dataclass(frozen=True)
-class History:
-    """Vertical contact force (n, 1) and axle force (n, 3) in N at multiples of the step (s), the wall
-    time (s) of the loop that made them, and the most points that touched at once."""
-
-    contact: np.ndarray
-    axle: np.ndarray
-    step: float
-    seconds: float
-    touching: int
-
-
-def modal(session: Session, response: Response, step: float, scheme: str = "linear") -> History:
+def modal(session: Session, response: Response, step: float) -> History:
     """The loop on the states that the step resolves."""
-    return history(session, Recursion(response.resolved(step), step, scheme, MPI.COMM_SELF), step)
+    tire = Recursion(response.resolved(step), step, "linear", MPI.COMM_SELF)
+    return follow(session, tire, step, 0.0)
 
 
-def history(session: Session, tire, step: float) -> History:
-    """The loop on any tire between the nodes of the session's patch."""
-    patch = session.patch
-    p = len(patch.index)
-    solver = step_solver(session.scene.contact, patch, tire.same_step[:p, :p])
-    drive = Drive(session.road.height, session.motion, session.road_speed)
-    steps = round(session.scene.time.duration / step)
-    contact, axle, most = np.zeros((steps, 1)), np.zeros((steps, 3)), 0
-    on_points = OnPoints(tire, patch.weights)
-    began = time.perf_counter()
-    for k, instant in enumerate(roll(on_points, solver, patch, drive, step, steps)):
-        contact[k], axle[k] = instant.force.sum(), instant.axle_force
-        most = max(most, instant.active)
-    return History(contact, axle, step, time.perf_counter() - began, most)
-
-
-def spectrum(values: np.ndarray, step: float, band: float = BAND) -> np.ndarray:
-    """Hann-windowed spectrum up to `band` (Hz) of (n, ...) values at step, 2 step, ..., n step."""
-    n = len(values)
-    window = np.sin(np.pi * np.arange(1, n + 1) / n) ** 2
-    frequency = np.fft.rfftfreq(n, step)
-    late = np.exp(-2j * np.pi * frequency * step)
-    keep = frequency <= band
-    lines = np.fft.rfft(window[:, None] * values, axis=0) * (step * late[:, None])
-    return lines[keep]
-
-
-def error(reference: np.ndarray, before: float, found: np.ndarray, step: float) -> float:
-    """Relative L2 error up to BAND of what varies in a force; each history has its own step (s)."""
-    still = reference.mean(axis=0)
-    exact = spectrum(reference - still, before)
-    return float(np.linalg.norm(spectrum(found - still, step) - exact) / np.linalg.norm(exact))
-
-
-def errors(reference: History, found: History) -> tuple[float, float]:
-    """Of the contact force and of the axle force."""
-    steps = reference.step, found.step
-    return (
-        error(reference.contact, steps[0], found.contact, steps[1]),
-        error(reference.axle, steps[0], found.axle, steps[1]),
+def errors(reference: History, found: History, duration: float) -> tuple[float, float]:
+    """Relative L2 up to BAND of what varies in the contact force and in the axle force, %."""
+    contact, axle = (
+        100 * distance(reference.values[name], found.values[name], duration, BAND).mean
+        for name in ("contact force", "axle force")
     )
+    return contact, axle
