@@ -74,8 +74,7 @@ class Operators:
     def consistent_mass(self) -> PETSc.Mat:
         """int rho phi_i . phi_j by full integration, kg: what the diagonal `mass` is compared to. Collective."""
         body = self.body
-        u, v = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
-        return self._assemble(body.material.density * ufl.inner(u, v) * body.dx)
+        return self._assemble(body.wall.density * ufl.inner(body.trial, body.test) * body.dx)
 
     def _assemble(self, form) -> PETSc.Mat:
         matrix = fem.petsc.assemble_matrix(compat.form(form))

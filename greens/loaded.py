@@ -13,7 +13,7 @@ FEW = 0.6
 
 
 class LoadedColumns:
-    """A (n, k), kept by columns; those of the loaded entries are laid side by side and kept.
+    """A (n, k), kept by `columns` (k, n); those of the loaded entries are laid side by side and kept.
 
     In contact the same points stay loaded for several steps: a product with a of k columns then
     reads 8 a n bytes instead of 8 k n. The sum's order depends on the loaded entries alone, not on
@@ -21,8 +21,8 @@ class LoadedColumns:
     """
 
     def __init__(self, matrix: Array) -> None:
-        self._columns = np.ascontiguousarray(matrix.T)
-        self._buffer = np.empty_like(self._columns[: int(FEW * len(self._columns))])
+        self.columns = np.ascontiguousarray(matrix.T)
+        self._buffer = np.empty_like(self.columns[: int(FEW * len(self.columns))])
         self._key = b""
         self._taken = self._buffer[:0]
 
@@ -30,7 +30,7 @@ class LoadedColumns:
         """A f (n,) for f (k,)."""
         index = force.nonzero()[0]
         if len(index) > len(self._buffer):
-            return force @ self._columns
+            return force @ self.columns
         return force[index] @ self.take(index)
 
     def take(self, index: Index) -> Array:
@@ -38,14 +38,14 @@ class LoadedColumns:
         key = index.tobytes()
         if key != self._key or len(self._taken) != len(index):
             if len(index) > len(self._buffer):
-                self._taken = self._columns[index]
+                self._taken = self.columns[index]
             else:
                 self._taken = self._buffer[: len(index)]
                 # Unlike the default, "clip" writes without a copy; the indices are in range.
-                np.take(self._columns, index, axis=0, out=self._taken, mode="clip")
+                np.take(self.columns, index, axis=0, out=self._taken, mode="clip")
             self._key = key
         return self._taken
 
     def between(self, rows: Index, columns: Index) -> Array:
         """A (a, b) between `rows` (a,) and `columns` (b,), column-major."""
-        return self._columns[columns[:, None], rows].T
+        return self.columns[columns[:, None], rows].T

@@ -108,7 +108,7 @@ class Recursion:
         """All states in the order of the response, the same for any number of processes. Collective."""
         kept = {"state": self._gathered(self.state), "push": self._gathered(self._push)}
         kept["push_force"] = self._force
-        block = self._block.snapshot() if self._block else {}
+        block = self._block.snapshot() if self._block else _NO_BLOCK
         return kept | self.comm.bcast(block)
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
@@ -174,6 +174,9 @@ class _Block:
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         self.state, self._force = kept["block_state"], kept["block_force"]
+
+
+_NO_BLOCK = {"block_state": np.zeros(0), "block_force": np.zeros(0)}
 
 
 def _weights(x: np.ndarray, step: float, scheme: str) -> tuple[np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contact.grid_patch import OnPoints
 from contact.model import step_solver
 from contact.rolling import Drive, roll
 from runs.session import Session
@@ -33,6 +34,8 @@ def follow(session: Session, tire, step: float, setup: float) -> History:
     """
     patch = session.patch
     solver = step_solver(session.scene.contact, patch, tire.same_step)
+    if patch.weights is not None:
+        tire = OnPoints(tire, patch.weights)
     drive = Drive(session.road.height, session.motion, session.road_speed)
     steps = round(session.scene.time.duration / step)
     contact, axle = np.zeros((2, steps, 3))
@@ -48,32 +51,33 @@ def follow(session: Session, tire, step: float, setup: float) -> History:
 
 @dataclass(frozen=True)
 class Distance:
-    """Relative L2 distance in 0 to BAND, and the largest difference there over the largest variation."""
+    """Relative L2 distance in the band, and the largest difference there over the largest variation."""
 
     mean: float
     worst: float
 
 
-def distance(reference: np.ndarray, found: np.ndarray, duration: float) -> Distance:
-    """How far `found` (n', k) is from what varies of `reference` (n, k), both over `duration` s.
+def distance(reference: np.ndarray, found: np.ndarray, duration: float, band=BAND) -> Distance:
+    """How far `found` (n', k) is from what varies of `reference` (n, k), both over `duration` s, from
+    0 to `band` Hz.
 
     Each is looked at with its own step: thinned out to a common one, force above half its sampling
     frequency would fold down into the band (seen: 0.6 % where there was 0.03 %). Hann window.
     """
     rest = reference.mean(axis=0)
-    exact = _low(reference - rest, duration)
-    off = _low(found - rest, duration) - exact
+    exact = _low(reference - rest, duration, band)
+    off = _low(found - rest, duration, band) - exact
     # Seen in time again, the same number of instants for both.
     seen = [np.fft.irfft(part, 8 * len(exact), axis=0) for part in (off, exact)]
     worst, most = (np.abs(part).max() for part in seen)
     return Distance(float(np.linalg.norm(off) / np.linalg.norm(exact)), float(worst / most))
 
 
-def _low(values: np.ndarray, duration: float) -> np.ndarray:
-    """Fourier coefficients of windowed values (n, k) at t = h, 2h, ... = duration, up to BAND."""
+def _low(values: np.ndarray, duration: float, band: float) -> np.ndarray:
+    """Fourier coefficients of windowed values (n, k) at t = h, 2h, ... = duration, up to `band` Hz."""
     n = len(values)
     # The window vanishes at both ends, so the value at t = 0 may be any.
     window = np.sin(np.pi * np.arange(n) / n)[:, None] ** 2
     shifted = np.concatenate([values[:1], values[:-1]])
-    keep = np.arange(n // 2 + 1) <= BAND * duration * (1 + 1e-9)
+    keep = np.arange(n // 2 + 1) <= band * duration * (1 + 1e-9)
     return np.fft.rfft(window * shifted, axis=0)[keep] / n
