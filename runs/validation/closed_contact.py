@@ -9,15 +9,13 @@ import numpy as np
 from contact import closed_forms as exact
 from contact.brush import Brush, BrushLaw
 from contact.complementarity import ActiveSet
-from contact.flat import Flat
 from contact.friction import Friction
-from contact.patch import Patch
-from contact.rolling import Drive, roll
-from contact.tangential import stick_slip
-from contact.tread import half_space_compliance, rectangle_potential, winkler_compliance
+from contact.tangential import Stiffness, stick_slip
+from contact.tread import half_space_compliance, rectangle_potential
 
 YOUNG, POISSON = 3.4e6, 0.49
 MODULUS = exact.contact_modulus(YOUNG, POISSON)
+FRICTION, LOAD, HALF = 0.4, 1000.0, 0.02  # of the rolling cylinder and the brush: -, N, m
 
 
 def rows() -> Iterator[tuple]:
@@ -27,7 +25,8 @@ def rows() -> Iterator[tuple]:
     yield from _cylinder()
     yield _punch()
     yield from _cattaneo_mindlin()
-    yield from _rolling_brush()
+    yield from _carter()
+    yield from _brush()
 
 
 def _cells(half_x: float, half_y: float, nx: int, ny: int) -> tuple[np.ndarray, np.ndarray]:
@@ -106,7 +105,7 @@ def _cattaneo_mindlin() -> Iterator[tuple]:
     x, y, normal = x[on], y[on], pressure[on] * pitch**2
     half = np.float64(pitch / 2)
     potential = rectangle_potential(x[:, None] - x, y[:, None] - y, half, half)
-    matrix = np.kron(potential / (2 * np.pi * pitch**2), np.eye(2))
+    matrix = Stiffness(np.kron(potential / (2 * np.pi * pitch**2), np.eye(2)))
     total = normal.sum()
     for share in (0.3, 0.7):
         shift = 3 * friction * total / 8 * (1 - (1 - share) ** (2 / 3))
@@ -116,58 +115,66 @@ def _cattaneo_mindlin() -> Iterator[tuple]:
         yield name, "N", float(force[:, 0].sum()), share * friction * total
 
 
-class _Rigid:
-    """A tire that does not give way."""
-
-    def __init__(self, count: int) -> None:
-        self.same_step = np.zeros((3 * count, 3 * count))
-
-    def predict(self) -> np.ndarray:
-        return np.zeros(len(self.same_step))
-
-    def advance(self, force: np.ndarray) -> None:
-        pass
-
-    def inertia_force(self) -> np.ndarray:
-        return np.zeros(3)
+def _brush() -> Iterator[tuple]:
+    """Bristles on a rigid body under a parabola of pressure."""
+    tread, (x, pitch) = 5e6, _line(200)
+    edges = np.clip(np.stack([x - pitch / 2, x + pitch / 2]) / HALF, -1, 1)
+    normal = 0.75 * LOAD * np.diff(edges - edges**3 / 3, axis=0)[0]
+    for slip in (0.01, 0.1, 1.0):
+        found = _steady(x, normal, slip, tread * pitch, np.zeros((len(x), len(x))))
+        closed = exact.brush_force(slip, FRICTION, LOAD, HALF, tread)
+        yield f"rolling brush, slip {slip:g} (Pacejka)", "N", found, closed
 
 
-def _rolling_brush() -> Iterator[tuple]:
-    """Bristles under a parabola of pressure (Fromm 1927; Pacejka, Tire and Vehicle Dynamics, 3.2):
+def _carter() -> Iterator[tuple]:
+    """Bristles a thousand times stiffer than the half-space under them, nu = 0.
 
-    F = mu P (3 z - 3 z^2 + z^3), z = theta s <= 1, theta = 2 c a^2/(3 mu P), c the bristles' stiffness
-    per length, s the slip.
+    A bristle is entered a pitch behind the leading edge, an error of first order: taken out by two
+    pitches.
     """
-    half, load, friction, count = 0.1, 500.0, 0.8, 120
-    pitch = 2 * half / count
-    x = (np.arange(count) - (count - 1) / 2) * pitch
-    patch = _line(x, load * (1 - (x / half) ** 2) / (1 - (x / half) ** 2).sum(), pitch)
-    stiffness = 2e6 * pitch
-    theta = 2 * (stiffness / pitch) * half**2 / (3 * friction * load)
-    for part in (0.1, 0.5, 2.0):
-        law = BrushLaw(stiffness, friction, (part / theta, 0.0))
-        brush = Brush(law, x, patch.line, 10.0, pitch / 10.0)
-        brush.begin(patch.force > 0)
-        rigid = _Rigid(count)
-        solver = ActiveSet(winkler_compliance(patch.area, 1e9))
-        drive = Drive(Flat().height, lambda t: 0.0, 10.0)
-        coupling = Friction(brush, rigid.same_step, None)
-        *_, last = roll(rigid, solver, patch, drive, pitch / 10.0, count + 5, coupling)
-        z = min(part, 1.0)
-        name = f"rolling brush at {part:g} of the slip that slides (Fromm, Pacejka)"
-        closed = friction * load * (3 * z - 3 * z**2 + z**3)
-        yield name, "N", float(last.horizontal[:, 0].sum()), closed
+    modulus = 4e6
+    radius = np.pi * modulus * HALF**2 / (4 * LOAD)
+    for share in (0.2, 0.6):
+        creepage = share * FRICTION * HALF / radius
+        coarse, fine = (_cylinder_force(cells, creepage, modulus) for cells in (40, 80))
+        closed = exact.carter_force(creepage, FRICTION, HALF, radius) * FRICTION * LOAD
+        name = f"rolling cylinder at {share:g} of the creepage that slides (Carter)"
+        yield name, "N", 2 * fine - coarse, closed
 
 
-def _line(x: np.ndarray, force: np.ndarray, pitch: float) -> Patch:
-    """Points of one line along the rolling direction, all touching."""
-    count = len(x)
-    return Patch(
-        index=np.arange(count),
-        points=np.column_stack([x, 0 * x, 0 * x]),
-        half_sizes=np.full((count, 2), pitch / 2),
-        force=force,
-        gap=np.zeros(count),
-        edge=np.zeros(count, dtype=bool),
-        line=np.zeros(count, dtype=int),
-    )
+def _cylinder_force(cells: int, creepage: float, modulus: float) -> float:
+    """Traction of a cylinder 1 m wide on a half-space, N."""
+    x, pitch = _line(cells)
+    edges = np.clip(np.stack([x - pitch / 2, x + pitch / 2]) / HALF, -1, 1)
+    over = edges * np.sqrt(1 - edges**2) + np.arcsin(edges)
+    normal = LOAD * np.diff(over, axis=0)[0] / np.pi
+    # Strips 80 m long; in the plane their displacement has no zero: put at the contact's width.
+    strip, half = np.float64(40.0), np.float64(pitch / 2)
+    lone = rectangle_potential(x[:, None] - x, 0 * x, half, strip)
+    lone -= rectangle_potential(np.array(2.2 * HALF), np.array(0.0), half, strip)
+    compliance = lone / (np.pi * modulus * pitch)
+    return _steady(x, normal, creepage, 1e3 / compliance[0, 0], compliance)
+
+
+def _line(cells: int) -> tuple[np.ndarray, float]:
+    """Middles of `cells` cells over the contact and three more on each side, and their pitch, m."""
+    pitch = 2 * HALF / cells
+    return pitch * (np.arange(cells + 6) - (cells + 5) / 2), pitch
+
+
+def _steady(x, normal, slip: float, stiffness: float, compliance) -> float:
+    """Total horizontal force (N) on a line of points after five passages under given normal forces.
+
+    `compliance` (c, c) m/N of the body to forces along the line.
+    """
+    c, way = len(x), x[1] - x[0]
+    tire = np.zeros((3 * c, 3 * c))
+    tire[c : 2 * c, c : 2 * c] = tire[2 * c :, 2 * c :] = compliance
+    law = BrushLaw(stiffness, FRICTION, (slip, 0.0))
+    brush = Brush(law, x, np.zeros(c, int), way, 1.0)
+    brush.begin(normal > 0)
+    friction, solver = Friction(brush, tire, None), ActiveSet(np.eye(c))
+    gap, free = np.where(normal > 0, 0.0, 1.0), np.zeros(2 * c)
+    for _ in range(10 * round(HALF / way)):
+        _, horizontal = friction.solve(solver, gap, normal > 0, normal, free)
+    return float(horizontal[:, 0].sum())
