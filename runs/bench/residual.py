@@ -74,8 +74,8 @@ def _basis(wheel: Wheel, modes: Modes, count: int) -> tuple[Basis, Modes]:
     )
     operators = wheel.operators
     comm = operators.body.comm
-    projection = project(few, wheel.rotation, operators.mass, comm)
-    shape = operators.body.surface(operators.spread(few.vectors)).reshape(-1, count)
+    projection = project(few, wheel.rotation, operators.carried, comm)
+    shape = operators.trace(few.vectors)
     return Basis(shape, projection, wheel.decouple(projection, comm)), few
 
 
