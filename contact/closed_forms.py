@@ -1,4 +1,4 @@
-"""Closed forms of frictionless contact with an elastic half-space, for tests and users alike.
+"""Closed forms of contact with an elastic half-space and of rolling, for tests and users alike.
 
 E* is the contact modulus, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, in Pa; a rigid body has no term.
 Source: Johnson, Contact Mechanics (1985), unless said otherwise.
@@ -6,6 +6,8 @@ Source: Johnson, Contact Mechanics (1985), unless said otherwise.
 
 import math
 from typing import NamedTuple
+
+import numpy as np
 
 # pi times the capacity of the unit-half-side square plate (0.3667892 per side, Read 1997): F/(E* a
 # delta).
@@ -66,3 +68,68 @@ def square_punch_load(approach: float, half_side: float, modulus: float) -> floa
 def love_square_centre(pressure: float, half_side: float, modulus: float) -> float:
     """Displacement (m) at the centre of a uniformly loaded square: 8 ln(1 + sqrt 2) p a/(pi E*)."""
     return LOVE_SQUARE_CENTRE * pressure * half_side / (math.pi * modulus)
+
+
+def westergaard_pressure(
+    x: np.ndarray, fraction: float, amplitude: float, wavelength: float, modulus: float
+) -> np.ndarray:
+    """Pressure (Pa) at x (m) from a crest, rigid waves of `amplitude` (m) pressed in until `fraction`
+    of the surface touches.
+
+    p = 2 p_m cos(pi x/L) sqrt(s^2 - sin^2(pi x/L))/s^2, s = sin(pi fraction/2), where it touches;
+    p_m as `westergaard_mean`. Source: Westergaard, J. Appl. Mech. 6 (1939) 49; Johnson 13.2.
+    """
+    s = math.sin(math.pi * fraction / 2)
+    mean = westergaard_mean(fraction, amplitude, wavelength, modulus)
+    turned = np.pi * np.asarray(x) / wavelength
+    inside = np.maximum(s**2 - np.sin(turned) ** 2, 0.0)
+    return 2 * mean * np.abs(np.cos(turned)) * np.sqrt(inside) / s**2
+
+
+def westergaard_mean(fraction: float, amplitude: float, wavelength: float, modulus: float) -> float:
+    """Mean pressure (Pa) at which `fraction` of a wavy surface touches: pi E* A/L sin^2(pi fraction/2).
+
+    `amplitude` A (m) is half the height from trough to crest.
+    """
+    full = math.pi * modulus * amplitude / wavelength
+    return full * math.sin(math.pi * fraction / 2) ** 2
+
+
+def carter_force(creepage: float, friction: float, half_width: float, radius: float) -> float:
+    """Tangential force over mu P of an elastic cylinder that rolls on a half-space (one of them rigid,
+    or both alike): Q/(mu P) = 1 - (1 - R xi/(mu a))^2, 1 from xi = mu a/R on.
+
+    `creepage` xi, `friction` mu, half width a (m), relative radius R (m).
+    Source: Carter, Proc. R. Soc. A 112 (1926) 151; Johnson (8.20).
+    """
+    share = min(radius * creepage / (friction * half_width), 1.0)
+    return 1.0 - (1.0 - share) ** 2
+
+
+def carter_traction(
+    x: np.ndarray, creepage: float, friction: float, half_width: float, radius: float
+) -> np.ndarray:
+    """Tangential over peak normal traction at x (m) from the middle, the leading edge at x = a.
+
+    mu [sqrt(1 - x^2/a^2) - c/a sqrt(1 - (x - a + c)^2/c^2)]; what sticks is 2c = 2a - 2 R xi/mu wide
+    and reaches to the leading edge.
+    """
+    a, x = half_width, np.asarray(x)
+    stick = a * math.sqrt(1.0 - carter_force(creepage, friction, half_width, radius))
+    whole = np.sqrt(np.maximum(1.0 - (x / a) ** 2, 0.0))
+    if stick == 0.0:
+        return friction * whole
+    inner = np.sqrt(np.maximum(1.0 - ((x - a + stick) / stick) ** 2, 0.0))
+    return friction * (whole - stick / a * inner)
+
+
+def brush_force(
+    slip: float, friction: float, load: float, half_length: float, tread: float
+) -> float:
+    """Force (N) of a sliding brush under parabolic pressure: mu F [1 - (1 - theta sigma)^3].
+
+    `slip` sigma, load F (N), half length a (m), stiffness `tread` c (N/m2) of the bristles per length,
+    theta = 2 c a^2/(3 mu F). Source: Pacejka, Tire and Vehicle Dynamics (2012), 3.2.
+    """
+    theta = 2 * tread * half_length**2 / (3 * friction * load)
+    return friction * load * (1 - (1 - min(theta * slip, 1.0)) ** 3)

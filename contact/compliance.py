@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.kernel import KernelTread
+from greens.loaded import LoadedColumns
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -17,15 +18,15 @@ Index = NDArray[np.intp]
 class Compliance(Protocol):
     """What the solvers need of A (c, c) m/N.
 
-    `block` is its part between the points `index`; `spread` the approach (c,) m under forces that
-    act on those points alone, `values` (a,) N; `precondition` roughly its inverse.
+    `block` is its part between given points, column-major as LAPACK takes it; `spread` is
+    `apply` for forces of which few are not zero; `precondition` roughly its inverse.
     """
 
     diagonal: Array
 
-    def block(self, index: Index) -> Array: ...
+    def block(self, rows: Index, columns: Index) -> Array: ...
 
-    def spread(self, values: Array, index: Index) -> Array: ...
+    def spread(self, force: Array) -> Array: ...
 
     def apply(self, force: Array) -> Array: ...
 
@@ -45,15 +46,13 @@ class SpreadCompliance:
         self.diagonal = tread.diagonal + np.asarray(own).ravel()
         self.precondition = tread.precondition
 
-    def block(self, index: Index) -> Array:
-        """A between the points `index`, (a, a) m/N."""
-        own = self._weights[index]
-        return own @ (own @ self._tire.T).T + self._tread.block(index)
+    def block(self, rows: Index, columns: Index) -> Array:
+        """A between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
+        ahead = self._weights[columns] @ self._tire.T
+        return np.asfortranarray(self._weights[rows] @ ahead.T + self._tread.block(rows, columns))
 
-    def spread(self, values: Array, index: Index) -> Array:
-        """Approach (c,) m under forces `values` (a,) N on the points `index`."""
-        force = np.zeros(len(self.diagonal))
-        force[index] = values
+    def spread(self, force: Array) -> Array:
+        """Approach (c,) m under forces (c,) N."""
         return self.apply(force)
 
     def apply(self, force: Array) -> Array:
@@ -66,20 +65,16 @@ class MatrixCompliance:
 
     def __init__(self, matrix: Array) -> None:
         self._matrix = matrix
-        # Rows of the transpose are the columns of A: picking some of them copies whole rows.
-        self._columns = np.ascontiguousarray(matrix.T)
+        self._columns = LoadedColumns(matrix)
         self.diagonal = matrix.diagonal().copy()
-        self._index: Index | None = None
 
-    def block(self, index: Index) -> Array:
-        """A between the points `index`, (a, a) m/N, column-major as LAPACK takes it."""
-        self._index, self._touching = index, self._columns[index]
-        return self._touching[:, index].T
+    def block(self, rows: Index, columns: Index) -> Array:
+        """A between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
+        return self._columns.between(rows, columns)
 
-    def spread(self, values: Array, index: Index) -> Array:
-        """Approach (c,) m under forces `values` (a,) N on the points `index`."""
-        touching = self._touching if index is self._index else self._columns[index]
-        return values @ touching
+    def spread(self, force: Array) -> Array:
+        """Approach (c,) m under forces (c,) N, few of them not zero."""
+        return self._columns @ force
 
     def apply(self, force: Array) -> Array:
         """Approach (c,) m under forces (c,) N."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from contact.rolling import Instant
-
 
 class Work:
     """Work (J) of the changes of the contact forces on the tire, summed over the steps.
@@ -18,11 +16,15 @@ class Work:
         self.total = 0.0
         self._force = self._moved = np.zeros(1)
 
-    def add(self, instant: Instant) -> None:
-        """Count a step."""
-        mean = 0.5 * (instant.change + self._force)
-        self.total += float(mean @ (instant.moved - self._moved))
-        self._force, self._moved = instant.change, instant.moved
+    def add(self, change: np.ndarray, moved: np.ndarray) -> None:
+        """Count n steps: `change` (n, k) N and `moved` (n, k) m of contact.rolling.Instant."""
+        force = np.concatenate([np.broadcast_to(self._force, (1, change.shape[1])), change])
+        place = np.concatenate([np.broadcast_to(self._moved, (1, moved.shape[1])), moved])
+        mean = 0.5 * (force[1:] + force[:-1])
+        # One step after the other: the sum does not depend on how the steps are blocked.
+        for work in (mean * np.diff(place, axis=0)).sum(axis=1).tolist():
+            self.total += work
+        self._force, self._moved = change[-1], moved[-1]
 
     def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint keeps."""

@@ -14,8 +14,9 @@ from scipy import sparse
 
 from contact.brush import Brush
 from contact.complementarity import ContactSolver
-from contact.tangential import stick_slip
+from contact.tangential import Stiffness, stick_slip
 from fem.errors import ConvergenceError
+from greens.loaded import LoadedColumns
 
 Array = NDArray[np.float64]
 
@@ -32,11 +33,13 @@ class Friction:
 
     def __init__(self, brush: Brush, tire: Array, weights: sparse.csr_matrix | None) -> None:
         p = len(tire) // 3
+        self._nodal = weights is None
         w = sparse.identity(p, format="csr") if weights is None else weights
         self._brush = brush
         self._w, self._w2 = w, sparse.block_diag([w, w], format="csr")
-        self._zz, self._zh = tire[:p, :p], tire[:p, p:]
-        self._hz, self._hh = tire[p:, :p], tire[p:, p:]
+        self._down, self._down2 = self._w.T.tocsr(), self._w2.T.tocsr()
+        self._zh, self._hz = LoadedColumns(tire[:p, p:]), LoadedColumns(tire[p:, :p])
+        self._hh = LoadedColumns(tire[p:, p:])
         self.horizontal = np.zeros((w.shape[0], 2))
         self.turns = 0
         self._key = b""
@@ -47,7 +50,7 @@ class Friction:
         count = len(touching)
         own = normal.block(index)
         w, w2 = self._w[index], self._w2[np.concatenate([index, index + count])]
-        coupling = np.linalg.solve(own, w @ (w2 @ self._zh.T).T)
+        coupling = np.linalg.solve(own, w @ (w2 @ self._zh.columns).T)
         return 1.0 / max(float(np.linalg.norm(coupling, 2)), 1e-300)
 
     def state(self) -> dict[str, Array]:
@@ -69,12 +72,12 @@ class Friction:
         share, past = self._brush.offer()
         horizontal = self.horizontal
         for self.turns in range(1, TURNS + 1):
-            pulled = self._w @ (self._zh @ (self._w2.T @ horizontal.T.ravel()))
+            pulled = self._w @ (self._zh @ (self._down2 @ horizontal.T.ravel()))
             force = normal.solve(q + pulled, guess, reference=static)
             guess = None
-            pushed = self._w2 @ (self._hz @ (self._w.T @ (force - static)))
+            pushed = self._w2 @ (self._hz @ (self._down @ (force - static)))
             moved = (free + pushed).reshape(2, -1).T
-            new = self._stick_slip(force, moved, share, past)
+            new = self._stick_slip(force, moved, (share, past), horizontal)
             change = np.abs(new - horizontal).max()
             horizontal = new
             if change <= TOLERANCE * force.max(initial=0.0):
@@ -87,33 +90,35 @@ class Friction:
         )
 
     def _finish(self, force: Array, moved: Array, horizontal: Array) -> None:
-        answer = self._w2 @ (self._hh @ (self._w2.T @ horizontal.T.ravel()))
+        answer = self._w2 @ (self._hh @ (self._down2 @ horizontal.T.ravel()))
         self.horizontal = horizontal
         self._brush.take(horizontal, moved + answer.reshape(2, -1).T, force > 0)
 
-    def _stick_slip(self, force: Array, moved: Array, share: Array, past: Array) -> Array:
+    def _stick_slip(
+        self, force: Array, moved: Array, bristles: tuple[Array, Array], guess: Array
+    ) -> Array:
         """t (c, 2): B t + c = 0 with B = A_hh + 1/(K share), c = u_other + past/share, or slip."""
+        share, past = bristles
         law = self._brush.law
         out = np.zeros((len(force), 2))
         index = np.flatnonzero((force > 0) & (share > 1e-9))
         if len(index) == 0:
             return out
-        matrix = self._between(index).copy()
-        spring = np.repeat(1.0 / (law.stiffness * share[index]), 2)
-        matrix[np.diag_indices_from(matrix)] += spring
+        stiffness = Stiffness(*self._between(index), 1.0 / (law.stiffness * share[index]))
         constant = moved[index] + past[index] / share[index, None]
         bound = np.full(len(index), np.inf)
         if law.friction is not None:
             bound = law.friction * force[index]
-        out[index] = stick_slip(matrix, constant, bound, self.horizontal[index])
+        out[index] = stick_slip(stiffness, constant, bound, guess[index])
         return out
 
-    def _between(self, index: NDArray[np.intp]) -> Array:
-        """A_hh between the points, x and y of each beside each other, (2a, 2a) m/N."""
+    def _between(self, index: NDArray[np.intp]) -> tuple[Array, Array | None]:
+        """A_hh between the points, through the nodes that carry them."""
         key = index.tobytes()
         if key != self._key:
-            count = self._w.shape[0]
-            w2 = self._w2[np.stack([index, index + count], axis=-1).ravel()]
-            self._block = w2 @ (w2 @ self._hh.T).T
-            self._key = key
-        return self._block
+            own, p = self._w[index], self._w.shape[1]
+            nodes = np.unique(own.indices)
+            both = np.stack([nodes, nodes + p], axis=-1).ravel()
+            own = None if self._nodal else own[:, nodes].toarray()
+            self._carried, self._key = (self._hh.between(both, both), own), key
+        return self._carried

@@ -22,10 +22,13 @@ from contact.complementarity import ContactSolver
 from contact.kernel import GridPlaces
 from contact.patch import Patch
 from fem.errors import ConvergenceError, InputError
+from greens.loaded import LoadedColumns
 
 # Points of the largest grid that is laid out before the reach is known.
 MOST_POINTS = 1_000_000
 LOAD_TOLERANCE = 1e-7
+# Displacements up to which W A W^T is a matrix: 8 MB.
+MOST_DENSE = 1000
 
 
 class Surface(Protocol):
@@ -144,10 +147,13 @@ class OnPoints:
         self._tire = tire
         self._weights = sparse.block_diag([weights] * components, format="csr")
         self._transposed = self._weights.T.tocsr()
-        count = self._weights.shape[0]
-        self.same_step = LinearOperator((count, count), matvec=self._answer, dtype=float)
+        self.same_step = self._same_step()
         self.inertia_force = tire.inertia_force
         self.snapshot, self.restore = tire.snapshot, tire.restore
+
+    def start(self, force: np.ndarray) -> None:
+        """Begin with a force (c,) N that is already there at t = 0."""
+        self._tire.start(self._transposed @ force)
 
     def predict(self) -> np.ndarray:
         """Displacement (c,) m at the end of the step with no new force."""
@@ -157,5 +163,14 @@ class OnPoints:
         """Take the force (c,) N at the end of the step."""
         self._tire.advance(self._transposed @ force)
 
+    def _same_step(self) -> np.ndarray | LinearOperator:
+        """W A W^T: a matrix where that is small, since then a step reads its loaded columns alone."""
+        weights, tire = self._weights, self._tire.same_step
+        count = weights.shape[0]
+        if count > MOST_DENSE:
+            self._answers = LoadedColumns(tire)
+            return LinearOperator((count, count), matvec=self._answer, dtype=float)
+        return weights @ (weights @ tire.T).T
+
     def _answer(self, force: np.ndarray) -> np.ndarray:
-        return self._weights @ (self._tire.same_step @ (self._transposed @ force))
+        return self._weights @ (self._answers @ (self._transposed @ force))

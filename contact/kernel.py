@@ -46,10 +46,11 @@ class KernelTread:
         least = 1e-3 * self.diagonal
         self._inverse = 1.0 / np.maximum(self._transform, least)
 
-    def block(self, index: NDArray[np.intp]) -> Array:
-        """The matrix between the points `index`, (a, a) m/N."""
-        i, j = np.divmod(self._grid.place[index], self._grid.shape[1])
-        return self._kernel[i[:, None] - i, j[:, None] - j]
+    def block(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
+        """The matrix between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
+        i, j = np.divmod(self._grid.place[rows, None], self._grid.shape[1])
+        k, m = np.divmod(self._grid.place[columns], self._grid.shape[1])
+        return self._kernel[i - k, j - m]
 
     def apply(self, force: Array) -> Array:
         """Approach (c,) m under forces (c,) N."""

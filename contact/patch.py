@@ -43,13 +43,16 @@ class Patch:
         low, high = self.points[:, :2].min(axis=0), self.points[:, :2].max(axis=0)
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
-    def check_edge(self, force: np.ndarray, time: float, reach: float) -> None:
-        """Raise ConvergenceError when a point on the edge touches: those beyond it may touch too."""
-        touching = np.flatnonzero(self.edge & (force > 0))
-        if len(touching):
-            x, y, _ = self.points[touching[0]]
+    def check_edge(self, force: np.ndarray, time: np.ndarray, reach: float) -> None:
+        """Raise ConvergenceError when a point on the edge touches: those beyond it may touch too.
+
+        `force` (n, c) N at the times (n,) s.
+        """
+        when, which = np.nonzero(force[:, self.edge] > 0)
+        if len(when):
+            x, y, _ = self.points[self.edge][which[0]]
             raise ConvergenceError(
-                f"contact: at t = {time:.6g} s the road touches the edge of the patch at "
+                f"contact: at t = {time[when[0]]:.6g} s the road touches the edge of the patch at "
                 f"x = {x:.4g} m, y = {y:.4g} m; points beyond it were left out because their static "
                 f"gap is more than {reach:.4g} m. Give contact.reach a larger value, "
                 f"e.g. {2 * reach:.2g}."

@@ -91,7 +91,7 @@ class ProjectedCG:
 
     def block(self, index: NDArray[np.intp]) -> Array:
         """A between the points `index`, (a, a) m/N."""
-        return self._compliance.block(index)
+        return self._compliance.block(index, index)
 
     def _begin(self, base: Array, guess_active: Mask | None) -> Array:
         if self._last is None or guess_active is not None:

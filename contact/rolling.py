@@ -11,19 +11,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from contact.complementarity import ContactSolver
 from contact.friction import Friction
 from contact.patch import Patch
+from greens.loaded import LoadedColumns
+
+# Road heights that are found at once: as many steps as make this many points, so that what a call
+# costs is shared; and at most so many steps.
+_POINTS_AHEAD, _STEPS_AHEAD = 20_000, 64
 
 
 class Tire(Protocol):
     """A linear tire between the patch's forces and displacements (greens.recursion, .convolution)."""
 
     same_step: np.ndarray
+
+    def start(self, force: np.ndarray) -> None: ...
 
     def predict(self) -> np.ndarray: ...
 
@@ -36,8 +43,7 @@ class Tire(Protocol):
     def restore(self, kept: dict[str, np.ndarray]) -> None: ...
 
 
-@dataclass(frozen=True)
-class Instant:
+class Instant(NamedTuple):
     """The state at the end of a step: (c,) arrays in N and m, `horizontal` (c, 2) N, `axle_force`
     (3,) N; `change` and `moved`, what the tire feels and does beyond the static state, all
     components.
@@ -57,7 +63,9 @@ class Instant:
 
 @dataclass(frozen=True)
 class Drive:
-    """How the road comes: `height(x, y)` m over the static plane, `motion(t)` m, `speed` in m/s."""
+    """How the road comes: `height(x, y)` m over the static plane, point by point for arrays of any
+    shape, `motion(t)` m, `speed` in m/s.
+    """
 
     height: Callable[[np.ndarray, np.ndarray], np.ndarray]
     motion: Callable[[float], float]
@@ -103,15 +111,15 @@ def roll(
     bits, so no process has to wait for another's answer. With `friction`, the tire's forces and
     displacements are three times as many: z, then x, then y of all points.
     """
-    x, y = patch.points[:, 0], patch.points[:, 1]
-    count = len(x)
+    count = len(patch.points)
     horizontal = np.zeros((count, 2))
     # The first step starts from the static contact set, the others from the solver's last one.
     touching = None if done else patch.force > 0
-    for k in range(done + 1, steps + 1):
-        time = k * step
+    answer = (
+        LoadedColumns(tire.same_step) if isinstance(tire.same_step, np.ndarray) else tire.same_step
+    )
+    for time, road in _roads(drive, patch, step, steps, done):
         free = tire.predict()
-        road = drive.height(x + drive.speed * time, y) + drive.motion(time)
         q = patch.gap + free[:count] - road
         if friction is None:
             force = solver.solve(q, touching, reference=patch.force)
@@ -121,7 +129,7 @@ def roll(
             change = np.concatenate([force - patch.force, *horizontal.T])
         touching = None
         tire.advance(change)
-        moved = free + tire.same_step @ change
+        moved = free + answer @ change
         axle = -tire.inertia_force()
         axle += [*horizontal.sum(axis=0), force.sum()]
         yield Instant(
@@ -136,3 +144,21 @@ def roll(
             change,
             moved,
         )
+
+
+def _roads(
+    drive: Drive, patch: Patch, step: float, steps: int, done: int
+) -> Iterator[tuple[float, np.ndarray]]:
+    """Time (s) and road (c,) m under the points for each step after `done`.
+
+    Blocks of steps are counted from the first step on: a loop that goes on finds the same bits.
+    """
+    x, y = patch.points[:, 0], patch.points[:, 1]
+    block = min(max(_POINTS_AHEAD // len(x), 1), _STEPS_AHEAD)
+    for first in range(done - done % block, steps, block):
+        times = step * np.arange(first + 1, min(first + block, steps) + 1)
+        along = x + drive.speed * times[:, None]
+        heights = drive.height(along, np.broadcast_to(y, along.shape))
+        for k, time in enumerate(times.tolist(), first):
+            if k >= done:
+                yield time, heights[k - first] + drive.motion(time)

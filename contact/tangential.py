@@ -8,68 +8,102 @@ when the symmetric part of B is positive definite.
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.krylov import gmres
 from fem.errors import ConvergenceError
 
 Array = NDArray[np.float64]
+Plane = NDArray[np.complex128]
 
 NEWTON_STEPS = 30
 GRADIENT_STEPS = 5000
 TOLERANCE = 1e-10  # of the largest bound, or of the largest force where nothing is bounded
+INNER = 1e-3  # reduction of a Newton step's own residual: the points that slip are not known better
 
 
-def stick_slip(matrix: Array, constant: Array, bound: Array, guess: Array) -> Array:
+class Stiffness:
+    """B = W A W^T + diag(spring): `matrix` A (2n, 2n) m/N, x and y of each node beside each other,
+    `weights` W (a, n) from nodes to points, None where they are the same, and `spring` (a,) m/N.
+    Forces and displacements in the plane are complex, x + iy.
+    """
+
+    def __init__(
+        self, matrix: Array, weights: Array | None = None, spring: Array | float = 0.0
+    ) -> None:
+        self._matrix, self._weights = matrix, weights
+        # What a force gives way to at its own point, the mean of both directions (a,).
+        if weights is None:
+            own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
+        else:
+            mean = 0.5 * (matrix[::2, ::2] + matrix[1::2, 1::2])
+            own = (weights @ mean * weights).sum(axis=1)
+        self._spring = np.broadcast_to(np.asarray(spring, dtype=float), own.shape)
+        self.inverse = 1.0 / (own + self._spring)
+
+    def __call__(self, force: Plane) -> Plane:
+        """B t (a,) m for t (a,) N."""
+        if self._weights is None:
+            return (self._matrix @ force.view(float)).view(complex) + self._spring * force
+        nodal = self._weights.T @ force.view(float).reshape(-1, 2)
+        moved = self._weights @ (self._matrix @ nodal.ravel()).reshape(-1, 2)
+        return moved.view(complex)[:, 0] + self._spring * force
+
+    def norm(self) -> float:
+        """A bound of the largest singular value, m/N."""
+        largest = float(np.linalg.norm(self._matrix, 2))
+        if self._weights is not None:
+            largest *= float(np.linalg.norm(self._weights, 2)) ** 2
+        return largest + float(self._spring.max())
+
+
+def stick_slip(stiffness: Stiffness, constant: Array, bound: Array, guess: Array) -> Array:
     """Tangential forces t (a, 2) N.
 
-    `matrix` B (2a, 2a) m/N, `constant` c (a, 2) m, `bound` (a,) N, infinite where nothing slips,
-    `guess` (a, 2). Semismooth Newton on t = P_b(t - r (B t + c)), P_b the projection on the discs
-    (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353); projected gradients, slow
-    but sure for symmetric B, where Newton circles. Returns with a residual below 1e-10 of the
-    forces or raises ConvergenceError.
+    `stiffness` B, `constant` c (a, 2) m, `bound` (a,) N, infinite where nothing slips, `guess`
+    (a, 2). Semismooth Newton on t = P_b(t - r (B t + c)), P_b the projection on the discs
+    (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353), r the inverse of B's
+    diagonal; its linear problems are close to the identity where the bristles are softer than the
+    tire, and GMRES solves them in a few products with B. Projected gradients, slow but sure for
+    symmetric B, where Newton circles. Returns with a residual below 1e-10 of the forces or raises
+    ConvergenceError.
     """
-    if np.isinf(bound).all():
-        return -np.linalg.solve(matrix, constant.ravel()).reshape(-1, 2)
-    step = 1.0 / matrix.diagonal().reshape(-1, 2).mean(axis=1)
-    force = _onto_discs(guess, bound)
+    begin, moved = (np.ascontiguousarray(a).view(complex)[:, 0] for a in (guess, constant))
+    force = _onto_discs(begin, bound)
     for _ in range(NEWTON_STEPS):
-        residual, change = _newton(matrix, constant, bound, force, step)
+        trial = force - stiffness.inverse * (stiffness(force) + moved)
+        residual = force - _onto_discs(trial, bound)
         if _small(residual, force, bound):
-            return _onto_discs(force, bound)
-        force = force + change
-    return _gradients(matrix, constant, bound, guess)
+            return _onto_discs(force, bound).view(float).reshape(-1, 2)
+        force = force + _newton(stiffness, trial, bound, residual)
+    return _gradients(stiffness, moved, bound, begin).view(float).reshape(-1, 2)
 
 
-def _newton(matrix: Array, constant: Array, bound: Array, force: Array, step: Array):
-    """The residual (a, 2) N and the step of semismooth Newton."""
-    rate = (matrix @ force.ravel()).reshape(-1, 2) + constant
-    trial = force - step[:, None] * rate
-    length = np.linalg.norm(trial, axis=1)
+def _newton(stiffness: Stiffness, trial: Plane, bound: Array, residual: Plane) -> Plane:
+    """The step d of semismooth Newton: d + P' (r B d - d) = -residual."""
+    length = np.abs(trial)
     slips = length > bound
-    # Derivative of the projection: identity where it sticks, else b/|t| (I - n n^T).
-    normal = trial / np.where(length > 0.0, length, 1.0)[:, None]
-    across = np.eye(2) - normal[:, :, None] * normal[:, None, :]
-    share = np.where(slips, np.where(np.isinf(bound), 0.0, bound) / np.maximum(length, 1e-300), 0.0)
-    derivative = np.where(slips[:, None, None], share[:, None, None] * across, np.eye(2))
-    scaled = step[:, None, None] * derivative
-    a = len(bound)
-    jacobian = np.einsum("ikl,iljm->ikjm", scaled, matrix.reshape(a, 2, a, 2))
-    diagonal = np.arange(a)
-    jacobian[diagonal, :, diagonal, :] += np.eye(2) - derivative
-    residual = force - _onto_discs(trial, bound)
-    change = np.linalg.solve(jacobian.reshape(2 * a, 2 * a), -residual.ravel())
-    return residual, change.reshape(-1, 2)
+    # Derivative P' of the projection: identity where it sticks, else b/|t| (I - n n^T).
+    long = np.where(slips, length, 1.0)
+    normal, share = np.where(slips, trial, 0.0) / long, np.where(slips, bound, 1.0) / long
+
+    def apply(flat: Array) -> Array:
+        step = flat.view(complex)
+        moved = stiffness.inverse * stiffness(step) - step
+        moved -= normal * (normal.real * moved.real + normal.imag * moved.imag)
+        return (step + share * moved).view(float)
+
+    return gmres(apply, -residual.view(float), INNER).view(complex)
 
 
-def _gradients(matrix: Array, constant: Array, bound: Array, guess: Array) -> Array:
+def _gradients(stiffness: Stiffness, constant: Plane, bound: Array, guess: Plane) -> Plane:
     """Projected gradients with Nesterov's momentum, restarted where it points uphill."""
-    step = 1.0 / np.linalg.norm(matrix, 2)
+    step = 1.0 / stiffness.norm()
     force = ahead = _onto_discs(guess, bound)
     weight = 1.0
     for _ in range(GRADIENT_STEPS):
-        rate = (matrix @ ahead.ravel()).reshape(-1, 2) + constant
-        new = _onto_discs(ahead - step * rate, bound)
-        if _small((new - ahead) * (matrix.diagonal().max() * step) ** -1.0, new, bound):
+        new = _onto_discs(ahead - step * (stiffness(ahead) + constant), bound)
+        if _small((new - ahead) * stiffness.inverse / step, new, bound):
             return new
-        if ((ahead - new) * (new - force)).sum() > 0.0:
+        if np.vdot(ahead - new, new - force).real > 0.0:
             weight = 1.0
         later = 0.5 + np.sqrt(0.25 + weight**2)
         ahead = new + (weight - 1.0) / later * (new - force)
@@ -80,13 +114,13 @@ def _gradients(matrix: Array, constant: Array, bound: Array, guess: Array) -> Ar
     )
 
 
-def _onto_discs(force: Array, bound: Array) -> Array:
-    length = np.linalg.norm(force, axis=1)
-    share = np.minimum(1.0, bound / np.where(length > 0.0, length, 1.0))
-    return force * np.where(length > bound, share, 1.0)[:, None]
+def _onto_discs(force: Plane, bound: Array) -> Plane:
+    length = np.abs(force)
+    outside = length > bound
+    return np.where(outside, bound / np.where(outside, length, 1.0), 1.0) * force
 
 
-def _small(residual: Array, force: Array, bound: Array) -> bool:
-    finite = bound[np.isfinite(bound)]
-    scale = max(float(finite.max(initial=0.0)), float(np.abs(force).max(initial=0.0)))
+def _small(residual: Plane, force: Plane, bound: Array) -> bool:
+    largest = float(bound.max(initial=0.0))
+    scale = max(largest if np.isfinite(largest) else 0.0, float(np.abs(force).max(initial=0.0)))
     return bool(np.abs(residual).max(initial=0.0) <= TOLERANCE * scale)

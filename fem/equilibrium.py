@@ -6,29 +6,30 @@ z + u_z >= z_road and one of both zero.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fem import compat, kinematics
 from fem.body import Body
+from fem.held_system import HeldSystem, Moved
 from fem.shape_damping import ShapeDamping
+from fem.timing import Timing
 from fem.virtual_work import AT_REST, Rolling, static_residual, stress_prediction, tangent
 
-MOST_STEPS = 25  # Newton steps; a load step that needs more is better halved
+MOST_STEPS = 25  # tangents; a load step that needs more is better halved
 TOLERANCE = 1e-12  # of the force scale
+_SERVES = 0.2  # a step with an old tangent costs a twentieth of one with a new tangent
 _DIVERGED = 1e8  # times the force scale: nothing comes back from there
 
 
 @dataclass(frozen=True)
 class Step:
-    """How one equilibrium solve ended; `residual` is relative to the force scale."""
+    """How one equilibrium solve ended: `iterations` tangents, `residual` relative to the force scale."""
 
     converged: bool
     iterations: int
@@ -46,7 +47,7 @@ class Equilibrium:
 
     def __init__(self, body: Body, rolling: Rolling = AT_REST):
         self.body = body
-        self.cost: dict[str, float] = {}
+        self.cost = Timing()
         self.road_height: float | None = None
         self.pressure = fem.Constant(body.mesh, 0.0)
         self._before = fem.Function(body.space)
@@ -62,67 +63,64 @@ class Equilibrium:
         self._local_tangent = fem.petsc.create_matrix(self._tangent)
         self.matrix = self._local_tangent
         self._work = fem.petsc.create_vector(self._residual)
-        self._right, self._change = self._work.duplicate(), self._work.duplicate()
         rim = body.rim[body.rim < body.nodes]
         self._rim = (3 * rim[:, None] + np.arange(3)).ravel()
         self._tread_z = body.space.tabulate_dof_coordinates()[body.tread, 2]
         self._vertical = 3 * body.tread + 2  # owned dofs that can meet the road
-        self._bound = np.full(len(body.tread), -np.inf)
+        self._height = -np.inf
         self._active = np.zeros(len(body.tread), dtype=bool)
         self._force = np.zeros(len(body.tread))
         self._scale, self._stiffness = self._yardsticks()
         damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
-        self._ksp = self._make_solver("lu" if damped else "cholesky")
+        kind = "lu" if damped else "cholesky"
+        self._system = HeldSystem(body.comm, self.matrix, kind, self.cost)
 
     @property
     def rounding(self) -> float:
         """Force below which nothing is balanced, N."""
         return TOLERANCE * self._scale
 
-    def _make_solver(self, factorisation: str) -> PETSc.KSP:
-        ksp = PETSc.KSP().create(self.body.comm)
-        ksp.setOptionsPrefix("static_")
-        ksp.setOperators(self.matrix)
-        ksp.setType(PETSc.KSP.Type.PREONLY)
-        pc = ksp.getPC()
-        pc.setType(factorisation)
-        pc.setFactorSolverType("mumps")
-        # Room for pivots that MUMPS did not foresee: a turning tire's tangent is not symmetric.
-        room = PETSc.Options("static_")
-        if not room.hasName("mat_mumps_icntl_14"):
-            room["mat_mumps_icntl_14"] = 100
-        ksp.setFromOptions()
-        return ksp
-
-    def solve(self, road_height: float | None = None) -> Step:
+    def solve(self, road_height: float | None = None, load: float | None = None) -> Step:
         """Equilibrium with the road plane at the given height (m), or without a road. Collective.
+
+        With a `load` (N) the road is moved, from the given height on, until it carries that.
 
         Newton's method and the active set of the road in one loop: a dof is held where
         f - c gap > 0, with c the dof's own stiffness; that is the complementarity condition for any
         c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Held dofs are put on
         the road by the linearised step: lifting them first strains the wall beyond any sense.
+        A tangent serves for as long as each step with it leaves a third of the error or less.
         """
         body = self.body
         kept = body.u.x.array.copy(), self._active.copy(), self._force.copy()
-        height = -np.inf if road_height is None else road_height
-        self._bound = height - self._tread_z
-        reason = f"no convergence in {MOST_STEPS} Newton steps"
-        for iteration in range(MOST_STEPS + 1):
-            changed = self._choose_active()
-            error = self._error()
-            if not error < _DIVERGED:
-                reason = "the residual grows without bound"
+        self._height = -np.inf if road_height is None else road_height
+        self._before.x.array[:] = body.u.x.array
+        error, tangents = 0.0, 0
+        while True:
+            changed, last = self._choose_active(), error
+            error = self._error(load)
+            reason = self._stopped(error, changed, tangents)
+            if reason == "converged":
+                self.road_height = None if road_height is None else self._height
+                return Step(True, tangents, error, reason)
+            closing = None
+            if not reason and (changed or not error < _SERVES * last):
+                tangents += 1
+                reason = "" if self._take_tangent() else "the tangent is singular"
+                closing = self._system.closing
+            reason = reason or self._move(closing, load)
+            if reason:
                 break
-            if error <= TOLERANCE and not changed:
-                if not self._inside_out():
-                    self.road_height = road_height
-                    return Step(True, iteration, error, "converged")
-                reason = "an element is inside out"
-                break
-            if iteration < MOST_STEPS:
-                self._newton_step(first=iteration == 0)
         body.u.x.array[:], self._active, self._force = kept
-        return Step(False, iteration, error, reason)
+        return Step(False, tangents, error, reason)
+
+    def _stopped(self, error: float, changed: bool, tangents: int) -> str:
+        """Why not to go on; empty while there is hope. Collective."""
+        if not error < _DIVERGED:
+            return "the residual grows without bound"
+        if error <= TOLERANCE and not changed:
+            return "an element is inside out" if self._inside_out() else "converged"
+        return "" if tangents < MOST_STEPS else f"no convergence in {MOST_STEPS} Newton steps"
 
     def _choose_active(self) -> bool:
         """Take the active set of the present state; whether it is another one on any process."""
@@ -130,51 +128,56 @@ class Equilibrium:
         changed = bool((wanted != self._active).any())
         self._active = wanted
         self._force[~wanted] = 0.0
-        return self.body.comm.allreduce(changed)
+        return self.body.comm.allreduce(changed, op=MPI.LOR)
 
     def _gap(self) -> np.ndarray:
         """Height of the owned tread dofs above the road, m; infinite without one."""
-        return self.body.u.x.array[self._vertical] - self._bound
+        return self.tread_height() - self._height
 
-    def _error(self) -> float:
+    def _error(self, load: float | None) -> float:
         """Norm of what is out of balance over the force scale, distance to the road as the dof's force."""
-        with self._timing("assembly"):
+        with self.cost("assembly"):
             out = self._assemble_residual().copy()
         out[self._vertical] -= self._force
         distance = (self._stiffness * self._gap())[self._active]
-        square = self.body.comm.allreduce(out @ out + distance @ distance)
-        return float(np.sqrt(square)) / self._scale
+        parts = np.array([out @ out + distance @ distance, self._force.sum()])
+        square, total = self.body.comm.allreduce(parts)
+        missing = 0.0 if load is None else load - total
+        return float(np.hypot(np.sqrt(square), missing)) / self._scale
 
-    def _newton_step(self, first: bool) -> None:
-        """One linearised step to balance, with the held dofs on the road. Collective.
+    def _take_tangent(self) -> bool:
+        """Assemble and factorise at the present state, the held dofs on their way to the road."""
+        with self.cost("assembly"):
+            self._assemble_tangent()
+        held = self._vertical[self._active]
+        return self._system.take(self.matrix, held, -self._gap()[self._active])
 
+    def _move(self, closing: Moved | None, load: float | None) -> str:
+        """One linearised step to balance, held dofs to the road; with a load, the road to that.
+
+        Why it cannot be taken, or nothing. Collective.
         The road's force is the reaction of the linearised problem; what the new state is out of
         balance is no force of the road (seen: held dofs let go and caught again for ever).
         """
         field, held = self.body.u.x, self._vertical[self._active]
-        if first:
-            self._before.x.array[:] = field.array
-        with self._timing("assembly"):
-            self._assemble_tangent()
-        rows = (held + self._work.getOwnershipRange()[0]).astype(PETSc.IntType)
-        own = PETSc.IS().createGeneral(rows, comm=self.body.comm)
-        reaction = self.matrix.createSubMatrix(own, None)
-        self._right.array[:] = -self._work.array
-        self._change.set(0.0)
-        self._change.array[held] = -self._gap()[self._active]
-        self.matrix.zeroRowsColumns(rows, 1.0, self._change, self._right)
-        with self._timing("factorisation"):
-            self._ksp.solve(self._right, self._change)
-        force = reaction.createVecLeft()
-        reaction.mult(self._change, force)
-        self._force[self._active] = force.array + self._work.array[held]
+        out = self._work.array_r.copy()
+        change, force = self._system.solve(-out, closing)
+        force += out[held]
+        if load is not None:
+            further, more = self._system.solve(np.zeros_like(out), self._system.raising)
+            total, rate = self.body.comm.allreduce(np.array([force.sum(), more.sum()]))
+            if not rate > 0:
+                return "the road meets nothing that resists"
+            rise = (load - total) / rate
+            self._height += rise
+            change, force = change + rise * further, force + rise * more
+        self._force[self._active] = force
         self._before.x.array[:] = field.array
-        field.array[: len(self._change.array)] += self._change.array
+        field.array[: len(change)] += change
         # To the last bit on the road: rounding of the solve would leave a gap or a penetration.
-        field.array[held] = self._bound[self._active]
+        field.array[held] = (self._height - self._tread_z)[self._active]
         field.scatter_forward()
-        for made in (own, reaction, force):
-            made.destroy()
+        return ""
 
     def contact_force(self) -> np.ndarray:
         """Vertical force of the road on the owned nodes (nodes,), N; not negative. Not collective."""
@@ -208,12 +211,6 @@ class Equilibrium:
         self._work.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         self._work.array[self._rim] = 0.0
         return self._work.array_r
-
-    @contextmanager
-    def _timing(self, part: str) -> Iterator[None]:
-        began = time.perf_counter()
-        yield
-        self.cost[part] = self.cost.get(part, 0.0) + time.perf_counter() - began
 
     def _assemble_tangent(self) -> None:
         self._local_tangent.zeroEntries()

@@ -10,15 +10,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from fem.equilibrium import Equilibrium, Step
 from fem.errors import ConvergenceError, InputError
+from fem.surface import outer_face
+from fem.tread_surface import TreadSurface
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
 _SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
 _LARGEST = 4  # times the first step
-_EASY = 6  # Newton steps up to which the next load step may grow
+_REACH = 1.9  # times the largest deflection so far: a load is sought no further away
+_EASY = 6  # tangents up to which the next load step may grow
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,10 @@ class Loader:
         self.touch = self.lowest()
 
     def lowest(self) -> float:
-        """Height of the lowest tread node, m. Collective."""
-        # Through comm.allreduce every process has the same bits, so all take the same steps.
-        lowest = self.equilibrium.tread_height().min(initial=float("inf"))
-        return self.body.comm.allreduce(lowest, op=MPI.MIN)
+        """Height of the lowest point of the outer face between its nodes, m. Collective."""
+        lattice = self.body.lattice
+        moved = self.body.surface(self.body.owned(self.body.u.x.array))
+        return TreadSurface(lattice, lattice.points(outer_face(lattice)) + moved).lowest()
 
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
@@ -84,20 +86,36 @@ class Loader:
             if abs(known[-1].load - load) <= max(LOAD_TOLERANCE * load, self.equilibrium.rounding):
                 return trial
             trial = self._next_deflection(known, load)
+            if trial < _REACH * max(k.deflection for k in known) and self._meet(load, trial, known):
+                return self.equilibrium.road_height - self.touch
         nearest = min(known, key=lambda k: abs(k.load - load))
         raise ConvergenceError(
             f"static: the load of {load:g} N was not met in 60 trials; nearest is {nearest.load:g} N. "
             "Give static.deflection instead, or refine the mesh."
         )
 
+    def _meet(self, load: float, trial: float, known: list[_Known]) -> bool:
+        """Solve for the load and the road's height at once, from the state guessed at a deflection."""
+        self._guess(trial, known)
+        step = self.equilibrium.solve(self.touch + trial, load)
+        self.newton_steps += step.iterations
+        if step.converged:
+            self._report("deflection", self.equilibrium.road_height - self.touch, "m", step)
+        return step.converged
+
+    def _guess(self, trial: float, known: list[_Known]) -> bool:
+        """Put the body on a line through the two states nearest to a deflection, if there are two."""
+        near = sorted(known, key=lambda k: abs(k.deflection - trial))[:2]
+        if len(near) < 2:
+            return False
+        reach = (trial - near[0].deflection) / (near[0].deflection - near[1].deflection)
+        change = near[0].displacement - near[1].displacement
+        self.body.u.x.array[:] = near[0].displacement + reach * change
+        return True
+
     def _try_deflection(self, trial: float, known: list[_Known]) -> None:
         """Solve at the trial deflection from a line through the two nearest states, else by steps."""
-        near = sorted(known, key=lambda k: abs(k.deflection - trial))[:2]
-        guess = near[0].displacement.copy()
-        if len(near) == 2:
-            reach = (trial - near[0].deflection) / (near[0].deflection - near[1].deflection)
-            guess += reach * (near[0].displacement - near[1].displacement)
-            self.body.u.x.array[:] = guess
+        if self._guess(trial, known):
             step = self.equilibrium.solve(self.touch + trial)
             self.newton_steps += step.iterations
             if step.converged:

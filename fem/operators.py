@@ -99,8 +99,7 @@ class Operators:
     def consistent_mass(self) -> PETSc.Mat:
         """int rho phi_i . phi_j by full integration, kg: what the diagonal `mass` is compared to. Collective."""
         body = self.body
-        u, v = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
-        return self._assemble(body.material.density * ufl.inner(u, v) * body.dx)
+        return self._assemble(body.wall.density * ufl.inner(body.trial, body.test) * body.dx)
 
     def _assemble(self, form) -> PETSc.Mat:
         matrix = fem.petsc.assemble_matrix(compat.form(form))
@@ -112,6 +111,10 @@ class Operators:
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Owned nodal values (nodes, 3, ...) from own unknowns (n, ...). Collective."""
         return self.unknowns.spread(values)
+
+    def restrict(self, nodal: np.ndarray) -> np.ndarray:
+        """Own unknowns (n, ...) from owned nodal values (nodes, 3, ...) of such a motion. Collective."""
+        return self.unknowns.restrict(nodal)
 
     def trace(self, values: np.ndarray) -> np.ndarray:
         """What is seen of motions (n, m) outside, on every process: the outer face (3 s, m), and after

@@ -99,6 +99,15 @@ class Unknowns:
             out[self.rim.dofs] = self.rim.shape @ self._rim_values(values)
         return out.reshape(self._body.nodes, 3, *values.shape[1:])
 
+    def restrict(self, nodal: np.ndarray) -> np.ndarray:
+        """Own unknowns (n, ...) from owned nodal values (nodes, 3, ...) of such a motion. Collective."""
+        flat = nodal.reshape(-1, *nodal.shape[2:])
+        own = flat[self.free]
+        if self.rim is None:
+            return own
+        on_rim = self.rim.unknowns(flat[self.rim.dofs])
+        return np.concatenate([own, on_rim]) if self.rim.mine else own
+
     def _rim_values(self, values: np.ndarray) -> np.ndarray:
         """The rim's six unknowns (6, ...), on every process. Collective."""
         return self.rim.shared(values[len(self.free) :])
@@ -143,6 +152,11 @@ class Rim:
     def shared(self, values: np.ndarray) -> np.ndarray:
         """The owner's (6, ...) values on every process. Collective."""
         return self._comm.bcast(values if self.mine else None, root=self._comm.size - 1)
+
+    def unknowns(self, motion: np.ndarray) -> np.ndarray:
+        """The six (6, ...) of a rigid motion of the rim's own dofs (d, ...). Collective."""
+        weighted = self._mass.reshape(-1, *[1] * (motion.ndim - 1)) * motion
+        return self._comm.allreduce(self.shape.T @ weighted)
 
     def momentum(self) -> np.ndarray:
         """Momentum (3, 6) kg per rate of the six unknowns. Collective."""

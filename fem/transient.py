@@ -19,6 +19,10 @@ from fem.compliance import on_own_rows, rotating_damping, rotating_stiffness
 from fem.direct import factorise, solve_columns
 from fem.operators import Operators, Rotation
 
+# What a step needs of the one before; `balanced` is the mean of two accelerations that balances the
+# forces at the step's end.
+_STATE = ("displacement", "velocity", "acceleration", "balanced")
+
 
 class FullTire:
     """All degrees of freedom of the tire between the patch's forces and displacements.
@@ -58,7 +62,7 @@ class FullTire:
         self._answer = solve_columns(self._solver, system, columns)
         self.same_step = self._comm.allreduce(self._outputs @ self._answer)
         n = len(self._mass)
-        self.displacement, self.velocity, self.acceleration, self._balanced = np.zeros((4, n))
+        self.displacement, self.velocity, self.acceleration, self.balanced = np.zeros((4, n))
         self._columns = columns
         self._vectors = system.createVecs()
 
@@ -68,7 +72,7 @@ class FullTire:
 
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
-        self.acceleration = self._balanced = self._columns @ force / self._mass
+        self.acceleration = self.balanced = self._columns @ force / self._mass
 
     def predict(self) -> np.ndarray:
         """Displacement (r,) m at the end of the step with no new force."""
@@ -100,9 +104,20 @@ class FullTire:
         acceleration = moved / (beta * h**2) - (0.5 / beta - 1) * self.acceleration
         self.velocity += h * ((1 - gamma) * self.acceleration + gamma * acceleration)
         # The scheme's own unknown lags: this is the mean that balances the forces at the step's end.
-        self._balanced = (1 - self._a) * acceleration + self._a * self.acceleration
+        self.balanced = (1 - self._a) * acceleration + self._a * self.acceleration
         self.displacement, self.acceleration = new, acceleration
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """The state at all nodes of the lattice, (n, 3) each: m, m/s, m/s2, m/s2. On every process."""
+        spread, everywhere = self._operators.spread, self._operators.body.everywhere
+        return {name: everywhere(spread(getattr(self, name))) for name in _STATE}
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on from a snapshot, between `advance` and `predict`; written on any number of processes."""
+        for name in _STATE:
+            own = kept[name][self._operators.body.ids]
+            setattr(self, name, self._operators.restrict(own))
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N: the convective parts cancel around the ring."""
-        return self._comm.allreduce(self._operators.carried @ self._balanced)
+        return self._comm.allreduce(self._operators.carried @ self.balanced)

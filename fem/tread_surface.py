@@ -13,6 +13,9 @@ _WINDOW = np.radians(75)  # of the ring and the arc around the lowest point: it 
 _STEP = 1e-6  # rad, of the difference quotients; Newton's rate, not its answer, depends on it
 _NEWTON = 30
 _CLOSE = 1e-11  # m
+_CLOSE_ANGLE = (
+    1e-9  # rad; at a lowest point the height's error is the square of it, times the radius
+)
 
 
 class TreadSurface:
@@ -39,6 +42,40 @@ class TreadSurface:
     def at(self, ring: np.ndarray, arc: np.ndarray) -> np.ndarray:
         """Deformed positions (k, 3), m."""
         return self.weights(ring, arc) @ self._positions
+
+    def lowest(self) -> float:
+        """Height of the lowest point of the face, m: where a road that comes up touches first.
+
+        An element dips below its lowest node by less than its nodes' range, so all that could reach
+        below every node are looked at; each by a grid that closes in on its lowest point.
+        """
+        section, edge = self._lattice.section, self._lattice.edge
+        order = len(edge) - 1
+        i = (order * np.arange(section.segments)[:, None] + np.arange(order + 1)) % self._shape[0]
+        j = order * np.arange(section.elements_arc)[:, None] + np.arange(order + 1)
+        height = self._positions[:, 2].reshape(self._shape)[i[:, None, :, None], j[None, :, None]]
+        low, high = height.min(axis=(2, 3)), height.max(axis=(2, 3))
+        around, along = np.nonzero(2 * low - high <= low.min())
+        corners = [
+            np.stack([line[index], line[index + 1]], axis=1)
+            for line, index in ((section.ring_corners, around), (section.arc_corners, along))
+        ]
+        while max((box[:, 1] - box[:, 0]).max() for box in corners) > _CLOSE_ANGLE:
+            corners, found = self._closed_in(*corners)
+        return float(found.min())
+
+    def _closed_in(self, ring: np.ndarray, arc: np.ndarray):
+        """Boxes (k, 2) a third as wide around the lowest of 7 x 7 points in each, and its height (k,)."""
+        t = np.linspace(0, 1, 7)
+        place = [box[:, :1] + (box[:, 1:] - box[:, :1]) * t for box in (ring, arc)]
+        grid = np.repeat(place[0], 7, axis=1), np.tile(place[1], (1, 7))
+        height = self.at(grid[0].ravel(), grid[1].ravel())[:, 2].reshape(-1, 49)
+        best = height.argmin(axis=1)
+        boxes = [
+            np.take_along_axis(line, np.clip(at[:, None] + np.array([-1, 1]), 0, 6), axis=1)
+            for line, at in zip(place, np.divmod(best, 7), strict=True)
+        ]
+        return boxes, height.min(axis=1)
 
     def locate(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles (rad) of the places seen from below at x, y (k,) m, and which were found (k,) bool.

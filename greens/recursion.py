@@ -16,6 +16,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy import linalg
 
+from greens.loaded import LoadedColumns
 from greens.response import Response
 
 
@@ -24,7 +25,9 @@ class Recursion:
 
     `predict` gives the displacement at the end of the next step if the new force were zero (without
     the residual); `advance` takes the new force. `same_step` (r, k) m/N is what a unit new force
-    adds to it at once, the residual included.
+    adds to it at once, the residual included. A step reads the output matrix once and of the input
+    matrix the columns of the forces that are not zero. The rate of momentum is three more outputs,
+    so that processes meet once a step.
     """
 
     def __init__(self, response: Response, step: float, scheme: str, comm: MPI.Comm):
@@ -32,33 +35,39 @@ class Recursion:
         self.step = step
         mine = np.arange(comm.rank, len(response.eigenvalue), comm.size)
         s = response.eigenvalue[mine]
-        self._s = s
         self._decay = np.exp(s * step)
         self._old, self._new = _weights(s * step, step, scheme)
-        # Real arithmetic and contiguous rows: a step is two matrix-vector products.
-        self._output = np.hstack([response.output[:, mine].real, -response.output[:, mine].imag])
-        self._input = np.vstack([response.input[mine].real, response.input[mine].imag])
-        self._momentum = response.momentum[:, mine]
-        self._block = _Block(response, step, scheme) if comm.rank == 0 else None
-        self._q = len(mine)
-        self.state = np.zeros(self._q, complex)
-        self._push = np.zeros(self._q, complex)  # P f of the step before
-        self.same_step = response.residual + self._reduce(self._direct())
-        self._late = np.zeros_like(response.residual)
+        momentum = response.momentum[:, mine]
+        # Real arithmetic on (re, im) beside each other, as the states lie in memory.
+        output = np.vstack([response.output[:, mine], momentum * s**2])
+        into = np.ascontiguousarray(response.input[mine])
+        self._output = np.ascontiguousarray(output.conj()).view(float)
+        self._input = LoadedColumns(np.ascontiguousarray(into.T).view(float).T)
+        self._block = None
+        if comm.rank == 0 and len(response.block):
+            self._block = _Block(response, step, scheme)
+        self.state = np.zeros(len(mine), complex)
+        self._push = np.zeros(len(mine), complex)  # P f of the step before
+        self._free = self.state
+        self._begun = response.direct_momentum_rate()
+        self._add_same_step(response, into)
+        self._late = None
         if response.pulse and scheme == "linear":
             # A pulse one step long answers the mean of a linear force over the step.
             self._late = response.residual / 2
             self.same_step -= self._late
         self._force = np.zeros(response.residual.shape[1])
+        self._rate = np.zeros(3)
 
-    def _direct(self) -> np.ndarray:
-        """Displacement at the end of a step per unit force there, of this process's states."""
-        weighted = self._new[:, None] * self._complex(self._input)
-        direct = self._output @ np.vstack([weighted.real, weighted.imag])
-        return direct + self._block.direct() if self._block else direct
-
-    def _complex(self, stacked: np.ndarray) -> np.ndarray:
-        return stacked[: self._q] + 1j * stacked[self._q :]
+    def _add_same_step(self, response: Response, into: np.ndarray) -> None:
+        """What a unit new force adds at once, to the displacements and to the rate of momentum."""
+        pushed = np.ascontiguousarray((self._new[:, None] * into).T).view(float)
+        direct = self._output @ pushed.T
+        if self._block:
+            direct += self._block.direct()
+        direct = self._reduce(direct)
+        self.same_step = response.residual + direct[:-3]
+        self._jump = LoadedColumns(direct[-3:] + self._begun)
 
     def _reduce(self, values: np.ndarray) -> np.ndarray:
         if self.comm.size == 1:
@@ -70,36 +79,43 @@ class Recursion:
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
         self._force = force
-        self._push = self._complex(self._input @ force)
+        self._push = (self._input @ force).view(complex)
+        self._rate = self._begun @ force
         if self._block:
             self._block.start(force)
 
     def predict(self) -> np.ndarray:
         """Displacement (r,) m at the end of the step with no new force. Collective."""
         self._free = self._decay * self.state + self._old * self._push
-        out = self._output @ np.concatenate([self._free.real, self._free.imag])
+        out = self._output @ self._free.view(float)
         if self._block:
             out += self._block.predict()
-        return self._reduce(out) + self._late @ self._force
+        out = self._reduce(out)
+        self._rate = out[-3:]
+        out = out[:-3]
+        return out if self._late is None else out + self._late @ self._force
 
     def advance(self, force: np.ndarray) -> None:
         """Take the force (k,) N at the end of the step; after `predict`. Local to each process."""
         self._force = force
-        self._push = self._complex(self._input @ force)
+        self._push = (self._input @ force).view(complex)
         self.state = self._free + self._new * self._push
+        self._rate = self._rate + self._jump @ force
         if self._block:
             self._block.advance(force)
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """All states in the order of the response, the same for any number of processes. Collective."""
         kept = {"state": self._gathered(self.state), "push": self._gathered(self._push)}
-        block = self._block.snapshot() if self._block else None
+        kept["push_force"] = self._force
+        block = self._block.snapshot() if self._block else _NO_BLOCK
         return kept | self.comm.bcast(block)
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from a snapshot, between `advance` and `predict`."""
         mine = slice(self.comm.rank, None, self.comm.size)
         self.state, self._push = kept["state"][mine].copy(), kept["push"][mine].copy()
+        self._force = kept["push_force"]
         if self._block:
             self._block.restore(kept)
 
@@ -111,26 +127,26 @@ class Recursion:
         return out
 
     def inertia_force(self) -> np.ndarray:
-        """Rate of the tire's momentum (3,), N: sum_k (int rho phi_k) eta_k''. Collective."""
-        rate = self._s * (self._s * self.state + self._push)
-        out = (self._momentum @ rate).real
-        if self._block:
-            out += self._block.inertia_force()
-        return self._reduce(out)
+        """Rate of the tire's momentum (3,), N: sum_k (int rho phi_k) eta_k'', after `advance`."""
+        return self._rate
 
 
 class _Block:
-    """The same recursion for the dense block of near-defective states, on the root process only."""
+    """The same recursion for the dense block of near-defective states, on the root process only.
+
+    Its last three outputs are the rate of momentum, the jump with the force left out.
+    """
 
     def __init__(self, response: Response, step: float, scheme: str):
-        self._response = response
-        size, forces = response.block_input.shape
+        block, push = response.block, response.block_input
+        self._output = np.vstack([response.block_output, response.block_momentum @ block @ block])
+        size, forces = push.shape
         # expm of [[T, P, 0], [0, 0, I/h], [0, 0, 0]] h carries e^{Th}, h phi1 P and h phi2 P at once.
         wide = np.zeros((size + 2 * forces, size + 2 * forces))
-        wide[:size, :size] = response.block * step
-        wide[:size, size : size + forces] = response.block_input * step
+        wide[:size, :size] = block * step
+        wide[:size, size : size + forces] = push * step
         wide[size : size + forces, size + forces :] = np.eye(forces)
-        moved = linalg.expm(wide)[:size] if size else np.zeros((0, size + 2 * forces))
+        moved = linalg.expm(wide)[:size]
         self._decay = moved[:, :size]
         first, second = moved[:, size : size + forces], moved[:, size + forces :]
         self._old, self._new = (
@@ -140,14 +156,14 @@ class _Block:
         self._force = np.zeros(forces)
 
     def direct(self) -> np.ndarray:
-        return self._response.block_output @ self._new
+        return self._output @ self._new
 
     def start(self, force: np.ndarray) -> None:
         self._force = force
 
     def predict(self) -> np.ndarray:
         self._free = self._decay @ self.state + self._old @ self._force
-        return self._response.block_output @ self._free
+        return self._output @ self._free
 
     def advance(self, force: np.ndarray) -> None:
         self._force = force
@@ -159,10 +175,8 @@ class _Block:
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         self.state, self._force = kept["block_state"], kept["block_force"]
 
-    def inertia_force(self) -> np.ndarray:
-        block = self._response.block
-        push = self._response.block_input @ self._force
-        return self._response.block_momentum @ (block @ (block @ self.state + push))
+
+_NO_BLOCK = {"block_state": np.zeros(0), "block_force": np.zeros(0)}
 
 
 def _weights(x: np.ndarray, step: float, scheme: str) -> tuple[np.ndarray, np.ndarray]:

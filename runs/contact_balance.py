@@ -4,37 +4,38 @@ from __future__ import annotations
 
 import numpy as np
 
-from contact.energy import Work, stored
+from contact.energy import stored
 from contact.rolling import Loop
 from modal.rotating import matrices
 from runs import observe
 from runs.session import Session
 
 
-def balance(session: Session, loop: Loop, work: Work, step: float) -> None:
+def balance(session: Session, loop: Loop, contact: float, driven: float, step: float) -> None:
     """Work of contact, energy left in the tire, and the rest: lost, less what the drive put in.
 
-    Of other states than the modes' own (residual dynamics, attachment modes) only the work is told.
+    `contact`, `driven` (J): the work of the contact's changes and of the prescribed forces. Of other states than the modes' own (residual dynamics, attachment modes) only the work is told.
     Collective.
     """
     kept = loop.tire.snapshot()
-    session.record.indicators["work of contact on the tire"] = (work.total, "J")
+    work = contact + driven
+    session.record.indicators["work of contact on the tire"] = (contact, "J")
+    if session.scene.force:
+        session.record.indicators["work of the prescribed forces"] = (driven, "J")
     response, modes = session.contact_response, session.state_modes
     own = np.array_equal(response.eigenvalue, modes.eigenvalue)
     if not own or len(modes.block) != len(kept["block_state"]):
-        observe.say(f"  energy: contact put {work.total:.4g} J into the tire")
+        observe.say(f"  energy: contact and forces put {work:.4g} J into the tire")
         return
     left = _left(session, kept, response.slow(step))
     session.record.indicators |= {
         "energy left in the modes": (left, "J"),
-        "lost, less the work of the drive": (work.total - left, "J"),
+        "lost, less the work of the drive": (work - left, "J"),
     }
-    observe.say(
-        f"  energy: contact put {work.total:.4g} J into the tire, {left:.4g} J are left in its modes"
-    )
-    if session.speed == 0 and left > work.total + 1e-3 * abs(work.total) + 1e-9:
+    observe.say(f"  energy: {work:.4g} J came into the tire, {left:.4g} J are left in its modes")
+    if session.speed == 0 and left > work + 1e-3 * abs(work) + 1e-9:
         session.record.warnings.append(
-            "the standing tire holds more energy than contact put in: take a smaller time.step, or "
+            "the standing tire holds more energy than was put in: take a smaller time.step, or "
             'time.scheme = "constant"'
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import time
 from pathlib import Path
 
@@ -23,8 +24,8 @@ _MODULES = {
     "modes": modes,
     "rotating": rotating,
     "greens": greens,
-    "response": response,
     "contact": contact,
+    "response": response,
     "spectra": spectra,
 }
 
@@ -77,6 +78,7 @@ def _run_stage(session: Session, stage: str, summary: Summary, fresh: bool) -> N
         return
     with session.recording(stage) as record:
         module.compute(session, path)
+        record.indicators["largest memory of a process so far"] = (_peak(comm), "GB")
     seconds = time.perf_counter() - began
     for text in record.warnings:
         observe.warn(f"{stage}: {text}")
@@ -93,6 +95,11 @@ def _run_stage(session: Session, stage: str, summary: Summary, fresh: bool) -> N
             cost=record.cost,
         ),
     )
+
+
+def _peak(comm: MPI.Comm) -> float:
+    """Largest resident memory of any process since it began, GB. Collective."""
+    return 1024e-9 * comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, MPI.MAX)
 
 
 def _report(directory: Path, summary: Summary) -> None:

@@ -7,8 +7,8 @@ STAGES = (
     "modes",
     "rotating",
     "greens",
-    "response",
     "contact",
+    "response",
     "spectra",
     "report",
 )

@@ -12,13 +12,13 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from fem.errors import InputError
 from runs import force_sections, tire_sections
 from runs.disk import write_text
+from runs.plan import STAGES
 from runs.quantities import quantity
 from runs.results import Absent, Results, Section
 from runs.schema import key_of, table_of
 from runs.tables import Scene
 from runs.version import PROGRAM
 
-STAGES = ("static", "modes", "rotating", "greens", "response", "contact", "spectra", "report")
 SECTIONS: Mapping[str, Callable[[Results], Section]] = {
     "static.h5": tire_sections.static,
     "modes.h5": tire_sections.modes,

@@ -147,6 +147,11 @@ def _force(scene: Scene, error: Where) -> None:
             ("output", "receptance", "step"),
             f"= {receptance.step:g} Hz must not be more than to = {receptance.to:g} Hz",
         )
+    for key in ("velocity", "acceleration"):
+        if scene.contact is not None and getattr(scene.output, key):
+            raise error(
+                ("output", key), "is not told in contact: leave it out, or take out [contact]"
+            )
     if scene.force and scene.time is None and receptance is None:
         raise error(("force",), "has nothing to drive: add [time] or output.receptance")
     for number, force in enumerate(scene.force):

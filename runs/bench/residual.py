@@ -17,13 +17,12 @@ from fem.mesh import Torus
 from fem.operators import Operators
 from greens.choice import keep
 from greens.recursion import Recursion
-from greens.response import couple
 from greens.truncation import Cutoff, estimate
 from modal import undamped
-from modal.basis import Projection, project
-from modal.rotating import standing
+from modal.basis import project
 from modal.undamped import Modes
 from runs.coupling import Basis, Wheel
+from runs.stages.modes import sites
 from runs.tabulate import Table
 
 ABOUT = "receptance of few modes with each residual against the full matrices; set-up times"
@@ -34,6 +33,8 @@ DAMPING = (500.0, 0.0)
 SPEED = 50.0
 BAND = 5  # frequencies up to half the highest kept mode
 INFLATION = 2e5
+# What the set-up times are asked for.
+MODES, FORCES = 1000, 300
 # Vertical forces and displacements around the lowest point, as a contact patch has them, in rad.
 PATCH = [(ring, arc) for ring in (-0.1, 0.0, 0.1) for arc in (-0.15, 0.0, 0.15)]
 
@@ -167,46 +168,43 @@ def _choice(wheel: Wheel, modes: Modes, probes) -> Table:
 def _times(comm: MPI.Comm) -> Table:
     """Set-up of the residual and of the recursion at full size. Collective."""
     operators = _tire(comm, 80, 16)
-    rolling = Wheel(operators, operators.rotation(), SPEED, DAMPING, "full")
-    lattice = operators.body.lattice
-    surface = len(operators.body.surface.ids)
-    places = probe.nodes(np.arange(300) + surface // 2, surface)
-    modes, forces = 1000, len(places.indptr) - 1
+    body = operators.body
+    nearest = np.argsort(body.lattice.points(body.surface.ids)[:, 2], kind="stable")
+    places = probe.nodes(nearest[:FORCES], len(nearest))
+    modes = undamped.solve(operators.stiffness, operators.mass, MODES, sites=sites(operators))
     rows = []
 
-    def clock(name: str, target: float, work) -> None:
+    def clock(name: str, target, work):
         comm.Barrier()
         began = time.perf_counter()
-        work()
+        done = work()
         comm.Barrier()
         rows.append([name, time.perf_counter() - began, target])
+        return done
 
-    for wheel in (Wheel(operators, None, 0.0, DAMPING, "full"), rolling):
+    for rotation, speed in ((None, 0.0), (operators.rotation(), SPEED)):
+        wheel = Wheel(operators, rotation, speed, DAMPING, "full")
         _ = wheel.rotating_stiffness, wheel.rotating_damping
-        for option in ("static", "second-order"):
-            basis = _synthetic(surface, 20)
-            clock(
-                f"residual {option}, {wheel.speed:g} rad/s",
+        basis, _ = _basis(wheel, modes, MODES)
+        for option in OPTIONS[2:]:
+            response = clock(
+                f"residual {option}, {speed:g} rad/s",
                 30.0,
-                lambda w=wheel, o=option, b=basis: w.respond(b, None, places, places, o),
+                lambda w=wheel, o=option, b=basis: w.respond(b, modes, places, places, o),
             )
-    projection = Projection((np.linspace(50, 900, modes) * 2 * np.pi) ** 2, np.ones((3, modes)))
-    shape = np.random.default_rng(0).normal(size=(forces, modes))
-    response = couple(standing(projection, DAMPING), shape, shape, projection.momentum)
+    states = len(response.eigenvalue)
     clock(
-        f"recursion, {modes} modes, {forces} forces",
+        f"recursion, {states} states, {FORCES} forces",
         5.0,
         lambda: Recursion(response, 1e-4, "linear", comm),
     )
     return Table(
-        f"Set-up at {3 * lattice.size} unknowns and {forces} contact dofs, {comm.size} process(es)",
+        f"Set-up with {MODES} modes at {operators.stiffness.getSize()[0]} unknowns and {FORCES} contact "
+        f"dofs, {comm.size} process(es)",
         [("what", "-"), ("time", "s"), ("target", "s")],
         rows,
+        [
+            "second-order and attachment find the states of the grown problem too: when rolling that "
+            "dense eigenproblem is most of their time"
+        ],
     )
-
-
-def _synthetic(surface: int, count: int) -> Basis:
-    """A few made-up modes: the time of the solves does not depend on their shapes."""
-    projection = Projection((np.linspace(50, 900, count) * 2 * np.pi) ** 2, np.ones((3, count)))
-    shape = 1e-3 * np.random.default_rng(0).normal(size=(3 * surface, count))
-    return Basis(shape, projection, standing(projection, DAMPING))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from contact.brush import Brush, BrushLaw
-from contact.energy import Work
+from contact.driven import Driven
 from contact.friction import Friction
 from contact.grid_patch import OnPoints, settle
 from contact.model import solver_name, step_solver
@@ -21,7 +21,9 @@ from greens.response import Response
 from runs import observe, store
 from runs.contact_balance import balance
 from runs.contact_file import ContactFile
+from runs.contact_totals import Figures, Totals
 from runs.mpi import Deferred, Stopped
+from runs.point_forces import directions, histories, shortest_period
 from runs.session import Session
 
 # Radians a kept mode may turn in one automatic step: 0.3 leaves less than a percent in its phase.
@@ -39,6 +41,7 @@ def inputs(session: Session) -> dict:
         "road": asdict(scene.road),
         "file": store.file_hash(scene.road.file) if scene.road.file else None,
         "speed": session.road_speed,
+        "forces": [asdict(force) for force in scene.force],
         "time": {k: v for k, v in asdict(scene.time).items() if k != "checkpoint"},
     }
 
@@ -50,48 +53,50 @@ def compute(session: Session, path: Path) -> None:
     tire, step, steps, scheme = integration(session, session.contact_response, shortest)
     with record.timing("tread and solver"):
         _settled(session)
-        loop = Loop(*_on_points(session, tire, step))
-    totals = _Totals()
+        driven = _driven(session, tire, step, steps)
+        loop = Loop(*_on_points(session, driven or tire, step))
+    totals = Totals(session.patch, session.reach)
     with ExitStack() as stack, record.timing("time loop"):
         file = ContactFile(session, {"step": step, "scheme": scheme})
         kept = file.open(stack, path)
-        work = Work()
         if kept is not None:
             loop.restore(kept)
-            work.set_state(kept)
-            totals = _Totals(**{name: kept[name].item() for name in vars(totals)})
-            observe.say(f"  goes on from the checkpoint at t = {totals.steps * step:.6g} s")
-        _run(session, loop, file, (totals, work), step, steps)
+            totals.set_state(kept)
+            observe.say(f"  goes on from the checkpoint at t = {totals.figures.steps * step:.6g} s")
+        _run(session, loop, driven, file, totals, step, steps)
         file.finish()
-    _describe(session, totals, loop.solver, step, steps, scheme)
+    _describe(session, totals.figures, loop.solver, step, steps, scheme)
     if scheme != "convolution":
-        balance(session, loop, work, step)
+        balance(session, loop, totals.work.total, driven.work if driven else 0.0, step)
 
 
-def _run(session: Session, loop: Loop, file: ContactFile, counts, step, steps) -> None:
-    """Take the steps that are left; stop between two of them when asked to. Collective.
+def _driven(session: Session, tire, step: float, steps: int) -> Driven | None:
+    """The tire under the scene's prescribed forces, where there are any."""
+    forces = session.scene.force
+    if not forces:
+        return None
+    return Driven(tire, histories(forces, step * np.arange(steps + 1)), directions(forces))
 
-    `counts`: the running figures and the work.
-    """
-    totals, work = counts
+
+def _run(session: Session, loop: Loop, driven, file: ContactFile, totals, step, steps) -> None:
+    """Take the steps that are left; stop between two of them when asked to. Collective."""
+    done = totals.figures.steps
     drive = Drive(session.road.height, session.motion, session.road_speed)
-    instants = roll(
-        loop.tire, loop.solver, session.patch, drive, step, steps, loop.friction, totals.steps
-    )
+    instants = roll(loop.tire, loop.solver, session.patch, drive, step, steps, loop.friction, done)
     watch = _Watch(session)
     with Deferred() as deferred, observe.Progress("contact", steps) as bar:
-        bar.advance(totals.steps)
+        bar.advance(done)
         for instant in instants:
-            session.patch.check_edge(instant.force, instant.time, session.reach)
-            totals.add(instant)
-            work.add(instant)
-            file.add(instant)
+            full = file.add(instant, driven.reading if driven else None)
             bar.advance()
             stop, due = watch(deferred.asked)
+            if full or stop or due:
+                file.flush(totals.add)
             if stop or due:
-                file.checkpoint(loop.snapshot() | vars(totals) | work.state())
+                file.checkpoint(loop.snapshot() | totals.state())
             if stop:
                 raise Stopped(stop)
+        file.flush(totals.add)
 
 
 class _Watch:
@@ -147,10 +152,11 @@ def integration(session: Session, response: Response, shortest: float):
 
 
 def _shortest_period(session: Session) -> float:
-    """Time in which the road's finest detail, or its motion, passes a point, s."""
+    """Time in which the road's finest detail, its motion, or a force's period passes, s."""
     motion, road = session.scene.road.motion, session.road
     passing = 2 * road.spacing / session.road_speed if session.road_speed else np.inf
-    return min(passing, 1 / motion.frequency) if motion.kind == "sine" else passing
+    moving = 1 / motion.frequency if motion.kind == "sine" else np.inf
+    return min(passing, moving, shortest_period(session.scene.force))
 
 
 def _settled(session: Session) -> None:
@@ -195,29 +201,7 @@ def _friction(session: Session, tire, step: float) -> Friction:
     return Friction(brush, tire.same_step, patch.weights)
 
 
-@dataclass
-class _Totals:
-    """Running figures of the loop."""
-
-    steps: int = 0
-    sum: float = 0.0
-    residual: float = 0.0
-    penetration: float = 0.0
-    least: float = np.inf
-    most: float = -np.inf
-    most_active: int = 0
-
-    def add(self, instant) -> None:
-        load = instant.force.sum()
-        self.steps += 1
-        self.sum += load
-        self.least, self.most = min(self.least, load), max(self.most, load)
-        self.most_active = max(self.most_active, instant.active)
-        self.residual = max(self.residual, instant.residual)
-        self.penetration = max(self.penetration, -instant.gap.min())
-
-
-def _describe(session: Session, totals: _Totals, solver, step, steps, scheme) -> None:
+def _describe(session: Session, totals: Figures, solver, step, steps, scheme) -> None:
     record = session.record
     record.headline |= {
         "mean load": (float(totals.sum / totals.steps), "N"),
@@ -233,10 +217,6 @@ def _describe(session: Session, totals: _Totals, solver, step, steps, scheme) ->
         "largest penetration": (float(totals.penetration), "m"),
         "factorisations": (solver.factorisations, "-"),
     }
-    if session.scene.force:
-        record.warnings.append(
-            "the point forces of [[force]] act in response.h5 alone, not in the contact"
-        )
     if totals.least == 0:
         record.warnings.append("the tire lost contact with the road for a while")
 

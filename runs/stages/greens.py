@@ -125,11 +125,12 @@ def _prepare_forces(session: Session) -> None:
 
 def compute(session: Session, path: Path) -> None:
     """Responses with their residual, the choice of dynamic states, and their file. Collective."""
-    responses = {}
-    for name, (outputs, loads) in _probes(session).items():
-        whole = make(session, outputs, loads)
-        responses[name] = chosen(session, whole)
-        judge(session, name, whole, responses[name])
+    name, outputs, loads = probes(session)
+    whole = make(session, outputs, loads)
+    responses = {name: chosen(session, whole)}
+    judge(session, name, whole, responses[name])
+    if name == "contact" and session.scene.force:
+        responses |= _apart(session, responses[name])
     _take(session, responses)
     _describe(session, responses)
 
@@ -142,19 +143,29 @@ def compute(session: Session, path: Path) -> None:
     session.write(path, "greens", fill)
 
 
-def _probes(session: Session) -> dict[str, tuple]:
-    """(outputs, loads) on the outer face of the contact patch and of the prescribed forces."""
+def probes(session: Session) -> tuple:
+    """(name, outputs, loads) on the outer face: of the contact patch with what prescribed forces add
+    to it, or of the prescribed forces alone."""
     from fem.probe import nodes
 
-    out = {}
-    if session.scene.contact:
-        count = len(session.static.points)
-        parts = [nodes(session.patch.index, count, part) for part in _components(session)]
-        points = sparse.vstack(parts, format="csr")
-        out["contact"] = points, points
+    if not session.scene.contact:
+        return "force", session.readings, session.loads
+    count = len(session.static.points)
+    parts = [nodes(session.patch.index, count, part) for part in _components(session)]
     if session.scene.force:
-        out["force"] = session.readings, session.loads
-    return out
+        parts += [session.loads, session.readings]
+    points = sparse.vstack(parts, format="csr")
+    return "contact", points, points
+
+
+def _apart(session: Session, whole: Response) -> dict[str, Response]:
+    """The contact's response, the prescribed forces among its inputs (contact.driven), and theirs."""
+    count = len(_components(session)) * len(session.patch.index)
+    inputs = count + len(session.scene.force)
+    return {
+        "contact": whole.between(slice(None), slice(inputs)),
+        "force": whole.between(slice(inputs, None), slice(count, inputs)),
+    }
 
 
 def _take(session: Session, responses: dict[str, Response]) -> None:

@@ -10,6 +10,8 @@ import numpy as np
 from greens.recursion import Recursion
 from greens.response import Response
 from runs import observe
+from runs.contact_file import DRIVEN
+from runs.point_forces import directions, histories, shortest_period
 from runs.session import Session
 from runs.stages.contact import integration
 from runs.store import put
@@ -23,6 +25,7 @@ def inputs(session: Session) -> dict:
         "forces": [asdict(force) for force in scene.force],
         "time": asdict(scene.time) if scene.time else None,
         "receptance": asdict(scene.output.receptance) if scene.output.receptance else None,
+        "contact": session.hashes.get("contact"),
         "also": [scene.output.velocity, scene.output.acceleration, scene.output.impulse],
     }
 
@@ -30,10 +33,12 @@ def inputs(session: Session) -> dict:
 def compute(session: Session, path: Path) -> None:
     """Integrate and sweep, then store. Collective."""
     out: dict[str, tuple[np.ndarray, str]] = {}
-    if session.scene.time:
+    if session.scene.contact:
+        out |= _in_contact(session)
+    elif session.scene.time:
         out |= _in_time(session)
-        if session.scene.output.impulse:
-            out["impulse"] = _impulse(session, out["time"][0]), "m/(N s)"
+    if session.scene.time and session.scene.output.impulse:
+        out["impulse"] = _impulse(session, out["time"][0]), "m/(N s)"
     if session.scene.output.receptance:
         out |= _in_frequency(session)
 
@@ -44,15 +49,32 @@ def compute(session: Session, path: Path) -> None:
     session.write(path, "response", fill)
 
 
+def _in_contact(session: Session) -> dict:
+    """What the contact loop found at the driven points, contact included. Collective."""
+
+    def pick(file):
+        return file["time"][:], file[DRIVEN][:], file["axle_force"][:]
+
+    time, displacement, axle = session.read(session.directory / "contact.h5", pick)
+    largest = float(np.abs(displacement).max())
+    session.record.headline["largest displacement"] = (largest, "m")
+    return {
+        "time": (time, "s"),
+        "force": (histories(session.scene.force, time), "N"),
+        "displacement": (displacement, "m"),
+        "axle_force": (axle, "N"),
+    }
+
+
 def _in_time(session: Session) -> dict:
     """Displacements and axle force of the prescribed forces. Collective."""
     forces = session.scene.force
-    fastest = max(force.frequency for force in forces)
-    shortest = 1 / fastest if fastest else np.inf
-    tire, step, steps, scheme = integration(session, session.force_response, shortest)
+    tire, step, steps, scheme = integration(
+        session, session.force_response, shortest_period(forces)
+    )
     time = step * np.arange(steps + 1)
-    force = np.stack([_history(f, time) for f in forces], axis=-1)
-    direction = _directions(forces)
+    force = histories(forces, time)
+    direction = directions(forces)
     displacement = np.zeros((steps + 1, 3 * len(forces)))
     axle = np.zeros((steps + 1, 3))
     tire.start(force[0])
@@ -85,10 +107,7 @@ def _rates(session: Session, time: np.ndarray, step: float, scheme: str) -> dict
     """Velocities and accelerations of the driven points, where wanted. Collective."""
     output, response = session.scene.output, session.force_response.resolved(step)
     velocity = response.rate()
-    forces = [
-        np.stack([_history(f, time, order) for f in session.scene.force], axis=-1)
-        for order in range(3)
-    ]
+    forces = [histories(session.scene.force, time, order) for order in range(3)]
     out = {}
     if output.velocity:
         moved = _march(session, velocity, step, scheme, forces[0])
@@ -118,20 +137,6 @@ def _march(session: Session, response: Response, step: float, scheme: str, force
     return np.stack(out)
 
 
-def _directions(forces) -> np.ndarray:
-    """Unit vectors of the forces, (k, 3)."""
-    given = np.array([force.direction for force in forces])
-    return given / np.linalg.norm(given, axis=1, keepdims=True)
-
-
-def _history(force, time: np.ndarray, order: int = 0) -> np.ndarray:
-    """amplitude sin(2 pi f t), or the constant amplitude from t = 0 on, N; or its order-th rate."""
-    if force.frequency == 0:
-        return np.full(len(time), force.amplitude if order == 0 else 0.0)
-    omega = 2 * np.pi * force.frequency
-    return force.amplitude * omega**order * np.sin(omega * time + order * np.pi / 2)
-
-
 def _in_frequency(session: Session) -> dict:
     """Receptances between the driven points, each along its own force."""
     wanted, forces = session.scene.output.receptance, session.scene.force
@@ -156,7 +161,7 @@ def _drifts(session: Session) -> bool:
 def _along(full: np.ndarray, forces) -> np.ndarray:
     """Each point's displacement along its own force, (n, k, k), from its components (n, 3 k, k)."""
     components = full.reshape(len(full), len(forces), 3, len(forces))
-    return np.einsum("frdk,rd->frk", components, _directions(forces))
+    return np.einsum("frdk,rd->frk", components, directions(forces))
 
 
 def _direct(session: Session) -> dict:

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from contact.complementarity import ActiveSet
 from contact.energy import Work
 from contact.flat import Flat
-from contact.rolling import Drive, roll
+from contact.rolling import Drive, _roads, roll
 from contact.synthetic import Strip, oval_patch
 from contact.tread import half_space_compliance
 from fem.errors import ConvergenceError
@@ -113,6 +113,25 @@ def test_constant_scheme_never_gains_energy_undamped() -> None:
     assert 0 < left[-1] < left[0]
 
 
+def test_road_heights_do_not_depend_on_where_a_loop_goes_on() -> None:
+    asked = []
+
+    def height(x, y):
+        asked.append(np.shape(x))
+        return wavy(x, y)
+
+    response = STRIP.response(PATCH.points, 3, 2)
+    whole, _, _ = run(response, 1e-4, 100, "linear", height=height)
+    assert len(asked) < 100 / 5 and all(shape[1] == len(PATCH.points) for shape in asked)
+    drive = Drive(height, lambda t: 0.0, 20.0)
+    for done in (0, 37, 99):
+        roads = list(_roads(drive, PATCH, 1e-4, 100, done))
+        assert [time for time, _ in roads] == [i.time for i in whole[done:]]
+        for (time, road), alone in zip(roads, whole[done:], strict=True):
+            here = wavy(PATCH.points[:, 0] + 20.0 * time, PATCH.points[:, 1])
+            assert np.allclose(road, here, rtol=0, atol=1e-18) and alone.time == time
+
+
 def test_motion_without_bound_is_refused() -> None:
     response = STRIP.response(PATCH.points, 3, 2)
     with pytest.raises(ConvergenceError, match="not finite"):
@@ -120,11 +139,12 @@ def test_motion_without_bound_is_refused() -> None:
 
 
 def test_edge_of_the_patch_is_reported() -> None:
-    at_edge = PATCH.force.copy()
-    PATCH.check_edge(at_edge, 0.0, 1e-3)
-    at_edge[0] = 1.0
-    with pytest.raises(ConvergenceError, match="contact.reach"):
-        PATCH.check_edge(at_edge, 0.5, 1e-3)
+    at_edge = np.tile(PATCH.force, (3, 1))
+    times = np.array([0.25, 0.5, 0.75])
+    PATCH.check_edge(at_edge, times, 1e-3)
+    at_edge[1:, 0] = 1.0
+    with pytest.raises(ConvergenceError, match="t = 0.5 s .*contact.reach"):
+        PATCH.check_edge(at_edge, times, 1e-3)
 
 
 @pytest.mark.mpi
@@ -158,8 +178,12 @@ def test_work_of_contact_is_the_energy_of_an_undamped_tire() -> None:
     for steps in (200, 400):
         work = Work()
         instants, tire, _ = run(response, 0.02 / steps, steps, "linear", speed=0.0)
-        for instant in instants:
-            work.add(instant)
+        loads, places = (np.array([getattr(i, n) for i in instants]) for n in ("change", "moved"))
+        work.add(loads, places)
+        blocked = Work()
+        for first in range(0, steps, 7):
+            blocked.add(loads[first : first + 7], places[first : first + 7])
+        assert blocked.total == work.total
         change = instants[-1].change
         held = (np.abs(tire.state) ** 2).sum() / strip.mass
         held += 0.5 * change @ response.residual @ change

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from dolfinx import fem
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from fem import compat
 from fem.equilibrium import Equilibrium
-from fem.errors import InputError
+from fem.errors import ConvergenceError, InputError
 from fem.loading import Loader
 from fem.material import Material
 from fem.state import static_state
@@ -157,6 +158,40 @@ def test_a_step_that_fails_leaves_the_state_as_it_was(make_body):
     step = equilibrium.solve()
     assert not step.converged
     np.testing.assert_array_equal(equilibrium.body.u.x.array, before)
+
+
+def test_the_road_finds_its_height_for_a_load(make_body):
+    """Load and height in one Newton loop; the height then gives the load back."""
+    equilibrium = Equilibrium(make_body(segments=16, footprint_size=0.3))
+    loader = Loader(equilibrium, lambda progress: None)
+    loader.inflate(2e5)
+    loader.deflect(0.002)
+    step = equilibrium.solve(equilibrium.road_height, load=1.3 * loader.load())
+    wanted = loader.load()
+    assert step.converged
+    assert step.iterations <= 4
+    loader.deflect(0.002)
+    assert loader.load() * 1.3 == pytest.approx(wanted, rel=1e-9)
+
+
+def test_a_road_below_the_tire_finds_no_height(make_body):
+    equilibrium = Equilibrium(make_body(segments=8, arc=2))
+    step = equilibrium.solve(-1.0, load=100.0)
+    assert not step.converged
+    assert "meets nothing" in step.reason
+
+
+def test_a_factorisation_out_of_memory_says_so(make_body):
+    """ICNTL(23) gives MUMPS one MB."""
+    options = PETSc.Options("static_")
+    options["mat_mumps_icntl_23"] = 1
+    try:
+        equilibrium = Equilibrium(make_body(segments=16, arc=10))
+        equilibrium.pressure.value = 2e5
+        with pytest.raises(ConvergenceError, match="MUMPS could not factorise.*INFOG"):
+            equilibrium.solve()
+    finally:
+        options.delValue("mat_mumps_icntl_23")
 
 
 def test_no_load_below_zero(make_body):

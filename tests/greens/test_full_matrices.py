@@ -131,7 +131,9 @@ def test_attachments_keep_the_modes_and_the_orthonormality() -> None:
     made, _ = wheel(60.0)
     shapes = static_shapes(operators, made.rotating_stiffness, made.rotating_damping, loads)
     comm = operators.body.comm
-    grown = with_attachments(modes, operators.stiffness, operators.mass, shapes.columns, comm)
+    idle = np.zeros((len(shapes.columns), 1))  # a load on the rim
+    columns = np.hstack([idle, shapes.columns])
+    grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
     assert len(grown.squares) == COUNT + len(SPOTS)
     assert grown.squares[COUNT:].min() > modes.squares[-1]
     weighted = operators.mass[:, None] * grown.vectors

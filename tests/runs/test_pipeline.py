@@ -175,3 +175,34 @@ def test_missing_scene_tire_that_cannot_carry_and_full_patch_are_told_in_one_lin
     assert "contact.reach" in done.stderr and "Traceback" not in done.stderr
     assert not (base / "edge" / "contact.h5").exists()
     assert (base / "edge" / "greens.h5").exists()
+
+
+def test_a_force_on_the_tire_in_contact_ends_where_statics_has_it(run):
+    """Point force and contact in one loop: once settled, df = -A_aa^-1 B_a F on the points that
+    touch, with the exact static flexibility; found at contact.h5 and response.h5 alike."""
+    tire, after = FLAT.replace("duration = 0.02", "duration = 0.15").split("[contact]")
+    force = (
+        "[[force]]\nangle = 30.0\ndirection = [0.0, 0.0, 1.0]\namplitude = 2.0\nfrequency = 0.0\n"
+    )
+    damping = "[damping]\nmass = 400.0\n"
+    folder, stages = run("pushed", tire + damping + force + '[contact]\ntread = "none"\n' + after)
+    flexibility = dataset(folder, "greens.h5", "contact/static_flexibility")
+    normal = dataset(folder, "contact.h5", "normal_force")
+    touching = np.flatnonzero(normal[0] > 0)
+    assert np.array_equal(touching, np.flatnonzero(normal[-1] > 0))
+    change = (
+        normal[-1, touching]
+        - dataset(folder, "static.h5", "contact/force")[:, 2][
+            dataset(folder, "static.h5", "contact/force")[:, 2] > 0
+        ]
+    )
+    own = np.linalg.solve(flexibility[np.ix_(touching, touching)], -2.0 * flexibility[touching, -1])
+    assert change == pytest.approx(own, abs=1e-4 * np.abs(own).max())
+    moved = flexibility[-3:, touching] @ own + 2.0 * flexibility[-3:, -1]
+    found = dataset(folder, "response.h5", "displacement")[-1, 0]
+    assert found == pytest.approx(moved, abs=1e-4 * np.abs(moved).max())
+    axle = dataset(folder, "response.h5", "axle_force")[-1]
+    total = dataset(folder, "contact.h5", "total_force")[-1]
+    assert axle == pytest.approx(total + [0.0, 0.0, 2.0], abs=1e-3)
+    work = stages["contact"]["indicators"]["work of the prescribed forces"]["value"]
+    assert work == pytest.approx(2.0 * found[2], rel=1e-6)

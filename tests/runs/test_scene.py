@@ -138,6 +138,7 @@ def test_bad_values_are_named(scene_file, text: str, words: list[str]) -> None:
         (["static.load="], ["contact", "static road", "load"]),
         (["modal.road=held"], ["modal.road", "[contact]"]),
         (["modal.rim=free"], ["modal.rim", "[contact]"]),
+        (["output.velocity=true"], ["output.velocity", "contact"]),
         (["contact=", "time="], ["force", "[time]", "receptance"]),
         (["force=", "output.receptance={}"], ["receptance", "[[force]]"]),
         (["output.receptance={to=1.0,step=2.0}"], ["receptance.step", "1 Hz"]),

@@ -55,6 +55,8 @@ def test_rigid_modes_of_a_free_rim(inflation, speed, rigid):
     transposed = operators.stiffness.transpose(PETSc.Mat())
     transposed.axpy(-1, operators.stiffness)
     assert transposed.norm() < 1e-13 * operators.stiffness.norm()
+    again = operators.restrict(operators.spread(modes.vectors))
+    np.testing.assert_allclose(again, modes.vectors, atol=1e-11)
     if speed:
         # The spin about the axle: centrifugal forces of the same size point outwards as they turn.
         near = np.sqrt(modes.squares[rigid : rigid + 3]) / speed

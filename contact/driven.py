@@ -1,0 +1,61 @@
+"""Prescribed forces that act on the tire while it is in contact: one tire, one loop.
+
+The tire's inputs are the contact's forces, then the k prescribed ones; its outputs the contact's
+displacements, then each prescribed force's own displacement along itself, then the readings.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contact.rolling import Tire
+
+
+class Driven:
+    """The tire as the contact sees it, its motion under prescribed forces included.
+
+    `history` (n + 1, k) N at the steps from t = 0 on; `directions` (k, 3) of unit length. After each
+    `advance`: `reading` (r,) m, and `work` (J) the prescribed forces did so far (trapezoid).
+    """
+
+    def __init__(self, tire: Tire, history: np.ndarray, directions: np.ndarray) -> None:
+        self._tire, self._history, self._directions = tire, history, directions
+        self._count = tire.same_step.shape[1] - history.shape[1]
+        self._same = tire.same_step
+        self.same_step = self._same[: self._count, : self._count]
+        self._step = 0
+        self._along = np.zeros(history.shape[1])
+        self.work = 0.0
+        tire.start(np.concatenate([np.zeros(self._count), history[0]]))
+
+    def predict(self) -> np.ndarray:
+        """Displacement (c,) m at the end of the step with no new contact force. Collective."""
+        self._step += 1
+        self._free = self._tire.predict()
+        pushed = self._same[: self._count, self._count :] @ self._history[self._step]
+        return self._free[: self._count] + pushed
+
+    def advance(self, force: np.ndarray) -> None:
+        """Take the contact's forces (c,) N at the end of the step."""
+        before, now = self._history[self._step - 1], self._history[self._step]
+        acting = np.concatenate([force, now])
+        self._tire.advance(acting)
+        moved = self._free[self._count :] + self._same[self._count :] @ acting
+        along, self.reading = np.split(moved, [len(now)])
+        self.work += float(0.5 * (before + now) @ (along - self._along))
+        self._along = along
+
+    def inertia_force(self) -> np.ndarray:
+        """What axle and contact together have to balance (3,), N: momentum's rate less the forces."""
+        return self._tire.inertia_force() - self._history[self._step] @ self._directions
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """The tire's, and how far the prescribed forces are. Collective when the tire's is."""
+        own = {"driven_step": self._step, "driven_along": self._along, "driven_work": self.work}
+        return self._tire.snapshot() | {name: np.array(value) for name, value in own.items()}
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on from a snapshot."""
+        self._step, self.work = int(kept["driven_step"]), float(kept["driven_work"])
+        self._along = kept["driven_along"]
+        self._tire.restore(kept)

@@ -1,0 +1,235 @@
+"""Run time against error of a tire that rolls on a rough road: modes x residual x step x mesh."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from fem.errors import ConvergenceError, InputError
+from runs import observe
+from runs.bench.rough_road import (
+    BAND,
+    SPEED,
+    Mesh,
+    errors,
+    fewer_modes,
+    modal,
+    prepared,
+)
+from runs.session import Session
+from runs.tabulate import Table
+from runs.validation.histories import History, follow
+
+ABOUT = "modes x residual x step x mesh against a far finer run: the Pareto front of rolling"
+
+COARSE, FINE = Mesh(24, 10, 0.35), Mesh(32, 12, 0.3)
+MOST = 450  # modes of the reference, attachment modes besides
+FINEST = 2.5e-5  # s, its step
+DURATION = 0.2  # s
+COUNTS = (50, 100, 200, 300)
+RESIDUALS = ("none", "static", "second-order", "attachment")
+STEPS = (5e-5, 1e-4, 2e-4, 4e-4)
+FULL_STEPS = (2e-4, 1e-4, 5e-5)
+TARGETS = (1.0, 0.1)  # %
+FULL = "full finite elements"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A configuration, what it costs (s a simulated second) and how far it is off (%)."""
+
+    mesh: str
+    modes: int
+    residual: str
+    states: int
+    step: float
+    cost: float
+    contact: float
+    axle: float
+
+    @property
+    def worst(self) -> float:
+        return max(self.contact, self.axle)
+
+    @property
+    def name(self) -> str:
+        """What a reader would ask for."""
+        if self.residual == FULL:
+            return f"{self.residual}, {self.step:g} s"
+        return f"{self.modes} modes, {self.residual}, {self.step:g} s"
+
+
+def run() -> list[Table]:
+    """The front on one mesh, what two meshes differ by, and full finite elements beside them."""
+    with tempfile.TemporaryDirectory() as folder:
+        return tables(Path(folder), (COARSE, FINE), COUNTS, MOST, FULL_STEPS)
+
+
+def tables(folder: Path, meshes: tuple[Mesh, Mesh], counts, most, full_steps) -> list[Table]:
+    """`meshes`: coarse and fine; `counts` of modes, and `most`, the reference's."""
+    session, exact = _reference(folder, meshes[0], most)
+    found = _choices(session, exact, str(meshes[0]), counts, RESIDUALS, STEPS)
+    full = [_full(session, exact, str(meshes[0]), step) for step in full_steps]
+    fine, finer = _reference(folder, meshes[1], most)
+    best = ("static", "attachment")
+    on_fine = _choices(fine, finer, str(meshes[1]), counts[1:], best, STEPS[1:])
+    apart = errors(finer, exact, DURATION)
+    return [
+        _front(found, full, session),
+        _meshes(found, on_fine, apart, session, fine),
+        _all(found + full + on_fine),
+    ]
+
+
+def _reference(folder: Path, mesh: Mesh, modes: int) -> tuple[Session, History]:
+    observe.say(f"  {mesh} elements: modes and reference ...")
+    keys = {"modes": modes, "residual": "attachment", "duration": DURATION, "step": FINEST}
+    session = prepared(folder / str(mesh), mesh, **keys)
+    return session, modal(session, session.contact_response, FINEST)
+
+
+def _choices(session: Session, exact: History, mesh: str, counts, residuals, steps) -> list[Choice]:
+    out = []
+    for count in counts:
+        for residual in residuals:
+            response = fewer_modes(session, count, residual)
+            states = len(response.eigenvalue) + len(response.block)
+            for step in steps:
+                try:
+                    found = modal(session, response, step)
+                except (ConvergenceError, InputError) as refused:
+                    observe.say(f"  {count} modes, {residual}, {step:g} s: {refused}")
+                    continue
+                cost, off = found.seconds / DURATION, errors(exact, found, DURATION)
+                out.append(Choice(mesh, count, residual, states, step, cost, *off))
+    return out
+
+
+def _full(session: Session, exact: History, mesh: str, step: float) -> Choice:
+    """Every degree of freedom of the same mesh in time."""
+    from fem.probe import nodes
+    from fem.transient import FullTire
+
+    observe.say(f"  full finite elements, {step:g} s ...")
+    points = nodes(session.patch.index, len(session.static.points))
+    tire = FullTire(
+        session.operators,
+        session.rotation_matrices,
+        session.speed,
+        session.damping,
+        step,
+        points,
+        points,
+    )
+    found = follow(session, tire, step, 0.0)
+    size = session.operators.stiffness.getSize()[0]
+    off = errors(exact, found, DURATION)
+    return Choice(mesh, size, FULL, 2 * size, step, found.seconds / DURATION, *off)
+
+
+def front(choices: list[Choice]) -> list[Choice]:
+    """Those that no other beats in both cost and error, the cheapest first."""
+    best: list[Choice] = []
+    for choice in sorted(choices, key=lambda c: (c.cost, c.worst)):
+        if not best or choice.worst < best[-1].worst:
+            best.append(choice)
+    return best
+
+
+_GUIDES = [(target, f"asked: {target:g} %") for target in TARGETS]
+_COLUMNS = [
+    ("mesh", ""),
+    ("modes", "-"),
+    ("residual", ""),
+    ("states", "-"),
+    ("step", "s"),
+    ("run time per simulated second", "s"),
+    ("error of contact force", "%"),
+    ("error of axle force", "%"),
+    ("larger error", "%"),
+]
+
+
+def _row(choice: Choice) -> list:
+    return [*vars(choice).values(), choice.worst]
+
+
+def _front(found: list[Choice], full: list[Choice], session: Session) -> Table:
+    best = front(found)
+    named = [[_letter(k), *_row(choice)] for k, choice in enumerate(best)]
+    beside = [["", *_row(choice)] for choice in full]
+    notes = [
+        f"Rolling at {SPEED:g} rad/s on a rough road (0.2 mm rms, waves of 30 to 200 mm) under 500 N: "
+        f"{3 * session.lattice.size} unknowns, {len(session.patch.points)} points that can touch. Error: "
+        "the larger one of contact and axle force, relative L2 of what varies from 0 to "
+        f"{BAND:g} Hz (Hann window), against {session.scene.modal.count} modes with attachment modes at "
+        f"a step of {FINEST:g} s. Run time: of the loop alone, on one core.",
+        *(_named(target, best, full) for target in TARGETS),
+    ]
+    plot = {
+        "kind": "front",
+        "x": "run time per simulated second",
+        "y": ["larger error"],
+        "by": "residual",
+        "mark": "step",
+        "size": "modes",
+        "points": [["", *_row(choice)] for choice in found],
+        "front": named,
+        "label": "on the front",
+        "beside": beside,
+        "beside_name": FULL,
+        "targets": _GUIDES,
+        "limits": [(1.0, "real time")],
+    }
+    columns = [("on the front", ""), *_COLUMNS]
+    return Table("Pareto front of rolling on a rough road", columns, named + beside, notes, plot)
+
+
+def _letter(k: int) -> str:
+    """A, B, ..., Z, A1, ..."""
+    return "ABCDEFGHIJKLMNOPQRSTUVWXYZ"[k % 26] + (str(k // 26) if k >= 26 else "")
+
+
+def _named(target: float, best: list[Choice], full: list[Choice]) -> str:
+    """The cheapest configuration within `target` percent, and its gain on full finite elements."""
+    good = next((choice for choice in best if choice.worst <= target), None)
+    if good is None:
+        return f"{target:g} %: none of these reaches it."
+    text = f"Cheapest within {target:g} %: {good.name}, {good.cost:.3g} s a simulated second"
+    slower = [choice for choice in full if choice.worst <= target]
+    if slower:
+        ratio = min(choice.cost for choice in slower) / good.cost
+        return f"{text}; full finite elements within {target:g} % take {ratio:.0f} times as long."
+    nearest = min(full, key=lambda choice: choice.worst, default=None)
+    if nearest is None:
+        return text + "."
+    return (
+        f"{text}; full finite elements at {nearest.step:g} s are off by {nearest.worst:.2g} % and "
+        f"take {nearest.cost / good.cost:.0f} times as long."
+    )
+
+
+def _meshes(found, on_fine, apart, coarse: Session, fine: Session) -> Table:
+    """Fronts of the two meshes, each against its own reference, and how far those are apart."""
+    rows = [_row(choice) for part in (found, on_fine) for choice in front(part)]
+    sizes = [f"{s.scene.tire.segments} x {s.scene.tire.elements_arc}" for s in (coarse, fine)]
+    unknowns = [3 * s.lattice.size for s in (coarse, fine)]
+    notes = [
+        f"Each mesh against its own reference. The references of {sizes[0]} ({unknowns[0]} unknowns) and "
+        f"{sizes[1]} ({unknowns[1]}) differ by {apart[0]:.2g} % in the contact force and {apart[1]:.2g} % "
+        "in the axle force: below that, error of modes and steps is not what limits a run.",
+    ]
+    plot = {
+        "x": "run time per simulated second",
+        "y": ["larger error"],
+        "log": "xy",
+        "by": "mesh",
+        "targets": _GUIDES,
+    }
+    return Table("Fronts of two meshes", _COLUMNS, rows, notes, plot)
+
+
+def _all(choices: list[Choice]) -> Table:
+    order = sorted(choices, key=lambda c: (c.mesh, c.residual, c.modes, -c.step))
+    return Table("All configurations", _COLUMNS, [_row(choice) for choice in order])

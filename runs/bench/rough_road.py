@@ -1,0 +1,140 @@
+"""The problem that the benchmarks of rolling share: a tire on a rough road, and how errors are told."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mpi4py import MPI
+
+from contact.grid_patch import settle
+from contact.model import step_solver
+from greens.recursion import Recursion
+from greens.response import Response
+from runs import observe
+from runs.session import Session
+from runs.validation.histories import History, distance, follow
+
+BAND = 500.0  # Hz, up to which errors are told
+SPEED = 100.0  # rad/s
+
+SCENE = """
+name = "bench"
+[tire]
+segments = {segments}
+elements_arc = {arc}
+footprint_size = {footprint}
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 500.0
+[damping]
+mass = 300.0
+[rotation]
+speed = {speed}
+[modal]
+count = {modes}
+[greens]
+residual = "{residual}"
+[contact]
+points = {{ dx = {pitch}, dy = {pitch} }}
+youngs_modulus = 1e7
+[road]
+kind = "texture"
+rms = 2e-4
+roll_off = 0.2
+cut_off = 0.03
+[time]
+duration = {duration}
+step = {step}
+"""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Elements around and from bead to bead, and their size where the road touches."""
+
+    segments: int
+    arc: int
+    footprint: float
+
+    def __str__(self) -> str:
+        return f"{self.segments} x {self.arc}"
+
+
+def write_scene(file: Path, mesh: Mesh, **keys: object) -> Path:
+    """The scene with some of its keys changed: speed, modes, residual, pitch, duration, step."""
+    values: dict[str, object] = {"speed": SPEED, "modes": 100, "residual": "static"}
+    values |= {"pitch": 0.008, "duration": 0.2, "step": 1e-4} | vars(mesh) | keys
+    file.write_text(SCENE.format(**values))
+    return file
+
+
+def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Session:
+    """A run up to its Green's functions, its points settled; `sets` as of --set. Collective."""
+    from runs.pipeline import run_scene
+    from runs.scene import load
+
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
+    with observe.quiet():
+        session = run_scene(
+            scene, folder, MPI.COMM_WORLD, until="greens", fresh=False, petsc_options=[]
+        )
+    settle_on_points(session)
+    return session
+
+
+def settle_on_points(session: Session) -> None:
+    """The static state on the session's grid of points, by its exact static flexibility."""
+    response, patch = session.contact_response, session.patch
+    p = len(patch.index)
+    flexibility = (response.static() + response.residual)[:p, :p]
+    solver = step_solver(session.scene.contact, patch, flexibility)
+    nodal = session.static.force[patch.index]
+    session.patch, _ = settle(patch, solver, flexibility, nodal)
+
+
+def fewer_modes(session: Session, count: int, residual: str) -> Response:
+    """The response that the session would have with its first modes and another residual. Collective."""
+    from fem.probe import nodes
+    from modal.undamped import Modes
+    from runs.responses import make
+    from runs.stages.modes import ModalBasis
+
+    few, modes, basis = copy.copy(session), session.modes, session.modal
+    greens = replace(session.scene.greens, residual=residual)
+    few.scene = replace(session.scene, greens=greens)
+    first = {"squares": modes.squares[:count], "vectors": modes.vectors[:, :count]}
+    few.modes = Modes(**vars(modes) | first)
+    square = {
+        name: matrix if matrix is None else matrix[:count, :count]
+        for name, matrix in vars(basis.projection).items()
+        if name not in ("squares", "momentum")
+    }
+    projection = replace(
+        basis.projection,
+        squares=basis.projection.squares[:count],
+        momentum=basis.projection.momentum[:, :count],
+        **square,
+    )
+    few.modal = ModalBasis(basis.frequency[:count], basis.shape[:, :count], projection)
+    few.state_modes = session.wheel.decouple(projection, session.comm)
+    points = nodes(session.patch.index, len(session.static.points), 2)
+    return make(few, points, points)
+
+
+def modal(session: Session, response: Response, step: float) -> History:
+    """The loop on the states that the step resolves."""
+    tire = Recursion(response.resolved(step), step, "linear", MPI.COMM_SELF)
+    return follow(session, tire, step, 0.0)
+
+
+def errors(reference: History, found: History, duration: float) -> tuple[float, float]:
+    """Relative L2 up to BAND of what varies in the contact force and in the axle force, %."""
+    contact, axle = (
+        100 * distance(reference.values[name], found.values[name], duration, BAND).mean
+        for name in ("contact force", "axle force")
+    )
+    return contact, axle

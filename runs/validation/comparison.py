@@ -1,0 +1,119 @@
+"""Modal runs beside full finite elements at several steps: errors, run times, targets reached or not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from runs.tabulate import Table
+from runs.validation.histories import BAND, Distance, History, distance
+from runs.validation.tires import Choice
+
+NOTES = [
+    f"Errors: relative L2 of what varies in 0 to {BAND:g} Hz (Hann window); worst: largest difference "
+    "there in time over the largest variation. All against the full finite elements at their smallest "
+    "step, whose own error is estimated: a third of its distance from the step before (second order).",
+    "Ratio: loop of the full finite elements, at the largest step at which they are as accurate, over "
+    "the loop of the row. Set-up: second eigenproblem and residual, or factorisation; static state and "
+    "modes are shared.",
+]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A history, its errors by quantity, and `error`, the largest of those that count; `choice` None
+    for full finite elements."""
+
+    choice: Choice | None
+    history: History
+    errors: dict[str, Distance]
+    error: float
+
+
+class Comparison:
+    """Full finite elements at falling steps (two or more), and modal runs judged by the last.
+
+    `counts`: the quantities whose error a run is chosen by.
+    """
+
+    def __init__(self, full: list[History], counts: tuple[str, ...]):
+        self._reference, self._counts = full[-1], counts
+        errors = [self._between(history) for history in full[:-1]]
+        last = {name: Distance(far.mean / 3, far.worst / 3) for name, far in errors[-1].items()}
+        self.full = [self._run(None, *pair) for pair in zip(full, [*errors, last], strict=True)]
+        self.modal: list[Run] = []
+
+    def add(self, choice: Choice, history: History) -> None:
+        """A modal run."""
+        self.modal.append(self._run(choice, history, self._between(history)))
+
+    def _run(self, choice: Choice | None, history: History, errors: dict[str, Distance]) -> Run:
+        return Run(choice, history, errors, max(errors[name].mean for name in self._counts))
+
+    def _between(self, history: History) -> dict[str, Distance]:
+        exact = self._reference.values
+        first = next(iter(exact.values()))
+        duration = self._reference.step * len(first)
+        return {
+            name: distance(exact[name], values, duration) for name, values in history.values.items()
+        }
+
+    def full_within(self, error: float) -> Run:
+        """The full run of the largest step whose error is not above the given one, else the finest."""
+        return next((run for run in self.full if run.error <= error), self.full[-1])
+
+    def table(self, title: str) -> Table:
+        """All runs."""
+        names = list(self._reference.values)
+        columns = [("modes", "-"), ("residual", ""), ("step", "s")]
+        columns += [(part, "%") for name in names for part in (name, f"worst {name}")]
+        columns += [("set-up", "s"), ("loop", "s"), ("ratio", "-"), ("ratio, same step", "-")]
+        rows = [self._row(run) for run in [*self.full, *self.modal]]
+        plot = {"x": "loop", "y": names[:1], "log": "xy", "by": "residual"}
+        return Table(title, columns, rows, list(NOTES), plot)
+
+    def _row(self, run: Run) -> list:
+        history, choice = run.history, run.choice
+        head = ["all", "full FE"] if choice is None else [choice.modes, choice.residual]
+        errors = [_percent(part) for far in run.errors.values() for part in (far.mean, far.worst)]
+        gain = self.full_within(run.error).history.seconds / history.seconds
+        same = [
+            other.history.seconds / history.seconds
+            for other in self.full
+            if other.history.step == history.step
+        ]
+        return [*head, history.step, *errors, history.setup, history.seconds, gain, *(same or [""])]
+
+    def verdict(self, case: str, error: float, asked: float) -> list:
+        """A row of `verdicts`: the fastest modal run within `error`, `asked` times as fast as full
+        finite elements that are no more accurate than that either."""
+        within = [run for run in self.modal if run.error <= error]
+        if within:
+            best = min(within, key=lambda run: run.history.seconds)
+        else:
+            best = min(self.modal, key=lambda run: run.error)
+        reference = self.full_within(error)
+        gain = reference.history.seconds / best.history.seconds
+        reached = "yes" if within and gain >= asked else "no"
+        choice = best.choice
+        named = f"{choice.modes} {choice.residual}, {choice.step:g} s"
+        full = f"{reference.history.step:g} s, {_percent(reference.error):g} %"
+        return [case, 100 * error, asked, named, _percent(best.error), full, gain, reached]
+
+
+def verdicts(title: str, rows: list[list], notes: list[str]) -> Table:
+    """The table of targets."""
+    columns = [
+        ("case", ""),
+        ("error asked", "%"),
+        ("ratio asked", "-"),
+        ("fastest run within it, or best", ""),
+        ("its error", "%"),
+        ("full FE within it, or finest", ""),
+        ("ratio", "-"),
+        ("reached", ""),
+    ]
+    return Table(title, columns, rows, notes)
+
+
+def _percent(part: float) -> float:
+    return float(f"{100 * part:.3g}")

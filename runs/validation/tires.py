@@ -1,0 +1,104 @@
+"""The two tires of a validation: modes, as many and with the residual wanted, and full finite elements."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from fem.transient import FullTire
+from greens.recursion import Recursion
+from modal.basis import Projection
+from modal.undamped import Modes
+from runs import observe
+from runs.pipeline import run_scene
+from runs.responses import make
+from runs.scene import load
+from runs.session import Session
+from runs.stages import greens
+from runs.stages.modes import ModalBasis
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a run of the modal tire may spend: modes, residual option, time step in s."""
+
+    modes: int
+    residual: str
+    step: float
+
+
+class Tires:
+    """A scene run up to its modes; its road, and the modes kept, can then be changed at little cost.
+
+    `seconds`: of static state and modes. Files go to `folder`.
+    """
+
+    def __init__(self, scene: str, folder: Path):
+        self._file = folder / "scene.toml"
+        began = time.perf_counter()
+        self._file.write_text(scene)
+        with observe.quiet():
+            self.session: Session = run_scene(
+                load(self._file),
+                folder,
+                MPI.COMM_WORLD,
+                until="modes",
+                fresh=False,
+                petsc_options=[],
+            )
+        self.seconds = time.perf_counter() - began
+        self._modes, self._modal = self.session.modes, self.session.modal
+        greens.prepare(self.session)
+
+    @property
+    def unknowns(self) -> int:
+        """Free degrees of freedom of the finite elements."""
+        return self.session.operators.stiffness.getSize()[0]
+
+    def change(self, scene: str) -> None:
+        """Take a scene that differs after its modes only: road, forces, contact, time."""
+        self._file.write_text(scene)
+        self.session.scene = load(self._file)
+        greens.prepare(self.session)
+
+    def modal(self, choice: Choice) -> tuple[Recursion, float, float]:
+        """The lowest modes with their residual between the points of the scene; step; set-up in s."""
+        began, session = time.perf_counter(), self.session
+        session.modes, session.modal = self._lowest(choice.modes)
+        session.state_modes = session.wheel.decouple(session.modal.projection, session.comm)
+        wanted = replace(session.scene.greens, residual=choice.residual)
+        session.scene = replace(session.scene, greens=wanted)
+        _, outputs, loads = greens.probes(session)
+        response = make(session, outputs, loads).resolved(choice.step)
+        tire = Recursion(response, choice.step, "linear", session.comm)
+        return tire, choice.step, time.perf_counter() - began
+
+    def _lowest(self, count: int) -> tuple[Modes, ModalBasis]:
+        """The first modes of those there are."""
+        modes, modal = self._modes, self._modal
+        parts = {f.name: getattr(modal.projection, f.name) for f in fields(Projection)}
+        cut = {
+            name: values if values is None else values[..., :count]
+            for name, values in parts.items()
+        }
+        for name in ("gyroscopic", "convective", "body", "body_convective"):
+            if cut[name] is not None:
+                cut[name] = np.ascontiguousarray(cut[name][:count])
+        few = replace(modes, squares=modes.squares[:count], vectors=modes.vectors[:, :count])
+        shape = modal.shape[:, :count]
+        return few, ModalBasis(modal.frequency[:count], shape, Projection(**cut))
+
+    def full(self, step: float) -> tuple[FullTire, float, float]:
+        """All degrees of freedom between the same points; step; set-up in s."""
+        session = self.session
+        rotation = session.rotation_matrices if session.speed else None
+        _, outputs, loads = greens.probes(session)
+        began = time.perf_counter()
+        tire = FullTire(
+            session.operators, rotation, session.speed, session.damping, step, outputs, loads
+        )
+        return tire, step, time.perf_counter() - began

@@ -1,0 +1,82 @@
+"""Prescribed forces in the contact loop: an oscillator that rests on a spring."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.complementarity import ActiveSet
+from contact.driven import Driven
+from contact.flat import Flat
+from contact.patch import Patch
+from contact.rolling import Drive, roll
+from greens.recursion import Recursion
+from greens.response import Response
+
+MASS, STIFFNESS, TREAD, FORCE = 2.0, 3e4, 5e-5, 8.0
+STEP, STEPS = 2e-5, 2000
+POINT = Patch(
+    index=np.array([0]),
+    points=np.zeros((1, 3)),
+    half_sizes=np.full((1, 2), 0.01),
+    force=np.array([50.0]),
+    gap=np.zeros(1),
+    edge=np.zeros(1, bool),
+    line=np.zeros(1, int),
+)
+
+
+def oscillator() -> Response:
+    """Inputs: contact, prescribed; outputs: contact, along the prescribed force, reading."""
+    own = np.sqrt(STIFFNESS / MASS)
+    shape = np.ones((3, 1), complex) / np.sqrt(MASS)
+    none = np.zeros((0, 0))
+    push = -1j / own * shape[:2].T
+    carried = np.sqrt(MASS) * np.array([[0.0], [0.0], [1.0]])
+    return Response(
+        np.array([1j * own]),
+        shape,
+        push,
+        none,
+        np.zeros((3, 0)),
+        np.zeros((0, 2)),
+        np.zeros((3, 2)),
+        carried.astype(complex),
+        np.zeros((3, 0)),
+    )
+
+
+def driven(steps: int = STEPS) -> Driven:
+    tire = Recursion(oscillator(), STEP, "linear", MPI.COMM_SELF)
+    return Driven(tire, np.full((steps + 1, 1), FORCE), np.array([[0.0, 0.0, 1.0]]))
+
+
+def rolled(tire: Driven, steps: int, done: int = 0):
+    solver = ActiveSet(tire.same_step + TREAD)
+    drive = Drive(Flat().height, lambda t: 0.0, 0.0)
+    for instant in roll(tire, solver, POINT, drive, STEP, steps, done=done):
+        yield instant, tire.reading, tire.work
+
+
+def test_a_force_on_a_tire_in_contact_is_the_oscillator_on_both_springs() -> None:
+    """u = F/(k + 1/C)(1 - cos w t), w^2 = (k + 1/C)/m: second order in the step."""
+    stiff = STIFFNESS + 1 / TREAD
+    own = np.sqrt(stiff / MASS)
+    for instant, reading, work in rolled(driven(), STEPS):
+        u = FORCE / stiff * (1 - np.cos(own * instant.time))
+        assert reading == pytest.approx([u], abs=2e-5 * FORCE / stiff)
+        assert instant.displacement == pytest.approx([u], abs=2e-5 * FORCE / stiff)
+        assert instant.force == pytest.approx(POINT.force - u / TREAD, abs=2e-5 * FORCE)
+        assert instant.axle_force[2] == pytest.approx(POINT.force[0] + STIFFNESS * u, abs=1e-3)
+        assert work == pytest.approx(FORCE * u, abs=1e-5 * FORCE**2 / stiff)
+
+
+def test_a_checkpoint_goes_on_with_the_same_bits() -> None:
+    whole = [reading for _, reading, _ in rolled(driven(), 60)]
+    first = driven()
+    for _, _reading, _ in rolled(first, 30):
+        pass
+    again = driven()
+    again.restore(first.snapshot())
+    rest = [reading for _, reading, _ in rolled(again, 60, done=30)]
+    assert np.array_equal(rest, whole[30:])
+    assert again.work == pytest.approx(FORCE * whole[-1][0], rel=1e-12)

@@ -1,0 +1,47 @@
+"""First touch: the lowest point of the face between its nodes."""
+
+import numpy as np
+import pytest
+
+from fem.equilibrium import Equilibrium
+from fem.loading import Loader
+from fem.mesh import Lattice, Torus
+from fem.tread_surface import TreadSurface
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("turn", [0.0, 0.2, 0.37])
+def test_the_lowest_point_of_a_turned_wheel(order, turn):
+    """A circle about the axle, turned by a part of an element: the face between nodes closes in on it."""
+    errors = []
+    for segments in (16, 32):
+        section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, segments // 2, 1, order)
+        edge = {1: [0, 1], 2: [0, 0.5, 1], 3: [0, 0.27639320225, 0.72360679775, 1]}[order]
+        lattice = Lattice(section, np.array(edge))
+        ring, arc = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
+        face = section.position(
+            ring.ravel() + turn * 2 * np.pi / segments, np.full(ring.size, 0.1), arc.ravel()
+        )
+        errors.append(abs(TreadSurface(lattice, face).lowest() + 0.32))
+    assert errors[0] < {1: 1e-2, 2: 3e-4, 3: 5e-5}[order]
+    assert errors[1] < 1e-12 or errors[1] < errors[0] / 2**order
+
+
+def test_no_place_on_the_face_is_lower():
+    rng = np.random.default_rng(3)
+    section = Torus(0.32, 0.1, 0.012, np.radians(120), 12, 6, 1, 3)
+    lattice = Lattice(section, np.array([0, 0.27639320225, 0.72360679775, 1]))
+    ring, arc = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
+    face = section.position(ring.ravel(), np.full(ring.size, 0.1), arc.ravel())
+    surface = TreadSurface(lattice, face + 5e-4 * rng.standard_normal(face.shape))
+    anywhere = surface.at(rng.uniform(-0.6, 0.6, 200_000), rng.uniform(-0.6, 0.6, 200_000))[:, 2]
+    assert anywhere.min() - 1e-5 < surface.lowest() <= anywhere.min()
+
+
+def test_a_tire_whose_crown_is_no_node_touches_below_its_nodes(make_body):
+    equilibrium = Equilibrium(make_body(order=3, segments=8, arc=5))
+    loader = Loader(equilibrium, lambda progress: None)
+    loader.inflate(2e5)
+    assert loader.touch < equilibrium.tread_height().min() - 1e-5
+    loader.carry(50.0)
+    assert loader.load() == pytest.approx(50.0, rel=1e-8)
