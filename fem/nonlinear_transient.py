@@ -115,7 +115,7 @@ class NonlinearTire(FullTire):
     def _at(self, motion: np.ndarray, work):
         """What `work()` says at the static state plus a motion; the body is put back."""
         field = self._body.u.x
-        field.array[self._operators.free] += motion
+        field.array[self._operators.unknowns.free] += motion
         field.scatter_forward()
         result = work()
         field.array[:] = self._static
@@ -127,7 +127,7 @@ class NonlinearTire(FullTire):
             local.set(0.0)
         fem.petsc.assemble_vector(self._assembled, self._force_form)
         self._assembled.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        return self._assembled.array_r[self._operators.free]
+        return self._assembled.array_r[self._operators.unknowns.free]
 
     def _stored(self) -> float:
         return self._comm.allreduce(fem.assemble_scalar(self._potential_form))

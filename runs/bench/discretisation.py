@@ -102,10 +102,10 @@ def _answer(section, consistent: bool = False) -> Answer:
 
 def _frequencies(operators, count: int = COUNT) -> np.ndarray:
     from modal import undamped
+    from runs.stages.modes import sites
 
-    body = operators.body
-    points = body.lattice.points(body.ids[operators.free_nodes])
-    return undamped.solve(operators.stiffness, operators.mass, count, points=points).frequency
+    where = sites(operators)
+    return undamped.solve(operators.stiffness, operators.mass, count, sites=where).frequency
 
 
 def _consistent(operators) -> np.ndarray:

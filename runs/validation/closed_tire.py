@@ -78,7 +78,7 @@ def _ring(speed: float) -> Iterator[tuple]:
     operators = Operators(body, 0.0)
     modes = _soft_modes(operators)
     rotation = operators.rotation() if speed else None
-    projection = project(modes, rotation, operators.mass, COMM)
+    projection = project(modes, rotation, operators.carried, COMM)
     states = rotating(*matrices(projection, speed, (0.0, 0.0), "full"))
     found = np.abs(states.eigenvalue.imag) / (2 * np.pi)
     bending = E * h**2 / (12 * density * R**4)
