@@ -6,8 +6,8 @@ import tempfile
 from pathlib import Path
 
 from runs.tabulate import Table
-from runs.validation.comparison import Comparison, verdicts
-from runs.validation.histories import follow
+from runs.validation.comparison import Comparison, digits, percent, verdicts
+from runs.validation.histories import History, distance, follow
 from runs.validation.tires import Choice, Tires
 
 ABOUT = "a standing tire on a flat road that moves: modes against full finite elements"
@@ -32,7 +32,7 @@ youngs_modulus = 1e7
 kind = "flat"
 motion = {{ kind = "sine", amplitude = {amplitude}, frequency = 50.0 }}
 [time]
-duration = 0.1
+duration = {duration}
 step = 1e-4
 """
 AMPLITUDES = (1e-4, 2e-3)  # m: the thesis's, and one at which the contact changes
@@ -46,7 +46,11 @@ CHOICES = (
     Choice(400, "static", 1e-4),
 )
 STEPS = (2e-4, 1e-4)  # s, of the full finite elements
-MESH = {"segments": 24, "elements_arc": 10}
+MESH = {"segments": 24, "elements_arc": 10, "duration": 0.1}
+# Large motions assemble the finite elements several times a step.
+SMALL = {"segments": 16, "elements_arc": 6, "duration": 0.04}
+MOVED = (1e-4, 1e-3, 2e-3, 4e-3)  # m
+STEP = 2e-4  # s
 
 
 def run() -> list[Table]:
@@ -63,7 +67,7 @@ def run() -> list[Table]:
             title = f"Standing, {name}: {tires.unknowns} unknowns"
             tables.append(found.table(title))
             rows.append(found.verdict(name, 0.005, 1.0))
-    return [*tables, verdicts("Moved flat road: what was asked for", rows, [])]
+    return [*tables, verdicts("Moved flat road: what was asked for", rows, []), _linearised()]
 
 
 def _compare(tires: Tires) -> Comparison:
@@ -73,3 +77,42 @@ def _compare(tires: Tires) -> Comparison:
     for choice in CHOICES:
         found.add(choice, follow(session, *tires.modal(choice)))
     return found
+
+
+def _linearised() -> Table:
+    """Motions about the static state, small against large ones of the same elements."""
+    choice = Choice(150, "attachment", STEP)
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        scenes = [SCENE.format(amplitude=a, modes=choice.modes, **SMALL) for a in MOVED]
+        tires = Tires(scenes[0], Path(folder))
+        for amplitude, scene in zip(MOVED, scenes, strict=True):
+            tires.change(scene)
+            session = tires.session
+            tire, *rest = tires.nonlinear(STEP)
+            exact = follow(session, tire, *rest)
+            linear = follow(session, *tires.full(STEP))
+            modal = follow(session, *tires.modal(choice))
+            load = exact.values["contact force"][:, 2]
+            for name, history in (("full FE, linear", linear), ("modes", modal)):
+                errors = [
+                    percent(part)
+                    for quantity in exact.values
+                    for far in [distance(*_both(exact, history, quantity), SMALL["duration"])]
+                    for part in (far.mean, far.worst)
+                ]
+                span = f"{load.min():.0f} to {load.max():.0f}"
+                times = [exact.seconds, history.seconds]
+                rows.append([amplitude, span, name, *errors, *map(digits, times)])
+    names = [part for name in exact.values for part in (name, f"worst {name}")]
+    columns = [("amplitude", "m"), ("load", "N"), ("linearised tire", "")]
+    columns += [(name, "%") for name in names] + [("large motions", "s"), ("loop", "s")]
+    notes = [
+        f"Against full finite elements with large motions, {tires.unknowns} unknowns, both at steps of "
+        f"{STEP:g} s, road moved at 50 Hz over {SMALL['duration']:g} s. 150 modes with attachment modes.",
+    ]
+    return Table("What linearising about the static state costs", columns, rows, notes)
+
+
+def _both(one: History, other: History, quantity: str):
+    return one.values[quantity], other.values[quantity]

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
+from fem.nonlinear_transient import NonlinearTire
 from fem.transient import FullTire
 from greens.recursion import Recursion
 from greens.response import Response
@@ -116,4 +117,14 @@ class Tires:
         began = time.perf_counter()
         given = session.operators, rotation, session.speed, session.damping, step, outputs, loads
         tire = FullTire(*given, spectral_radius=RADIUS)
+        return tire, step, time.perf_counter() - began
+
+    def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
+        """The full finite elements with large motions, standing; step; set-up in s."""
+        session = self.session
+        _, outputs, loads = greens.probes(session)
+        began = time.perf_counter()
+        inflation = session.scene.static.inflation
+        given = session.operators, inflation, session.damping, step, outputs, loads
+        tire = NonlinearTire(*given, spectral_radius=RADIUS)
         return tire, step, time.perf_counter() - began
