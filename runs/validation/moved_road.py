@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from runs.tabulate import Table
 from runs.validation.comparison import Comparison, digits, percent, verdicts
-from runs.validation.histories import History, distance, follow
+from runs.validation.histories import distance, follow
 from runs.validation.tires import Choice, Tires
 
 ABOUT = "a standing tire on a flat road that moves: modes against full finite elements"
@@ -50,7 +51,8 @@ MESH = {"segments": 24, "elements_arc": 10, "duration": 0.1}
 # Large motions assemble the finite elements several times a step.
 SMALL = {"segments": 16, "elements_arc": 6, "duration": 0.04}
 MOVED = (1e-4, 1e-3, 2e-3, 4e-3)  # m
-STEP = 2e-4  # s
+LINEARISED = Choice(150, "attachment", 2e-4)
+QUANTITIES = ("contact force", "axle force", "displacement")
 
 
 def run() -> list[Table]:
@@ -73,7 +75,7 @@ def run() -> list[Table]:
 def _compare(tires: Tires) -> Comparison:
     session = tires.session
     full = [follow(session, *tires.full(step)) for step in STEPS]
-    found = Comparison(full, ("contact force", "axle force", "displacement"))
+    found = Comparison(full, QUANTITIES)
     for choice in CHOICES:
         found.add(choice, follow(session, *tires.modal(choice)))
     return found
@@ -81,38 +83,38 @@ def _compare(tires: Tires) -> Comparison:
 
 def _linearised() -> Table:
     """Motions about the static state, small against large ones of the same elements."""
-    choice = Choice(150, "attachment", STEP)
-    rows = []
+    modes, rows = LINEARISED.modes, []
     with tempfile.TemporaryDirectory() as folder:
-        scenes = [SCENE.format(amplitude=a, modes=choice.modes, **SMALL) for a in MOVED]
+        scenes = [SCENE.format(amplitude=a, modes=modes, **SMALL) for a in MOVED]
         tires = Tires(scenes[0], Path(folder))
         for amplitude, scene in zip(MOVED, scenes, strict=True):
             tires.change(scene)
-            session = tires.session
-            tire, *rest = tires.nonlinear(STEP)
-            exact = follow(session, tire, *rest)
-            linear = follow(session, *tires.full(STEP))
-            modal = follow(session, *tires.modal(choice))
-            load = exact.values["contact force"][:, 2]
-            for name, history in (("full FE, linear", linear), ("modes", modal)):
-                errors = [
-                    percent(part)
-                    for quantity in exact.values
-                    for far in [distance(*_both(exact, history, quantity), SMALL["duration"])]
-                    for part in (far.mean, far.worst)
-                ]
-                span = f"{load.min():.0f} to {load.max():.0f}"
-                times = [exact.seconds, history.seconds]
-                rows.append([amplitude, span, name, *errors, *map(digits, times)])
-    names = [part for name in exact.values for part in (name, f"worst {name}")]
+            rows += [[amplitude, *row] for row in _against_large_motions(tires)]
+    names = [part for name in QUANTITIES for part in (name, f"worst {name}")]
     columns = [("amplitude", "m"), ("load", "N"), ("linearised tire", "")]
     columns += [(name, "%") for name in names] + [("large motions", "s"), ("loop", "s")]
     notes = [
         f"Against full finite elements with large motions, {tires.unknowns} unknowns, both at steps of "
-        f"{STEP:g} s, road moved at 50 Hz over {SMALL['duration']:g} s. 150 modes with attachment modes.",
+        f"{LINEARISED.step:g} s, road moved at 50 Hz over {SMALL['duration']:g} s. Modes: {modes} with "
+        "attachment modes.",
     ]
     return Table("What linearising about the static state costs", columns, rows, notes)
 
 
-def _both(one: History, other: History, quantity: str):
-    return one.values[quantity], other.values[quantity]
+def _against_large_motions(tires: Tires) -> Iterator[list]:
+    """Rows of the linear full finite elements and of the modes."""
+    session, step = tires.session, LINEARISED.step
+    exact = follow(session, *tires.nonlinear(step))
+    load = exact.values["contact force"][:, 2]
+    for name, tire in (
+        ("full FE, linear", tires.full(step)),
+        ("modes", tires.modal(LINEARISED)),
+    ):
+        found = follow(session, *tire)
+        errors = []
+        for quantity in QUANTITIES:
+            pair = exact.values[quantity], found.values[quantity]
+            far = distance(*pair, SMALL["duration"])
+            errors += [percent(far.mean), percent(far.worst)]
+        times = digits(exact.seconds), digits(found.seconds)
+        yield [f"{load.min():.0f} to {load.max():.0f}", name, *errors, *times]
