@@ -179,7 +179,7 @@ class ActiveSet:
         return force
 
 
-def make_solver(name: str, matrix: Array) -> ContactSolver:
+def make_solver(name: str, matrix: Array | Compliance) -> ContactSolver:
     """The solver named "active-set" or "snes-vi" (`contact.solver`). InputError for another."""
     if name == "active-set":
         return ActiveSet(matrix)
