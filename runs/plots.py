@@ -24,7 +24,7 @@ def drawn(table: Any) -> str | None:
     kind "lines" (default): `y` columns over column `x`, a curve for every value of column `by`, axes
     logarithmic as `log` says; "front": `points` (rows like the table's), coloured by column `by`, their
     marks by column `mark` and their sizes by column `size`, the rows `front` joined and labelled by
-    column `label`, the rows `beside` as a curve of their own; "bars": column `y` for each `x`.
+    column `label`, the rows `beside` as a curve of their own; "bars": column `y`, named by the columns `x`.
     `targets` are lines across, `limits` upright ones: (value, text) each.
     """
     if table.plot is None:
@@ -159,7 +159,8 @@ def _bars(table: Any) -> str:
     here.barh(range(len(rows)), lengths, color=COLOURS[0], height=0.6)
     for k, length in enumerate(lengths):
         here.annotate(f"{length:.3g}", (length, k), (4, 0), textcoords="offset points", va="center")
-    here.set_yticks(range(len(rows)), [str(columns.pick(row, plot["x"])) for row in rows])
+    texts = [": ".join(str(columns.pick(row, name)) for name in plot["x"]) for row in rows]
+    here.set_yticks(range(len(rows)), texts)
     here.grid(axis="y", visible=False)
     _scales(here, plot.get("log", ""))
     here.margins(x=0.12)
