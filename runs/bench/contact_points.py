@@ -90,7 +90,9 @@ def rough() -> Table:
     if importlib.util.find_spec("tamaas"):
         rows.append(_tamaas(-q.reshape(n, n), force))
     else:
-        notes.append("The package tamaas, to compare with, is not installed here.")
+        notes.append(
+            "The package tamaas, to compare with, is not installed here (pip install --no-deps tamaas)."
+        )
     columns = [("solver", ""), ("time", "ms"), ("iterations", "-"), ("residual", "-"),
                ("load", "N"), ("difference of forces", "-")]  # fmt: skip
     return Table("Static rough contact, 128 x 128 points, from nothing", columns, rows, notes)
