@@ -81,7 +81,8 @@ class Comparison:
             for other in self.full
             if other.history.step == history.step
         ]
-        return [*head, history.step, *errors, history.setup, history.seconds, gain, *(same or [""])]
+        times = [_digits(t) for t in (history.setup, history.seconds, gain, *same)]
+        return [*head, history.step, *errors, *times, *([] if same else [""])]
 
     def verdict(self, case: str, error: float, asked: float) -> list:
         """A row of `verdicts`: the fastest modal run within `error`, `asked` times as fast as full
@@ -97,7 +98,7 @@ class Comparison:
         choice = best.choice
         named = f"{choice.modes} {choice.residual}, {choice.step:g} s"
         full = f"{reference.history.step:g} s, {_percent(reference.error):g} %"
-        return [case, 100 * error, asked, named, _percent(best.error), full, gain, reached]
+        return [case, 100 * error, asked, named, _percent(best.error), full, _digits(gain), reached]
 
 
 def verdicts(title: str, rows: list[list], notes: list[str]) -> Table:
@@ -116,4 +117,9 @@ def verdicts(title: str, rows: list[list], notes: list[str]) -> Table:
 
 
 def _percent(part: float) -> float:
-    return float(f"{100 * part:.3g}")
+    return _digits(100 * part)
+
+
+def _digits(value: float) -> float:
+    """Three of them: more is noise, of errors as of times."""
+    return float(f"{value:.3g}")

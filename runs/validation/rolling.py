@@ -69,13 +69,16 @@ CHOICES = (
     Choice(100, "none", 1e-4),
     Choice(100, "static", 1e-4),
     Choice(100, "attachment", 1e-4),
+    Choice(200, "second-order", 1e-4),
     Choice(200, "attachment", 1e-4),
-    Choice(400, "static", 5e-5),
-    Choice(200, "second-order", 5e-5),
-    Choice(100, "attachment", 5e-5),
     Choice(200, "attachment", 5e-5),
+    Choice(400, "static", 5e-5),
+    Choice(400, "attachment", 1e-4),
     Choice(400, "attachment", 5e-5),
     Choice(400, "attachment", 2.5e-5),
+    Choice(800, "static", 5e-5),
+    Choice(800, "attachment", 5e-5),
+    Choice(800, "attachment", 2.5e-5),
 )
 TARGETS = ((0.01, 100.0), (0.001, 30.0))  # error, ratio of run times
 MESH = {"segments": 32, "elements_arc": 12}

@@ -1,4 +1,4 @@
-"""The contact loop where it could blow up: each case runs to its end or is refused with the reason."""
+"""Every package where it could blow up: each case comes to its end, or is refused with the reason."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ from contact.tread import half_space_compliance, half_space_influence, winkler_c
 from fem.errors import ConvergenceError, InputError
 from greens.recursion import Recursion
 from runs.tabulate import Table
+from runs.validation import stress_fem, stress_greens, stress_modal
 
-ABOUT = "the contact loop under stress: time step, speed, stiffness, damping, friction, size"
+ABOUT = "finite elements, modes, Green's functions and the contact loop under stress"
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 HALF_SPACE = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
 CRITICAL = 60.0  # m/s: the wave speed of the strip
@@ -50,7 +51,7 @@ def wavy(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def run() -> list[Table]:
-    """One table: what happened, the largest force and residual of each case."""
+    """All packages in one table, and the figures of the contact loop in another."""
     rows = [_row(case) for case in cases()]
     rows += [_one_mode(), _many_points()]
     columns = [("case", ""), ("steps", "-"), ("ended", ""), ("largest load", "N"),
@@ -59,7 +60,22 @@ def run() -> list[Table]:
         "A made-up tire of 8 kg on a periodic strip, 500 N. Last over first tenth: the variation of the "
         "load; waves that grew would show. No case may end in NaN.",
     ]
-    return [Table("Stability of the contact loop", columns, rows, notes)]
+    return [_gathered(rows), Table("Stability of the contact loop", columns, rows, notes)]
+
+
+def _gathered(contact: list[list]) -> Table:
+    """Case, what happened, how it was caught: fem, modal, greens, contact."""
+    rows = [*stress_fem.rows(), *stress_modal.rows(), *stress_greens.rows()]
+    for name, steps, ended, most, growth, residual, left in contact:
+        if ended == "whole":
+            what = f"{steps} steps, load to {most:.4g} N, variation grew {growth:.2g} times"
+            what += ", left the road" if left else ""
+            caught = f"complementarity in every step, worst {residual:.0e}"
+        else:
+            what, _, caught = ended.partition(": ")
+        rows.append(["contact", name, what, caught or "not caught"])
+    columns = [("package", ""), ("case", ""), ("what happened", ""), ("how it was caught", "")]
+    return Table("Numerical stability", columns, rows, ["No case may end in NaN or uncaught."])
 
 
 def cases() -> Iterator[Case]:
