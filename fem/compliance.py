@@ -8,11 +8,9 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from fem.errors import ConvergenceError
+from fem.direct import multiply, solve_all, symmetric
 from fem.operators import Operators, Rotation
-
-_CHUNK = 64  # right-hand sides a solve: enough for BLAS 3 in MUMPS, little memory
-RESIDUAL_TOLERANCE = 1e-8
+from fem.relief import statics
 
 
 def rotating_stiffness(
@@ -25,6 +23,7 @@ def rotating_stiffness(
     """K_Omega = K + Omega^2 S + gamma1 Omega B + gamma2 Omega K M^-1 B; doppler: S_B for S. Collective."""
     stiffness = operators.stiffness.copy()
     if speed == 0:
+        stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # not every copy knows it
         return stiffness
     different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
     convective = rotation.convective if inertia == "full" else rotation.body_convective
@@ -88,33 +87,25 @@ def static_shapes(
 ) -> StaticShapes:
     """Static shapes of the probes (p, 3 s), each a load and a reading. Collective.
 
-    An unsymmetric stiffness is factorised a second time, transposed.
+    An unsymmetric stiffness is factorised a second time, transposed; a free tire that stands answers
+    by inertia relief (fem.relief).
     """
     comm = operators.body.comm
     loads = on_own_rows(operators, probes)
-    x = solve_all(stiffness, loads)
-    if _symmetric(stiffness):
+    x = statics(operators, stiffness, loads)
+    if symmetric(stiffness):
         y = x
     else:
         transposed = stiffness.transpose(PETSc.Mat())
         y = solve_all(transposed, loads)
         transposed.destroy()
-    weighted = operators.mass[:, None] * x
     return StaticShapes(
         x,
         comm.allreduce(loads.T @ x),
-        comm.allreduce(y.T @ _multiply(damping, x)),
-        comm.allreduce(y.T @ weighted),
-        comm.allreduce(np.stack([weighted[d::3].sum(axis=0) for d in range(3)])),
+        comm.allreduce(y.T @ multiply(damping, x)),
+        comm.allreduce(y.T @ (operators.mass[:, None] * x)),
+        comm.allreduce(operators.carried @ x),
     )
-
-
-def solve_all(matrix: PETSc.Mat, loads: sparse.csc_matrix) -> np.ndarray:
-    """Own rows of matrix^-1 loads (n, p), by one factorisation. Collective."""
-    pc = factorise(matrix)
-    solution = solve_columns(pc, matrix, loads.toarray())
-    pc.destroy()
-    return solution
 
 
 def compliance(
@@ -126,74 +117,22 @@ def compliance(
     Raises ConvergenceError when a solve leaves a relative residual above 1e-8.
     """
     rows = on_own_rows(operators, outputs).T.tocsr()
-    solution = solve_all(stiffness, on_own_rows(operators, loads))
+    solution = statics(operators, stiffness, on_own_rows(operators, loads))
     return operators.body.comm.allreduce(rows @ solution)
 
 
-def solve_columns(pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray) -> np.ndarray:
-    """Own rows of matrix^-1 columns, (n, k), by the matrix's factorisation; checked. Collective."""
-    factor = pc.getFactorMatrix()
-    chunks = range(0, columns.shape[1], _CHUNK)
-    return np.hstack([_solve(factor, matrix, columns[:, k : k + _CHUNK]) for k in chunks])
-
-
 def on_own_rows(operators: Operators, probes: sparse.csr_matrix) -> sparse.csr_matrix:
-    """The probes as columns over this process's free dofs, (n, k)."""
+    """The probes as columns over this process's unknowns, (n, k). Collective.
+
+    Weights (k, 3 s) of the outer face's nodes, or (k, 3 s + 6) with those of a free rim's translation
+    and rotation.
+    """
     body = operators.body
     face = body.surface
     own = sparse.csr_matrix(
         (np.ones(len(face.local)), (face.local, face.place)), shape=(body.nodes, len(face.ids))
     )
-    nodal = sparse.kron(own, sparse.identity(3), format="csr") @ probes.T.tocsr()
-    return nodal[operators.free]
-
-
-def _symmetric(matrix: PETSc.Mat) -> bool:
-    known, symmetric = matrix.isSymmetricKnown()
-    return bool(known and symmetric)
-
-
-def factorise(stiffness: PETSc.Mat) -> PETSc.PC:
-    """A direct factorisation by MUMPS: L D L^T where the matrix is marked symmetric. Collective."""
-    pc = PETSc.PC().create(stiffness.comm)
-    pc.setOperators(stiffness)
-    pc.setType(PETSc.PC.Type.CHOLESKY if _symmetric(stiffness) else PETSc.PC.Type.LU)
-    pc.setFactorSolverType("mumps")
-    pc.setFactorSetUpSolverType()
-    pc.getFactorMatrix().setMumpsIcntl(14, 100)  # room for pivots that MUMPS did not foresee
-    pc.setUp()
-    return pc
-
-
-def _solve(factor: PETSc.Mat, stiffness: PETSc.Mat, loads: np.ndarray) -> np.ndarray:
-    """Own rows of stiffness^-1 loads, checked. Collective."""
-    right = _dense(loads, stiffness.comm)
-    solution = right.duplicate()
-    factor.matSolve(right, solution)
-    out = solution.getDenseArray().copy()
-    right.destroy()
-    solution.destroy()
-    comm, defect = stiffness.comm.tompi4py(), _multiply(stiffness, out) - loads
-    worst, scale = comm.allreduce(np.array([(defect**2).sum(), (loads**2).sum()]))
-    if not worst <= (RESIDUAL_TOLERANCE**2) * max(scale, np.finfo(float).tiny):
-        raise ConvergenceError(
-            f"greens: static flexibility has a relative residual of {np.sqrt(worst / scale):.1e}: the "
-            "stiffness of the rotating tire is singular or nearly so (critical speed). Lower the speed."
-        )
-    return out
-
-
-def _multiply(matrix: PETSc.Mat, columns: np.ndarray) -> np.ndarray:
-    """Own rows of matrix @ columns. Collective."""
-    given = _dense(columns, matrix.comm)
-    product = matrix.matMult(given)
-    out = product.getDenseArray().copy()
-    product.destroy()
-    given.destroy()
-    return out
-
-
-def _dense(columns: np.ndarray, comm: PETSc.Comm) -> PETSc.Mat:
-    rows, count = columns.shape
-    sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, count))
-    return PETSc.Mat().createDense(sizes, array=np.asfortranarray(columns), comm=comm)
+    weights = probes.T.tocsr()
+    on_face, on_rim = weights[: 3 * len(face.ids)], weights[3 * len(face.ids) :]
+    nodal = sparse.kron(own, sparse.identity(3), format="csr") @ on_face
+    return operators.unknowns.loads(nodal, on_rim.toarray() if on_rim.shape[0] else None)

@@ -1,4 +1,4 @@
-"""Matrices of small motions about a static state, with the clamped rim eliminated.
+"""Matrices of small motions about a static state, on the unknowns that its support leaves.
 
 For basis functions phi on the undeformed mesh, w = e_y x X (speed taken out), K the tangent with
 geometric and follower-pressure stiffness:
@@ -19,7 +19,15 @@ from petsc4py import PETSc
 
 from fem import compat, kinematics
 from fem.body import Body
-from fem.virtual_work import AT_REST, body_rate_form, convection_form, static_residual, tangent
+from fem.support import FIXED, Support, Unknowns
+from fem.virtual_work import (
+    AT_REST,
+    Rolling,
+    body_rate_form,
+    convection_form,
+    static_residual,
+    tangent,
+)
 
 
 @dataclass(frozen=True)
@@ -33,24 +41,41 @@ class Rotation:
 
 
 class Operators:
-    """Matrices on the free dofs of a body at its present displacement. Collective.
+    """Matrices on the unknowns of a body at its present displacement. Collective.
 
     `mass` is the diagonal of the Gauss-Lobatto mass matrix, kg: positive, and of the full order of
-    the elements (the quadrature points are the nodes). `free` are this process's owned free dofs.
+    the elements (the quadrature points are the nodes); `carried` (3, n) kg the momentum per rate of
+    each. `unknowns` says what they are. With a free
+    rim the static forces on it count, those of the `rolling` shape too (mass damping only).
     """
 
-    def __init__(self, body: Body, inflation: float):
+    def __init__(
+        self,
+        body: Body,
+        inflation: float,
+        support: Support = FIXED,
+        rolling: Rolling = AT_REST,
+    ):
         self.body = body
-        rim = body.rim[body.rim < body.nodes]
-        self.free_nodes = np.setdiff1d(np.arange(body.nodes), rim)
-        self.free = (3 * self.free_nodes[:, None] + np.arange(3)).ravel()
-        first = body.space.dofmap.index_map.local_range[0]
-        self._rows = PETSc.IS().createGeneral(
-            (self.free + 3 * first).astype(PETSc.IntType), comm=body.comm
-        )
-        self.mass = body.nodal_mass()[self.free]
+        self.unknowns = Unknowns(body, support)
+        self.mass, self.carried = self.unknowns.mass, self.unknowns.carried
         self.stiffness = self._assemble(self._tangent(inflation))
+        if self.unknowns.rim:
+            self._add_turning(inflation, rolling)
         self.stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+
+    def _add_turning(self, inflation: float, rolling: Rolling) -> None:
+        """What the rim's static forces add to the stiffness of its rotations. Collective."""
+        body, rim = self.body, self.unknowns.rim
+        pressure = fem.Constant(body.mesh, inflation)
+        out = fem.petsc.assemble_vector(compat.form(static_residual(body, pressure, rolling)))
+        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        turning = rim.turning_stiffness(out.array_r[rim.dofs])
+        if rim.mine:
+            end = self.stiffness.getOwnershipRange()[1]
+            six = np.arange(end - 6, end, dtype=PETSc.IntType)
+            self.stiffness.setValues(six, six, turning, PETSc.InsertMode.ADD)
+        self.stiffness.assemble()
 
     def _tangent(self, inflation: float):
         pressure = fem.Constant(self.body.mesh, inflation)
@@ -79,16 +104,23 @@ class Operators:
     def _assemble(self, form) -> PETSc.Mat:
         matrix = fem.petsc.assemble_matrix(compat.form(form))
         matrix.assemble()
-        reduced = matrix.createSubMatrix(self._rows, self._rows)
+        reduced = self.unknowns.reduced(matrix)
         matrix.destroy()
         return reduced
 
-    def spread(self, free: np.ndarray) -> np.ndarray:
-        """Owned nodal values (nodes, 3, ...) with zeros on the rim from values at the free dofs."""
-        out = np.zeros((3 * self.body.nodes, *free.shape[1:]))
-        out[self.free] = free
-        return out.reshape(self.body.nodes, 3, *free.shape[1:])
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """Owned nodal values (nodes, 3, ...) from own unknowns (n, ...). Collective."""
+        return self.unknowns.spread(values)
 
     def restrict(self, nodal: np.ndarray) -> np.ndarray:
-        """Values at the free dofs from owned nodal values (nodes, 3, ...)."""
-        return nodal.reshape(-1, *nodal.shape[2:])[self.free]
+        """Own unknowns (n, ...) from owned nodal values (nodes, 3, ...) of such a motion. Collective."""
+        return self.unknowns.restrict(nodal)
+
+    def trace(self, values: np.ndarray) -> np.ndarray:
+        """What is seen of motions (n, m) outside, on every process: the outer face (3 s, m), and after
+        it the translation and rotation of a free rim (6, m). Collective.
+        """
+        face = self.body.surface(self.spread(values)).reshape(-1, values.shape[1])
+        if self.unknowns.rim is None:
+            return face
+        return np.vstack([face, self.unknowns.rim_motion(values)])

@@ -9,7 +9,8 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from fem.compliance import add_diagonal, on_own_rows, solve_all
+from fem.compliance import add_diagonal, on_own_rows
+from fem.direct import solve_all
 from fem.operators import Operators
 
 

@@ -15,13 +15,8 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from fem.compliance import (
-    factorise,
-    on_own_rows,
-    rotating_damping,
-    rotating_stiffness,
-    solve_columns,
-)
+from fem.compliance import on_own_rows, rotating_damping, rotating_stiffness
+from fem.direct import factorise, solve_columns
 from fem.operators import Operators, Rotation
 
 # What a step needs of the one before; `balanced` is the mean of two accelerations that balances the
@@ -125,5 +120,4 @@ class FullTire:
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N: the convective parts cancel around the ring."""
-        rate = (self._mass * self.balanced).reshape(-1, 3).sum(axis=0)
-        return self._comm.allreduce(rate)
+        return self._comm.allreduce(self._operators.carried @ self.balanced)

@@ -27,7 +27,8 @@ class Response:
 
     `eigenvalue` (q,) 1/s, `output` (r, q) and `input` (q, k) complex, `block` (b, b) with its
     `block_output` (r, b) and `block_input` (b, k), `residual` (r, k) m/N; `momentum` (3, q) and
-    `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries. With `pulse` the
+    `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries. The last `rigid`
+    states of the block drift under a constant force: static figures leave them out. With `pulse` the
     residual answers not at once but with a pulse 1/step high and one step long in place of its
     delta(t) (thesis (C.4)).
     """
@@ -42,6 +43,7 @@ class Response:
     momentum: np.ndarray
     block_momentum: np.ndarray
     pulse: bool = False
+    rigid: int = 0
 
     def impulse(self, times: np.ndarray) -> np.ndarray:
         """Green's functions g (t, r, k), m/(N s), without the residual's delta at t = 0."""
@@ -65,7 +67,7 @@ class Response:
         return g
 
     def receptance(self, frequency: np.ndarray) -> np.ndarray:
-        """H (f, r, k) complex, m/N, at the given frequencies in Hz."""
+        """H (f, r, k) complex, m/N, at the given frequencies in Hz, 0 only without rigid states."""
         H = np.empty((len(frequency), *self.residual.shape), complex)
         for k, s in enumerate(2j * np.pi * frequency):
             poles = (self.output / (s - self.eigenvalue)) @ self.input
@@ -79,16 +81,22 @@ class Response:
     def static(self) -> np.ndarray:
         """Displacement (r, k) per constant force, m/N, of the poles alone: H at 0 Hz."""
         static = -((self.output / self.eigenvalue) @ self.input).real
-        if len(self.block):
-            static -= self.block_output @ np.linalg.solve(self.block, self.block_input)
+        block, output, push = self._held_block()
+        if len(block):
+            static -= output @ np.linalg.solve(block, push)
         return static
+
+    def _held_block(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The block with its output and input without rigid states, which are last and apart."""
+        k = len(self.block) - self.rigid
+        return self.block[:k, :k], self.block_output[:, :k], self.block_input[:k]
 
     def spectral_moment(self) -> np.ndarray:
         """-dH/ds (r, k) at s = 0, m s/N: what damping adds to a slow force's displacement."""
         first = ((self.output / self.eigenvalue**2) @ self.input).real
-        if len(self.block):
-            twice = np.linalg.solve(self.block, np.linalg.solve(self.block, self.block_input))
-            first += self.block_output @ twice
+        block, output, push = self._held_block()
+        if len(block):
+            first += output @ np.linalg.solve(block, np.linalg.solve(block, push))
         return first
 
     def keeping(self, keep: np.ndarray) -> Response:
@@ -142,18 +150,21 @@ class Response:
         )
 
     def joined(self, other: Response) -> Response:
-        """Both sets of states between the same outputs and forces; the residuals add up."""
+        """Both sets of states between the same outputs and forces; the residuals add up. The `other`
+        has no rigid states.
+        """
         return Response(
             np.concatenate([self.eigenvalue, other.eigenvalue]),
             np.hstack([self.output, other.output]),
             np.vstack([self.input, other.input]),
-            linalg.block_diag(self.block, other.block),
-            np.hstack([self.block_output, other.block_output]),
-            np.vstack([self.block_input, other.block_input]),
+            linalg.block_diag(other.block, self.block),
+            np.hstack([other.block_output, self.block_output]),
+            np.vstack([other.block_input, self.block_input]),
             self.residual + other.residual,
             np.hstack([self.momentum, other.momentum]),
-            np.hstack([self.block_momentum, other.block_momentum]),
+            np.hstack([other.block_momentum, self.block_momentum]),
             self.pulse,
+            self.rigid,
         )
 
 
@@ -180,6 +191,7 @@ def couple(
         np.zeros((len(output), len(forces))),
         momentum @ modes.right,
         momentum @ modes.block_right,
+        rigid=modes.rigid,
     )
     if compliance is None:
         return response

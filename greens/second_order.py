@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from greens.response import Response, couple
-from modal.rotating import StateModes, rotating
+from modal.rotating import GROWS, StateModes, rotating
 
 # Share of the largest static flexibility below which a direction is the solver's rounding.
 _ROUNDING = 1e-9
@@ -62,7 +62,9 @@ def second_order(
     output = flexibility @ basis
     forces = inverse @ (basis.T @ flexibility)
     extra = couple(states, output, forces.T, missing.momentum @ basis)
-    whole = response.joined(extra.keeping(extra.eigenvalue.real <= 0))
+    # Undamped states are on the axis to rounding only, on either side of it.
+    still = GROWS * np.abs(extra.eigenvalue).max(initial=0.0)
+    whole = response.joined(extra.keeping(extra.eigenvalue.real <= still))
     return replace(whole, residual=moments.compliance - whole.static())
 
 
@@ -83,14 +85,16 @@ def _missing(
 def _statics(modes: StateModes, push: np.ndarray, block_push: np.ndarray) -> np.ndarray:
     """K~^-1 Phi^T (m, p): the modal coordinates under constant unit forces."""
     static = -((modes.right / modes.eigenvalue) @ push).real
-    if len(modes.block):
-        static -= modes.block_right @ np.linalg.solve(modes.block, block_push)
+    k = len(modes.block) - modes.rigid
+    if k:
+        static -= modes.block_right[:, :k] @ np.linalg.solve(modes.block[:k, :k], block_push[:k])
     return static
 
 
 def _adjoints(modes: StateModes, reading: np.ndarray, block_reading: np.ndarray) -> np.ndarray:
     """Phi K~^-1 (p, m)."""
     static = -((reading / modes.eigenvalue) @ modes.left).real
-    if len(modes.block):
-        static -= block_reading @ np.linalg.solve(modes.block, modes.block_left)
+    k = len(modes.block) - modes.rigid
+    if k:
+        static -= block_reading[:, :k] @ np.linalg.solve(modes.block[:k, :k], modes.block_left[:k])
     return static

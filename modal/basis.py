@@ -26,8 +26,10 @@ class Projection:
     body_convective: np.ndarray | None = None
 
 
-def project(modes: Modes, rotation, mass: np.ndarray, comm) -> Projection:
-    """Project the rotation matrices (fem.operators.Rotation, or None) and the momentum. Collective."""
+def project(modes: Modes, rotation, carried: np.ndarray, comm) -> Projection:
+    """Project the rotation matrices (fem.operators.Rotation, or None) and the momentum: `carried` (3, n)
+    kg of own rows, as in fem.operators. Collective.
+    """
     vectors = modes.vectors
 
     def reduced(matrix):
@@ -39,7 +41,7 @@ def project(modes: Modes, rotation, mass: np.ndarray, comm) -> Projection:
     def symmetric(matrix):
         return (matrix + matrix.T) / 2
 
-    moved = momentum(comm, mass, vectors)
+    moved = comm.allreduce(carried @ vectors)
     if rotation is None:
         return Projection(modes.squares, moved)
     return Projection(
@@ -50,9 +52,3 @@ def project(modes: Modes, rotation, mass: np.ndarray, comm) -> Projection:
         skew(reduced(rotation.body)),
         symmetric(reduced(rotation.body_convective)),
     )
-
-
-def momentum(comm, mass: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """int rho phi_k (3, m) of fields given by own rows (n, m), with the diagonal mass. Collective."""
-    weighted = mass[:, None] * vectors
-    return comm.allreduce(np.stack([weighted[d::3].sum(axis=0) for d in range(3)]))

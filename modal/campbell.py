@@ -82,11 +82,12 @@ def critical_speed(projection: Projection, inertia: str) -> float:
     """The least Omega (rad/s) at which a wave stands still in the non-rotating frame; inf if none does.
 
     Undamped, K~ = Lambda + Omega^2 S is singular there: Omega^-2 is the largest eigenvalue of
-    Lambda^-1/2 (-S) Lambda^-1/2. A road that stands still to the axle excites such a wave without end.
+    Lambda^-1/2 (-S) Lambda^-1/2, rigid modes left out. A road that stands still to the axle excites such a wave without end.
     """
     convective = projection.convective if inertia == "full" else projection.body_convective
-    root = 1 / np.sqrt(projection.squares)
-    scaled = -convective * np.outer(root, root)
+    flexible = projection.squares > 0
+    root = 1 / np.sqrt(projection.squares[flexible])
+    scaled = -convective[np.ix_(flexible, flexible)] * np.outer(root, root)
     largest = linalg.eigvalsh(scaled, subset_by_index=[len(root) - 1] * 2)[0]
     return float(1 / np.sqrt(largest)) if largest > 0 else np.inf
 

@@ -20,6 +20,9 @@ from modal.basis import Projection
 
 # Above this condition an eigenvector loses ten of sixteen digits; such eigenvalues go to the block.
 DEFECTIVE = 1e6
+SINGULAR = 1e13  # condition of K~ beyond which it has no inverse
+# States slower than this part of the fastest drift, as rigid modes do, unless their vectors are apart.
+_AT_REST, _SKEWED = 1e-5, 1e2
 GROWS = 1e-9  # of the largest |s|: a growth rate below is rounding
 
 
@@ -30,7 +33,8 @@ class StateModes:
     `eigenvalue` (q,) 1/s, Im >= 0; `right` (m, q) with the weight 2 of a pair already in it; `left`
     (q, m), transposed and not conjugated, divided by a_q; `block` (k, k), `block_right` (m, k),
     `block_left` (k, m). `residual`, `left_residual` (q,) relative to the terms of the quadratic
-    problem; `condition` the worst eigenvector condition among those kept as vectors.
+    problem; `condition` the worst eigenvector condition among those kept as vectors. The last `rigid`
+    states of the block belong to rigid modes: they drift, and have no static answer.
     """
 
     eigenvalue: np.ndarray
@@ -42,6 +46,7 @@ class StateModes:
     residual: np.ndarray
     left_residual: np.ndarray
     condition: float
+    rigid: int = 0
 
     @property
     def unstable(self) -> int:
@@ -75,9 +80,11 @@ def standing(projection: Projection, damping: tuple[float, float]) -> StateModes
     # Condition of the eigenvectors of one mode's companion matrix is about omega / |root|.
     size = np.maximum(np.maximum(np.sqrt(np.abs(squares)), half), np.finfo(float).tiny)
     condition = 1 / np.maximum(np.abs(root) / size, np.finfo(float).eps ** 2)
-    defective = np.flatnonzero(condition > DEFECTIVE)
-    paired = np.flatnonzero((root.imag != 0) & (condition <= DEFECTIVE))
-    real = np.flatnonzero((root.imag == 0) & (condition <= DEFECTIVE))
+    rigid = squares == 0
+    split = (condition <= DEFECTIVE) & ~rigid
+    defective = np.concatenate([np.flatnonzero(~split & ~rigid), np.flatnonzero(rigid)])
+    paired = np.flatnonzero((root.imag != 0) & split)
+    real = np.flatnonzero((root.imag == 0) & split)
     # Of the two real roots the slow one is omega^2 over the fast one: no cancellation.
     fast = -half[real] - root[real].real
     eigenvalue = np.concatenate([-half[paired] + root[paired], fast, squares[real] / fast])
@@ -91,23 +98,24 @@ def standing(projection: Projection, damping: tuple[float, float]) -> StateModes
     block, block_right, block_left = _companion_blocks(defective, squares, half, m)
     none = np.zeros(len(mode))
     worst = float(condition[np.r_[paired, real]].max(initial=1.0))
-    return StateModes(eigenvalue, right, left, block, block_right, block_left, none, none, worst)
+    drifting = 2 * int(rigid.sum())
+    return StateModes(
+        eigenvalue, right, left, block, block_right, block_left, none, none, worst, drifting
+    )
 
 
 def checks(modes: StateModes, drag: np.ndarray, stiffness: np.ndarray) -> dict[str, float]:
     """How far the decoupled equations are from the problem they came from, relative figures by name.
 
     Over all 2m states  sum u w^T / a = 0,  sum s u w^T / a = 1,  sum -u w^T / (a s) = K~^-1,  and
-    w_i^T [(s_i + s_j) + D~] u_j = a_i delta_ij among states with vectors. Raises ConvergenceError when
+    w_i^T [(s_i + s_j) + D~] u_j = a_i delta_ij among states with vectors; the third only where K~ has an
+    inverse, which rigid modes deny it. Raises ConvergenceError when
     a residual exceeds 1e-8 or an identity 1e-6.
     """
     m = len(drag)
     s, block = modes.eigenvalue, modes.block
     displacement = (modes.right @ modes.left).real + modes.block_right @ modes.block_left
     rate = (modes.right * s @ modes.left).real + modes.block_right @ block @ modes.block_left
-    compliance = -(modes.right / s @ modes.left).real
-    if len(block):
-        compliance -= modes.block_right @ np.linalg.solve(block, modes.block_left)
     # A displacement per velocity is a time: the slowest state's is the yardstick.
     slowest = np.abs(s).min(initial=np.inf) if len(s) else 1.0
     figures = {
@@ -115,11 +123,15 @@ def checks(modes: StateModes, drag: np.ndarray, stiffness: np.ndarray) -> dict[s
         "worst left residual": float(modes.left_residual.max(initial=0.0)),
         "sum identity 0": float(np.abs(displacement).max() * slowest),
         "sum identity 1": float(np.abs(rate - np.eye(m)).max()),
-        "sum identity K^-1": float(np.abs(stiffness @ compliance - np.eye(m)).max()),
         "biorthogonality": float(
             np.abs(overlap(modes, modes, drag) - np.eye(len(s))).max(initial=0.0)
         ),
     }
+    if np.linalg.cond(stiffness, 1) < SINGULAR:
+        compliance = -(modes.right / s @ modes.left).real
+        if len(block):
+            compliance -= modes.block_right @ np.linalg.solve(block, modes.block_left)
+        figures["sum identity K^-1"] = float(np.abs(stiffness @ compliance - np.eye(m)).max())
     for name, figure in figures.items():
         if not figure <= (1e-8 if "residual" in name else 1e-6):
             raise ConvergenceError(
@@ -141,7 +153,7 @@ def overlap(one: StateModes, other: StateModes, drag: np.ndarray) -> np.ndarray:
 
 
 def _companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m: int):
-    """(T, R_b, L_b) of single modes at critical damping, each as its own companion matrix."""
+    """(T, R_b, L_b) of single modes, critically damped or rigid, each as its own companion matrix."""
     k = 2 * len(modes)
     block, right, left = np.zeros((k, k)), np.zeros((m, k)), np.zeros((k, m))
     for i, mode in enumerate(modes):
@@ -166,7 +178,8 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
     block, block_vectors = np.zeros((0, 0)), np.zeros((2 * m, 0))
     inverse, _ = _inverse(values, vectors, block_vectors)
     condition = np.linalg.norm(inverse, axis=1)
-    good = condition <= DEFECTIVE
+    drifting = (np.abs(values) <= _AT_REST * np.abs(values).max()) & (condition > _SKEWED)
+    good = (condition <= DEFECTIVE) & ~drifting
     block_inverse = block_vectors.T
     if not good.all():
         block, block_vectors = _invariant(companion, values[~good])
@@ -201,17 +214,27 @@ def _inverse(values, vectors, block_vectors) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _invariant(companion: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Schur block and orthonormal real basis of the invariant subspace of the chosen eigenvalues."""
-    near = 1e-6 * np.abs(chosen).max()
+    """Schur block and orthonormal real basis of the invariant subspace of the chosen eigenvalues.
 
-    def wanted(re, im):
-        return bool(
-            np.abs(chosen - complex(re, abs(im))).min() < near
-            or np.abs(chosen - complex(re, -abs(im))).min() < near
-        )
+    Another algorithm finds them again within what a defective one is uncertain by: a small part of
+    itself, or, where it is zero, of the matrix.
+    """
+    expected = int(np.where(chosen.imag > 0, 2, 1).sum())
+    everything = np.linalg.norm(companion, 2)
+    for near in (1e-6 * np.abs(chosen).max(), 1e-7 * everything, 1e-6 * everything):
 
-    schur, basis, count = linalg.schur(companion, output="real", sort=wanted)
-    return schur[:count, :count], basis[:, :count]
+        def wanted(re, im, near=near):
+            both = np.abs([chosen - complex(re, im), chosen - complex(re, -im)])
+            return bool(both.min() < near)
+
+        schur, basis, count = linalg.schur(companion, output="real", sort=wanted)
+        if count == expected:
+            return schur[:count, :count], basis[:, :count]
+    raise ConvergenceError(
+        f"rotating: {len(chosen)} eigenvalues next to defective ones ({np.abs(chosen).min():.4g} to "
+        f"{np.abs(chosen).max():.4g} 1/s) cannot be told from others. Change the damping or the speed a "
+        "little."
+    )
 
 
 def _quadratic_residual(drag, stiffness, values, vectors) -> np.ndarray:
@@ -222,4 +245,6 @@ def _quadratic_residual(drag, stiffness, values, vectors) -> np.ndarray:
 
     terms = (vectors * values**2, times(drag) * values, times(stiffness))
     size = sum(np.linalg.norm(term, axis=0) for term in terms)
-    return np.linalg.norm(sum(terms), axis=0) / size
+    # A state at rest, of a rigid mode, has terms of rounding alone: a faster one is its yardstick.
+    least = _AT_REST * np.abs(values).max(initial=0.0) ** 2 * np.linalg.norm(vectors, axis=0)
+    return np.linalg.norm(sum(terms), axis=0) / np.maximum(size, least)

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from fem.errors import ConvergenceError
 from modal.spectrum import Bottom, Slice, Spectrum
-from modal.symmetry import sectors
+from modal.symmetry import Sites, sectors
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
 ORTHONORMALITY_TOLERANCE = 1e-10
@@ -26,7 +26,7 @@ class Modes:
     """The lowest m modes. `squares` omega^2 (m,) 1/s2 ascending; `vectors` this process's rows (n, m)
     of the mass-normalised shapes, kg^-1/2; `residual` (m,) ||K phi - lambda M phi|| / ||lambda M phi||;
     `inertia_count` eigenvalues below `counted_below` (1/s2) by Sylvester's law, equal to the number
-    found there; `rigid` modes without stiffness among them; `sectors` sizes of the independent problems
+    found there; `rigid` modes without stiffness, whose square is 0, among them; `sectors` sizes of the independent problems
     that mirror planes split it into, `slices` intervals solved.
     """
 
@@ -52,13 +52,13 @@ def solve(
     count: int | None = None,
     *,
     up_to: float = np.inf,
-    points: np.ndarray | None = None,
+    sites: Sites | None = None,
 ) -> Modes:
     """The `count` lowest modes, or all below `up_to` (Hz), of a stiffness (n, n) in N/m and a diagonal
     mass (own rows) in kg; at least one of the two is given.
 
     The diagonal mass turns the pencil into the standard problem of A = M^-1/2 K M^-1/2. With the
-    `points` (own n / 3, 3) of its dofs, mirror planes that A has split it (modal.symmetry); each part
+    `sites` of its own unknowns, mirror planes that A has split it (modal.symmetry); each part
     is sliced by inertia (modal.spectrum) and solved by block Lanczos (modal.lanczos). Every process
     holds a copy of A. Raises ConvergenceError when a mode is missing, inaccurate or unstable.
     Collective.
@@ -68,8 +68,8 @@ def solve(
     scaled = _scaled(stiffness, mass)
     whole = _everywhere(scaled)
     bases = [sparse.identity(size, format="csr")]
-    if points is not None:
-        bases = sectors(whole, np.concatenate(comm.allgather(points)))
+    if sites is not None:
+        bases = sectors(whole, sites.everywhere(comm))
     modes = _solve(scaled, whole, bases, mass, min(count or size, size), (2 * np.pi * up_to) ** 2)
     if len(bases) > 1 and modes.residual.max(initial=0.0) > RESIDUAL_TOLERANCE:
         # Mirror symmetric to the tolerance, and yet too coarsely for the lowest modes: do not split.
@@ -98,6 +98,7 @@ def _solve(scaled, whole, bases, mass, count: int, limit: float) -> Modes:
     defect = _orthonormalise(comm, vectors, matrix)
     squares = values[order]
     rigid = int((squares <= bottom.zero).sum())
+    squares[:rigid] = 0.0
     scale = squares[
         min(rigid, len(squares) - 1)
     ]  # a rigid mode is measured by the first flexible one
@@ -129,7 +130,8 @@ def _check_stable(bottom: Bottom) -> None:
         raise ConvergenceError(
             f"modes: the tangent stiffness has {bottom.negative} negative eigenvalue(s) (growth rate "
             f"about {growth:.3g} 1/s): the state is unstable once the road is replaced by its "
-            "forces, the tire buckles. Lower the load, raise the inflation or stiffen the wall."
+            "forces: the tire buckles, or topples if its rim is free. Lower the load, raise the "
+            "inflation or stiffen the wall; let a free rim stand on no road."
         )
 
 
@@ -188,7 +190,8 @@ def _orthonormalise(comm: MPI.Comm, vectors: np.ndarray, matrix: np.ndarray) -> 
         part = vectors[:, columns]
         defect = gram(comm, part, part) - np.eye(len(columns))
         if np.abs(defect).max() > _REPAIR:
-            part -= part @ (defect / 2)
+            # What is rounding already stays: mixed in, it would carry stiff modes into soft ones.
+            part -= part @ (np.where(np.abs(defect) > _REPAIR / 10, defect, 0.0) / 2)
             vectors[:, columns] = part
             defect = gram(comm, part, part) - np.eye(len(columns))
         worst = max(worst, float(np.abs(defect).max()))

@@ -8,10 +8,19 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from fem.compliance import compliance, rotating_damping, rotating_stiffness, static_shapes
+from fem.compliance import (
+    StaticShapes,
+    compliance,
+    on_own_rows,
+    rotating_damping,
+    rotating_stiffness,
+    static_shapes,
+)
 from fem.operators import Operators, Rotation
 from fem.receptance import receptance
+from fem.relief import statics
 from greens.attachment import with_attachments
+from greens.axle import axle_transfer
 from greens.response import Response, couple
 from greens.second_order import Moments, second_order
 from modal.basis import Projection, project
@@ -22,16 +31,22 @@ from runs.mpi import on_root
 
 @dataclass(frozen=True)
 class Basis:
-    """`shape` (3 s, m) of the outer face kg^-1/2, the projected matrices, and the decoupled states."""
+    """`shape` kg^-1/2 of the outer face (3 s, m), of a free rim after it (+ 6); the projected matrices;
+    the decoupled states.
+    """
 
     shape: np.ndarray
     projection: Projection
     states: StateModes
 
     def couple(self, outputs, loads, flexibility: np.ndarray | None = None) -> Response:
-        """Response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s)."""
+        """Response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s), or 3 s + 6 wide."""
         momentum = self.projection.momentum
-        return couple(self.states, outputs @ self.shape, loads @ self.shape, momentum, flexibility)
+        return couple(self.states, self.seen(outputs), self.seen(loads), momentum, flexibility)
+
+    def seen(self, probes: sparse.csr_matrix) -> np.ndarray:
+        """The modes (k, m) as the probes read them."""
+        return probes @ self.shape[: probes.shape[1]]
 
 
 @dataclass(frozen=True)
@@ -74,28 +89,59 @@ class Wheel:
         r, k = outputs.shape[0], loads.shape[0]
         same = outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
-        shapes = static_shapes(
-            self.operators, self.rotating_stiffness, self.rotating_damping, probes
-        )
         if option == "attachment":
-            grown = self._grown(modes, shapes.columns)
-            whole = grown.couple(probes, probes, shapes.compliance)
+            whole = self._attached(modes, probes)
         else:
+            shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
             poles = basis.couple(probes, probes)
             carried = basis.projection.momentum
-            whole = second_order(poles, basis.states, probes @ basis.shape, carried, moments)
+            whole = second_order(poles, basis.states, basis.seen(probes), carried, moments)
         return whole if same else whole.between(slice(r), slice(r, r + k))
+
+    def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
+        full = self.rotating_stiffness, self.rotating_damping
+        return static_shapes(self.operators, *full, probes)
+
+    def _attached(self, modes: Modes, probes: sparse.csr_matrix) -> Response:
+        """Response of the modes and the attachment modes of all probes. Collective."""
+        if not self._drifts:
+            shapes = self._static_shapes(probes)
+            return self._grown(modes, shapes.columns).couple(probes, probes, shapes.compliance)
+        return self._standing_attachments(modes, probes).couple(probes, probes)
+
+    @property
+    def _drifts(self) -> bool:
+        """Whether the turning tire has no static answer: with a free rim K_Omega has no inverse."""
+        return self.rotation is not None and self.operators.unknowns.rim is not None
+
+    def _standing_attachments(self, modes: Modes, probes: sparse.csr_matrix) -> Basis:
+        """Modes with the static shapes, relieved where nothing holds the tire, of K. Collective."""
+        loads = on_own_rows(self.operators, probes)
+        return self._grown(modes, statics(self.operators, self.operators.stiffness, loads))
+
+    def axle(self, modes: Modes, loads: sparse.csr_matrix, frequency: np.ndarray) -> np.ndarray:
+        """Force on the held axle per unit load (f, 3, k), -, by the modes of the free rim (greens.axle).
+
+        `loads` (k, 3 s); the rim's and the loads' attachment modes join the basis. Collective.
+        """
+        width = loads.shape[1]
+        rim = sparse.hstack([sparse.csr_matrix((6, width)), sparse.identity(6)])
+        apart = sparse.hstack([loads, sparse.csr_matrix((loads.shape[0], 6))])
+        probes = sparse.vstack([rim, apart], format="csr")
+        grown = self._standing_attachments(modes, probes)
+        seen, momentum = grown.seen(probes), grown.projection.momentum
+        response = couple(grown.states, np.vstack([seen[:6], momentum]), seen, momentum)
+        turning = self.speed, self.damping[0]
+        return axle_transfer(response.receptance(frequency), frequency, *turning)
 
     def _grown(self, modes: Modes, columns: np.ndarray) -> Basis:
         """The basis with attachment modes. Collective."""
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
-        projection = project(grown, self.rotation, operators.mass, comm)
-        shape = operators.body.surface(operators.spread(grown.vectors))
-        return Basis(
-            shape.reshape(-1, len(grown.squares)), projection, self.decouple(projection, comm)
-        )
+        projection = project(grown, self.rotation, operators.carried, comm)
+        shape = operators.trace(grown.vectors)
+        return Basis(shape, projection, self.decouple(projection, comm))
 
     def decouple(self, projection: Projection, comm) -> StateModes:
         """The second eigenproblem, or the closed formula when the wheel stands. Collective."""

@@ -76,7 +76,7 @@ def judge(session: Session, name: str, whole: Response, response: Response) -> N
     band, record = _band(session), session.record
     some = [slice(None, None, -(-n // _SAMPLE)) for n in whole.residual.shape]
     whole, response = whole.between(*some), response.between(*some)
-    frequency = np.linspace(0, band, _FREQUENCIES)
+    frequency = np.linspace(0, band, _FREQUENCIES)[1 if whole.rigid else 0 :]
     off = estimate(whole, session.scene.greens.residual, _cutoff(session), frequency)
     label = f"up to {band:.4g} Hz, {name}"
     record.indicators[f"estimated truncation error {label}"] = (float(off.max()), "-")
@@ -92,12 +92,17 @@ def fill_response(file: h5py.File, name: str, response: Response) -> None:
     for key, unit in _UNITS.items():
         put(file, f"{name}/{key}", getattr(response, key), unit)
     put(file, f"{name}/static_flexibility", response.residual + response.static(), "m/N")
+    file[name].attrs["rigid_states"] = response.rigid
 
 
 def read_responses(file: h5py.File, pulse: bool) -> dict[str, Response]:
     """All the responses of a file, by name."""
     return {
-        name: Response(**{key: group[key][:] for key in _UNITS}, pulse=pulse)
+        name: Response(
+            **{key: group[key][:] for key in _UNITS},
+            pulse=pulse,
+            rigid=int(group.attrs["rigid_states"]),
+        )
         for name, group in file.items()
         if "eigenvalue" in group
     }

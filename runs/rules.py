@@ -15,8 +15,6 @@ Where = Callable[[tuple[str, ...], str], InputError]
 LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "tire.mesh": ((), 'only section = "torus" is supported in this version'),
     "tire.section": (("torus",), 'only "torus" is supported in this version'),
-    "modal.rim": (("fixed",), 'only "fixed" is supported in this version'),
-    "modal.road": (("forces",), 'only "forces" is supported in this version'),
     "output.vibration": ((False,), "only false is supported in this version"),
     "output.fields": ((False,), "only false is supported in this version"),
 }
@@ -45,6 +43,7 @@ def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise InputError for the first contradiction between keys or tables."""
     _geometry(scene, error)
     _static(scene, raw, error)
+    _modal(scene, error)
     if scene.contact is not None:
         _contact(scene, error)
     _force(scene, error)
@@ -96,6 +95,47 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
     if len(given) > 1:
         raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
+
+
+def _modal(scene: Scene, error: Where) -> None:
+    modal, static, rotation = scene.modal, scene.static, scene.rotation
+    road = (static.load, static.deflection, static.road_height) != (None, None, None)
+    if modal.road == "held" and not road:
+        raise error(("modal", "road"), '= "held" needs a road: add load (N) to [static]')
+    if scene.contact is not None and modal.road == "held":
+        raise error(
+            ("modal", "road"),
+            '= "held" fixes the nodes whose contact is to be computed: [contact] needs "forces"',
+        )
+    if scene.contact is not None and modal.rim == "free":
+        raise error(
+            ("modal", "rim"),
+            '= "free" leaves nothing to carry the load: [contact] needs "fixed"',
+        )
+    if modal.rim == "fixed" or rotation is None or rotation.speed == 0:
+        return
+    if rotation.method == "full":
+        raise error(
+            ("rotation", "method"),
+            '= "full" is solved about K^-1, which a free rim does not have: take "projected"',
+        )
+    if not static.steady_rolling:
+        raise error(
+            ("static", "steady_rolling"),
+            "= false leaves out the centrifugal tension that keeps a free turning wheel upright",
+        )
+    if scene.damping.mass:
+        raise error(
+            ("damping", "mass"),
+            f"= {scene.damping.mass:g} 1/s acts against a wheel that turns about a fixed axle; a free one"
+            " would be driven round by it: take 0, and damping.stiffness (s) instead",
+        )
+    if scene.greens.residual not in ("none", "attachment"):
+        raise error(
+            ("greens", "residual"),
+            f'= "{scene.greens.residual}" needs the static answer of the turning tire, which with a'
+            ' free rim does not exist: take "attachment" or "none"',
+        )
 
 
 def _force(scene: Scene, error: Where) -> None:

@@ -73,6 +73,13 @@ class Session:
         """gamma1 (1/s) and gamma2 (s)."""
         return self.scene.damping.mass, self.scene.damping.stiffness
 
+    @property
+    def rolling(self) -> tuple[float, float, float]:
+        """Speed and damping of the steady-rolling static state; zeros at rest."""
+        if not self.scene.static.steady_rolling or self.speed == 0:
+            return 0.0, 0.0, 0.0
+        return self.speed, *self.damping
+
     @cached_property
     def section(self):
         """The torus of the scene."""
@@ -111,9 +118,22 @@ class Session:
     def operators(self):
         """Matrices at the static state. Collective."""
         from fem.operators import Operators
+        from fem.virtual_work import Rolling
 
         with self.record.timing("matrices"):
-            return Operators(self.body, self.scene.static.inflation)
+            return Operators(
+                self.body, self.scene.static.inflation, self._support(), Rolling(*self.rolling)
+            )
+
+    def _support(self):
+        """What holds the tire in its small motions."""
+        from fem.support import Support
+
+        wanted = self.scene.modal
+        if wanted.road == "forces":
+            return Support(wanted.rim)
+        face = self.body.surface
+        return Support(wanted.rim, face.local[self.static.force[face.place] > 0])
 
     @cached_property
     def rotation_matrices(self):

@@ -117,8 +117,14 @@ class Modal:
     up_to: float | None = number(
         None, "Hz", "all modes below it are wanted, instead of count", above=0, most=1e6
     )
-    rim: str = choice("fixed", ("fixed", "free"), "the two bead faces")
-    road: str = choice("forces", ("forces", "held"), "after the static state: its forces, or held")
+    rim: str = choice(
+        "fixed", ("fixed", "free"), "the bead faces: clamped, or one rigid body that nothing holds"
+    )
+    road: str = choice(
+        "forces",
+        ("forces", "held"),
+        "after the static state: its forces, or its nodes' height held",
+    )
 
 
 @dataclass(frozen=True)

@@ -27,9 +27,7 @@ def run() -> list[Table]:
     comm = MPI.COMM_WORLD
     observe.say("static state of the tire ...")
     operators = _tire(comm)
-    body = operators.body
-    points = body.lattice.points(body.ids[operators.free_nodes])
-    table, modes = _standing(comm, operators, points)
+    table, modes = _standing(comm, operators)
     plain = _plain(comm, operators, table.rows)
     return [table, plain, _rolling(comm, operators, modes)]
 
@@ -61,15 +59,16 @@ def _timed(comm: MPI.Comm, work: Callable):
     return comm.allreduce(time.perf_counter() - began, op=MPI.MAX), result
 
 
-def _standing(comm: MPI.Comm, operators, points: np.ndarray):
+def _standing(comm: MPI.Comm, operators):
     from modal import undamped
+    from runs.stages.modes import sites
 
     rows, modes = [], None
     for count in COUNTS:
         seconds, found = _timed(
             comm,
             lambda count=count: undamped.solve(
-                operators.stiffness, operators.mass, count, points=points
+                operators.stiffness, operators.mass, count, sites=sites(operators)
             ),
         )
         gigabytes = comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) / 1e6
@@ -136,7 +135,7 @@ def _rolling(comm: MPI.Comm, operators, modes) -> Table:
     from modal.rotating import matrices, rotating
 
     observe.say("projected states ...")
-    projection = project(modes, operators.rotation(), operators.mass, comm)
+    projection = project(modes, operators.rotation(), operators.carried, comm)
     pencil = matrices(projection, 50.0, (500.0, 0.0), "full")
     states = {}
     for m in (125, 250, 500, 1000):

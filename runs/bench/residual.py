@@ -22,6 +22,7 @@ from modal import undamped
 from modal.basis import project
 from modal.undamped import Modes
 from runs.coupling import Basis, Wheel
+from runs.stages.modes import sites
 from runs.tabulate import Table
 
 ABOUT = "receptance of few modes with each residual against the full matrices; set-up times"
@@ -74,8 +75,8 @@ def _basis(wheel: Wheel, modes: Modes, count: int) -> tuple[Basis, Modes]:
     )
     operators = wheel.operators
     comm = operators.body.comm
-    projection = project(few, wheel.rotation, operators.mass, comm)
-    shape = operators.body.surface(operators.spread(few.vectors)).reshape(-1, count)
+    projection = project(few, wheel.rotation, operators.carried, comm)
+    shape = operators.trace(few.vectors)
     return Basis(shape, projection, wheel.decouple(projection, comm)), few
 
 
@@ -170,8 +171,7 @@ def _times(comm: MPI.Comm) -> Table:
     body = operators.body
     nearest = np.argsort(body.lattice.points(body.surface.ids)[:, 2], kind="stable")
     places = probe.nodes(nearest[:FORCES], len(nearest))
-    points = body.lattice.points(body.ids[operators.free_nodes])
-    modes = undamped.solve(operators.stiffness, operators.mass, MODES, points=points)
+    modes = undamped.solve(operators.stiffness, operators.mass, MODES, sites=sites(operators))
     rows = []
 
     def clock(name: str, target, work):

@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 
 from modal import quadratic
-from modal.basis import momentum
 from modal.quadratic import FullModes, truncation
 from modal.rotating import StateModes
 from modal.undamped import gram
@@ -31,8 +30,8 @@ def compute(session: Session, projected: StateModes) -> StateModes:
             session.scene.rotation.count,
         )
     basis, coordinates = _orthonormal(session, found)
-    shape = session.body.surface(operators.spread(basis)).reshape(-1, basis.shape[1])
-    replace_basis(session, shape, momentum(session.comm, operators.mass, basis))
+    momenta = session.comm.allreduce(operators.carried @ basis)
+    replace_basis(session, operators.trace(basis), momenta)
     _compare(session, found, projected)
     return _states(found, coordinates)
 

@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
+from modal.symmetry import Sites
 from runs.session import Session
 from runs.store import put
 
 
 @dataclass(frozen=True)
 class ModalBasis:
-    """`frequency` (m,) Hz, `shape` (3 s, m) kg^-1/2 of the outer face, and the small matrices."""
+    """`frequency` (m,) Hz, `shape` kg^-1/2 of the outer face (3 s, m), of a free rim after it (+ 6),
+    and the small matrices.
+    """
 
     frequency: np.ndarray
     shape: np.ndarray
@@ -38,9 +41,8 @@ def compute(session: Session, path: Path) -> None:
         modes = solve(session)
     rotation = session.rotation_matrices if session.speed else None
     with record.timing("projection"):
-        projection = project(modes, rotation, operators.mass, session.comm)
-        nodal = operators.spread(modes.vectors)
-        shape = session.body.surface(nodal).reshape(-1, len(modes.squares))
+        projection = project(modes, rotation, operators.carried, session.comm)
+        shape = operators.trace(modes.vectors)
         labels = _labels(session, modes.vectors)
     session.modes = modes
     session.modal = ModalBasis(modes.frequency, shape, projection)
@@ -71,14 +73,13 @@ def solve(session: Session):
         operators.mass,
         None if wanted.up_to else wanted.count,
         up_to=wanted.up_to or np.inf,
-        points=_points(session),
+        sites=sites(operators),
     )
 
 
-def _points(session: Session) -> np.ndarray:
-    """Undeformed positions (n / 3, 3) m of this process's free nodes, where mirrors are looked for."""
-    body = session.body
-    return body.lattice.points(body.ids[session.operators.free_nodes])
+def sites(operators) -> Sites:
+    """Where this process's unknowns are: there mirrors and repeated segments are looked for."""
+    return Sites(operators.unknowns.place, operators.unknowns.component)
 
 
 def _labels(session: Session, vectors: np.ndarray):
@@ -87,12 +88,12 @@ def _labels(session: Session, vectors: np.ndarray):
 
     if session.static.road_height is not None:
         return None
-    body, operators = session.body, session.operators
-    _, wall, along = np.unravel_index(body.ids[operators.free_nodes], body.lattice.shape)
+    body = session.body
+    _, wall, along = np.unravel_index(body.ids, body.lattice.shape)
     circles = wall * body.lattice.shape[2] + along
-    every = np.unique(np.concatenate(session.comm.allgather(circles)))
-    ring = np.searchsorted(every, circles)
-    return label(session.comm, _points(session), ring, operators.mass, vectors)
+    nodal = session.operators.spread(vectors).reshape(-1, vectors.shape[1])
+    points = body.lattice.points(body.ids)
+    return label(session.comm, points, circles, body.nodal_mass(), nodal)
 
 
 def _fill(file, session: Session, modes, labels) -> None:
@@ -101,7 +102,11 @@ def _fill(file, session: Session, modes, labels) -> None:
     put(file, "frequency", basis.frequency, "Hz")
     put(file, "residual", modes.residual, "-")
     put(file, "surface/points", session.static.points, "m")
-    put(file, "surface/shape", basis.shape.T.reshape(m, -1, 3), "kg^-1/2")
+    face = 3 * len(session.static.points)
+    put(file, "surface/shape", basis.shape[:face].T.reshape(m, -1, 3), "kg^-1/2")
+    if len(basis.shape) > face:
+        put(file, "rim/translation", basis.shape[face : face + 3].T, "kg^-1/2")
+        put(file, "rim/rotation", basis.shape[face + 3 :].T, "rad/(m kg^1/2)")
     if labels is not None:
         put(file, "wave_number", labels.wave, "-")
         put(file, "section_mode", labels.section, "-")
@@ -128,10 +133,11 @@ def reuse(session: Session, path: Path) -> None:
     from modal.basis import Projection
 
     def pick(file):
-        shape = file["surface/shape"][:]
+        parts = [file["surface/shape"][:]]
+        if "rim" in file:
+            parts += [file["rim/translation"][:], file["rim/rotation"][:]]
+        shape = np.hstack([part.reshape(len(part), -1) for part in parts]).T.copy()
         matrices = {name: values[:] for name, values in file["projected"].items()}
-        return ModalBasis(
-            file["frequency"][:], shape.reshape(len(shape), -1).T.copy(), Projection(**matrices)
-        )
+        return ModalBasis(file["frequency"][:], shape, Projection(**matrices))
 
     session.modal = session.read(path, pick)

@@ -93,12 +93,14 @@ def _in_time(session: Session) -> dict:
         "scheme": (scheme, "-"),
         "largest displacement": (float(np.abs(displacement).max()), "m"),
     }
-    return {
+    out = {
         "time": (time, "s"),
         "force": (force, "N"),
         "displacement": (displacement.reshape(steps + 1, -1, 3), "m"),
-        "axle_force": (axle, "N"),
-    } | _rates(session, time, step, "linear" if scheme == "convolution" else scheme)
+    }
+    if not _drifts(session):  # with a free rim nothing holds the axle
+        out["axle_force"] = axle, "N"
+    return out | _rates(session, time, step, "linear" if scheme == "convolution" else scheme)
 
 
 def _rates(session: Session, time: np.ndarray, step: float, scheme: str) -> dict:
@@ -139,6 +141,8 @@ def _in_frequency(session: Session) -> dict:
     """Receptances between the driven points, each along its own force."""
     wanted, forces = session.scene.output.receptance, session.scene.force
     frequency = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
+    if _drifts(session):
+        frequency = frequency[1:]
     with session.record.timing("receptance"):
         full = session.force_response.receptance(frequency)
     along = _along(full, forces)
@@ -147,6 +151,11 @@ def _in_frequency(session: Session) -> dict:
     session.record.headline["at"] = (float(frequency[peak]), "Hz")
     out = {"frequency": (frequency, "Hz"), "receptance": (along, "m/N")}
     return out | (_direct(session) if wanted.direct else {})
+
+
+def _drifts(session: Session) -> bool:
+    """Whether a constant force moves the tire ever further: it has no receptance at 0 Hz then."""
+    return session.scene.modal.rim == "free"
 
 
 def _along(full: np.ndarray, forces) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -136,7 +136,7 @@ def reuse(session: Session, path: Path) -> None:
     """Read the state modes back. Collective."""
 
     def pick(file):
-        values = {f.name: file[f.name][:] for f in fields(StateModes) if f.name != "condition"}
+        values = {name: file[name][:] for name in _UNITS}
         states = StateModes(condition=float(file.attrs["basis_condition"]), **values)
         if "basis" not in file:
             return states, None

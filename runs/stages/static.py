@@ -23,15 +23,8 @@ def inputs(session: Session) -> dict:
     return {
         "tire": asdict(scene.tire),
         "static": asdict(scene.static),
-        "rolling": _rolling(session),
+        "rolling": session.rolling,
     }
-
-
-def _rolling(session: Session) -> tuple[float, float, float]:
-    """Speed and damping of the steady-rolling state; zeros at rest."""
-    if not session.scene.static.steady_rolling or session.speed == 0:
-        return 0.0, 0.0, 0.0
-    return session.speed, *session.damping
 
 
 def compute(session: Session, path: Path) -> None:
@@ -43,7 +36,7 @@ def compute(session: Session, path: Path) -> None:
 
     record, wanted = session.record, session.scene.static
     with record.timing("mesh and forms"):
-        equilibrium = Equilibrium(session.body, Rolling(*_rolling(session)))
+        equilibrium = Equilibrium(session.body, Rolling(*session.rolling))
     loader = Loader(equilibrium, _show)
     began = time.perf_counter()
     last = path.with_name("static_last.h5")

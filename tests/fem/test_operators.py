@@ -101,7 +101,7 @@ def test_frequencies_of_the_diagonal_mass_close_in_on_the_consistent_ones(make_b
         weighted = body.wall.density * ufl.inner(u, v) * body.dx
         assembled = fem.petsc.assemble_matrix(compat.form(weighted))
         assembled.assemble()
-        consistent = csr(assembled)[operators.free][:, operators.free]
+        consistent = csr(assembled)[operators.unknowns.free][:, operators.unknowns.free]
         stiffness = csr(operators.stiffness).tocsc()
         squares = [
             eigsh(stiffness, 10, mass.tocsc(), sigma=0, return_eigenvectors=False)

@@ -61,11 +61,11 @@ def test_compliance_is_that_of_a_direct_solve(make_body, csr, inertia):
     turned = turned + speed * damping[1] * stiffness @ inverse_mass @ csr(rotation.body)
     dofs = [
         np.flatnonzero(
-            operators.free == 3 * np.flatnonzero(body.ids == body.surface.ids[i])[0] + 2
+            operators.unknowns.free == 3 * np.flatnonzero(body.ids == body.surface.ids[i])[0] + 2
         )[0]
         for i in (4, 5, 31)
     ]
-    loads = np.zeros((len(operators.free), 3))
+    loads = np.zeros((len(operators.unknowns.free), 3))
     loads[dofs, range(3)] = 1.0
     np.testing.assert_allclose(spsolve(turned.tocsc(), loads)[dofs], alone, rtol=1e-8)
 

@@ -49,8 +49,8 @@ def wheel(speed: float, damping=DAMPING, inertia: str = "full") -> tuple[Wheel, 
     operators, rotation, modes, _, _ = tire()
     made = Wheel(operators, rotation if speed else None, speed, damping, inertia)
     comm = operators.body.comm
-    projection = project(modes, made.rotation, operators.mass, comm)
-    shape = operators.body.surface(operators.spread(modes.vectors)).reshape(-1, COUNT)
+    projection = project(modes, made.rotation, operators.carried, comm)
+    shape = operators.trace(modes.vectors)
     return made, Basis(shape, projection, made.decouple(projection, comm))
 
 

@@ -8,6 +8,7 @@ from scipy import sparse
 
 from fem.errors import ConvergenceError
 from modal import undamped
+from modal.symmetry import Sites
 
 COMM = MPI.COMM_WORLD
 ROUNDING = 1e-9  # relative error of an eigenvalue of a well-scaled chain
@@ -109,7 +110,10 @@ def test_mirror_planes_split_a_symmetric_chain():
     points = np.zeros((61, 3))
     points[:, 0] = np.linspace(-1, 1, 61)
     modes = undamped.solve(
-        distributed(matrix, unit=3), ones(183, unit=3), 40, points=points[low // 3 : high // 3]
+        distributed(matrix, unit=3),
+        ones(183, unit=3),
+        40,
+        sites=Sites.of_nodes(points[low // 3 : high // 3]),
     )
     assert sorted(modes.sectors) == [30, 31, 61, 61]
     everything = np.sort(np.concatenate([exact, 2 * exact, 3 * exact]))
@@ -125,7 +129,7 @@ def test_one_odd_spring_breaks_the_mirror():
     matrix = spatial(stiffness.tocsr(), (1.0, 2.0, 3.0))
     points = np.zeros((61, 3))
     points[:, 0] = np.linspace(-1, 1, 61)
-    modes = undamped.solve(distributed(matrix), ones(183), 40, points=points)
+    modes = undamped.solve(distributed(matrix), ones(183), 40, sites=Sites.of_nodes(points))
     assert sorted(modes.sectors) == [61, 122]
     dense = np.linalg.eigvalsh(matrix.toarray())
     np.testing.assert_allclose(modes.squares, dense[:40], rtol=ROUNDING)

@@ -14,6 +14,7 @@ from modal import undamped
 from modal.basis import project
 from modal.campbell import critical_speed, growth, onset
 from modal.rotating import checks, matrices, rotating
+from runs.stages.modes import sites
 
 COMM = MPI.COMM_WORLD
 SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
@@ -31,9 +32,7 @@ def operators() -> Operators:
 
 @pytest.fixture(scope="module")
 def modes(operators) -> undamped.Modes:
-    body = operators.body
-    points = body.lattice.points(body.ids[operators.free_nodes])
-    return undamped.solve(operators.stiffness, operators.mass, 10**6, points=points)
+    return undamped.solve(operators.stiffness, operators.mass, 10**6, sites=sites(operators))
 
 
 def test_all_modes_are_the_dense_ones(operators, modes):
@@ -52,7 +51,7 @@ def test_all_modes_are_the_dense_ones(operators, modes):
 @pytest.mark.parametrize("inertia", ["full", "doppler"])
 def test_every_speed_and_damping_keeps_its_identities(operators, modes, inertia, gamma):
     """Below, near and past the critical speed; overdamped pairs; `checks` raises what fails."""
-    projection = project(modes, operators.rotation(), operators.mass, COMM)
+    projection = project(modes, operators.rotation(), operators.carried, COMM)
     critical = critical_speed(projection, inertia)
     for speed in (0.0, 0.3 * critical, 0.999 * critical, 1.3 * critical):
         drag, stiffness = matrices(projection, speed, (gamma, 0.0), inertia)
@@ -61,7 +60,7 @@ def test_every_speed_and_damping_keeps_its_identities(operators, modes, inertia,
 
 def test_growth_begins_where_onset_says(operators, modes):
     """Far past critical the pressed tire is unstable; onset brackets the first speed."""
-    projection = project(modes, operators.rotation(), operators.mass, COMM)
+    projection = project(modes, operators.rotation(), operators.carried, COMM)
     high = 2 * critical_speed(projection, "full")
     assert growth(projection, high, (50.0, 0.0), "full") > 0
     first = onset(projection, (50.0, 0.0), "full", high)

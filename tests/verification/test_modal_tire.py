@@ -15,6 +15,7 @@ from fem.operators import Operators
 from modal import quadratic, undamped
 from modal.basis import project
 from modal.rotating import checks, matrices, rotating
+from runs.stages.modes import sites
 
 COMM = MPI.COMM_WORLD
 INFLATION = 2e5
@@ -31,11 +32,6 @@ def tire(deflection: float, segments: int = 16) -> Operators:
     return Operators(body, INFLATION)
 
 
-def points(operators: Operators) -> np.ndarray:
-    body = operators.body
-    return body.lattice.points(body.ids[operators.free_nodes])
-
-
 @pytest.fixture(scope="module")
 def pressed() -> Operators:
     return tire(0.004)
@@ -49,7 +45,7 @@ def round_tire() -> Operators:
 @pytest.mark.mpi
 def test_mirrors_of_a_pressed_tire(pressed):
     """At rest without friction both planes are there; splitting changes no eigenvalue."""
-    split = undamped.solve(pressed.stiffness, pressed.mass, 40, points=points(pressed))
+    split = undamped.solve(pressed.stiffness, pressed.mass, 40, sites=sites(pressed))
     whole = undamped.solve(pressed.stiffness, pressed.mass, 40)
     assert len(split.sectors) == 4
     assert len(whole.sectors) == 1
@@ -62,8 +58,8 @@ def test_mirrors_of_a_pressed_tire(pressed):
 def test_round_tire_has_double_modes_and_doppler_shifts(round_tire):
     """Eigenvalues of an axisymmetric tire, seen from the ground: those at rest shifted by +- i n Omega."""
     operators, speed, gamma = round_tire, 30.0, 40.0
-    modes = undamped.solve(operators.stiffness, operators.mass, 120, points=points(operators))
-    projection = project(modes, operators.rotation(), operators.mass, COMM)
+    modes = undamped.solve(operators.stiffness, operators.mass, 120, sites=sites(operators))
+    projection = project(modes, operators.rotation(), operators.carried, COMM)
     drag, stiffness = matrices(projection, speed, (gamma, 0.0), "doppler")
     turning = rotating(drag, stiffness)
     checks(turning, drag, stiffness)
@@ -89,8 +85,8 @@ def test_full_quadratic_problem_agrees_with_many_projected_modes(pressed, inerti
     diagonal.array[:] += damping[0] * pressed.mass
     drag.setDiagonal(diagonal)
     full = quadratic.solve(pressed.mass, drag, stiffness, 8)
-    modes = undamped.solve(pressed.stiffness, pressed.mass, 400, points=points(pressed))
-    projection = project(modes, rotation, pressed.mass, COMM)
+    modes = undamped.solve(pressed.stiffness, pressed.mass, 400, sites=sites(pressed))
+    projection = project(modes, rotation, pressed.carried, COMM)
     pencil = matrices(projection, speed, damping, inertia)
     errors = [
         quadratic.truncation(
@@ -107,4 +103,4 @@ def test_buckled_state_is_named(round_tire):
     body = round_tire.body
     flat = Operators(body, -5e6)
     with pytest.raises(ConvergenceError, match="negative eigenvalue.*buckles"):
-        undamped.solve(flat.stiffness, flat.mass, 10, points=points(flat))
+        undamped.solve(flat.stiffness, flat.mass, 10, sites=sites(flat))
