@@ -74,7 +74,7 @@ def _estimate(session: Session, loader) -> None:
     from fem.companion import load_error
     from fem.virtual_work import Rolling
 
-    found = load_error(loader, Rolling(*_rolling(session)))
+    found = load_error(loader, Rolling(*session.rolling))
     if isinstance(found, str):
         observe.say(f"  error of the load not estimated: {found}")
         return
