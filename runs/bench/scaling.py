@@ -90,7 +90,7 @@ def unknowns(folder: Path, meshes: tuple[Mesh, ...], modes: int) -> Table:
 
 
 def _size(folder: Path, mesh: Mesh, modes: int) -> list:
-    from fem.compliance import factorise, solve_columns
+    from fem.direct import factorise, solve_columns
 
     session = prepared(folder, mesh, modes=modes)
     stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
