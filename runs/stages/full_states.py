@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from modal import quadratic
+from modal.fields import gram
 from modal.quadratic import FullModes, truncation
 from modal.rotating import StateModes
-from modal.undamped import gram
 from runs.session import Session
 
 _ROUNDING = 1e-14  # of the largest squared length: directions below are the fields' rounding
