@@ -50,6 +50,8 @@ class Ring:
         """H_n, real where the ring is its own mirror image, and the phases (d,) taken out of its vectors."""
         alpha = 2 * np.pi / self.segments
         H = sum(np.exp(1j * n * alpha * j) * block for j, block in self.blocks.items())
+        if self.single(n):
+            return np.ascontiguousarray(H.real), np.ones(len(H))
         phase = np.exp(1j * n * self.angle) * np.where(self.along, 1j, 1.0)
         mirrored = phase.conj()[:, None] * H * phase
         largest = np.abs(H).max()
@@ -67,8 +69,7 @@ class Ring:
         _, found = linalg.eigh(H, subset_by_index=[0, count - 1])
         found = phase[:, None] * found
         if self.single(n):
-            # One phase makes the whole field real.
-            return found * np.exp(-1j * np.angle((found**2).sum(axis=0)) / 2)
+            return found
         return np.stack([found, -1j * found], axis=-1).reshape(len(found), -1)
 
 
