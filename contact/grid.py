@@ -5,6 +5,8 @@ import copy
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.rows import ArrayRows, Rows
+from contact.window import Window
 from fem.errors import InputError
 
 Array = NDArray[np.float64]
@@ -25,6 +27,10 @@ class Axis:
         self._per_metre = 1.0 / mean
         self.step = mean if self._even else float(np.diff(positions).min())
 
+    def part(self, places: slice) -> "Axis":
+        """Some of the positions that follow each other."""
+        return Axis(self.positions[places])
+
     def locate(self, values: Array) -> tuple[NDArray[np.intp], Array]:
         """Index of the cell and the share (0 to 1) within it; values outside go to the border."""
         if self._even:
@@ -42,6 +48,8 @@ class Axis:
 class Grid:
     """Heights z (nx, ny) at ascending x (nx,) and y (ny,), all in m; x counts from its first value.
 
+    z may be rows in a file (contact.rows): they are read as the road rolls by, 32 MB at a time.
+
     `holes`: what becomes of missing heights (NaN) inside the strip that `prepare` is asked for:
     "refuse" them, or "fill" them by linear interpolation across the road, then along it, and by the
     nearest valid height at the borders; `filled` counts them. `end`: what becomes of a strip longer
@@ -53,27 +61,28 @@ class Grid:
         self,
         x: Array,
         y: Array,
-        z: Array,
+        z: Array | Rows,
         holes: str = "refuse",
         end: str = "refuse",
         source: str = "road",
     ) -> None:
-        x, y, z = (np.asarray(a, dtype=float) for a in (x, y, z))
-        _check_axes(x, y, z, source)
+        x, y = (np.asarray(a, dtype=float) for a in (x, y))
+        rows = _as_rows(z)
+        _check_axes(x, y, rows.shape, source)
         _check_choice("holes", holes, ("refuse", "fill"))
         _check_choice("end", end, ("refuse", "mirror"))
         self._holes, self._end, self.source = holes, end, source
         self._x, self._y = Axis(x - x[0]), Axis(y)
-        self._set_heights(z)
+        self._rows = rows
+        self._window = self._over(slice(0, len(x)), slice(0, len(y)))
         self._length = float(x[-1] - x[0])
         self._sides = float(y[0]), float(y[-1])
         self.filled = 0
 
-    def _set_heights(self, z: Array) -> None:
-        """z and its four views in which one index finds the corners of a cell."""
-        self._z = np.ascontiguousarray(z)
-        flat, width = self._z.ravel(), z.shape[1]
-        self._corners = flat, flat[1:], flat[width:], flat[width + 1 :]
+    def _over(self, rows: slice, columns: slice) -> Window:
+        place = rows.start, columns
+        x, y = self._x.positions[rows], self._y.positions[columns]
+        return Window(self._rows, place, x, y, self.source)
 
     @property
     def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -93,11 +102,7 @@ class Grid:
             x = self._reflect(x)
         i, s = self._x.locate(x)
         j, t = self._y.locate(y)
-        k = i * self._z.shape[1] + j
-        near, near_left, far, far_left = (corner.take(k) for corner in self._corners)
-        near += t * (near_left - near)
-        far += t * (far_left - far)
-        return near + s * (far - near)
+        return self._window.bilinear(i, s, j, t)
 
     def _reflect(self, x: Array) -> Array:
         """x folded into [0, length]: 0 and the length are mirrors."""
@@ -105,15 +110,11 @@ class Grid:
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """The highest grid height around the strip (m), which bilinear heights cannot exceed."""
-        return float(np.nanmax(self._around(x0, x1, y0, y1)))
+        return self._window.bounds(*self._cells(x0, x1, y0, y1))[1]
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """The lowest grid height around the strip, m."""
-        return float(np.nanmin(self._around(x0, x1, y0, y1)))
-
-    def _around(self, x0: float, x1: float, y0: float, y1: float) -> Array:
-        rows, columns = self._cells(x0, x1, y0, y1)
-        return self._z[rows, columns]
+        return self._window.bounds(*self._cells(x0, x1, y0, y1))[0]
 
     def _cells(self, x0: float, x1: float, y0: float, y1: float) -> tuple[slice, slice]:
         """Grid points of all cells the strip touches; all rows when it leaves a mirrored road."""
@@ -130,15 +131,13 @@ class Grid:
         """
         self._check_strip(x0, x1, y0, y1)
         rows, columns = self._cells(x0, x1, y0, y1)
-        z = self._z[rows, columns]
-        missing = np.isnan(z)
-        if missing.any() and self._holes == "refuse":
-            self._refuse_holes(missing, rows.start, columns.start)
+        window = self._over(rows, columns)
+        window.scan()
+        if window.missing and self._holes == "refuse":
+            self._refuse_holes(window, rows.start, columns.start)
         road = copy.copy(self)
-        x, y = self._x.positions[rows], self._y.positions[columns]
-        road.filled = int(missing.sum())
-        road._set_heights(fill_holes(z, x, y, self.source))
-        road._x, road._y = Axis(x), Axis(y)
+        road._window, road.filled = window, window.missing
+        road._x, road._y = self._x.part(rows), self._y.part(columns)
         return road
 
     def _check_strip(self, x0: float, x1: float, y0: float, y1: float) -> None:
@@ -156,47 +155,33 @@ class Grid:
                 'continue it by end = "mirror"'
             )
 
-    def _refuse_holes(self, missing: NDArray[np.bool_], row: int, column: int) -> None:
-        i, j = np.argwhere(missing)[0]
+    def _refuse_holes(self, window: Window, row: int, column: int) -> None:
+        i, j = window.hole
         raise InputError(
-            f"{self.source}: {int(missing.sum())} heights are missing in the strip driven over, "
+            f"{self.source}: {window.missing} heights are missing in the strip driven over, "
             f"the first at {self._x.positions[row + i]:.4g} m along and y = "
             f"{self._y.positions[column + j]:.4g} m; choose another [road] lateral or start, or "
             'fill them by holes = "fill"'
         )
 
 
-def fill_holes(z: Array, x: Array, y: Array, source: str = "road") -> Array:
-    """z (nx, ny) m with its NaN replaced.
-
-    Linear across y between valid neighbours, the nearest one beyond the last, then the same along x
-    for rows without any. InputError when all is missing.
-    """
-    if not np.isnan(z).any():
+def _as_rows(z: Array | Rows) -> Rows:
+    if hasattr(z, "read"):
         return z
-    z = z.copy()
-    for row in np.flatnonzero(np.isnan(z).any(axis=1)):
-        valid = ~np.isnan(z[row])
-        if valid.any():
-            z[row] = np.interp(y, y[valid], z[row, valid])
-    known = ~np.isnan(z[:, 0])
-    if not known.any():
-        raise InputError(f"{source}: no valid height in the strip driven over")
-    for column in range(z.shape[1] if not known.all() else 0):
-        z[:, column] = np.interp(x, x[known], z[known, column])
-    return z
+    z = np.asarray(z, dtype=float)
+    if np.isinf(z).any():
+        raise InputError(f"road: {int(np.isinf(z).sum())} heights are infinite")
+    return ArrayRows(z)
 
 
-def _check_axes(x: Array, y: Array, z: Array, source: str) -> None:
+def _check_axes(x: Array, y: Array, shape: tuple[int, ...], source: str) -> None:
     for name, axis in (("x", x), ("y", y)):
         if axis.ndim != 1 or len(axis) < 2:
             raise InputError(f"{source}: {name} must hold at least two positions (m)")
         if not np.all(np.isfinite(axis)) or not np.all(np.diff(axis) > 0.0):
             raise InputError(f"{source}: {name} must be finite and ascend (m)")
-    if z.shape != (len(x), len(y)):
-        raise InputError(f"{source}: z has shape {z.shape}, x and y ask for {(len(x), len(y))}")
-    if np.isinf(z).any():
-        raise InputError(f"{source}: {int(np.isinf(z).sum())} heights are infinite")
+    if shape != (len(x), len(y)):
+        raise InputError(f"{source}: z has shape {shape}, x and y ask for {(len(x), len(y))}")
 
 
 def _check_choice(key: str, value: str, choices: tuple[str, ...]) -> None:

@@ -8,6 +8,7 @@ Array = NDArray[np.float64]
 
 # The strip's profile is taken over at most this many points.
 MOST_POINTS = 1_000_000
+STRETCH = 10.0  # m
 # The Gaussian profile filter of ISO 16610-21 passes half of a wave of the cut-off length; its
 # weight exp(-pi (x / (alpha lambda))^2) has the standard deviation alpha lambda / sqrt(2 pi).
 DEVIATION = np.sqrt(np.log(2) / np.pi) / np.sqrt(2 * np.pi)
@@ -24,7 +25,7 @@ class Level:
 
     def bounds(self, x0: float, x1: float) -> tuple[float, float]:
         """Least and greatest height from x0 to x1, m."""
-        inside = self._z[(self._x > x0) & (self._x < x1)]
+        inside = self._z[np.searchsorted(self._x, x0) : np.searchsorted(self._x, x1)]
         ends = np.interp([x0, x1], self._x, self._z)
         values = np.concatenate([inside, ends])
         return float(values.min()), float(values.max())
@@ -56,4 +57,7 @@ def _profile(road, x0: float, x1: float, y0: float, y1: float) -> tuple[Array, A
     nx, ny = (max(int(c / excess), 1) for c in counts)
     x = x0 + (np.arange(nx) + 0.5) * (x1 - x0) / nx
     y = y0 + (np.arange(ny) + 0.5) * (y1 - y0) / ny
-    return x, sum(road.height(x, np.full(nx, yj)) for yj in y) / ny
+    # A stretch at a time: a road in a file is read once, not once for every y.
+    parts = np.array_split(x, max(int((x1 - x0) / STRETCH), 1))
+    means = [sum(road.height(part, np.full(len(part), yj)) for yj in y) / ny for part in parts]
+    return x, np.concatenate(means)

@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 from contact.grid import Grid
 from contact.opencrg_header import MAX_BYTES, Blocks, key_values, read_header
 from contact.opencrg_payload import Payload, read_payload
+from contact.rows import Columns, Rows, pieces
 from fem.errors import InputError
 
 Array = NDArray[np.float64]
+Channel = tuple[int, str, str]  # line in the file, name, unit
 
 SMALLEST_RADIUS = 20.0
 # Steps (m) beyond it are damage, and would overflow further on.
@@ -52,12 +54,13 @@ def read_opencrg(file: Path, holes: str = "refuse", end: str = "refuse") -> Grid
         table = read_payload(payload)
     except OSError as error:
         raise InputError(f"road.file {file}: cannot be read ({error})") from error
-    if len(table) < 2:
-        raise InputError(f"{file}: {len(table)} cross sections, at least 2 are needed")
+    count = table.shape[0]
+    if count < 2:
+        raise InputError(f"{file}: {count} cross sections, at least 2 are needed")
     _check_line(file, channels, parameters, table, step)
     v, columns = _sections(file, channels, parameters)
-    u = step * np.arange(len(table))
-    return Grid(u, v, table[:, columns], holes=holes, end=end, source=f"road.file {file}")
+    u = step * np.arange(count)
+    return Grid(u, v, Columns(table, columns), holes=holes, end=end, source=f"road.file {file}")
 
 
 def _refuse_blocks(file: Path, blocks: Blocks) -> None:
@@ -80,7 +83,7 @@ def _refuse_blocks(file: Path, blocks: Blocks) -> None:
                 )
 
 
-def _definition(file: Path, blocks: Blocks) -> tuple[str, list[tuple[int, str, str]]]:
+def _definition(file: Path, blocks: Blocks) -> tuple[str, list[Channel]]:
     """Format code and the channels as (line, name, unit) of $KD_DEFINITION."""
     code, channels = "KRBI", []
     for number, text in blocks["KD_DEFINITION"]:
@@ -131,7 +134,7 @@ def _rows(
 
 
 def _sections(
-    file: Path, channels: list[tuple[int, str, str]], parameters: dict[str, float]
+    file: Path, channels: list[Channel], parameters: dict[str, float]
 ) -> tuple[Array, list[int]]:
     """Ascending v (m) of the long sections, and their columns in the data."""
     places, numbers, columns = [], [], []
@@ -182,9 +185,9 @@ def _numbered(file: Path, numbers: Array, parameters: dict[str, float]) -> Array
 
 def _check_line(
     file: Path,
-    channels: list[tuple[int, str, str]],
+    channels: list[Channel],
     parameters: dict[str, float],
-    table: Array,
+    table: Rows,
     step: float,
 ) -> None:
     """Refuse lines that slope, bank or turn too sharply for heights to be read at (u, v)."""
@@ -195,20 +198,31 @@ def _check_line(
     start = parameters.get("REFERENCE_LINE_START_Z", 0.0)
     if abs(parameters.get("REFERENCE_LINE_END_Z", start) - start) > 1e-9:
         raise InputError(f"{file}: REFERENCE_LINE_START_Z and END_Z differ: slope is not supported")
+    lines = [c for c in channels if c[1].startswith("reference line ")]
+    for line, name, _ in lines:
+        if name in ("reference line x", "reference line y"):
+            raise InputError(f"{file}, line {line}: channel {name!r} is not supported")
+    if lines:
+        # Each piece repeats a row: what turns or slopes between two rows is in one of them.
+        for first, rows in pieces(table, overlap=1):
+            _check_rows(file, channels, rows, (first, step))
+
+
+def _check_rows(file: Path, channels: list[Channel], rows: Array, place: tuple[int, float]) -> None:
+    """Refuse slope, banking and sharp turns in some rows; `place`: the first row and the step (m)."""
+    first, step = place
     for column, (line, name, _) in enumerate(channels):
-        # Slope and heading belong to the segment before a point: the first value is not used.
-        values = table[0 if name == "reference line banking" else 1 :, column]
+        # Slope and heading belong to the segment before a point: the road's first value is not used.
+        values = rows[0 if first or name == "reference line banking" else 1 :, column]
         if name in ("reference line slope", "reference line banking"):
             if np.any(np.nan_to_num(values) != 0.0):
                 raise InputError(f"{file}, line {line}: {name} is not zero: not supported")
         elif name == "reference line phi":
-            _check_radius(file, values, step)
-        elif name in ("reference line x", "reference line y"):
-            raise InputError(f"{file}, line {line}: channel {name!r} is not supported")
+            _check_radius(file, values, step, step * max(first, 1))
 
 
-def _check_radius(file: Path, phi: Array, step: float) -> None:
-    """InputError where heading (rad) turns faster than the smallest radius allows."""
+def _check_radius(file: Path, phi: Array, step: float, start: float) -> None:
+    """InputError where heading (rad) turns faster than the smallest radius allows; begins at `start`."""
     if np.isnan(phi).any():
         missing = int(np.isnan(phi).sum())
         raise InputError(f"{file}: reference line phi is missing at {missing} points")
@@ -216,6 +230,6 @@ def _check_radius(file: Path, phi: Array, step: float) -> None:
     if len(turn) > 0 and turn.max() > 1.0 / SMALLEST_RADIUS:
         raise InputError(
             f"{file}: the reference line turns with a radius of {1.0 / turn.max():.3g} m at "
-            f"{step * (int(turn.argmax()) + 1):.4g} m along; below {SMALLEST_RADIUS:g} m heights "
+            f"{start + step * int(turn.argmax()):.4g} m along; below {SMALLEST_RADIUS:g} m heights "
             "cannot be read along it"
         )

@@ -13,7 +13,7 @@ Blocks = dict[str, list[tuple[int, str]]]
 # Ten thousand channels of 72 bytes each fit; a binary file without separator is not read to its
 # end.
 MAX_HEADER = 1_000_000
-MAX_BYTES = 4_000_000_000
+MAX_BYTES = 1_000_000_000_000  # a typing error, not a road
 
 
 def read_header(file: Path) -> tuple[Blocks, int, int]:

@@ -1,16 +1,19 @@
 """The sequential data of an OpenCRG file: rows of numbers in 80-byte records, text or binary."""
 
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.rows import FileRows, Packed, Rows, Spool
 from fem.errors import InputError
 
 Array = NDArray[np.float64]
 
 RECORD = 80
+BLOCK = 4096  # rows of text taken at a time
 
 
 class Payload(NamedTuple):
@@ -28,72 +31,94 @@ class Payload(NamedTuple):
     rows: int | None
 
 
-def read_payload(payload: Payload) -> Array:
-    """(rows, channels) numbers, NaN where missing. InputError names the place of damage."""
+def read_payload(payload: Payload) -> Rows:
+    """Rows of numbers, NaN where missing. InputError names the place of damage.
+
+    Binary data stay in the file; text is converted once (contact.rows.Spool).
+    """
     if payload.code in ("KRBI", "KDBI"):
         return _read_binary(payload)
     return _read_text(payload)
 
 
-def _read_binary(payload: Payload) -> Array:
+def _read_binary(payload: Payload) -> Rows:
     """Big-endian numbers, packed without regard to rows; the last record is filled with NaN."""
     kind = np.dtype(">f4" if payload.code == "KRBI" else ">f8")
     size = payload.file.stat().st_size - payload.start
     whole = size - size % RECORD
-    rows = payload.rows
+    rows, row = payload.rows, payload.channels * kind.itemsize
     if rows is None:
-        rows = whole // (kind.itemsize * payload.channels)
-    data = rows * payload.channels * kind.itemsize
-    needed = -(-data // RECORD) * RECORD
+        rows = whole // row
+    needed = -(-rows * row // RECORD) * RECORD
     # A line's end may follow the last record.
-    if size < data or size - whole > 2 or (payload.rows is not None and whole > needed):
+    if size < rows * row or size - whole > 2 or (payload.rows is not None and whole > needed):
         raise InputError(
             f"{payload.file}: {size:,} bytes of data from byte {payload.start:,} on, "
             f"{needed:,} expected for {rows} rows of {payload.channels} channels ({payload.code}): "
             f"the file is {'longer than its header says' if whole > needed else 'truncated'}"
         )
+    if payload.rows is None:
+        rows = _without_padding(payload, kind, rows, whole)
+    return FileRows(payload.file, Packed(payload.start, kind, (rows, payload.channels)))
+
+
+def _without_padding(payload: Payload, kind: np.dtype, rows: int, whole: int) -> int:
+    """Rows without those of NaN that fill the last record: a cross section has one valid height."""
+    row = payload.channels * kind.itemsize
+    most = min(RECORD // row, rows)
     with payload.file.open("rb") as stream:
-        stream.seek(payload.start)
-        numbers = np.fromfile(stream, dtype=kind, count=whole // kind.itemsize)
-    # A signalling NaN would raise an invalid-operation flag when widened to double.
-    with np.errstate(invalid="ignore"):
-        numbers = numbers.astype(float)
-    used = rows * payload.channels
-    if payload.rows is None and not np.isnan(numbers[used:]).all():
+        stream.seek(payload.start + (rows - most) * row)
+        last = np.frombuffer(stream.read(whole - (rows - most) * row), kind)
+    if not np.isnan(last[most * payload.channels :]).all():
         raise InputError(
             f"{payload.file}: {whole:,} bytes of data from byte {payload.start:,} on end within a "
             f"row of {payload.channels} channels ({payload.code}): the file is truncated"
         )
-    table = numbers[:used].reshape(rows, payload.channels)
-    return _without_padding(table, kind.itemsize) if payload.rows is None else table
+    empty = np.isnan(last[: most * payload.channels].reshape(most, payload.channels)).all(axis=1)
+    while most > 0 and empty[most - 1]:
+        rows, most = rows - 1, most - 1
+    return rows
 
 
-def _without_padding(table: Array, itemsize: int) -> Array:
-    """Without the rows of NaN that fill the last record: a cross section has one valid height."""
-    most = RECORD // itemsize // table.shape[1]
-    while most > 0 and len(table) > 0 and np.isnan(table[-1]).all():
-        table, most = table[:-1], most - 1
-    return table
-
-
-def _read_text(payload: Payload) -> Array:
+def _read_text(payload: Payload) -> Rows:
     """Fields of 10 (LRFI) or 20 (LDFI) characters; a row begins a new record (line)."""
     width = 10 if payload.code == "LRFI" else 20
-    a_record = RECORD // width
-    with payload.file.open("rb") as stream:
-        stream.seek(payload.start)
-        lines = stream.read().splitlines()
-    while lines and not lines[-1].strip():
-        lines.pop()
-    per_row = -(-payload.channels // a_record)
-    rows = len(lines) // per_row
-    if len(lines) % per_row or (payload.rows is not None and rows != payload.rows):
+    per_row = -(-payload.channels // (RECORD // width))
+    count = _lines(payload)
+    rows = count // per_row
+    if count % per_row or (payload.rows is not None and rows != payload.rows):
         wanted = f"{payload.rows} rows" if payload.rows is not None else "whole rows"
         raise InputError(
-            f"{payload.file}: {len(lines)} records of data from line {payload.line} on, "
+            f"{payload.file}: {count} records of data from line {payload.line} on, "
             f"{wanted} of {per_row} records expected: the file is truncated or damaged"
         )
-    table = np.empty((rows, payload.channels))
+    spool = Spool()
+    with payload.file.open("rb") as stream:
+        stream.seek(payload.start)
+        left, part = count, payload
+        while left:
+            lines = [line.rstrip(b"\r\n") for line in islice(stream, min(left, BLOCK * per_row))]
+            spool.add(_table(part, lines, width, per_row))
+            left -= len(lines)
+            part = part._replace(line=part.line + len(lines))
+    return spool.rows()
+
+
+def _lines(payload: Payload) -> int:
+    """Lines of data, without the empty ones at the end."""
+    with payload.file.open("rb") as stream:
+        stream.seek(payload.start)
+        last = 0
+        for number, line in enumerate(stream, 1):
+            if line.strip():
+                last = number
+    return last
+
+
+def _table(payload: Payload, lines: list[bytes], width: int, per_row: int) -> Array:
+    """Numbers (rows, channels) of some lines, the first of them the payload's."""
+    a_record = RECORD // width
+    table = np.empty((len(lines) // per_row, payload.channels))
     for k in range(per_row):
         first = k * a_record
         count = min(a_record, payload.channels - first)

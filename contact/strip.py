@@ -10,8 +10,9 @@ from fem.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Pieces a strip is cut into for its bounds: the level changes slowly over one.
+# Pieces a strip is cut into for its bounds, at least: the level changes slowly over one.
 PIECES = 64
+LONGEST = 0.25  # m
 
 
 class Road(Protocol):
@@ -162,7 +163,8 @@ class PreparedRoad:
     def _pieces(self, x0: float, x1: float, y0: float, y1: float):
         """The strip in the road's own coordinates, piece by piece with bounds of what is taken off."""
         dx, dy = self._shift
-        edges = np.linspace(x0 + dx, x1 + dx, PIECES + 1)
+        count = max(PIECES, int(np.ceil((x1 - x0) / LONGEST))) if self._level else 1
+        edges = np.linspace(x0 + dx, x1 + dx, count + 1)
         for start, end in zip(edges[:-1], edges[1:], strict=True):
             low, high = self._level.bounds(start, end) if self._level else (0.0, 0.0)
             yield (start, end, y0 + dy, y1 + dy), low - self._offset, high - self._offset

@@ -2,7 +2,9 @@
 
 Made static, a state with A = C P leaves  (A e(s) + A* e(s*)) / 2,  e(s) = i w / (s (i w - s)),  behind.
 Its participation is the largest size of that over the band; fast modes lose by (w/s)^2, since the
-two halves of a pair all but cancel.
+two halves of a pair all but cancel. The axle force, the contact forces less the rate of momentum,
+loses the same with s^2 times the state's momentum in place of C: the few modes that carry a net
+momentum matter there long after the displacements have stopped to need them.
 """
 
 from __future__ import annotations
@@ -13,11 +15,19 @@ from greens.response import Response
 
 
 def participation(response: Response, band: float) -> np.ndarray:
-    """What the displacements lose when a state is made static, (q,) m/N, from 0 to `band` Hz.
-
-    The Frobenius norm over all outputs and forces.
+    """What is lost when a state is made static, (q,), from 0 to `band` Hz: the larger of its shares in
+    the static displacements and in the axle force. Frobenius norms over all outputs and forces.
     """
-    s, output, push = response.eigenvalue, response.output, response.input.T
+    still = np.linalg.norm(response.static() + response.residual)
+    displacement = _lost(response, response.output, band) / still
+    # Of every unit force one unit reaches the axle.
+    axle = _lost(response, response.momentum * response.eigenvalue**2, band)
+    return np.maximum(displacement, axle / np.sqrt(response.input.shape[1]))
+
+
+def _lost(response: Response, output: np.ndarray, band: float) -> np.ndarray:
+    """Largest size (q,) over the band of what each state leaves behind at the outputs (r, q)."""
+    s, push = response.eigenvalue, response.input.T
     # Largest at its resonance when that lies within the band, else at the band's end.
     omega = 1j * np.clip(np.abs(s), 0, 2 * np.pi * band)
     half = omega / (s * (omega - s))

@@ -24,7 +24,7 @@ def drawn(table: Any) -> str | None:
     kind "lines" (default): `y` columns over column `x`, a curve for every value of column `by`, axes
     logarithmic as `log` says; "front": `points` (rows like the table's), coloured by column `by`, their
     marks by column `mark` and their sizes by column `size`, the rows `front` joined and labelled by
-    column `label`, the rows `beside` as a curve of their own; "bars": column `y` for each `x`.
+    column `label`, the rows `beside` as a curve of their own; "bars": column `y`, named by the columns `x`.
     `targets` are lines across, `limits` upright ones: (value, text) each.
     """
     if table.plot is None:
@@ -113,12 +113,13 @@ def _front(table: Any) -> str:
         here.plot(*far, "*--", color=INK, ms=9, lw=0.9, label=plot["beside_name"])
     best = list(zip(*map(place, plot["front"]), strict=True))
     here.step(*best, where="post", color=INK, lw=1.3, zorder=2)
-    for row in plot["front"]:
+    for k, row in enumerate(plot["front"]):
+        # Every other letter on the other side: neighbours on a front may be close.
+        aside = {"ha": "left", "va": "bottom"} if k % 2 else {"ha": "right", "va": "top"}
+        offset = (4, 4) if k % 2 else (-4, -4)
         text = str(columns.pick(row, plot["label"]))
-        here.annotate(
-            text, place(row), (-4, -4), textcoords="offset points", ha="right", va="top",
-            fontweight="bold", zorder=4,
-        )  # fmt: skip
+        style = {"textcoords": "offset points", "fontweight": "bold", "zorder": 4}
+        here.annotate(text, place(row), offset, **style, **aside)
     _scales(here, "xy")
     here.set(xlabel=columns.label(plot["x"]), ylabel=columns.label(plot["y"][0]))
     _guides(here, plot)
@@ -159,7 +160,8 @@ def _bars(table: Any) -> str:
     here.barh(range(len(rows)), lengths, color=COLOURS[0], height=0.6)
     for k, length in enumerate(lengths):
         here.annotate(f"{length:.3g}", (length, k), (4, 0), textcoords="offset points", va="center")
-    here.set_yticks(range(len(rows)), [str(columns.pick(row, plot["x"])) for row in rows])
+    texts = [": ".join(str(columns.pick(row, name)) for name in plot["x"]) for row in rows]
+    here.set_yticks(range(len(rows)), texts)
     here.grid(axis="y", visible=False)
     _scales(here, plot.get("log", ""))
     here.margins(x=0.12)

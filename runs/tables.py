@@ -106,6 +106,9 @@ class Static:
     steady_rolling: bool = flag(
         True, "inertia and damping of the rolling shape; false: the state at rest"
     )
+    error_estimate: bool = flag(
+        True, "how far the load is from that of finer elements, by a run on coarser ones"
+    )
 
 
 @dataclass(frozen=True)

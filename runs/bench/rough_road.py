@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import copy
+import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import h5py
+import numpy as np
 from mpi4py import MPI
 
 from contact.grid_patch import settle
@@ -84,6 +87,39 @@ def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Session:
         )
     settle_on_points(session)
     return session
+
+
+@dataclass(frozen=True)
+class Rolled:
+    """A run as a user starts it: its stages' entries of summary.json, and forces (n, 3) N by name."""
+
+    stages: dict[str, dict]
+    forces: dict[str, np.ndarray]
+
+    def figure(self, stage: str, name: str):
+        """A headline figure or an indicator of a stage."""
+        entry = self.stages[stage]
+        return (entry["headline"] | entry["indicators"])[name]["value"]
+
+    @property
+    def loop(self) -> float:
+        """Wall time (s) of the time loop, files and checks included."""
+        return self.stages["contact"]["cost"]["time loop"]
+
+
+def rolled(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Rolled:
+    """A run up to its contact forces; stages that the folder holds are reused. Collective."""
+    from runs.pipeline import run_scene
+    from runs.scene import load
+
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
+    with observe.quiet():
+        run_scene(scene, folder, MPI.COMM_WORLD, until="contact", fresh=False, petsc_options=[])
+    stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
+    with h5py.File(folder / "contact.h5") as file:
+        forces = {name: file[name][:] for name in ("total_force", "axle_force")}
+    return Rolled(stages, forces)
 
 
 def settle_on_points(session: Session) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from runs import observe
 from runs.mpi import on_root
 from runs.session import Session
 from runs.store import put
+
+COARSE = 0.02  # estimated error of the load above which the user is warned
 
 
 def inputs(session: Session) -> dict:
@@ -35,6 +38,7 @@ def compute(session: Session, path: Path) -> None:
     with record.timing("mesh and forms"):
         equilibrium = Equilibrium(session.body, Rolling(*session.rolling))
     loader = Loader(equilibrium, _show)
+    began = time.perf_counter()
     last = path.with_name("static_last.h5")
     try:
         loader.inflate(wanted.inflation)
@@ -44,8 +48,13 @@ def compute(session: Session, path: Path) -> None:
         session.write(last, "static", lambda file: _fill(file, session, equilibrium))
         raise ConvergenceError(f"{error} The last state that converged is in {last}.") from None
     record.cost |= equilibrium.cost
+    record.cost["other"] = time.perf_counter() - began - sum(equilibrium.cost.values())
     session.static = static_state(equilibrium, loader.touch)
     _describe(session, loader)
+    if wanted.error_estimate and session.static.load:
+        with record.timing("error estimate"):
+            _estimate(session, loader)
+    observe.say(f"  {_parts(record.cost)}")
     session.write(path, "static", lambda file: _fill(file, session, equilibrium))
     on_root(session.comm, lambda: last.unlink(missing_ok=True))
 
@@ -58,6 +67,36 @@ def _place(loader, wanted) -> None:
         loader.deflect(wanted.deflection)
     elif wanted.road_height is not None:
         loader.deflect(wanted.road_height - loader.touch)
+
+
+def _estimate(session: Session, loader) -> None:
+    """Print and keep how far the load is from that of finer elements. Collective."""
+    from fem.companion import load_error
+    from fem.virtual_work import Rolling
+
+    found = load_error(loader, Rolling(*session.rolling))
+    if isinstance(found, str):
+        observe.say(f"  error of the load not estimated: {found}")
+        return
+    load = session.static.load
+    session.record.indicators["estimated error of the load"] = (100 * found.relative, "%")
+    observe.say(
+        f"  estimated error of the load at this deflection: {100 * found.relative:.2g} %, from "
+        f"{found.load:.6g} N on elements of twice the size ({found.unknowns} unknowns) against "
+        f"{load:.6g} N"
+    )
+    if found.relative > COARSE:
+        session.record.warnings.append(
+            f"the load may be off by {100 * found.relative:.2g} %: take smaller elements "
+            "(tire.segments, tire.elements_arc, tire.footprint_size)"
+        )
+
+
+def _parts(cost: dict[str, float]) -> str:
+    """Seconds of each part, the largest first."""
+    total = sum(cost.values()) or 1.0
+    parts = sorted(cost.items(), key=lambda part: -part[1])
+    return "time: " + ", ".join(f"{k} {v:.2g} s ({v / total:.0%})" for k, v in parts)
 
 
 def _show(progress) -> None:

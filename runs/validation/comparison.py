@@ -74,14 +74,15 @@ class Comparison:
     def _row(self, run: Run) -> list:
         history, choice = run.history, run.choice
         head = ["all", "full FE"] if choice is None else [choice.modes, choice.residual]
-        errors = [_percent(part) for far in run.errors.values() for part in (far.mean, far.worst)]
+        errors = [percent(part) for far in run.errors.values() for part in (far.mean, far.worst)]
         gain = self.full_within(run.error).history.seconds / history.seconds
         same = [
             other.history.seconds / history.seconds
             for other in self.full
             if other.history.step == history.step
         ]
-        return [*head, history.step, *errors, history.setup, history.seconds, gain, *(same or [""])]
+        times = [digits(t) for t in (history.setup, history.seconds, gain, *same)]
+        return [*head, history.step, *errors, *times, *([] if same else [""])]
 
     def verdict(self, case: str, error: float, asked: float) -> list:
         """A row of `verdicts`: the fastest modal run within `error`, `asked` times as fast as full
@@ -96,8 +97,8 @@ class Comparison:
         reached = "yes" if within and gain >= asked else "no"
         choice = best.choice
         named = f"{choice.modes} {choice.residual}, {choice.step:g} s"
-        full = f"{reference.history.step:g} s, {_percent(reference.error):g} %"
-        return [case, 100 * error, asked, named, _percent(best.error), full, gain, reached]
+        full = f"{reference.history.step:g} s, {percent(reference.error):g} %"
+        return [case, 100 * error, asked, named, percent(best.error), full, digits(gain), reached]
 
 
 def verdicts(title: str, rows: list[list], notes: list[str]) -> Table:
@@ -115,5 +116,11 @@ def verdicts(title: str, rows: list[list], notes: list[str]) -> Table:
     return Table(title, columns, rows, notes)
 
 
-def _percent(part: float) -> float:
-    return float(f"{100 * part:.3g}")
+def percent(part: float) -> float:
+    """A share in %, to three digits."""
+    return digits(100 * part)
+
+
+def digits(value: float) -> float:
+    """Three of them: more is noise, of errors as of times."""
+    return float(f"{value:.3g}")

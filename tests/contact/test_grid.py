@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from contact.grid import Grid, fill_holes
+from contact.grid import Grid
 from contact.grid_file import read_grid
+from contact.window import fill_holes
 from fem.errors import InputError
 
 X, Y = 5.0 + 0.1 * np.arange(31), np.linspace(-0.5, 0.5, 11)

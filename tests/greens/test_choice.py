@@ -1,5 +1,7 @@
 """States kept dynamic, and what their number costs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from systems import make
@@ -20,17 +22,34 @@ def uneven():
     """Every second mode hardly moves the points: a tire's antisymmetric modes under its middle."""
     system = make(m=30, damping=10.0, speed=0.0)
     shape = system.shape * np.where(np.arange(30) % 2, 1.0, 0.02)
-    return type(system)(system.drag, system.stiffness, shape).response()
+    response = type(system)(system.drag, system.stiffness, shape).response()
+    return replace(response, momentum=1e-6 * response.momentum)
 
 
-def test_participation_is_what_making_static_loses(uneven) -> None:
+def momentum_rate(response):
+    """The rate of momentum (3,) per force, as a response of its own."""
+    output = response.momentum * response.eigenvalue**2
+    none = np.zeros((3, response.input.shape[1]))
+    return replace(response, output=output, block_output=none[:, :0], residual=none)
+
+
+@pytest.mark.parametrize("carried", [1e-6, 1.0])
+def test_participation_is_what_making_static_loses(uneven, carried) -> None:
+    """With little momentum the displacements decide, with much of it the axle force does."""
     band = 60.0
     frequency = np.linspace(0, band, 4001)
+    whole = replace(uneven, momentum=1e6 * carried * uneven.momentum)
+    forces = np.eye(whole.input.shape[1])
+    still = np.linalg.norm(whole.static())
+    found = participation(whole, band)
     for q in (0, 3, 8, 29):
         alone = np.arange(30) != q
-        lost = uneven.receptance(frequency) - uneven.keeping(alone).receptance(frequency)
-        worst = np.linalg.norm(lost, axis=(1, 2)).max()
-        assert participation(uneven, band)[q] == pytest.approx(worst, rel=0.02)
+        shares = []
+        for seen, size in ((whole, still), (momentum_rate(whole), np.linalg.norm(forces))):
+            lost = seen.receptance(frequency) - seen.keeping(alone).receptance(frequency)
+            shares.append(np.linalg.norm(lost, axis=(1, 2)).max() / size)
+        assert shares.index(max(shares)) == (0 if carried < 1e-3 else 1)
+        assert found[q] == pytest.approx(max(shares), rel=0.02)
 
 
 def test_choice_by_participation_beats_the_slowest(uneven) -> None:

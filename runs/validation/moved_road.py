@@ -1,0 +1,120 @@
+"""Modes against full finite elements in time: a standing tire on a flat road that moves (figures 6.4, 6.5)."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from runs.tabulate import Table
+from runs.validation.comparison import Comparison, digits, percent, verdicts
+from runs.validation.histories import distance, follow
+from runs.validation.tires import Choice, Tires
+
+ABOUT = "a standing tire on a flat road that moves: modes against full finite elements"
+
+SCENE = """
+name = "validate"
+[tire]
+segments = {segments}
+elements_arc = {elements_arc}
+footprint_size = 0.35
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 500.0
+[damping]
+mass = 500.0
+[modal]
+count = {modes}
+[contact]
+youngs_modulus = 1e7
+[road]
+kind = "flat"
+motion = {{ kind = "sine", amplitude = {amplitude}, frequency = 50.0 }}
+[time]
+duration = {duration}
+step = 1e-4
+"""
+AMPLITUDES = (1e-4, 2e-3)  # m: the thesis's, and one at which the contact changes
+CHOICES = (
+    Choice(50, "none", 1e-4),
+    Choice(50, "static", 1e-4),
+    Choice(50, "static", 2e-4),
+    Choice(150, "none", 1e-4),
+    Choice(150, "static", 1e-4),
+    Choice(150, "attachment", 1e-4),
+    Choice(400, "static", 1e-4),
+)
+STEPS = (2e-4, 1e-4)  # s, of the full finite elements
+MESH = {"segments": 24, "elements_arc": 10, "duration": 0.1}
+# Large motions assemble the finite elements several times a step.
+SMALL = {"segments": 16, "elements_arc": 6, "duration": 0.04}
+MOVED = (1e-4, 1e-3, 2e-3, 4e-3)  # m
+LINEARISED = Choice(150, "attachment", 2e-4)
+QUANTITIES = ("contact force", "axle force", "displacement")
+
+
+def run() -> list[Table]:
+    """Contact force, axle force, displacement of the contact points; run times."""
+    tables, rows = [], []
+    modes = max(choice.modes for choice in CHOICES)
+    with tempfile.TemporaryDirectory() as folder:
+        scenes = [SCENE.format(amplitude=a, modes=modes, **MESH) for a in AMPLITUDES]
+        tires = Tires(scenes[0], Path(folder))
+        for amplitude, scene in zip(AMPLITUDES, scenes, strict=True):
+            tires.change(scene)
+            found = _compare(tires)
+            name = f"flat road moved by {1e3 * amplitude:g} mm at 50 Hz"
+            title = f"Standing, {name}: {tires.unknowns} unknowns"
+            tables.append(found.table(title))
+            rows.append(found.verdict(name, 0.005, 1.0))
+    return [*tables, verdicts("Moved flat road: what was asked for", rows, []), _linearised()]
+
+
+def _compare(tires: Tires) -> Comparison:
+    session = tires.session
+    full = [follow(session, *tires.full(step)) for step in STEPS]
+    found = Comparison(full, QUANTITIES)
+    for choice in CHOICES:
+        found.add(choice, follow(session, *tires.modal(choice)))
+    return found
+
+
+def _linearised() -> Table:
+    """Motions about the static state, small against large ones of the same elements."""
+    modes, rows = LINEARISED.modes, []
+    with tempfile.TemporaryDirectory() as folder:
+        scenes = [SCENE.format(amplitude=a, modes=modes, **SMALL) for a in MOVED]
+        tires = Tires(scenes[0], Path(folder))
+        for amplitude, scene in zip(MOVED, scenes, strict=True):
+            tires.change(scene)
+            rows += [[amplitude, *row] for row in _against_large_motions(tires)]
+    names = [part for name in QUANTITIES for part in (name, f"worst {name}")]
+    columns = [("amplitude", "m"), ("load", "N"), ("linearised tire", "")]
+    columns += [(name, "%") for name in names] + [("large motions", "s"), ("loop", "s")]
+    notes = [
+        f"Against full finite elements with large motions, {tires.unknowns} unknowns, both at steps of "
+        f"{LINEARISED.step:g} s, road moved at 50 Hz over {SMALL['duration']:g} s. Modes: {modes} with "
+        "attachment modes.",
+    ]
+    return Table("What linearising about the static state costs", columns, rows, notes)
+
+
+def _against_large_motions(tires: Tires) -> Iterator[list]:
+    """Rows of the linear full finite elements and of the modes."""
+    session, step = tires.session, LINEARISED.step
+    exact = follow(session, *tires.nonlinear(step))
+    load = exact.values["contact force"][:, 2]
+    for name, tire in (
+        ("full FE, linear", tires.full(step)),
+        ("modes", tires.modal(LINEARISED)),
+    ):
+        found = follow(session, *tire)
+        errors = []
+        for quantity in QUANTITIES:
+            pair = exact.values[quantity], found.values[quantity]
+            far = distance(*pair, SMALL["duration"])
+            errors += [percent(far.mean), percent(far.worst)]
+        times = digits(exact.seconds), digits(found.seconds)
+        yield [f"{load.min():.0f} to {load.max():.0f}", name, *errors, *times]
