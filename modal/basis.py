@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modal.undamped import Modes, gram, multiply
+from modal.fields import gram, multiply
+from modal.undamped import Modes
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from fem.operators import Operators
 from greens.truncation import Cutoff, estimate
 from modal import undamped
 from modal.basis import project
+from modal.fields import gram, multiply
 from runs.coupling import Basis, Wheel
 
 MATERIAL = {
@@ -137,10 +138,10 @@ def test_attachments_keep_the_modes_and_the_orthonormality() -> None:
     assert len(grown.squares) == COUNT + len(SPOTS)
     assert grown.squares[COUNT:].min() > modes.squares[-1]
     weighted = operators.mass[:, None] * grown.vectors
-    unit = undamped.gram(comm, grown.vectors, weighted)
+    unit = gram(comm, grown.vectors, weighted)
     assert np.abs(unit - np.eye(len(unit))).max() < 1e-10
-    product = undamped.multiply(operators.stiffness, grown.vectors)
-    energy = undamped.gram(comm, grown.vectors, product)
+    product = multiply(operators.stiffness, grown.vectors)
+    energy = gram(comm, grown.vectors, product)
     size = np.sqrt(np.outer(grown.squares, grown.squares))
     assert np.abs((energy - np.diag(grown.squares)) / size).max() < 1e-7
 
