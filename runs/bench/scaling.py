@@ -38,14 +38,14 @@ def run() -> list[Table]:
     """Stages over unknowns, the loop over its sizes, stages over processes, the machine's own rates."""
     with tempfile.TemporaryDirectory() as folder:
         return [
-            _machine(),
+            machine_rates(),
             unknowns(Path(folder), MESHES, MODES),
             loop(SIZES, STATES, STEPS),
             processes(Path(folder), STRONG, MODES, os.cpu_count() or 1),
         ]
 
 
-def _machine() -> Table:
+def machine_rates() -> Table:
     rows = [
         ["memory bandwidth, triad", bandwidth() / 1e9, "GB/s"],
         ["dense product", flop_rate() / 1e9, "Gflop/s"],
@@ -90,7 +90,7 @@ def unknowns(folder: Path, meshes: tuple[Mesh, ...], modes: int) -> Table:
 
 
 def _size(folder: Path, mesh: Mesh, modes: int) -> list:
-    from fem.compliance import factorise, solve_columns
+    from fem.direct import factorise, solve_columns
 
     session = prepared(folder, mesh, modes=modes)
     stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
