@@ -65,13 +65,8 @@ def run() -> list[Table]:
             for choice in CHOICES:
                 found.add(choice, _history(*tires.modal(choice), frequency))
         what = f"Point force of 1 N at {frequency:g} Hz ({name})"
-        tables.append(
-            found.table(
-                f"{what}: {tires.unknowns} unknowns; static state and {modes} modes took "
-                f"{tires.seconds:.1f} s"
-            )
-        )
-        rows.append(found.verdict(what, 0.005, 1.0))
+        tables.append(found.table(f"{what}: {tires.setting}"))
+        rows.append(found.verdict(what, 0.005, 1.0, tires.modes_seconds))
     return [*tables, verdicts("Point force: what was asked for", rows, [])]
 
 

@@ -45,11 +45,12 @@ def test_the_fastest_run_within_an_error_is_held_against_full_elements_within_it
     found.add(Choice(10, "none", 1e-4), made(1e-4, 1.2, 0.01))
     found.add(Choice(50, "static", 1e-4), made(1e-4, 1.008, 0.05))
     found.add(Choice(90, "static", 1e-4), made(1e-4, 1.002, 0.1))
-    case, error, asked, best, its, _, gain, reached = found.verdict("road", 0.01, 100.0)
+    *_, best, its, _, gain, pays, reached = found.verdict("road", 0.01, 100.0, 30.0)
     assert (best, gain, reached) == ("50 static, 0.0001 s", 200.0, "yes")
+    assert pays == pytest.approx(0.1 * 30.0 / (10.0 - 0.05), rel=1e-2)
     assert its == pytest.approx(0.8, rel=0.03)
-    assert found.verdict("road", 0.01, 300.0)[-1] == "no"
-    *_, gain, reached = found.verdict("road", 1e-4, 30.0)
+    assert found.verdict("road", 0.01, 300.0, 30.0)[-1] == "no"
+    *_, gain, _, reached = found.verdict("road", 1e-4, 30.0, 30.0)
     assert (gain, reached) == (200.0, "no")
     table = found.table("title")
     assert all(len(row) == len(table.columns) for row in table.rows)
