@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from contact.model import step_solver
+from contact.rolling import Drive, Loop, roll
 from runs.tabulate import modules
 from runs.validation import rolling
 from runs.validation.comparison import Comparison
@@ -65,10 +67,35 @@ def test_every_validation_says_what_it_is_about() -> None:
     assert hasattr(rolling, "run_large")
 
 
-def test_modes_linear_and_large_motions_agree_where_all_should(tmp_path) -> None:
+@pytest.fixture(scope="module")
+def tires(tmp_path_factory) -> Tires:
     """A small motion of the road under a coarse standing tire."""
     mesh = {"segments": 12, "elements_arc": 4, "duration": 0.02}
-    tires = Tires(SCENE.format(amplitude=1e-5, modes=120, **mesh), tmp_path)
+    return Tires(SCENE.format(amplitude=1e-5, modes=120, **mesh), tmp_path_factory.mktemp("tires"))
+
+
+def test_full_elements_in_contact_go_on_from_a_checkpoint_with_the_same_bits(tires) -> None:
+    session, step = tires.session, 2e-4
+    patch = session.patch
+    drive = Drive(session.road.height, session.motion, 0.0)
+
+    def loop() -> Loop:
+        tire, *_ = tires.full(step)
+        return Loop(tire, step_solver(session.scene.contact, patch, tire.same_step))
+
+    def forces(of: Loop, steps: int, done: int = 0) -> np.ndarray:
+        instants = roll(of.tire, of.solver, patch, drive, step, steps, None, done)
+        return np.stack([instant.force for instant in instants])
+
+    whole = forces(loop(), 40)
+    broken, again = loop(), loop()
+    forces(broken, 25)
+    again.restore(broken.snapshot())
+    assert np.array_equal(forces(again, 40, 25), whole[25:])
+    assert np.ptp(whole[25:].sum(axis=1)) > 0.1
+
+
+def test_modes_linear_and_large_motions_agree_where_all_should(tires) -> None:
     session, step = tires.session, 2e-4
     linear = follow(session, *tires.full(step)).values["contact force"]
     large = follow(session, *tires.nonlinear(step)).values["contact force"]
