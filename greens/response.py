@@ -15,6 +15,11 @@ from scipy import linalg
 
 from modal.rotating import StateModes
 
+# Radians a state may turn in a step and stay dynamic. Undamped and bouncing on a stiff tread, up to 3
+# gained no energy and 5 blew up: from pi on a turn is not seen any more. Rolling on a rough road in
+# steps of 0.2 ms, 1 errs by 1.6 % in the axle force, 1.5 to 3 by 0.7 %: what turns is better not static.
+RESOLVED = 2.0
+
 
 @dataclass(frozen=True)
 class Response:
@@ -108,14 +113,14 @@ class Response:
             residual=self.residual - gone.real,
         )
 
-    def slow(self, step: float, limit: float = 1.0) -> np.ndarray:
+    def slow(self, step: float, limit: float = RESOLVED) -> np.ndarray:
         """Which poles (q,) `resolved` keeps."""
         return np.abs(self.eigenvalue) * step <= limit
 
-    def resolved(self, step: float, limit: float = 1.0) -> Response:
+    def resolved(self, step: float, limit: float = RESOLVED) -> Response:
         """Poles with |s| step above the limit leave the dynamics and follow the force statically.
 
-        Integrating them over so long a step gains nothing and can gain energy.
+        Over so long a step their turning is not seen, and they can gain energy in contact.
         """
         return self.keeping(self.slow(step, limit))
 

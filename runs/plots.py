@@ -113,12 +113,13 @@ def _front(table: Any) -> str:
         here.plot(*far, "*--", color=INK, ms=9, lw=0.9, label=plot["beside_name"])
     best = list(zip(*map(place, plot["front"]), strict=True))
     here.step(*best, where="post", color=INK, lw=1.3, zorder=2)
-    for row in plot["front"]:
+    for k, row in enumerate(plot["front"]):
+        # Every other letter on the other side: neighbours on a front may be close.
+        aside = {"ha": "left", "va": "bottom"} if k % 2 else {"ha": "right", "va": "top"}
+        offset = (4, 4) if k % 2 else (-4, -4)
         text = str(columns.pick(row, plot["label"]))
-        here.annotate(
-            text, place(row), (-4, -4), textcoords="offset points", ha="right", va="top",
-            fontweight="bold", zorder=4,
-        )  # fmt: skip
+        style = {"textcoords": "offset points", "fontweight": "bold", "zorder": 4}
+        here.annotate(text, place(row), offset, **style, **aside)
     _scales(here, "xy")
     here.set(xlabel=columns.label(plot["x"]), ylabel=columns.label(plot["y"][0]))
     _guides(here, plot)

@@ -69,6 +69,7 @@ def run_all(package: str, names: list[str], out: Path | None, large: bool = Fals
 def show(table: Table) -> None:
     """Print a table as text."""
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table as Grid
 
     grid = Grid(title=table.title, title_justify="left", header_style="bold")
@@ -77,7 +78,7 @@ def show(table: Table) -> None:
             name if unit in ("", "-") else f"{name} [{unit}]".replace("[", r"\["), overflow="fold"
         )
     for row in table.rows:
-        grid.add_row(*(_shown(value) for value in row))
+        grid.add_row(*(escape(_shown(value)) for value in row))
     text = io.StringIO()
     Console(file=text, width=120).print(grid)
     observe.say(text.getvalue().rstrip())

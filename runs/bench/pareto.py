@@ -24,10 +24,10 @@ from runs.validation.histories import History, follow
 ABOUT = "modes x residual x step x mesh against a far finer run: the Pareto front of rolling"
 
 COARSE, FINE = Mesh(24, 10, 0.35), Mesh(32, 12, 0.3)
-MOST = 450  # modes of the reference, attachment modes besides
+MOST = 600  # modes of the reference, attachment modes besides
 FINEST = 2.5e-5  # s, its step
 DURATION = 0.2  # s
-COUNTS = (50, 100, 200, 300)
+COUNTS = (50, 100, 200, 400)
 RESIDUALS = ("none", "static", "second-order", "attachment")
 STEPS = (5e-5, 1e-4, 2e-4, 4e-4)
 FULL_STEPS = (2e-4, 1e-4, 5e-5)

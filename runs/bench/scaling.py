@@ -38,14 +38,14 @@ def run() -> list[Table]:
     """Stages over unknowns, the loop over its sizes, stages over processes, the machine's own rates."""
     with tempfile.TemporaryDirectory() as folder:
         return [
-            _machine(),
+            machine_rates(),
             unknowns(Path(folder), MESHES, MODES),
             loop(SIZES, STATES, STEPS),
             processes(Path(folder), STRONG, MODES, os.cpu_count() or 1),
         ]
 
 
-def _machine() -> Table:
+def machine_rates() -> Table:
     rows = [
         ["memory bandwidth, triad", bandwidth() / 1e9, "GB/s"],
         ["dense product", flop_rate() / 1e9, "Gflop/s"],

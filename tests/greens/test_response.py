@@ -5,6 +5,8 @@ import pytest
 from scipy import linalg
 from systems import make
 
+from greens.response import RESOLVED
+
 TIMES = np.array([0.0, 1e-4, 3e-3, 0.02, 0.1])
 
 
@@ -74,10 +76,10 @@ def test_static_limit_with_residual_is_exact() -> None:
 def test_resolved_keeps_the_static_limit_and_the_slow_modes() -> None:
     system = make(damping=8.0)
     response = system.response()
-    step = 1 / np.median(np.abs(response.eigenvalue))
+    step = RESOLVED / np.median(np.abs(response.eigenvalue))
     kept = response.resolved(step)
     assert 0 < len(kept.eigenvalue) < len(response.eigenvalue)
-    assert np.abs(kept.eigenvalue).max() * step <= 1
+    assert np.abs(kept.eigenvalue).max() * step <= RESOLVED
     low = np.array([0.0, 1.0])
     exact, found = response.receptance(low), kept.receptance(low)
     size = np.abs(exact).max()
