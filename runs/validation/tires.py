@@ -125,14 +125,14 @@ class Tires:
         shape = modal.shape[:, :count]
         return few, ModalBasis(modal.frequency[:count], shape, Projection(**cut))
 
-    def full(self, step: float) -> tuple[FullTire, float, float]:
+    def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
         """All degrees of freedom between the same points; step; set-up in s."""
         session = self.session
         rotation = session.rotation_matrices if session.speed else None
         _, outputs, loads = greens.probes(session)
         began = time.perf_counter()
         given = session.operators, rotation, session.speed, session.damping, step, outputs, loads
-        tire = FullTire(*given, spectral_radius=RADIUS)
+        tire = FullTire(*given, spectral_radius=radius)
         return tire, step, time.perf_counter() - began
 
     def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
