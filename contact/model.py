@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.complementarity import ActiveSet, ContactSolver, checked_compliance, make_solver
+from contact.complementarity import ContactSolver, checked_compliance, make_solver
 from contact.compliance import Compliance, MatrixCompliance, SpreadCompliance
 from contact.kernel import KernelTread
 from contact.layer import LayerInfluence
@@ -56,9 +56,9 @@ def step_solver(spec: Spec, patch: Patch, tire: Array) -> ContactSolver:
     InputError when the matrix of that many points is not affordable, or A not positive definite.
     """
     name, count = solver_name(spec, patch), len(patch.points)
-    solvers = {"active-set": ActiveSet, "projected-cg": ProjectedCG}
-    if patch.places is not None and count > DENSE_POINTS and name in solvers:
-        return solvers[name](_product(spec, patch, tire))
+    if patch.places is not None and count > DENSE_POINTS:
+        product = _product(spec, patch, tire)
+        return ProjectedCG(product) if name == "projected-cg" else make_solver(name, product)
     if count > MOST_DENSE:
         raise InputError(
             f'contact: solver "{name}" on these points keeps a matrix, which is for at most '

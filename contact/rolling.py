@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -41,6 +41,15 @@ class Tire(Protocol):
     def snapshot(self) -> dict[str, np.ndarray]: ...
 
     def restore(self, kept: dict[str, np.ndarray]) -> None: ...
+
+
+@runtime_checkable
+class NonlinearTire(Tire, Protocol):
+    """A tire whose answer is known in approximation (fem.nonlinear_transient): `settle` gives None when
+    its motion under a force balances, else the free displacement to solve the contact for again.
+    """
+
+    def settle(self, force: np.ndarray) -> np.ndarray | None: ...
 
 
 class Instant(NamedTuple):
@@ -118,16 +127,25 @@ def roll(
     answer = (
         LoadedColumns(tire.same_step) if isinstance(tire.same_step, np.ndarray) else tire.same_step
     )
+    iterated = isinstance(tire, NonlinearTire)
     for time, road in _roads(drive, patch, step, steps, done):
         free = tire.predict()
-        q = patch.gap + free[:count] - road
-        if friction is None:
-            force = solver.solve(q, touching, reference=patch.force)
-            change = force - patch.force
-        else:
-            force, horizontal = friction.solve(solver, q, touching, patch.force, free[count:])
-            change = np.concatenate([force - patch.force, *horizontal.T])
-        touching = None
+        past = friction.state() if friction else {}
+        while True:
+            q = patch.gap + free[:count] - road
+            if friction is None:
+                force = solver.solve(q, touching, reference=patch.force)
+                change = force - patch.force
+            else:
+                force, horizontal = friction.solve(solver, q, touching, patch.force, free[count:])
+                change = np.concatenate([force - patch.force, *horizontal.T])
+            touching = None
+            again = tire.settle(change) if iterated else None
+            if again is None:
+                break
+            free = again
+            if friction:
+                friction.set_state(past)
         tire.advance(change)
         moved = free + answer @ change
         axle = -tire.inertia_force()

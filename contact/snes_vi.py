@@ -10,6 +10,8 @@ from contact.complementarity import (
     checked_compliance,
     complementarity_residual,
 )
+from contact.compliance import Compliance, MatrixCompliance
+from contact.snes_product import Preconditioner, Product
 from fem.errors import ConvergenceError
 
 Array = NDArray[np.float64]
@@ -24,34 +26,46 @@ class SnesVI:
 
     PETSc sees it without units, A / max diag(A) and q / max |q|, because SNES VI's own tolerance of
     what lies on a bound is absolute. PETSc options with the prefix `contact_` are read last and
-    win. The dense matrix is factorised anew in every Newton step. The line search can give up when
-    the skew part of A outweighs the symmetric one; the tire's does not.
-    Source: Benson and Munson, Optim. Methods Softw. 21 (2006) 575.
+    win: `-contact_snes_type vinewtonssls` is the semismooth method, which takes several times the
+    steps and gives the same forces. A matrix is factorised anew in every Newton step; a product
+    (thousands of points) is solved with by GMRES, preconditioned by the tread's inverse, and never
+    made. The line search can give up when the skew part of A outweighs the symmetric one; the
+    tire's does not.
+    Sources: Benson and Munson, Optim. Methods Softw. 21 (2006) 575; Munson, Facchinei, Ferris,
+    Fischer and Kanzow, INFORMS J. Comput. 13 (2001) 294.
     """
 
-    def __init__(self, matrix: Array) -> None:
-        self._matrix = checked_compliance(matrix)
-        self._diagonal = self._matrix.diagonal().copy()
+    def __init__(self, matrix: Array | Compliance) -> None:
+        if isinstance(matrix, np.ndarray):
+            matrix = MatrixCompliance(checked_compliance(matrix))
+        self._compliance = matrix
+        n = len(matrix.diagonal)
+        self._diagonal = matrix.diagonal.copy()
         self._unit = float(self._diagonal.max())
-        self._scaled = self._matrix / self._unit
-        n = len(self._diagonal)
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
         self.residual = 0.0
         self.iterations = 0
         self.factorisations = 0
         self._offset = np.zeros(n)
+        self._make_jacobian(n)
         self._make_vectors(n)
         self._make_snes()
 
+    def _make_jacobian(self, n: int) -> None:
+        every = np.arange(n)
+        self._product = None
+        if isinstance(self._compliance, MatrixCompliance):
+            # By rows: petsc4py takes a matrix by columns for its transpose.
+            self._dense = np.ascontiguousarray(self._compliance.block(every, every)) / self._unit
+            self._jacobian = PETSc.Mat().createDense((n, n), comm=PETSc.COMM_SELF)
+            self._jacobian.setUp()
+        else:
+            self._product = Product(self._compliance, self._unit, every)
+            self._jacobian = self._product.matrix()
+
     def _make_vectors(self, n: int) -> None:
-        comm = PETSc.COMM_SELF
-        self._jacobian = PETSc.Mat().createDense((n, n), comm=comm)
-        self._jacobian.setUp()
-        rows = np.arange(n, dtype=PETSc.IntType)
-        self._jacobian.setValues(rows, rows, self._scaled)
-        self._jacobian.assemble()
-        self._force = PETSc.Vec().createSeq(n, comm=comm)
+        self._force = PETSc.Vec().createSeq(n, comm=PETSc.COMM_SELF)
         self._function = self._force.duplicate()
         self._bounds = self._force.duplicate(), self._force.duplicate()
         self._bounds[0].set(0.0)
@@ -61,11 +75,18 @@ class SnesVI:
         snes = PETSc.SNES().create(comm=PETSc.COMM_SELF)
         snes.setType(PETSc.SNES.Type.VINEWTONRSLS)
         snes.setFunction(self._evaluate, self._function)
-        snes.setJacobian(lambda _s, _x, _J, _P: None, self._jacobian)
+        snes.setJacobian(self._fill, self._jacobian)
         snes.setVariableBounds(*self._bounds)
         snes.setTolerances(rtol=0.0, atol=1e-12, stol=0.0, max_it=MAX_ITERATIONS)
-        snes.ksp.setType(PETSc.KSP.Type.PREONLY)
-        snes.ksp.pc.setType(PETSc.PC.Type.LU)
+        if self._product is None:
+            snes.ksp.setType(PETSc.KSP.Type.PREONLY)
+            snes.ksp.pc.setType(PETSc.PC.Type.LU)
+        else:
+            snes.ksp.setType(PETSc.KSP.Type.GMRES)
+            snes.ksp.setTolerances(rtol=1e-10, max_it=500)
+            snes.ksp.setGMRESRestart(100)
+            snes.ksp.pc.setType(PETSc.PC.Type.PYTHON)
+            snes.ksp.pc.setPythonContext(Preconditioner())
         snes.setOptionsPrefix(PREFIX)
         # 1e-8 by default: forces below it would count as none, above our tolerance.
         options = PETSc.Options(PREFIX)
@@ -74,8 +95,21 @@ class SnesVI:
         snes.setFromOptions()
         self._snes = snes
 
+    def _fill(self, _snes: PETSc.SNES, _force: PETSc.Vec, jacobian: PETSc.Mat, _p) -> None:
+        """A anew: the semismooth solver scales it in place."""
+        if self._product is not None:
+            self._product.reset()
+            return
+        every = np.arange(len(self._diagonal), dtype=PETSc.IntType)
+        jacobian.setValues(every, every, self._dense)
+        jacobian.assemble()
+
     def _evaluate(self, _snes: PETSc.SNES, force: PETSc.Vec, function: PETSc.Vec) -> None:
-        function.array[:] = self._scaled @ force.array_r + self._offset
+        function.array[:] = self._moved(force.array_r)
+
+    def _moved(self, force: Array) -> Array:
+        """Gaps without units."""
+        return self._compliance.apply(force) / self._unit + self._offset
 
     def solve(
         self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
@@ -87,14 +121,14 @@ class SnesVI:
         q = np.asarray(q, dtype=float)
         if not np.all(np.isfinite(q)):
             check_residual("snes-vi", np.nan)
-        offset = q if reference is None else q - self._matrix @ reference
+        offset = q if reference is None else q - self._compliance.apply(reference)
         length = float(np.abs(offset).max()) or 1.0
         self._offset = offset / length
         if guess_active is not None:
             self._force.array[~np.asarray(guess_active, dtype=bool)] = 0.0
         self._snes.solve(None, self._force)
         self.iterations = self._snes.getIterationNumber()
-        self.factorisations += self.iterations
+        self.factorisations += self.iterations if self._product is None else 0
         return self._finish(length)
 
     def state(self) -> dict[str, Array]:
@@ -107,12 +141,12 @@ class SnesVI:
 
     def block(self, index: NDArray[np.intp]) -> Array:
         """A between the points `index`, (a, a) m/N."""
-        return self._matrix[np.ix_(index, index)]
+        return self._compliance.block(index, index)
 
     def _finish(self, length: float) -> Array:
         """Back to newtons and metres, and the residual by the same measure as ActiveSet's."""
         force = np.maximum(self._force.array_r, 0.0)
-        gap = self._scaled @ force + self._offset
+        gap = self._moved(force)
         scale = float(np.abs(self._offset).max() + force.max())
         diagonal = self._diagonal / self._unit
         self.residual = complementarity_residual(force, gap, diagonal, scale)
@@ -124,9 +158,10 @@ class SnesVI:
                 '"active-set", or pass -contact_snes_monitor to watch it'
             )
         check_residual("snes-vi", self.residual)
-        self.active = force > 0.0
+        # The semismooth method leaves forces of rounding size on points that do not touch.
+        self.active = diagonal * force > gap
         self.gap = length * np.where(self.active, 0.0, gap)
-        return force * (length / self._unit)
+        return np.where(self.active, force, 0.0) * (length / self._unit)
 
     def destroy(self) -> None:
         """Free PETSc's objects."""

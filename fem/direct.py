@@ -24,7 +24,9 @@ def solve_columns(pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray) -> np.nd
     """Own rows of matrix^-1 columns, (n, k), by the matrix's factorisation; checked. Collective."""
     factor = pc.getFactorMatrix()
     chunks = range(0, columns.shape[1], _CHUNK)
-    return np.hstack([_solve(factor, matrix, columns[:, k : k + _CHUNK]) for k in chunks])
+    out = np.hstack([_solve(factor, matrix, columns[:, k : k + _CHUNK]) for k in chunks])
+    factor.destroy()  # this hold on it, which petsc4py would keep for ever
+    return out
 
 
 def symmetric(matrix: PETSc.Mat) -> bool:
@@ -40,7 +42,9 @@ def factorise(stiffness: PETSc.Mat) -> PETSc.PC:
     pc.setType(PETSc.PC.Type.CHOLESKY if symmetric(stiffness) else PETSc.PC.Type.LU)
     pc.setFactorSolverType("mumps")
     pc.setFactorSetUpSolverType()
-    pc.getFactorMatrix().setMumpsIcntl(14, 100)  # room for pivots that MUMPS did not foresee
+    factor = pc.getFactorMatrix()
+    factor.setMumpsIcntl(14, 100)  # room for pivots that MUMPS did not foresee
+    factor.destroy()
     pc.setUp()
     return pc
 

@@ -69,6 +69,7 @@ class HeldSystem:
     def _checked(self) -> bool:
         factors = self._ksp.getPC().getFactorMatrix()
         code, detail = factors.getMumpsInfog(1), factors.getMumpsInfog(2)
+        factors.destroy()  # this hold on them, which petsc4py would keep for ever
         if code < 0 and code not in _SINGULAR:
             raise ConvergenceError(
                 f"static: MUMPS could not factorise the tangent, INFOG(1) = {code}, INFOG(2) = "

@@ -21,18 +21,22 @@ def receptance(
     outputs: sparse.csr_matrix,
     loads: sparse.csr_matrix,
     frequency: np.ndarray,
+    moment: bool = False,
 ) -> np.ndarray:
     """H (f, r, k) complex, m/N, on every process, at the frequencies in Hz. Collective.
 
+    With `moment` three rows more: the first moment int rho u, kg m/N.
     `stiffness` K_Omega and `damping` E as in fem.compliance. One unsymmetric factorisation of twice
     the unknowns a frequency. Raises ConvergenceError when a solve leaves a residual above 1e-8.
     """
     comm = operators.body.comm
     rows = on_own_rows(operators, outputs).T.tocsr()
+    if moment:
+        rows = sparse.vstack([rows, sparse.csr_matrix(operators.carried)], format="csr")
     columns = on_own_rows(operators, loads)
     n = columns.shape[0]
     both = sparse.vstack([columns, sparse.csc_matrix(columns.shape)], format="csc")
-    H = np.empty((len(frequency), outputs.shape[0], loads.shape[0]), complex)
+    H = np.empty((len(frequency), rows.shape[0], loads.shape[0]), complex)
     for k, omega in enumerate(2 * np.pi * frequency):
         dynamic = _dynamic_stiffness(stiffness, damping, operators.mass, omega)
         solution = solve_all(dynamic, both)

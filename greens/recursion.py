@@ -42,7 +42,6 @@ class Recursion:
         output = np.vstack([response.output[:, mine], momentum * s**2])
         into = np.ascontiguousarray(response.input[mine])
         self._output = np.ascontiguousarray(output.conj()).view(float)
-        self._input = LoadedColumns(np.ascontiguousarray(into.T).view(float).T)
         self._block = None
         if comm.rank == 0 and len(response.block):
             self._block = _Block(response, step, scheme)
@@ -67,7 +66,8 @@ class Recursion:
             direct += self._block.direct()
         direct = self._reduce(direct)
         self.same_step = response.residual + direct[:-3]
-        self._jump = LoadedColumns(direct[-3:] + self._begun)
+        pushes = np.ascontiguousarray(into.T).view(float).T
+        self._input = LoadedColumns(np.vstack([pushes, direct[-3:] + self._begun]))
 
     def _reduce(self, values: np.ndarray) -> np.ndarray:
         if self.comm.size == 1:
@@ -79,7 +79,7 @@ class Recursion:
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
         self._force = force
-        self._push = (self._input @ force).view(complex)
+        self._push = (self._input @ force)[:-3].view(complex)
         self._rate = self._begun @ force
         if self._block:
             self._block.start(force)
@@ -98,9 +98,10 @@ class Recursion:
     def advance(self, force: np.ndarray) -> None:
         """Take the force (k,) N at the end of the step; after `predict`. Local to each process."""
         self._force = force
-        self._push = (self._input @ force).view(complex)
+        pushed = self._input @ force
+        self._push = pushed[:-3].view(complex)
         self.state = self._free + self._new * self._push
-        self._rate = self._rate + self._jump @ force
+        self._rate = self._rate + pushed[-3:]
         if self._block:
             self._block.advance(force)
 

@@ -107,8 +107,9 @@ def _states(mass, drag, stiffness, wanted: int):
     s, vectors = _read(pep, stiffness, found)
     order = _up_to_a_gap(s, wanted)
     s, vectors = s[order], vectors[:, order]
-    vectors = _polished(ksp.getPC().getFactorMatrix(), mass, drag, s, vectors)
-    for thing in (pep, inertia, weight):
+    factor = ksp.getPC().getFactorMatrix()
+    vectors = _polished(factor, mass, drag, s, vectors)
+    for thing in (factor, pep, inertia, weight):
         thing.destroy()
     residual = _residuals(mass, drag, stiffness, s, vectors)
     if not residual.max() <= RESIDUAL_TOLERANCE:

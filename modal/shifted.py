@@ -57,7 +57,8 @@ class Shifted:
         return out
 
     def destroy(self) -> None:
-        """Free the factor, the largest memory of the eigensolver."""
+        """Free the factor, the largest memory of the eigensolver: petsc4py does not when it goes."""
+        self._factor.destroy()
         self._pc.destroy()
 
 

@@ -91,6 +91,10 @@ def parser() -> argparse.ArgumentParser:
         some = command(name, text)
         some.add_argument("names", nargs="*", metavar="NAME", help="all by default")
         some.add_argument("--out", type=Path, metavar="FILE.json", help="also a page beside it")
+        if name == "validate":
+            some.add_argument(
+                "--large", action="store_true", help="on meshes of full size: hours, not minutes"
+            )
     test = command("test", "the test suite, serial and on 2 and 3 processes")
     test.add_argument("arguments", nargs="*", metavar="PYTEST ARGUMENTS")
     return top
@@ -209,7 +213,7 @@ def _bench(args: argparse.Namespace) -> None:
 def _validate(args: argparse.Namespace) -> None:
     from runs.tabulate import run_all
 
-    run_all("runs.validation", args.names, args.out)
+    run_all("runs.validation", args.names, args.out, args.large)
 
 
 def _results(directory: Path) -> Path:

@@ -32,16 +32,24 @@ class Table:
 
 
 def modules(package: str) -> dict[str, ModuleType]:
-    """The modules of a package by name, each with ABOUT (a line) and run() -> list[Table]."""
+    """The modules of a package by name, each with ABOUT (a line) and run() -> list[Table].
+
+    Some have run_large() too: the same on a mesh that takes longer than one would wait for.
+    """
     path = Path(importlib.import_module(package).__file__).parent
     names = sorted(found.name for found in pkgutil.iter_modules([str(path)]))
     loaded = {name: importlib.import_module(f"{package}.{name}") for name in names}
     return {name: module for name, module in loaded.items() if hasattr(module, "run")}
 
 
-def run_all(package: str, names: list[str], out: Path | None) -> None:
-    """Run the named modules of a package (all by default), show their tables, keep them in files."""
+def run_all(package: str, names: list[str], out: Path | None, large: bool = False) -> None:
+    """Run the named modules of a package (all by default), show their tables, keep them in files.
+
+    With `large` those that can run at full size, and by default only those.
+    """
     known = modules(package)
+    if large:
+        known = {name: module for name, module in known.items() if hasattr(module, "run_large")}
     for name in names:
         if name not in known:
             raise InputError(f"{name!r} is none of: {', '.join(known)}")
@@ -49,7 +57,7 @@ def run_all(package: str, names: list[str], out: Path | None) -> None:
     for name in names or known:
         observe.say(f"{name}: {known[name].ABOUT}")
         began = time.perf_counter()
-        tables = known[name].run()
+        tables = known[name].run_large() if large else known[name].run()
         for table in tables:
             show(table)
         observe.say(f"{name}: {time.perf_counter() - began:.1f} s\n")
@@ -61,6 +69,7 @@ def run_all(package: str, names: list[str], out: Path | None) -> None:
 def show(table: Table) -> None:
     """Print a table as text."""
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table as Grid
 
     grid = Grid(title=table.title, title_justify="left", header_style="bold")
@@ -69,7 +78,7 @@ def show(table: Table) -> None:
             name if unit in ("", "-") else f"{name} [{unit}]".replace("[", r"\["), overflow="fold"
         )
     for row in table.rows:
-        grid.add_row(*(_shown(value) for value in row))
+        grid.add_row(*(escape(_shown(value)) for value in row))
     text = io.StringIO()
     Console(file=text, width=120).print(grid)
     observe.say(text.getvalue().rstrip())

@@ -15,12 +15,12 @@ from contact.friction import Friction
 from contact.rolling import Drive, roll
 from contact.synthetic import Strip, oval_patch
 from contact.tread import half_space_compliance
-from greens.convolution import Convolution
 from greens.recursion import Recursion
-from runs.bench.contact_points import median
+from runs.bench.contact_points import large, median, rough
+from runs.bench.contact_steps import convolution, orders
 from runs.tabulate import Table
 
-ABOUT = "cost of a contact step: against its floor, with friction, against direct convolution"
+ABOUT = "the contact loop: cost of a step, friction, convolution, many points; asked and measured"
 STEP = 1e-4
 ELASTIC = 5e6, 0.45
 BLOCK = 20  # steps between two looks at the floor
@@ -28,7 +28,33 @@ BLOCK = 20  # steps between two looks at the floor
 
 def run() -> list[Table]:
     """The tables; ratios are of times measured in one run, in turns."""
-    return [_step(), _friction(), _convolution()]
+    tables = [_step(), _friction(), convolution(), orders(), large(), rough()]
+    return [_asked(*tables), *tables]
+
+
+def _asked(step, friction, convolved, order, many, static) -> Table:
+    """What was asked for beside what the other tables measured."""
+    limits = [row[-1] for row in convolved.rows if row[-1] != ""]
+    rows = [
+        ["a step, 500 points x 500 states, wavy road", "at most", 2.0, step.rows[1][4], "passes"],
+        ["the same, matrices from memory", "at most", 2.0, step.rows[1][6], "passes"],
+        ["factorisations after the first step, road at rest", "at most", 0.0,
+         float(step.rows[0][7] - 1), ""],
+        ["a step without friction over one with it", "at most", 0.4,
+         max(row[-1] for row in friction.rows), ""],
+        ["4,000 steps, faster than convolution", "at least", 300.0, convolved.rows[-1][3], "times"],
+        ["difference from it in the limit of the step", "at most", 1e-6, limits[-1], ""],
+        ["100 x 100 points, a step", "at most", 60.0, float(many.rows[-1][-1]), "ms"],
+        ["order, linear force", "at least", 1.9, order.rows[-1][2], ""],
+        ["order, constant force", "at least", 0.9, order.rows[-1][4], ""],
+    ]  # fmt: skip
+    if len(static.rows) > 1:
+        ratio = static.rows[0][1] / static.rows[1][1]
+        rows.append(["128 x 128 points, time over tamaas's", "at most", 1.0, ratio, ""])
+    for row in rows:
+        row.append(row[3] <= row[2] if row[1] == "at most" else row[3] >= row[2])
+    columns = [("what", ""), ("", ""), ("asked", ""), ("measured", ""), ("in", ""), ("reached", "")]
+    return Table("The contact loop: asked and measured", columns, rows, static.notes)
 
 
 def _parts(shape: tuple[int, int], modes: int, horizontal: bool = False):
@@ -134,72 +160,3 @@ def _friction() -> Table:
         "Friction 0.8 at a slip of 2 % and 1 %. Asked: a step without at most 0.4 of one with."
     ]
     return Table("One step with friction, wavy road", columns, rows, notes)
-
-
-def _convolution() -> Table:
-    """Prescribed forces, the same in both; the convolution is timed at the end of 200 steps and at
-    4,000 by its cost, which grows with their number.
-    """
-    patch = oval_patch((10, 6), (0.015, 0.02), 500.0)
-    response = Strip(speed=20.0).response(patch.points, 12, 5)
-    rows, before = [], []
-    for steps in (200, 400, 800, 1600):
-        times, off, size = _both(response, patch.force, 0.02, steps, 200)
-        # Romberg's table: both err by even powers of the step, for the force begins smoothly.
-        limits = [off]
-        for order, coarse in enumerate(before, 1):
-            limits.append(limits[-1] + (limits[-1] - coarse) / (4**order - 1))
-        before = limits
-        errors = [float(np.abs(limit).max() / size) for limit in (off, limits[-1])]
-        rows.append([steps, *times, times[1] / times[0], *errors])
-    rows.append(_many_steps(4000))
-    columns = [("steps", "-"), ("recursion", "s"), ("convolution", "s"), ("ratio", "-"),
-               ("difference", "-"), ("of the limits", "-")]  # fmt: skip
-    return Table(
-        f"Recursion against direct convolution, {len(patch.points)} points, "
-        f"{len(response.eigenvalue)} states, the same forces",
-        columns,
-        rows,
-        [
-            "The convolution's cost grows with the square of the steps, and its rectangle rule errs with "
-            "the step; of the limits: both extrapolated to step 0 from the rows so far. Asked: 1e-6 in "
-            "the limit; a ratio of 300 at 4,000 steps of 500 points and 500 states."
-        ],  # fmt: skip
-        {"x": "steps", "y": ["recursion", "convolution"], "log": "xy", "by": None},
-    )
-
-
-def _both(response, shape: np.ndarray, duration: float, steps: int, shown: int):
-    """Seconds of recursion and convolution, the difference of their displacements at `shown` common
-    times (shown, r) m, and the largest displacement, m."""
-    h = duration / steps
-    tires = Recursion(response, h, "linear", MPI.COMM_SELF), Convolution(response, h, steps)
-    times, off, size = [0.0, 0.0], [], 0.0
-    for k in range(1, steps + 1):
-        force, moved = shape * np.sin(300 * k * h) ** 2, []
-        for i, tire in enumerate(tires):
-            began = time.perf_counter()
-            u = tire.predict()
-            tire.advance(force)
-            times[i] += time.perf_counter() - began
-            moved.append(u + tire.same_step @ force)
-        size = max(size, float(np.abs(moved[0]).max()))
-        if k % (steps // shown) == 0:
-            off.append(moved[0] - moved[1])
-    return times, np.array(off), size
-
-
-def _many_steps(steps: int) -> list:
-    """500 points and 500 states: the recursion's steps, and steps/2 lags of the convolution each."""
-    points, lags = 500, 20
-    tire = _parts((25, 20), 490)[1]
-    force = np.ones(points)
-
-    def step():
-        tire.predict()
-        tire.advance(force)
-
-    kernel, history = np.ones((lags, points, points)), np.ones((lags, points))
-    lag = median(lambda: np.einsum("trk,tk->r", kernel, history, optimize=True), 9) / lags
-    one, other = steps * median(step, 200), steps * steps / 2 * lag
-    return [steps, one, other, other / one, "", ""]

@@ -1,4 +1,4 @@
-"""Thousands of contact points: the solvers of a step, and a static rough contact against tamaas."""
+"""Part of `bench contact`: thousands of points, and a static rough contact against tamaas."""
 
 from __future__ import annotations
 
@@ -17,13 +17,7 @@ from contact.texture import Texture
 from contact.tread import half_space_influence
 from runs.tabulate import Table
 
-ABOUT = "a step on up to 100 x 100 points; static rough contact on 128 x 128 against tamaas"
 ELASTIC = 5e6, 0.45
-
-
-def run() -> list[Table]:
-    """Both tables."""
-    return [_large(), _rough()]
 
 
 def median(function: Callable[[], object], repeats: int) -> float:
@@ -45,7 +39,8 @@ def _grid_case(n: int):
     return x, y, kernel
 
 
-def _large() -> Table:
+def large() -> Table:
+    """Both solvers on a textured road that moves; the last row is 100 x 100 points by projected CG."""
     rows = []
     for n in (32, 64, 100):
         x, y, kernel = _grid_case(n)
@@ -78,7 +73,8 @@ def _large() -> Table:
     )  # fmt: skip
 
 
-def _rough() -> Table:
+def rough() -> Table:
+    """128 x 128 points from nothing; tamaas, where it is installed, in the last row."""
     n = 128
     x, y, kernel = _grid_case(n)
     road = Texture(2e-4, 0.8, 0.05, 0.004, seed=2)
@@ -94,7 +90,9 @@ def _rough() -> Table:
     if importlib.util.find_spec("tamaas"):
         rows.append(_tamaas(-q.reshape(n, n), force))
     else:
-        notes.append("The package tamaas, to compare with, is not installed here.")
+        notes.append(
+            "The package tamaas, to compare with, is not installed here (pip install --no-deps tamaas)."
+        )
     columns = [("solver", ""), ("time", "ms"), ("iterations", "-"), ("residual", "-"),
                ("load", "N"), ("difference of forces", "-")]  # fmt: skip
     return Table("Static rough contact, 128 x 128 points, from nothing", columns, rows, notes)

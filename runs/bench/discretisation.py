@@ -16,7 +16,7 @@ INFLATION, DEFLECTION = 2e5, 0.005  # Pa, m
 COUNT = 20  # modes
 RATIOS = (0.45, 0.49, 0.499, 0.4995)
 # order, segments, elements_arc, elements_thickness, grading, footprint_size
-REFERENCE = (3, 40, 20, 1, "bead", 0.25)
+REFERENCE = (3, 36, 18, 1, "bead", 0.25)
 MESHES = (
     (2, 20, 8, 1, "bead", 0.25),
     (2, 30, 12, 1, "bead", 0.25),
@@ -27,7 +27,6 @@ MESHES = (
     (2, 50, 16, 1, "bead", 0.5),
     (2, 50, 16, 1, "bead", 1.0),
     (2, 100, 16, 1, "bead", 1.0),
-    (2, 20, 8, 1, "uniform", 0.25),
     (2, 30, 12, 1, "uniform", 0.25),
     (2, 50, 16, 1, "uniform", 0.25),
     (2, 30, 12, 2, "bead", 0.25),
@@ -36,7 +35,6 @@ MESHES = (
     (3, 20, 10, 1, "bead", 0.25),
     (3, 30, 12, 1, "bead", 0.25),
     (3, 20, 10, 1, "bead", 0.5),
-    (3, 20, 10, 1, "uniform", 0.25),
 )
 QUANTITIES = ("1st frequency", "20th frequency", "load", "footprint")
 DECIDING = 3  # of them: the footprint's area, known to a node or two, is told and decides nothing
@@ -61,7 +59,8 @@ def run() -> list[Table]:
     answers = {}
     for mesh in MESHES:
         answers[mesh] = _answer(_section(*mesh), consistent=mesh[4:] == ("bead", 0.25))
-        observe.say(f"  {mesh}: {answers[mesh].seconds:.1f} s")
+        errors = ", ".join(f"{e:.2g}" for e in _errors(answers[mesh], reference))
+        observe.say(f"  {mesh}: {answers[mesh].seconds:.1f} s, errors {errors} %")
     return [_meshes(answers, reference), _locking(), _masses(answers, reference)]
 
 
@@ -102,10 +101,10 @@ def _answer(section, consistent: bool = False) -> Answer:
 
 def _frequencies(operators, count: int = COUNT) -> np.ndarray:
     from modal import undamped
+    from runs.stages.modes import sites
 
-    body = operators.body
-    points = body.lattice.points(body.ids[operators.free_nodes])
-    return undamped.solve(operators.stiffness, operators.mass, count, points=points).frequency
+    where = sites(operators)
+    return undamped.solve(operators.stiffness, operators.mass, count, sites=where).frequency
 
 
 def _consistent(operators) -> np.ndarray:
@@ -172,7 +171,7 @@ def _meshes(answers: dict, reference: Answer) -> Table:
 
 def _locking() -> Table:
     """First frequency without loads, the dilatation by full and by reduced integration."""
-    meshes = [(2, 20, 8), (2, 40, 16), (3, 12, 6), (3, 24, 12)]
+    meshes = [(2, 20, 8), (2, 40, 16), (3, 16, 8)]
     rows = []
     for ratio in RATIOS:
         row: list = [ratio]

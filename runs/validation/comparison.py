@@ -74,14 +74,14 @@ class Comparison:
     def _row(self, run: Run) -> list:
         history, choice = run.history, run.choice
         head = ["all", "full FE"] if choice is None else [choice.modes, choice.residual]
-        errors = [_percent(part) for far in run.errors.values() for part in (far.mean, far.worst)]
+        errors = [percent(part) for far in run.errors.values() for part in (far.mean, far.worst)]
         gain = self.full_within(run.error).history.seconds / history.seconds
         same = [
             other.history.seconds / history.seconds
             for other in self.full
             if other.history.step == history.step
         ]
-        times = [_digits(t) for t in (history.setup, history.seconds, gain, *same)]
+        times = [digits(t) for t in (history.setup, history.seconds, gain, *same)]
         return [*head, history.step, *errors, *times, *([] if same else [""])]
 
     def verdict(self, case: str, error: float, asked: float) -> list:
@@ -97,8 +97,8 @@ class Comparison:
         reached = "yes" if within and gain >= asked else "no"
         choice = best.choice
         named = f"{choice.modes} {choice.residual}, {choice.step:g} s"
-        full = f"{reference.history.step:g} s, {_percent(reference.error):g} %"
-        return [case, 100 * error, asked, named, _percent(best.error), full, _digits(gain), reached]
+        full = f"{reference.history.step:g} s, {percent(reference.error):g} %"
+        return [case, 100 * error, asked, named, percent(best.error), full, digits(gain), reached]
 
 
 def verdicts(title: str, rows: list[list], notes: list[str]) -> Table:
@@ -116,10 +116,11 @@ def verdicts(title: str, rows: list[list], notes: list[str]) -> Table:
     return Table(title, columns, rows, notes)
 
 
-def _percent(part: float) -> float:
-    return _digits(100 * part)
+def percent(part: float) -> float:
+    """A share in %, to three digits."""
+    return digits(100 * part)
 
 
-def _digits(value: float) -> float:
+def digits(value: float) -> float:
     """Three of them: more is noise, of errors as of times."""
     return float(f"{value:.3g}")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from runs.tabulate import Table
-from runs.validation.comparison import Comparison, verdicts
-from runs.validation.histories import follow
+from runs.validation.comparison import Comparison, digits, percent, verdicts
+from runs.validation.histories import distance, follow
 from runs.validation.tires import Choice, Tires
 
 ABOUT = "a standing tire on a flat road that moves: modes against full finite elements"
@@ -32,7 +33,7 @@ youngs_modulus = 1e7
 kind = "flat"
 motion = {{ kind = "sine", amplitude = {amplitude}, frequency = 50.0 }}
 [time]
-duration = 0.1
+duration = {duration}
 step = 1e-4
 """
 AMPLITUDES = (1e-4, 2e-3)  # m: the thesis's, and one at which the contact changes
@@ -46,7 +47,12 @@ CHOICES = (
     Choice(400, "static", 1e-4),
 )
 STEPS = (2e-4, 1e-4)  # s, of the full finite elements
-MESH = {"segments": 24, "elements_arc": 10}
+MESH = {"segments": 24, "elements_arc": 10, "duration": 0.1}
+# Large motions assemble the finite elements several times a step.
+SMALL = {"segments": 16, "elements_arc": 6, "duration": 0.04}
+MOVED = (1e-4, 1e-3, 2e-3, 4e-3)  # m
+LINEARISED = Choice(150, "attachment", 2e-4)
+QUANTITIES = ("contact force", "axle force", "displacement")
 
 
 def run() -> list[Table]:
@@ -63,13 +69,52 @@ def run() -> list[Table]:
             title = f"Standing, {name}: {tires.unknowns} unknowns"
             tables.append(found.table(title))
             rows.append(found.verdict(name, 0.005, 1.0))
-    return [*tables, verdicts("Moved flat road: what was asked for", rows, [])]
+    return [*tables, verdicts("Moved flat road: what was asked for", rows, []), _linearised()]
 
 
 def _compare(tires: Tires) -> Comparison:
     session = tires.session
     full = [follow(session, *tires.full(step)) for step in STEPS]
-    found = Comparison(full, ("contact force", "axle force", "displacement"))
+    found = Comparison(full, QUANTITIES)
     for choice in CHOICES:
         found.add(choice, follow(session, *tires.modal(choice)))
     return found
+
+
+def _linearised() -> Table:
+    """Motions about the static state, small against large ones of the same elements."""
+    modes, rows = LINEARISED.modes, []
+    with tempfile.TemporaryDirectory() as folder:
+        scenes = [SCENE.format(amplitude=a, modes=modes, **SMALL) for a in MOVED]
+        tires = Tires(scenes[0], Path(folder))
+        for amplitude, scene in zip(MOVED, scenes, strict=True):
+            tires.change(scene)
+            rows += [[amplitude, *row] for row in _against_large_motions(tires)]
+    names = [part for name in QUANTITIES for part in (name, f"worst {name}")]
+    columns = [("amplitude", "m"), ("load", "N"), ("linearised tire", "")]
+    columns += [(name, "%") for name in names] + [("large motions", "s"), ("loop", "s")]
+    notes = [
+        f"Against full finite elements with large motions, {tires.unknowns} unknowns, both at steps of "
+        f"{LINEARISED.step:g} s, road moved at 50 Hz over {SMALL['duration']:g} s. Modes: {modes} with "
+        "attachment modes.",
+    ]
+    return Table("What linearising about the static state costs", columns, rows, notes)
+
+
+def _against_large_motions(tires: Tires) -> Iterator[list]:
+    """Rows of the linear full finite elements and of the modes."""
+    session, step = tires.session, LINEARISED.step
+    exact = follow(session, *tires.nonlinear(step))
+    load = exact.values["contact force"][:, 2]
+    for name, tire in (
+        ("full FE, linear", tires.full(step)),
+        ("modes", tires.modal(LINEARISED)),
+    ):
+        found = follow(session, *tire)
+        errors = []
+        for quantity in QUANTITIES:
+            pair = exact.values[quantity], found.values[quantity]
+            far = distance(*pair, SMALL["duration"])
+            errors += [percent(far.mean), percent(far.worst)]
+        times = digits(exact.seconds), digits(found.seconds)
+        yield [f"{load.min():.0f} to {load.max():.0f}", name, *errors, *times]

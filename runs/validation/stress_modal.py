@@ -16,6 +16,7 @@ from modal import undamped
 from modal.basis import Projection, project
 from modal.campbell import critical_speed, growth, onset
 from modal.rotating import checks, matrices, rotating
+from runs.stages.modes import sites
 
 COUNT = 120
 DAMPING = (0.0, 500.0, 5e3, 1e5)  # gamma1, 1/s
@@ -32,16 +33,14 @@ def rows() -> list[list]:
     loader.deflect(0.003)
     operators = Operators(body, 2e5)
     modes = _modes(operators)
-    projection = project(modes, operators.rotation(), operators.mass, MPI.COMM_SELF)
+    projection = project(modes, operators.rotation(), operators.carried, MPI.COMM_SELF)
     found += [_damped(projection, gamma) for gamma in DAMPING]
     found.append(_past_critical(projection))
     return [["modal", *row] for row in found]
 
 
 def _modes(operators: Operators) -> undamped.Modes:
-    body = operators.body
-    points = body.lattice.points(body.ids[operators.free_nodes])
-    return undamped.solve(operators.stiffness, operators.mass, COUNT, points=points)
+    return undamped.solve(operators.stiffness, operators.mass, COUNT, sites=sites(operators))
 
 
 def _double(operators: Operators) -> list:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
+from fem.nonlinear_transient import NonlinearTire
 from fem.transient import FullTire
 from greens.recursion import Recursion
 from greens.response import Response
@@ -75,22 +76,23 @@ class Tires:
         """The lowest modes with their residual between the points of the scene; step; set-up in s."""
         key = choice.modes, choice.residual
         if key not in self._responses:
-            self._responses[key] = self._respond(*key)
+            began = time.perf_counter()
+            self._responses[key] = self.response(*key), time.perf_counter() - began
         response, seconds = self._responses[key]
         began = time.perf_counter()
         kept = response.resolved(choice.step)
         tire = Recursion(kept, choice.step, "linear", self.session.comm)
         return tire, choice.step, seconds + time.perf_counter() - began
 
-    def _respond(self, count: int, residual: str) -> tuple[Response, float]:
-        """The response as the program's own stages make it, and the seconds it took."""
-        began, session = time.perf_counter(), self.session
+    def response(self, count: int, residual: str) -> Response:
+        """The response of the lowest modes, as the program's own stages make it."""
+        session = self.session
         session.modes, session.modal = self._lowest(count)
         session.state_modes = session.wheel.decouple(session.modal.projection, session.comm)
         wanted = replace(session.scene.greens, residual=residual)
         session.scene = replace(session.scene, greens=wanted)
         _, outputs, loads = greens.probes(session)
-        return make(session, outputs, loads), time.perf_counter() - began
+        return make(session, outputs, loads)
 
     def _lowest(self, count: int) -> tuple[Modes, ModalBasis]:
         """The first modes of those there are."""
@@ -115,4 +117,14 @@ class Tires:
         began = time.perf_counter()
         given = session.operators, rotation, session.speed, session.damping, step, outputs, loads
         tire = FullTire(*given, spectral_radius=RADIUS)
+        return tire, step, time.perf_counter() - began
+
+    def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
+        """The full finite elements with large motions, standing; step; set-up in s."""
+        session = self.session
+        _, outputs, loads = greens.probes(session)
+        began = time.perf_counter()
+        inflation = session.scene.static.inflation
+        given = session.operators, inflation, session.damping, step, outputs, loads
+        tire = NonlinearTire(*given, spectral_radius=RADIUS)
         return tire, step, time.perf_counter() - began

@@ -69,6 +69,20 @@ def test_flat_road_at_rest_leaves_the_tire_exactly_at_rest(run, rotation):
     assert (stages["rotating"]["status"] == "skipped") == (rotation == "")
 
 
+@pytest.mark.parametrize("wanted", [True, False])
+def test_the_load_comes_with_its_estimated_error_and_a_breakdown_of_the_time(run, wanted):
+    option = () if wanted else ("--set", "static.error_estimate=false")
+    folder, stages = run("static", FLAT, "--until", "static", *option)
+    static = stages["static"]
+    assert ("estimated error of the load" in static["indicators"]) == wanted
+    assert ("error estimate" in static["cost"]) == wanted
+    assert {"factorisation", "assembly", "solve", "other"} <= set(static["cost"])
+    assert sum(static["cost"].values()) == pytest.approx(static["seconds"], rel=0.3)
+    log = (folder / "log.txt").read_text().split("---")[-1]
+    assert ("estimated error of the load" in log) == wanted
+    assert "factorisation" in log
+
+
 def test_another_road_reuses_everything_before_it(run):
     road = FLAT.replace('kind = "flat"', 'kind = "sine"\namplitude = 1e-4\nwavelength = 0.2')
     rolling = "[rotation]\nspeed = 40.0\n"

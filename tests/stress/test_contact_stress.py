@@ -12,22 +12,41 @@ from contact.rolling import Drive, roll
 from contact.synthetic import Strip, oval_patch
 from contact.tread import half_space_compliance
 from greens.recursion import Recursion
-from runs.validation.stability import _one_mode, _row, cases
+from runs.validation.stress_contact import (
+    CRITICAL,
+    Ended,
+    cases,
+    one_mode,
+    outcome,
+    thrown_up,
+)
 
 CASES = [replace(case, steps=min(case.steps, 400)) for case in cases()]
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
 def test_case_ends_whole_or_refused(case) -> None:
-    name, steps, ended, *_ = _row(case)
-    if "critical" in name and case.strip.speed > 60:
-        assert ended == "whole" or "positive definite" in ended or "without bound" in ended
+    ended = outcome(case)
+    if "critical" in case.name and case.strip.speed > CRITICAL and ended.refused:
+        assert "positive definite" in ended.refused or "without bound" in ended.refused
     else:
-        assert ended == "whole"
+        assert not ended.refused and np.isfinite(ended.load) and ended.residual < 1e-9
+    assert ended.row[-1] != "not caught"
 
 
 def test_one_mode_one_point() -> None:
-    assert _one_mode()[2] == "whole"
+    ended = one_mode()
+    assert not ended.refused and ended.left and 0.9 < ended.growth < 1.1
+
+
+def test_thousands_of_steps_gain_no_energy() -> None:
+    ended = thrown_up(5000)
+    rise = ended.said.split("by more than ")[1].split()[0]
+    assert ended.left and float(rise) < 1e-12
+
+
+def test_what_is_not_finite_counts_as_not_caught() -> None:
+    assert Ended("made up", 1, float("nan"), 0.0, 0.0, False).row[-1] == "not caught"
 
 
 def test_states_that_turn_far_in_a_step_are_static_or_blow_up() -> None:

@@ -1,0 +1,167 @@
+"""Axle force by momentum and by the free rim (thesis (7.4)), each checking the other; both against full FE."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy import sparse
+
+from fem.operators import Operators
+from fem.receptance import receptance
+from fem.support import Support
+from fem.virtual_work import Rolling
+from greens.response import Response
+from modal import undamped
+from runs.coupling import Wheel
+from runs.stages import greens
+from runs.stages.modes import sites
+from runs.tabulate import Table
+from runs.validation.tires import Tires
+
+ABOUT = "axle force per force on the tread: by momentum, by the free rim's modes, by full finite elements"
+FREQUENCY = np.array([10.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0])  # Hz
+COUNTS = (30, 100, 300)
+
+SCENE = """
+name = "validate"
+[tire]
+segments = 20
+elements_arc = 8
+[tire.material]
+youngs_modulus = 48e6
+[damping]
+mass = 100.0
+[rotation]
+speed = {speed}
+[modal]
+count = 300
+{forces}
+[time]
+duration = 0.1
+"""
+
+# Angle around the axle and arc along the section, degrees; direction. Around where the road would be: on
+# a road a free rim topples.
+FORCES = (
+    (0.0, 0.0, (0.0, 0.0, 1.0)),
+    (6.0, 4.0, (0.0, 0.0, 1.0)),
+    (-8.0, -10.0, (0.0, 0.0, 1.0)),
+    (4.0, -5.0, (1.0, 0.0, 0.0)),
+    (0.0, 8.0, (0.0, 1.0, 0.0)),
+)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Axle force per force (f, 3, k), -, by one way, and the seconds it took."""
+
+    form: str
+    modes: int | str
+    transfer: np.ndarray
+    seconds: float
+
+
+def run() -> list[Table]:
+    """Standing and rolling."""
+    columns = [
+        ("speed", "rad/s"),
+        ("form", ""),
+        ("modes", "-"),
+        ("off full FE", "%"),
+        ("worst off full FE", "%"),
+        ("off the other form", "%"),
+        ("run time", "s"),
+    ]
+    rows = [row for speed in (0.0, 100.0) for row in _rows(speed)]
+    notes = [
+        f"Transfer functions from forces on the inflated tire's tread to the axle, {FREQUENCY[0]:g} to "
+        f"{FREQUENCY[-1]:g} Hz: relative L2, and the worst entry over the largest.",
+        "Momentum: sum of forces less the rate of momentum, modes of the clamped rim with attachment modes. "
+        "Free rim: -H_rr^-1 H_rc, modes of a rigid rim that nothing holds, with attachment modes of rim "
+        "and loads. Full FE: all unknowns of the clamped rim, frequency by frequency.",
+        "Rolling the two forms differ by the lumping of the mass too: int rho e_y x u is by full "
+        "integration in one and by the diagonal mass in the other.",
+    ]
+    return [Table("Axle force, two ways", columns, rows, notes)]
+
+
+def _rows(speed: float) -> Iterator[list]:
+    with tempfile.TemporaryDirectory() as folder:
+        forces = "\n".join(
+            f"[[force]]\nangle = {angle}\narc = {arc}\ndirection = {list(direction)}"
+            for angle, arc, direction in FORCES
+        )
+        tires = Tires(SCENE.format(speed=speed, forces=forces), Path(folder))
+        exact = _full(tires)
+        free = _free_rim(tires)
+        yield [speed, "full FE", "all", 0.0, 0.0, "", exact.seconds]
+        for count in COUNTS:
+            pair = [_momentum(tires, count), next(free)]
+            for one, other in (pair, pair[::-1]):
+                yield [
+                    speed,
+                    one.form,
+                    one.modes,
+                    *_off(one.transfer, exact.transfer),
+                    _off(one.transfer, other.transfer)[0],
+                    one.seconds,
+                ]
+
+
+def _off(found: np.ndarray, exact: np.ndarray) -> tuple[float, float]:
+    """Relative L2 and worst, %."""
+    far = found - exact
+    mean = np.linalg.norm(far) / np.linalg.norm(exact)
+    return 100 * float(mean), 100 * float(np.abs(far).max() / np.abs(exact).max())
+
+
+def _from_moment(loads: sparse.csr_matrix, moment: np.ndarray) -> np.ndarray:
+    """Sum of the unit loads less the rate of momentum, from the first moment (f, 3, k) kg m/N."""
+    total = loads.toarray().reshape(loads.shape[0], -1, 3).sum(axis=1).T
+    return total + (2 * np.pi * FREQUENCY[:, None, None]) ** 2 * moment
+
+
+def _full(tires: Tires) -> Found:
+    session = tires.session
+    _, _, loads = greens.probes(session)
+    began = time.perf_counter()
+    wheel, none = session.wheel, sparse.csr_matrix((0, loads.shape[1]))
+    full = wheel.rotating_stiffness, wheel.rotating_damping
+    moment = receptance(session.operators, *full, none, loads, FREQUENCY, moment=True)
+    return Found("full FE", "all", _from_moment(loads, moment), time.perf_counter() - began)
+
+
+def _momentum(tires: Tires, count: int) -> Found:
+    """The program's own way: its response, with the momentum of each state for an output."""
+    _, _, loads = greens.probes(tires.session)
+    began = time.perf_counter()
+    response = tires.response(count, "attachment")
+    moment: Response = replace(
+        response,
+        output=response.momentum,
+        block_output=response.block_momentum,
+        residual=np.zeros((3, loads.shape[0])),
+    )
+    transfer = _from_moment(loads, moment.receptance(FREQUENCY))
+    return Found("momentum", count, transfer, time.perf_counter() - began)
+
+
+def _free_rim(tires: Tires) -> Iterator[Found]:
+    """Modes of the same static state with its rim let go."""
+    session = tires.session
+    _, _, loads = greens.probes(session)
+    shape = Rolling(*session.rolling)
+    operators = Operators(session.body, session.scene.static.inflation, Support("free"), shape)
+    rotation = operators.rotation() if session.speed else None
+    wheel = Wheel(operators, rotation, session.speed, session.damping, "full")
+    modes = undamped.solve(operators.stiffness, operators.mass, max(COUNTS), sites=sites(operators))
+    for count in COUNTS:
+        few = replace(modes, squares=modes.squares[:count], vectors=modes.vectors[:, :count])
+        began = time.perf_counter()
+        transfer = wheel.axle(few, loads, FREQUENCY)
+        yield Found("free rim", count, transfer, time.perf_counter() - began)

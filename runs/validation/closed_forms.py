@@ -1,0 +1,22 @@
+"""Parts of the program against closed forms."""
+
+from __future__ import annotations
+
+from runs.tabulate import Table
+from runs.validation import closed_contact, closed_tire
+
+ABOUT = "tube, rings, oscillator, Hertz, punch, friction and brush against closed forms"
+
+
+def run() -> list[Table]:
+    """One table."""
+    rows = [
+        [case, found, exact, unit, 100 * abs(found / exact - 1)]
+        for package in (closed_tire, closed_contact)
+        for case, unit, found, exact in package.rows()
+    ]
+    columns = [("case", ""), ("computed", "-"), ("exact", "-"), ("unit", ""), ("error", "%")]
+    notes = [
+        "Errors are those of the discretisation: they fall with the mesh or the number of points."
+    ]
+    return [Table("Closed forms", columns, rows, notes)]

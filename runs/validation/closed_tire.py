@@ -1,0 +1,116 @@
+"""Finite elements, modes and recursion against closed forms: (case, unit, computed, exact)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from mpi4py import MPI
+from scipy import sparse
+from scipy.sparse.linalg import eigsh
+
+from fem.body import Body
+from fem.equilibrium import Equilibrium
+from fem.loading import Loader
+from fem.material import Material
+from fem.mesh import Torus
+from fem.operators import Operators
+from greens.recursion import Recursion
+from greens.response import couple
+from modal.basis import Projection, project
+from modal.rotating import matrices, rotating, standing
+from modal.undamped import Modes
+
+FLAT = 1e6  # m, radius of the section circle: what is used of the torus is a cylinder
+COMM = MPI.COMM_SELF
+
+
+def rows() -> Iterator[tuple]:
+    """All of them."""
+    yield from _tube()
+    yield from _ring(0.0)
+    yield from _ring(50.0)
+    yield from _oscillator()
+
+
+def _cylinder(outer: float, thickness: float, width: float, mesh: tuple, rubber: Material) -> Body:
+    segments, across, layers = mesh
+    section = Torus(
+        outer, FLAT, thickness, width / 2 / FLAT, segments, across, layers, 2, "uniform"
+    )
+    return Body(COMM, section, rubber)
+
+
+def _tube() -> Iterator[tuple]:
+    """Thick Mooney tube, plane strain: the middle of one with clamped ends, which leave an axial
+    strain behind that falls with one over its length: 1.9, 1.0 % more growth at 1.6, 3 m.
+
+    p = 2 (C1 + C2) [ln(a B/(b A)) + (a^2 - A^2)(a^-2 - b^-2)/2].
+    """
+    A, B = 0.25, 0.30
+    rubber = Material("mooney-rivlin", 1000.0, c10=4e5, c01=1e5, bulk_modulus=1e9)
+    body = _cylinder(B, B - A, 20.0, (8, 24, 1), rubber)
+    loader = Loader(Equilibrium(body), lambda progress: None)
+    for a in (0.26, 0.275):
+        b = np.sqrt(a * a + B * B - A * A)
+        p = 1e6 * (np.log(a * B / (b * A)) + (a * a - A * A) * (a**-2 - b**-2) / 2)
+        loader.inflate(p)
+        points = body.lattice.points(np.arange(body.lattice.size))
+        inner = (np.hypot(points[:, 0], points[:, 2]) < A + 1e-3) & (abs(points[:, 1]) < 1e-3)
+        moved = (points + body.displacement())[inner]
+        found = float(np.hypot(moved[:, 0], moved[:, 2]).mean())
+        yield f"thick Mooney tube at {p:.0f} Pa, growth of its inner radius", "m", found - A, a - A
+
+
+def _ring(speed: float) -> Iterator[tuple]:
+    """Thin free ring, inextensional, fixed frame (Endo et al. 1984); n = 2, 3, 4.
+
+    |2 n W/(n^2+1) +- sqrt{n^2 (n^2-1)^2/(n^2+1) [EI/(rho A R^4) + W^2/(n^2+1)]} - n W|.
+    """
+    R, h, E, density = 0.3, 0.003, 480e6, 1200.0
+    body = _cylinder(R + h / 2, h, h, (120, 1, 1), Material("neo-hookean", density, E, 0.0))
+    body.rim = np.array([], dtype=np.int32)
+    points = body.lattice.points(np.arange(body.lattice.size))
+    # The spin's hoop strain rho R^2 W^2/E, by a displacement that stretches nothing else.
+    out = points * [1.0, 0.0, 1.0]
+    out *= density * R**3 * speed**2 / E / np.linalg.norm(out, axis=1, keepdims=True)
+    body.set_displacement(out)
+    operators = Operators(body, 0.0)
+    modes = _soft_modes(operators)
+    rotation = operators.rotation() if speed else None
+    projection = project(modes, rotation, operators.carried, COMM)
+    states = rotating(*matrices(projection, speed, (0.0, 0.0), "full"))
+    found = np.abs(states.eigenvalue.imag) / (2 * np.pi)
+    bending = E * h**2 / (12 * density * R**4)
+    for n in (2, 3, 4):
+        root = np.sqrt(n**2 * (n**2 - 1) ** 2 / (n**2 + 1) * (bending + speed**2 / (n**2 + 1)))
+        turn = 2 * n * speed / (n**2 + 1) - n * speed
+        for sign in (1, -1) if speed else (1,):
+            closed = abs(turn + sign * root) / (2 * np.pi)
+            name = f"thin free ring at {speed:g} rad/s, n = {n} (Endo)"
+            yield name, "Hz", float(found[np.abs(found - closed).argmin()]), float(closed)
+
+
+def _soft_modes(operators: Operators) -> Modes:
+    """60 modes by SciPy: next to the ring's stiffness across, its softest bending is below what
+    modal.undamped takes for digits."""
+    size = operators.stiffness.getSize()
+    stiffness = sparse.csr_matrix(operators.stiffness.getValuesCSR()[::-1], shape=size)
+    mass = sparse.diags(operators.mass).tocsc()
+    squares, vectors = eigsh(stiffness.tocsc(), 60, mass, sigma=-1e3)
+    return Modes(squares, vectors, np.zeros(60), 0.0, 60, np.inf, 6, (size[0],), 1)
+
+
+def _oscillator() -> Iterator[tuple]:
+    """u'' + u' + u = 1 (thesis, appendix D): 1 - e^{-t/2} (cos w t + sin w t/sqrt 3), w = sqrt 3/2."""
+    one = np.ones((1, 1))
+    states = standing(Projection(np.ones(1), np.ones((3, 1))), (1.0, 0.0))
+    tire = Recursion(couple(states, one, one, np.ones((3, 1))), 0.7, "linear", COMM)
+    tire.start(np.ones(1))
+    for k in range(1, 6):
+        found = float((tire.predict() + tire.same_step @ np.ones(1))[0])
+        tire.advance(np.ones(1))
+        t, w = 0.7 * k, np.sqrt(3) / 2
+        if k in (1, 5):
+            closed = 1 - np.exp(-t / 2) * (np.cos(w * t) + np.sin(w * t) / np.sqrt(3))
+            yield f"oscillator of appendix D after {k} steps of 0.7 s", "m", found, float(closed)

@@ -1,0 +1,79 @@
+"""What `validate` measures with: distances in a band, runs judged by the reference, both tires of a scene."""
+
+import numpy as np
+import pytest
+
+from runs.tabulate import modules
+from runs.validation import rolling
+from runs.validation.comparison import Comparison
+from runs.validation.histories import History, distance, follow
+from runs.validation.moved_road import SCENE
+from runs.validation.tires import Choice, Tires
+
+DURATION = 0.1
+
+
+def signal(step: float, amplitude: float = 1.0, fast: float = 0.0) -> np.ndarray:
+    """A tone of 100 Hz on an offset, and one of 9.95 kHz."""
+    t = step * np.arange(1, round(DURATION / step) + 1)
+    values = 500 + amplitude * np.sin(2 * np.pi * 100 * t) + fast * np.sin(2 * np.pi * 9950 * t)
+    return values[:, None] * np.ones(3)
+
+
+@pytest.mark.parametrize("steps", [(1e-4, 1e-4), (2.5e-5, 1e-4), (1e-4, 2.5e-5)])
+def test_distance_is_that_of_the_band_whatever_the_steps(steps) -> None:
+    one, other = signal(steps[0]), signal(steps[1], 1.02)
+    far = distance(one, other, DURATION)
+    assert far.mean == pytest.approx(0.02, rel=1e-2)
+    assert far.worst == pytest.approx(0.02, rel=1e-2)
+
+
+def test_what_lies_above_the_band_does_not_count_nor_fold_down() -> None:
+    assert distance(signal(5e-5), signal(5e-5, fast=3.0), DURATION).mean < 1e-3
+    # Thinned out to 1e-4 s, 9.95 kHz would be seen at 50 Hz.
+    assert distance(signal(5e-5), signal(2.5e-5, fast=3.0), DURATION).mean < 1e-3
+
+
+def made(step: float, amplitude: float, seconds: float) -> History:
+    return History(step, {"contact force": signal(step, amplitude)}, seconds, 0.1)
+
+
+def test_the_fastest_run_within_an_error_is_held_against_full_elements_within_it() -> None:
+    full = [made(2e-4, 1.03, 5.0), made(1e-4, 1.004, 10.0), made(5e-5, 1.0, 20.0)]
+    found = Comparison(full, ("contact force",))
+    assert [run.error for run in found.full] == pytest.approx([0.03, 0.004, 0.004 / 3], rel=0.03)
+    found.add(Choice(10, "none", 1e-4), made(1e-4, 1.2, 0.01))
+    found.add(Choice(50, "static", 1e-4), made(1e-4, 1.008, 0.05))
+    found.add(Choice(90, "static", 1e-4), made(1e-4, 1.002, 0.1))
+    case, error, asked, best, its, _, gain, reached = found.verdict("road", 0.01, 100.0)
+    assert (best, gain, reached) == ("50 static, 0.0001 s", 200.0, "yes")
+    assert its == pytest.approx(0.8, rel=0.03)
+    assert found.verdict("road", 0.01, 300.0)[-1] == "no"
+    *_, gain, reached = found.verdict("road", 1e-4, 30.0)
+    assert (gain, reached) == (200.0, "no")
+    table = found.table("title")
+    assert all(len(row) == len(table.columns) for row in table.rows)
+
+
+def test_every_validation_says_what_it_is_about() -> None:
+    known = modules("runs.validation")
+    assert {"point_force", "moved_road", "rolling", "axle", "closed_forms", "stability"} <= set(
+        known
+    )
+    assert all(module.ABOUT for module in known.values())
+    assert hasattr(rolling, "run_large")
+
+
+def test_modes_linear_and_large_motions_agree_where_all_should(tmp_path) -> None:
+    """A small motion of the road under a coarse standing tire."""
+    mesh = {"segments": 12, "elements_arc": 4, "duration": 0.02}
+    tires = Tires(SCENE.format(amplitude=1e-5, modes=120, **mesh), tmp_path)
+    session, step = tires.session, 2e-4
+    linear = follow(session, *tires.full(step)).values["contact force"]
+    large = follow(session, *tires.nonlinear(step)).values["contact force"]
+    modal = follow(session, *tires.modal(Choice(120, "attachment", step))).values["contact force"]
+    assert np.ptp(linear[:, 2]) > 1.0
+    assert distance(large, linear, 0.02).worst < 2e-3
+    assert distance(linear, modal, 0.02).worst < 5e-3
+    few = follow(session, *tires.modal(Choice(10, "none", step))).values["contact force"]
+    assert distance(linear, few, 0.02).worst > 0.05

@@ -1,0 +1,62 @@
+"""The nonlinear tire on a road that rises by millimetres and stays: the static solver's state."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.complementarity import ActiveSet
+from contact.patch import Patch
+from contact.rolling import Drive, roll
+from fem.body import Body
+from fem.equilibrium import Equilibrium
+from fem.loading import Loader
+from fem.material import Material
+from fem.mesh import Torus
+from fem.nonlinear_transient import NonlinearTire
+from fem.operators import Operators
+from fem.probe import nodes
+from fem.state import static_state
+from fem.transient import FullTire
+
+INFLATION, STEP = 2e5, 2e-4
+DAMPING = (400.0, 0.0)
+RISE = 4e-3  # m
+
+
+def pressed(deflection: float):
+    """A loader at a deflection of a standing tire of few elements."""
+    section = Torus(0.32, 0.10, 0.012, np.radians(120), 16, 6, 1, 2, footprint_size=0.3)
+    body = Body(MPI.COMM_SELF, section, Material("neo-hookean", 1200.0, 4.8e7, 0.45))
+    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader.inflate(INFLATION)
+    loader.deflect(deflection)
+    return loader
+
+
+def patch_of(state) -> Patch:
+    """Every node of the outer face within 12 mm of the road."""
+    near = np.flatnonzero(state.gap < 0.012)
+    none = np.zeros(len(near), dtype=int)
+    places = state.positions[near], state.half_sizes[near]
+    return Patch(near, *places, state.force[near], state.gap[near], none.astype(bool), none)
+
+
+def risen(full, patch) -> float:
+    """Load (N) long after the road has risen by RISE within 10 ms."""
+    drive = Drive(lambda x, y: np.zeros(x.shape), lambda t: RISE * min(t / 0.01, 1.0), 0.0)
+    solver = ActiveSet(full.same_step)
+    *_, last = roll(full, solver, patch, drive, STEP, 500)
+    return float(last.force.sum())
+
+
+def test_a_road_that_has_risen_carries_the_static_load():
+    loader = pressed(0.002)
+    state = static_state(loader.equilibrium, loader.touch)
+    patch = patch_of(state)
+    operators = Operators(loader.body, INFLATION)
+    points = nodes(patch.index, len(state.points))
+    full = NonlinearTire(operators, INFLATION, DAMPING, STEP, points, points)
+    straight = FullTire(operators, None, 0.0, DAMPING, STEP, points, points)
+    further = pressed(0.002 + RISE)
+    assert risen(full, patch) == pytest.approx(further.load(), rel=1e-4)
+    assert abs(risen(straight, patch) / further.load() - 1) > 0.01
