@@ -22,6 +22,7 @@ from runs import observe
 from runs.bench.floors import bandwidth, exponent, fastest, flop_rate
 from runs.bench.rough_road import Mesh, prepared, write_scene
 from runs.tabulate import Table
+from runs.threads import one_blas_thread
 
 ABOUT = "cost exponents over unknowns, modes, points, steps; processes; memory; floors"
 
@@ -122,6 +123,7 @@ def _size(folder: Path, mesh: Mesh, modes: int) -> list:
     ]
 
 
+@one_blas_thread()
 def loop(sizes, states, steps) -> Table:
     """Steps of the contact loop over points, states and their number, beside a pass over memory."""
     rows = []
