@@ -146,6 +146,17 @@ def test_attachments_keep_the_modes_and_the_orthonormality() -> None:
     assert np.abs((energy - np.diag(grown.squares)) / size).max() < 1e-7
 
 
+def test_a_basis_that_grows_keeps_its_projection() -> None:
+    operators, rotation, modes, _, _ = tire()
+    comm = operators.body.comm
+    first = {**vars(modes), "squares": modes.squares[:7], "vectors": modes.vectors[:, :7]}
+    known = project(undamped.Modes(**first), rotation, operators.carried, comm)
+    whole = project(modes, rotation, operators.carried, comm)
+    grown = project(modes, rotation, operators.carried, comm, known)
+    for name, value in vars(whole).items():
+        assert np.abs(getattr(grown, name) - value).max() <= 1e-12 * np.abs(value).max(), name
+
+
 def test_direct_receptance_is_reciprocal_and_damped() -> None:
     """H_ij(Omega) = H_ji of the same wheel only when it stands; power goes in, never out."""
     made, _ = wheel(0.0)
