@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from os.path import commonprefix
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -24,7 +25,7 @@ def drawn(table: Any) -> str | None:
     kind "lines" (default): `y` columns over column `x`, a curve for every value of column `by`, axes
     logarithmic as `log` says; "front": `points` (rows like the table's), coloured by column `by`, their
     marks by column `mark` and their sizes by column `size`, the rows `front` joined and labelled by
-    column `label`, the rows `beside` as a curve of their own; "bars": column `y`, named by the columns `x`.
+    column `label`, the rows `beside` as a curve of their own; "bars": ratios of column `y`, from 1 on, named by the columns `x`.
     `targets` are lines across, `limits` upright ones: (value, text) each.
     """
     if table.plot is None:
@@ -82,9 +83,13 @@ def _lines(table: Any) -> str:
 
 
 def _shared_label(names: list[str], columns: _Columns) -> str:
-    """What several curves on one axis have in common: their unit."""
-    units = {columns.label(name).removeprefix(name).removeprefix(" in ") for name in names}
-    return units.pop() if len(units) == 1 and units != {""} else ""
+    """What several curves on one axis have in common: the words they begin with, and their unit."""
+    words = commonprefix([name.split() for name in names])
+    while words and words[-1] in ("of", "a", "the"):
+        words.pop()
+    units = {columns.label(name).removeprefix(name) for name in names}
+    unit = units.pop() if len(units) == 1 else ""
+    return " ".join(words) + unit if words else unit.removeprefix(" in ")
 
 
 @styled
@@ -157,7 +162,8 @@ def _bars(table: Any) -> str:
     figure, axes = canvas(8.0, 0.32 * len(rows) + 1.0)
     here = axes[0, 0]
     lengths = [columns.pick(row, plot["y"][0]) for row in rows]
-    here.barh(range(len(rows)), lengths, color=COLOURS[0], height=0.6)
+    ratios = [length - 1.0 for length in lengths]
+    here.barh(range(len(rows)), ratios, left=1.0, color=COLOURS[0], height=0.6)
     for k, length in enumerate(lengths):
         here.annotate(f"{length:.3g}", (length, k), (4, 0), textcoords="offset points", va="center")
     texts = [": ".join(str(columns.pick(row, name)) for name in plot["x"]) for row in rows]

@@ -19,6 +19,7 @@ from runs.bench.rough_road import (
 )
 from runs.session import Session
 from runs.tabulate import Table
+from runs.threads import one_blas_thread
 from runs.validation.histories import History, follow
 
 ABOUT = "modes x residual x step x mesh against a far finer run: the Pareto front of rolling"
@@ -122,7 +123,8 @@ def _full(session: Session, exact: History, mesh: str, step: float) -> Choice:
         points,
         points,
     )
-    found = follow(session, tire, step, 0.0)
+    with one_blas_thread():
+        found = follow(session, tire, step, 0.0)
     size = session.operators.stiffness.getSize()[0]
     off = errors(exact, found, DURATION)
     return Choice(mesh, size, FULL, 2 * size, step, found.seconds / DURATION, *off)

@@ -17,6 +17,7 @@ from greens.recursion import Recursion
 from greens.response import Response
 from runs import observe
 from runs.session import Session
+from runs.threads import one_blas_thread
 from runs.validation.histories import History, distance, follow
 
 BAND = 500.0  # Hz, up to which errors are told
@@ -164,7 +165,8 @@ def fewer_modes(session: Session, count: int, residual: str) -> Response:
 def modal(session: Session, response: Response, step: float) -> History:
     """The loop on the states that the step resolves."""
     tire = Recursion(response.resolved(step), step, "linear", MPI.COMM_SELF)
-    return follow(session, tire, step, 0.0)
+    with one_blas_thread():
+        return follow(session, tire, step, 0.0)
 
 
 def errors(reference: History, found: History, duration: float) -> tuple[float, float]:

@@ -118,7 +118,7 @@ def test_efficiency_over_processes(tmp_path, monkeypatch) -> None:
 
     def run(folder, kind, mesh, modes, count):
         seconds = alone[6] / (1 if kind == "weak" else count) * (2 if count == 4 else 1)
-        return [kind, count, mesh.segments, *alone[3:6], seconds, alone[7]]
+        return [kind, count, mesh.segments, *alone[3:6], seconds, *alone[7:]]
 
     monkeypatch.setattr(scaling, "_on", run)
     table = scaling.processes(tmp_path, TINY, 12, 5)
