@@ -40,7 +40,7 @@ class Friction:
         self._down, self._down2 = self._w.T.tocsr(), self._w2.T.tocsr()
         self._zh, self._hz = LoadedColumns(tire[:p, p:]), LoadedColumns(tire[p:, :p])
         self._hh = LoadedColumns(tire[p:, p:])
-        self.horizontal = np.zeros((w.shape[0], 2))
+        self.horizontal = self._before = np.zeros((w.shape[0], 2))
         self.turns = 0
         self._key = b""
 
@@ -55,11 +55,12 @@ class Friction:
 
     def state(self) -> dict[str, Array]:
         """What a checkpoint keeps."""
-        return self._brush.state() | {"horizontal": self.horizontal}
+        kept = {"horizontal": self.horizontal, "horizontal_before": self._before}
+        return self._brush.state() | kept
 
     def set_state(self, kept: dict[str, Array]) -> None:
         """Go on from `state`."""
-        self.horizontal = kept["horizontal"]
+        self.horizontal, self._before = kept["horizontal"], kept["horizontal_before"]
         self._brush.set_state(kept)
 
     def solve(
@@ -70,7 +71,7 @@ class Friction:
         ConvergenceError when 100 turns do not settle.
         """
         share, past = self._brush.offer()
-        horizontal = self.horizontal
+        horizontal = 2.0 * self.horizontal - self._before  # carried on linearly: a turn less
         for self.turns in range(1, TURNS + 1):
             pulled = self._w @ (self._zh @ (self._down2 @ horizontal.T.ravel()))
             force = normal.solve(q + pulled, guess, reference=static)
@@ -91,7 +92,7 @@ class Friction:
 
     def _finish(self, force: Array, moved: Array, horizontal: Array) -> None:
         answer = self._w2 @ (self._hh @ (self._down2 @ horizontal.T.ravel()))
-        self.horizontal = horizontal
+        self._before, self.horizontal = self.horizontal, horizontal
         self._brush.take(horizontal, moved + answer.reshape(2, -1).T, force > 0)
 
     def _stick_slip(

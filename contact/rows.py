@@ -109,7 +109,7 @@ class Spool:
     def rows(self) -> Rows:
         """All of them."""
         if self._open is None:
-            return ArrayRows(np.concatenate(self._blocks))
+            return ArrayRows(np.concatenate(self._blocks) if self._blocks else np.empty((0, 0)))
         self._flush()
         return FileRows(self._open, Packed(0, np.dtype(float), (self._rows, self._width)))
 

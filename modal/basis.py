@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modal.undamped import Modes, gram, multiply
+from modal.fields import gram, multiply
+from modal.undamped import Modes
 
 
 @dataclass(frozen=True)
@@ -26,29 +27,39 @@ class Projection:
     body_convective: np.ndarray | None = None
 
 
-def project(modes: Modes, rotation, carried: np.ndarray, comm) -> Projection:
+def project(
+    modes: Modes, rotation, carried: np.ndarray, comm, known: Projection | None = None
+) -> Projection:
     """Project the rotation matrices (fem.operators.Rotation, or None) and the momentum: `carried` (3, n)
-    kg of own rows, as in fem.operators. Collective.
+    kg of own rows, as in fem.operators. `known`, the projection on the first of the modes, is taken
+    over: a basis that grows costs the products with what joins it. Collective.
     """
-    vectors = modes.vectors
-
-    def reduced(matrix):
-        return gram(comm, vectors, multiply(matrix, vectors))
-
-    def skew(matrix):
-        return (matrix - matrix.T) / 2
-
-    def symmetric(matrix):
-        return (matrix + matrix.T) / 2
-
-    moved = comm.allreduce(carried @ vectors)
+    moved = comm.allreduce(carried @ modes.vectors)
     if rotation is None:
         return Projection(modes.squares, moved)
+
+    def reduced(name: str, sign: int) -> np.ndarray:
+        old = None if known is None else getattr(known, name)
+        return _reduced(comm, modes.vectors, getattr(rotation, name), sign, old)
+
     return Projection(
         modes.squares,
         moved,
-        skew(reduced(rotation.gyroscopic)),
-        symmetric(reduced(rotation.convective)),
-        skew(reduced(rotation.body)),
-        symmetric(reduced(rotation.body_convective)),
+        reduced("gyroscopic", -1),
+        reduced("convective", 1),
+        reduced("body", -1),
+        reduced("body_convective", 1),
     )
+
+
+def _reduced(comm, vectors: np.ndarray, matrix, sign: int, known: np.ndarray | None) -> np.ndarray:
+    """V^T X V (m, m), symmetric (sign 1) or skew (-1); `known` (k, k) is its upper left part."""
+    m, k = vectors.shape[1], 0 if known is None else len(known)
+    out = np.empty((m, m))
+    out[:, k:] = gram(comm, vectors, multiply(matrix, vectors[:, k:]))
+    own = out[k:, k:]
+    out[k:, k:] = (own + sign * own.T) / 2
+    out[k:, :k] = sign * out[:k, k:].T
+    if known is not None:
+        out[:k, :k] = known
+    return out

@@ -17,7 +17,7 @@ from scipy import optimize
 from slepc4py import SLEPc
 
 from fem.errors import ConvergenceError
-from modal.undamped import multiply
+from modal.fields import multiply
 
 RESIDUAL_TOLERANCE = 1e-8
 _EXTRA = 10  # states beyond the wanted ones, to end in a gap and never inside a cluster
@@ -36,6 +36,49 @@ class FullModes:
     residual: np.ndarray
     left_residual: np.ndarray
     condition: float
+
+    def among(self, wanted: np.ndarray) -> FullModes:
+        """The states where `wanted` (q,) is true."""
+        return FullModes(
+            self.eigenvalue[wanted],
+            self.right[:, wanted],
+            self.left[:, wanted],
+            self.residual[wanted],
+            self.left_residual[wanted],
+            self.condition,
+        )
+
+
+def window(
+    mass: np.ndarray,
+    drag: PETSc.Mat,
+    stiffness: PETSc.Mat,
+    span: tuple[float, float],
+    rate: float,
+    expected: int,
+) -> FullModes:
+    """All states with Im s between the two of `span`, 1/s, oscillating ones and, from 0 on, real ones.
+
+    In real arithmetic the shift stays at zero, so all below are found too, from about `expected` pairs on
+    until one lies beyond |s|^2 = Im^2 + (rate / 2)^2, `rate` 1/s the fastest damping in the window.
+    Raises ConvergenceError. Collective.
+    """
+    low, high = span
+    limit = 1.01 * np.hypot(high, rate / 2)
+    most = stiffness.getSize()[0]
+    count = min(max(expected, 1) + _EXTRA, most)
+    while True:
+        found = solve(mass, drag, stiffness, count)
+        if np.abs(found.eigenvalue).max() > limit or count == most:
+            break
+        count = min(2 * count, most)
+    inside = (found.eigenvalue.imag >= low) & (found.eigenvalue.imag <= high)
+    if not inside.any():
+        raise ConvergenceError(
+            f"rotating: no state from {low / (2 * np.pi):.4g} to {high / (2 * np.pi):.4g} Hz. Widen "
+            "rotation.window."
+        )
+    return found.among(inside)
 
 
 def solve(mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -> FullModes:

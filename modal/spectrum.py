@@ -50,7 +50,7 @@ class Spectrum:
         self.size = sum(matrix.shape[0] for matrix in matrices)
         self.bound = 1.001 * max(float(abs(matrix).sum(axis=1).max()) for matrix in matrices)
 
-    def _shared(self, tasks: int, work: Callable[[int], np.ndarray]) -> list[np.ndarray]:
+    def shared(self, tasks: int, work: Callable[[int], np.ndarray]) -> list[np.ndarray]:
         """The results of all tasks on every process, each computed by one of them. Collective."""
         mine = {task: work(task) for task in range(self.comm.rank, tasks, self.comm.size)}
         everyone = self.comm.allgather(mine)
@@ -67,7 +67,7 @@ class Spectrum:
             shifted.destroy()
             return np.append(estimates, negative)
 
-        found = self._shared(len(self.matrices), work)
+        found = self.shared(len(self.matrices), work)
         negative = int(sum(one[-1] for one in found))
         return Bottom(zero, negative, np.sort(np.concatenate([one[:-1] for one in found])))
 
@@ -80,7 +80,7 @@ class Spectrum:
             shifted.destroy()
             return negative
 
-        return np.array(self._shared(len(self.matrices), work))
+        return np.array(self.shared(len(self.matrices), work))
 
     def boundaries(
         self, bottom: Bottom, count: int, limit: float

@@ -10,15 +10,16 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from fem.errors import ConvergenceError
-from modal.spectrum import Bottom, Slice, Spectrum
+from modal.circulant import Ring, Wave, repeated
+from modal.fields import CHUNK, collect, everywhere, gram, multiply, scaled_by
+from modal.lanczos import Interval
+from modal.spectrum import ZERO, Bottom, Slice, Spectrum
 from modal.symmetry import Sites, sectors
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
 ORTHONORMALITY_TOLERANCE = 1e-10
-_REPAIR = (
-    1e-12  # vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product
-)
-_CHUNK = 64  # columns a matrix product: no second copy of all vectors
+# Vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product.
+_REPAIR = 1e-12
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,9 @@ class Modes:
     """The lowest m modes. `squares` omega^2 (m,) 1/s2 ascending; `vectors` this process's rows (n, m)
     of the mass-normalised shapes, kg^-1/2; `residual` (m,) ||K phi - lambda M phi|| / ||lambda M phi||;
     `inertia_count` eigenvalues below `counted_below` (1/s2) by Sylvester's law, equal to the number
-    found there; `rigid` modes without stiffness, whose square is 0, among them; `sectors` sizes of the independent problems
-    that mirror planes split it into, `slices` intervals solved.
+    found there; `rigid` modes without stiffness, whose square is 0, among them; `sectors` sizes of the
+    independent problems that mirror planes or wave numbers split it into, `slices` intervals solved;
+    `segments` equal ones around the axle, 1 where there are none that hold the matrix.
     """
 
     squares: np.ndarray
@@ -39,6 +41,7 @@ class Modes:
     rigid: int
     sectors: tuple[int, ...]
     slices: int
+    segments: int = 1
 
     @property
     def frequency(self) -> np.ndarray:
@@ -58,19 +61,27 @@ def solve(
     mass (own rows) in kg; at least one of the two is given.
 
     The diagonal mass turns the pencil into the standard problem of A = M^-1/2 K M^-1/2. With the
-    `sites` of its own unknowns, mirror planes that A has split it (modal.symmetry); each part
-    is sliced by inertia (modal.spectrum) and solved by block Lanczos (modal.lanczos). Every process
-    holds a copy of A. Raises ConvergenceError when a mode is missing, inaccurate or unstable.
-    Collective.
+    `sites` of its own unknowns, equal segments split it by wave number into small dense problems
+    (modal.circulant), or else mirror planes (modal.symmetry) into parts that are sliced by inertia
+    (modal.spectrum) and solved by block Lanczos (modal.lanczos). Every process holds a copy of A.
+    Raises ConvergenceError when a mode is missing, inaccurate or unstable. Collective.
     """
     comm = stiffness.comm.tompi4py()
     size = stiffness.getSize()[0]
-    scaled = _scaled(stiffness, mass)
-    whole = _everywhere(scaled)
-    bases = [sparse.identity(size, format="csr")]
+    scaled = scaled_by(stiffness, mass)
+    whole = everywhere(scaled)
+    wanted = min(count or size, size), (2 * np.pi * up_to) ** 2
+    bases, modes = [sparse.identity(size, format="csr")], None
     if sites is not None:
-        bases = sectors(whole, sites.everywhere(comm))
-    modes = _solve(scaled, whole, bases, mass, min(count or size, size), (2 * np.pi * up_to) ** 2)
+        all_sites = sites.everywhere(comm)
+        ring = repeated(whole, all_sites)
+        if ring is not None:
+            modes = _by_waves(scaled, whole, ring, mass, *wanted)
+        if modes is not None and modes.residual.max(initial=0.0) <= RESIDUAL_TOLERANCE:
+            scaled.destroy()
+            return _checked(modes)
+        bases = sectors(whole, all_sites)
+    modes = _solve(scaled, whole, bases, mass, *wanted)
     if len(bases) > 1 and modes.residual.max(initial=0.0) > RESIDUAL_TOLERANCE:
         # Mirror symmetric to the tolerance, and yet too coarsely for the lowest modes: do not split.
         whole_basis = [sparse.identity(size, format="csr")]
@@ -80,32 +91,95 @@ def solve(
 
 
 def _solve(scaled, whole, bases, mass, count: int, limit: float) -> Modes:
+    """By slices of the independent problems that the isometries `bases` leave. Collective."""
     comm = scaled.comm.tompi4py()
     spectrum = Spectrum(comm, [(basis.T @ whole @ basis).tocsr() for basis in bases])
     bottom = spectrum.bottom()
     _check_stable(bottom)
     boundaries = spectrum.boundaries(bottom, count, limit)
-    top, inertia = boundaries[-1][0], int(boundaries[-1][1].sum())
-    if inertia == 0:
-        raise ConvergenceError(
-            f"modes: the tire has no mode below {np.sqrt(top) / (2 * np.pi):.4g} Hz. Raise modal.up_to."
-        )
+    proof = _Proof(bottom, boundaries[-1][0], int(boundaries[-1][1].sum()))
     found = spectrum.slices(boundaries)
+    return _together(scaled, bases, mass, count, found, proof)
+
+
+@dataclass(frozen=True)
+class _Proof:
+    """What inertia says: next to zero, and how many eigenvalues lie below `top`."""
+
+    bottom: Bottom
+    top: float
+    inertia: int
+
+
+def _by_waves(scaled, whole, ring: Ring, mass, count: int, limit: float) -> Modes | None:
+    """By the wave numbers of equal segments; None when inertia does not bear them out. Collective."""
+    comm = scaled.comm.tompi4py()
+    spectrum = Spectrum(comm, [whole])
+    values = spectrum.shared(len(ring.waves), ring.values)
+    twice = [np.repeat(own, 1 if ring.single(n) else 2) for n, own in enumerate(values)]
+    every = np.sort(np.concatenate(twice))
+    zero = ZERO * spectrum.bound
+    bottom = Bottom(zero, int((every < -zero).sum()), every[: 8 + int((every < -zero).sum())])
+    _check_stable(bottom)
+    inside = min(count, int(np.searchsorted(every, limit)))
+    top = min(_just_above(every, inside, spectrum.bound), limit) if inside else limit
+    proof = _Proof(bottom, top, int(spectrum.below(top).sum()))
+    if proof.inertia != np.searchsorted(every, top):
+        return None
+    found = []
+    for n, own in enumerate(twice):
+        wanted = int(np.searchsorted(own, top))
+        owner = n % comm.size
+        vectors = None
+        if wanted and owner == comm.rank:
+            vectors = ring.vectors(n, wanted if ring.single(n) else wanted // 2)
+        found.append(Slice(n, Interval(-zero, top, wanted), owner, own[:wanted], vectors))
+    found = [one for one in found if one.interval.count]
+    bases = [Wave(ring, n) for n in ring.waves]
+    return _together(scaled, bases, mass, count, found, proof, ring.segments)
+
+
+def _just_above(every: np.ndarray, count: int, bound: float) -> float:
+    """A value in the gap after the lowest `count`, pairs not parted."""
+    beyond = every[count:][every[count:] > every[count - 1] * (1 + 1e-6)]
+    return (every[count - 1] + beyond[0]) / 2 if len(beyond) else bound
+
+
+def _together(
+    scaled, bases, mass, count: int, found: list[Slice], proof: _Proof, segments: int = 1
+) -> Modes:
+    """The lowest `count` modes of all slices, orthonormal, with their residuals. Collective."""
+    comm, bottom = scaled.comm.tompi4py(), proof.bottom
+    if proof.inertia == 0:
+        raise ConvergenceError(
+            f"modes: the tire has no mode below {np.sqrt(proof.top) / (2 * np.pi):.4g} Hz. Raise "
+            "modal.up_to."
+        )
     values = np.concatenate([one.values for one in found])
     order = np.argsort(values, kind="stable")[:count]
-    vectors = _collect(scaled, bases, found, order)
+    vectors = collect(scaled, bases, found, order)
     matrix = np.concatenate([np.full(len(one.values), one.matrix) for one in found])[order]
     defect = _orthonormalise(comm, vectors, matrix)
     squares = values[order]
     rigid = int((squares <= bottom.zero).sum())
     squares[:rigid] = 0.0
-    scale = squares[
-        min(rigid, len(squares) - 1)
-    ]  # a rigid mode is measured by the first flexible one
+    # A rigid mode is measured by the first flexible one.
+    scale = squares[min(rigid, len(squares) - 1)]
     residual = _residuals(scaled, squares, vectors, max(scale, bottom.zero))
     vectors /= np.sqrt(mass)[:, None]
     parts = tuple(basis.shape[1] for basis in bases)
-    return Modes(squares, vectors, residual, defect, inertia, top, rigid, parts, len(found))
+    return Modes(
+        squares,
+        vectors,
+        residual,
+        defect,
+        proof.inertia,
+        proof.top,
+        rigid,
+        parts,
+        len(found),
+        segments,
+    )
 
 
 def _checked(modes: Modes) -> Modes:
@@ -135,49 +209,6 @@ def _check_stable(bottom: Bottom) -> None:
         )
 
 
-def _scaled(stiffness: PETSc.Mat, mass: np.ndarray) -> PETSc.Mat:
-    scaled = stiffness.copy()
-    roots = scaled.createVecLeft()
-    roots.array[:] = 1 / np.sqrt(mass)
-    scaled.diagonalScale(roots, roots)
-    scaled.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    roots.destroy()
-    return scaled
-
-
-def _everywhere(matrix: PETSc.Mat) -> sparse.csr_matrix:
-    """The whole matrix on every process. Collective."""
-    size = matrix.getSize()[0]
-    every = PETSc.IS().createStride(size, first=0, step=1, comm=PETSc.COMM_SELF)
-    (whole,) = matrix.createSubMatrices(every, every)
-    rows, columns, values = whole.getValuesCSR()
-    every.destroy()
-    whole.destroy()
-    return sparse.csr_matrix((values, columns, rows), (size, size))
-
-
-def _collect(matrix: PETSc.Mat, bases, found: list[Slice], order: np.ndarray) -> np.ndarray:
-    """This process's rows of the vectors in the given order, each slice sent by its owner. Collective."""
-    comm = matrix.comm.tompi4py()
-    ranges = matrix.getOwnershipRanges()
-    column = np.full(sum(len(one.values) for one in found), -1)
-    column[order] = np.arange(len(order))
-    vectors = np.empty((ranges[comm.rank + 1] - ranges[comm.rank], len(order)), order="F")
-    start = 0
-    for one in found:
-        place = column[start : start + len(one.values)]
-        start += len(one.values)
-        wanted = place >= 0
-        if not wanted.any():
-            continue
-        parts = None
-        if one.owner == comm.rank:
-            full = bases[one.matrix] @ one.vectors[:, wanted]
-            parts = [full[low:high] for low, high in zip(ranges, ranges[1:], strict=False)]
-        vectors[:, place[wanted]] = comm.scatter(parts, root=one.owner)
-    return vectors
-
-
 def _orthonormalise(comm: MPI.Comm, vectors: np.ndarray, matrix: np.ndarray) -> float:
     """Worst entry of V^T V - 1 after a correction where slices meet, in place. Collective.
 
@@ -202,29 +233,9 @@ def _residuals(
     scaled: PETSc.Mat, values: np.ndarray, vectors: np.ndarray, least: float
 ) -> np.ndarray:
     squares = np.empty(len(values))
-    for start in range(0, len(values), _CHUNK):
-        some = slice(start, start + _CHUNK)
+    for start in range(0, len(values), CHUNK):
+        some = slice(start, start + CHUNK)
         defect = multiply(scaled, vectors[:, some]) - vectors[:, some] * values[some]
         squares[some] = (defect**2).sum(axis=0)
     squares = scaled.comm.tompi4py().allreduce(squares)
     return np.sqrt(squares) / np.maximum(values, least)
-
-
-def multiply(matrix: PETSc.Mat, vectors: np.ndarray) -> np.ndarray:
-    """This process's rows of matrix @ vectors, vectors given by rows (n, m). Collective."""
-    rows, columns = vectors.shape
-    out = np.empty((rows, columns), order="F")
-    for start in range(0, columns, _CHUNK):
-        some = np.asfortranarray(vectors[:, start : start + _CHUNK])
-        sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, some.shape[1]))
-        dense = PETSc.Mat().createDense(sizes, array=some, comm=matrix.comm)
-        product = matrix.matMult(dense)
-        out[:, start : start + _CHUNK] = product.getDenseArray()
-        product.destroy()
-        dense.destroy()
-    return out
-
-
-def gram(comm: MPI.Comm, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """left^T right over all processes, rows distributed alike. Collective."""
-    return comm.allreduce(left.T @ right)

@@ -32,7 +32,10 @@ def balance(session: Session, loop: Loop, contact: float, driven: float, step: f
         "energy left in the modes": (left, "J"),
         "lost, less the work of the drive": (work - left, "J"),
     }
-    observe.say(f"  energy: {work:.4g} J came into the tire, {left:.4g} J are left in its modes")
+    observe.say(
+        f"  energy: {work:.4g} J came into the tire, {left:.4g} J are left in its modes, "
+        f"{work - left:.4g} J were lost{' less what the drive put in' if session.speed else ''}"
+    )
     if session.speed == 0 and left > work + 1e-3 * abs(work) + 1e-9:
         session.record.warnings.append(
             "the standing tire holds more energy than was put in: take a smaller time.step, or "

@@ -90,7 +90,7 @@ class Wheel:
         same = outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
-            whole = self._attached(modes, probes)
+            whole = self._attached(basis, modes, probes)
         else:
             shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
@@ -103,11 +103,12 @@ class Wheel:
         full = self.rotating_stiffness, self.rotating_damping
         return static_shapes(self.operators, *full, probes)
 
-    def _attached(self, modes: Modes, probes: sparse.csr_matrix) -> Response:
+    def _attached(self, basis: Basis, modes: Modes, probes: sparse.csr_matrix) -> Response:
         """Response of the modes and the attachment modes of all probes. Collective."""
         if not self._drifts:
             shapes = self._static_shapes(probes)
-            return self._grown(modes, shapes.columns).couple(probes, probes, shapes.compliance)
+            grown = self._grown(modes, shapes.columns, basis.projection)
+            return grown.couple(probes, probes, shapes.compliance)
         return self._standing_attachments(modes, probes).couple(probes, probes)
 
     @property
@@ -135,11 +136,11 @@ class Wheel:
         turning = self.speed, self.damping[0]
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
-    def _grown(self, modes: Modes, columns: np.ndarray) -> Basis:
-        """The basis with attachment modes. Collective."""
+    def _grown(self, modes: Modes, columns: np.ndarray, known: Projection | None = None) -> Basis:
+        """The basis with attachment modes; `known` is the projection on the modes. Collective."""
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
-        projection = project(grown, self.rotation, operators.carried, comm)
+        projection = project(grown, self.rotation, operators.carried, comm, known)
         shape = operators.trace(grown.vectors)
         return Basis(shape, projection, self.decouple(projection, comm))
 

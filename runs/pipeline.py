@@ -116,9 +116,20 @@ def _report(directory: Path, summary: Summary) -> None:
 
 def _check_options(petsc_options: list[str]) -> None:
     """An option that nothing read is most likely misspelt: say so."""
+    unused = [o for o in petsc_options if o.startswith("-") and not _was_read(o.lstrip("-"))]
+    if unused:
+        observe.warn(f"PETSc options that nothing read: {' '.join(unused)}")
+
+
+def _was_read(name: str) -> bool:
+    """Whether PETSc has looked for an option; petsc4py tells it from 3.19 on."""
+    import ctypes
+
     from petsc4py import PETSc
 
     options = PETSc.Options()
-    unused = [o for o in petsc_options if o.startswith("-") and not options.used(o.lstrip("-"))]
-    if unused:
-        observe.warn(f"PETSc options that nothing read: {' '.join(unused)}")
+    if hasattr(options, "used"):
+        return options.used(name)
+    found = ctypes.c_int(0)
+    ctypes.CDLL(PETSc.__file__).PetscOptionsUsed(None, name.encode(), ctypes.byref(found))
+    return bool(found.value)

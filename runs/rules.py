@@ -43,6 +43,7 @@ def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise InputError for the first contradiction between keys or tables."""
     _geometry(scene, error)
     _static(scene, raw, error)
+    _rotation(scene, error)
     _modal(scene, error)
     if scene.contact is not None:
         _contact(scene, error)
@@ -95,6 +96,19 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
     if len(given) > 1:
         raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
+
+
+def _rotation(scene: Scene, error: Where) -> None:
+    rotation = scene.rotation
+    if rotation is None or not any(rotation.window):
+        return
+    low, high = rotation.window
+    if low >= high:
+        raise error(("rotation", "window"), f"= [{low:g}, {high:g}] Hz must ascend")
+    if rotation.method != "full":
+        raise error(
+            ("rotation", "window"), 'is of method = "full": the projected one finds all states'
+        )
 
 
 def _modal(scene: Scene, error: Where) -> None:

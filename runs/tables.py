@@ -146,6 +146,13 @@ class Rotation:
     inertia: str = choice("full", ("full", "doppler"), "doppler: without Coriolis, centrifugal")
     method: str = choice("projected", ("projected", "full"), "second eigenproblem")
     count: int = integer(40, "pairs wanted of method full", least=1, most=10000)
+    window: tuple[float, float] = vector(
+        (0.0, 0.0),
+        "Hz",
+        "from, to: all states of method full in it; 0, 0: count",
+        least=0,
+        most=1e6,
+    )
     rolling_radius: float | None = number(
         None, "m", "effective; absent: from the static state", above=0, most=10
     )

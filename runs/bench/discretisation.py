@@ -36,13 +36,15 @@ MESHES = (
     (3, 30, 12, 1, "bead", 0.25),
     (3, 20, 10, 1, "bead", 0.5),
 )
-QUANTITIES = ("1st frequency", "20th frequency", "load", "footprint")
-DECIDING = 3  # of them: the footprint's area, known to a node or two, is told and decides nothing
+QUANTITIES = ("1st frequency", "20th frequency", "load", "footprint length")
+DECIDING = (
+    3  # of them: the footprint is known to a part of an element; it is told and decides nothing
+)
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What one mesh gives: `values` as in QUANTITIES (Hz, Hz, N, m2), of `unknowns` in `seconds`."""
+    """What one mesh gives: `values` as in QUANTITIES (Hz, Hz, N, m), of `unknowns` in `seconds`."""
 
     unknowns: int
     seconds: float
@@ -94,7 +96,7 @@ def _answer(section, consistent: bool = False) -> Answer:
     loader.deflect(DEFLECTION)
     state = static_state(equilibrium, loader.touch)
     seconds = MPI.COMM_WORLD.allreduce(time.perf_counter() - began, op=MPI.MAX)
-    values = np.array([modes[0], modes[-1], state.load, state.footprint().area])
+    values = np.array([modes[0], modes[-1], state.load, state.footprint().length])
     other = _consistent(operators) if consistent else None
     return Answer(3 * body.lattice.size, seconds, values, other)
 
@@ -162,7 +164,7 @@ def _meshes(answers: dict, reference: Answer) -> Table:
             f"Time: static state and {COUNT} modes of the inflated tire, one after the other; forms "
             "compiled before. Worst: of both frequencies and the load.",
             f"Reference: order {REFERENCE[0]}, {REFERENCE[1]} x {REFERENCE[2]}, "
-            f"{reference.unknowns} unknowns, {reference.seconds:.1f} s: {exact} (Hz, Hz, N, m2).",
+            f"{reference.unknowns} unknowns, {reference.seconds:.1f} s: {exact} (Hz, Hz, N, m).",
             f"Pareto-best: {best}.",
         ],
         {"x": "time", "y": ["worst"], "log": "xy", "by": "family"},

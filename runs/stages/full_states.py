@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from modal import quadratic
+from modal.fields import gram
 from modal.quadratic import FullModes, truncation
 from modal.rotating import StateModes
-from modal.undamped import gram
 from runs.session import Session
 
 _ROUNDING = 1e-14  # of the largest squared length: directions below are the fields' rounding
@@ -23,17 +23,30 @@ def compute(session: Session, projected: StateModes) -> StateModes:
     """Solve, put the fields into `session.modal`, and say how far the projected states are off. Collective."""
     operators, wheel = session.operators, session.wheel
     with session.record.timing("full eigensolver"):
-        found = quadratic.solve(
-            operators.mass,
-            wheel.rotating_damping,
-            wheel.rotating_stiffness,
-            session.scene.rotation.count,
-        )
+        pencil = operators.mass, wheel.rotating_damping, wheel.rotating_stiffness
+        found = _solve(session, pencil, projected.eigenvalue)
     basis, coordinates = _orthonormal(session, found)
     momenta = session.comm.allreduce(operators.carried @ basis)
     replace_basis(session, operators.trace(basis), momenta)
     _compare(session, found, projected)
     return _states(found, coordinates)
+
+
+def _solve(session: Session, pencil, projected: np.ndarray) -> FullModes:
+    """As many pairs as the scene wants, or all in its window. Collective."""
+    wanted, (mass, stiffness) = session.scene.rotation, session.damping
+    if not any(wanted.window):
+        return quadratic.solve(*pencil, wanted.count)
+    low, high = (2 * np.pi * f for f in wanted.window)
+    rate = mass + stiffness * high**2
+    below = int((np.abs(projected) <= np.hypot(high, rate / 2)).sum())
+    found = quadratic.window(*pencil, (low, high), rate, below)
+    inside = int(((projected.imag >= low) & (projected.imag <= high)).sum())
+    session.record.indicators |= {
+        "states in the window": (len(found.eigenvalue), "-"),
+        "projected states in the window": (inside, "-"),
+    }
+    return found
 
 
 def _orthonormal(session: Session, found: FullModes) -> tuple[np.ndarray, np.ndarray]:

@@ -50,8 +50,11 @@ def compute(session: Session, path: Path) -> None:
         "modes": (len(modes.squares), "-"),
         "lowest": (float(modes.frequency[0]), "Hz"),
         "highest": (float(modes.frequency[-1]), "Hz"),
-        "mirror planes": (len(modes.sectors).bit_length() - 1, "-"),
     }
+    if modes.segments > 1:
+        record.headline["equal segments, solved by wave number"] = (modes.segments, "-")
+    else:
+        record.headline["mirror planes"] = (len(modes.sectors).bit_length() - 1, "-")
     record.indicators |= {
         "worst residual": (float(modes.residual.max()), "-"),
         "orthonormality": (modes.orthonormality, "-"),

@@ -35,7 +35,7 @@ def inputs(session: Session) -> dict:
         "speed": session.speed,
         "inertia": wanted.inertia,
         "campbell": asdict(wanted.campbell) if wanted.campbell else None,
-        "full": wanted.count if wanted.method == "full" else None,
+        "full": (wanted.count, wanted.window) if wanted.method == "full" else None,
     }
 
 

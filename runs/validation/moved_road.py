@@ -66,9 +66,8 @@ def run() -> list[Table]:
             tires.change(scene)
             found = _compare(tires)
             name = f"flat road moved by {1e3 * amplitude:g} mm at 50 Hz"
-            title = f"Standing, {name}: {tires.unknowns} unknowns"
-            tables.append(found.table(title))
-            rows.append(found.verdict(name, 0.005, 1.0))
+            tables.append(found.table(f"Standing, {name}: {tires.setting}"))
+            rows.append(found.verdict(name, 0.005, 1.0, tires.modes_seconds))
     return [*tables, verdicts("Moved flat road: what was asked for", rows, []), _linearised()]
 
 

@@ -64,8 +64,7 @@ class Ended:
     def row(self) -> list:
         """Package, case, what happened, how it was caught."""
         if self.refused:
-            what, _, caught = self.refused.partition(": ")
-            return ["contact", self.name, f"refused: {what}", caught or "not caught"]
+            return ["contact", self.name, "refused", self.refused.removeprefix("contact: ")]
         if not np.isfinite(self.load):
             return ["contact", self.name, "NaN", "not caught"]
         what = f"{self.steps} steps, load to {self.load:.4g} N"

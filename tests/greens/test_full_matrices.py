@@ -17,6 +17,7 @@ from fem.operators import Operators
 from greens.truncation import Cutoff, estimate
 from modal import undamped
 from modal.basis import project
+from modal.fields import gram, multiply
 from runs.coupling import Basis, Wheel
 
 MATERIAL = {
@@ -137,12 +138,23 @@ def test_attachments_keep_the_modes_and_the_orthonormality() -> None:
     assert len(grown.squares) == COUNT + len(SPOTS)
     assert grown.squares[COUNT:].min() > modes.squares[-1]
     weighted = operators.mass[:, None] * grown.vectors
-    unit = undamped.gram(comm, grown.vectors, weighted)
+    unit = gram(comm, grown.vectors, weighted)
     assert np.abs(unit - np.eye(len(unit))).max() < 1e-10
-    product = undamped.multiply(operators.stiffness, grown.vectors)
-    energy = undamped.gram(comm, grown.vectors, product)
+    product = multiply(operators.stiffness, grown.vectors)
+    energy = gram(comm, grown.vectors, product)
     size = np.sqrt(np.outer(grown.squares, grown.squares))
     assert np.abs((energy - np.diag(grown.squares)) / size).max() < 1e-7
+
+
+def test_a_basis_that_grows_keeps_its_projection() -> None:
+    operators, rotation, modes, _, _ = tire()
+    comm = operators.body.comm
+    first = {**vars(modes), "squares": modes.squares[:7], "vectors": modes.vectors[:, :7]}
+    known = project(undamped.Modes(**first), rotation, operators.carried, comm)
+    whole = project(modes, rotation, operators.carried, comm)
+    grown = project(modes, rotation, operators.carried, comm, known)
+    for name, value in vars(whole).items():
+        assert np.abs(getattr(grown, name) - value).max() <= 1e-12 * np.abs(value).max(), name
 
 
 def test_direct_receptance_is_reciprocal_and_damped() -> None:

@@ -8,6 +8,7 @@ from scipy import sparse
 
 from fem.errors import ConvergenceError
 from modal import undamped
+from modal.fields import gram, multiply
 from modal.symmetry import Sites
 
 COMM = MPI.COMM_WORLD
@@ -21,10 +22,10 @@ def ones(size: int, unit: int = 1) -> np.ndarray:
 
 def checked(matrix, mass, modes: undamped.Modes) -> None:
     """Residual and orthonormality, measured here once more with the unscaled matrices."""
-    product = undamped.multiply(matrix, modes.vectors)
+    product = multiply(matrix, modes.vectors)
     weighted = mass[:, None] * modes.vectors
     np.testing.assert_allclose(
-        undamped.gram(COMM, modes.vectors, weighted), np.eye(len(modes.squares)), atol=1e-10
+        gram(COMM, modes.vectors, weighted), np.eye(len(modes.squares)), atol=1e-10
     )
     defect = COMM.allreduce(((product - weighted * modes.squares) ** 2).sum(axis=0))
     assert np.sqrt(defect).max() <= 1e-8 * max(modes.squares.max(), 1.0)

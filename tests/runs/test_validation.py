@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from contact.model import step_solver
+from contact.rolling import Drive, Loop, roll
 from runs.tabulate import modules
 from runs.validation import rolling
 from runs.validation.comparison import Comparison
@@ -45,11 +47,12 @@ def test_the_fastest_run_within_an_error_is_held_against_full_elements_within_it
     found.add(Choice(10, "none", 1e-4), made(1e-4, 1.2, 0.01))
     found.add(Choice(50, "static", 1e-4), made(1e-4, 1.008, 0.05))
     found.add(Choice(90, "static", 1e-4), made(1e-4, 1.002, 0.1))
-    case, error, asked, best, its, _, gain, reached = found.verdict("road", 0.01, 100.0)
+    *_, best, its, _, gain, pays, reached = found.verdict("road", 0.01, 100.0, 30.0)
     assert (best, gain, reached) == ("50 static, 0.0001 s", 200.0, "yes")
+    assert pays == pytest.approx(0.1 * 30.0 / (10.0 - 0.05), rel=1e-2)
     assert its == pytest.approx(0.8, rel=0.03)
-    assert found.verdict("road", 0.01, 300.0)[-1] == "no"
-    *_, gain, reached = found.verdict("road", 1e-4, 30.0)
+    assert found.verdict("road", 0.01, 300.0, 30.0)[-1] == "no"
+    *_, gain, _, reached = found.verdict("road", 1e-4, 30.0, 30.0)
     assert (gain, reached) == (200.0, "no")
     table = found.table("title")
     assert all(len(row) == len(table.columns) for row in table.rows)
@@ -64,10 +67,35 @@ def test_every_validation_says_what_it_is_about() -> None:
     assert hasattr(rolling, "run_large")
 
 
-def test_modes_linear_and_large_motions_agree_where_all_should(tmp_path) -> None:
+@pytest.fixture(scope="module")
+def tires(tmp_path_factory) -> Tires:
     """A small motion of the road under a coarse standing tire."""
     mesh = {"segments": 12, "elements_arc": 4, "duration": 0.02}
-    tires = Tires(SCENE.format(amplitude=1e-5, modes=120, **mesh), tmp_path)
+    return Tires(SCENE.format(amplitude=1e-5, modes=120, **mesh), tmp_path_factory.mktemp("tires"))
+
+
+def test_full_elements_in_contact_go_on_from_a_checkpoint_with_the_same_bits(tires) -> None:
+    session, step = tires.session, 2e-4
+    patch = session.patch
+    drive = Drive(session.road.height, session.motion, 0.0)
+
+    def loop() -> Loop:
+        tire, *_ = tires.full(step)
+        return Loop(tire, step_solver(session.scene.contact, patch, tire.same_step))
+
+    def forces(of: Loop, steps: int, done: int = 0) -> np.ndarray:
+        instants = roll(of.tire, of.solver, patch, drive, step, steps, None, done)
+        return np.stack([instant.force for instant in instants])
+
+    whole = forces(loop(), 40)
+    broken, again = loop(), loop()
+    forces(broken, 25)
+    again.restore(broken.snapshot())
+    assert np.array_equal(forces(again, 40, 25), whole[25:])
+    assert np.ptp(whole[25:].sum(axis=1)) > 0.1
+
+
+def test_modes_linear_and_large_motions_agree_where_all_should(tires) -> None:
     session, step = tires.session, 2e-4
     linear = follow(session, *tires.full(step)).values["contact force"]
     large = follow(session, *tires.nonlinear(step)).values["contact force"]

@@ -1,5 +1,7 @@
 """The modal keys of a scene through the whole program."""
 
+import json
+
 import h5py
 import numpy as np
 import pytest
@@ -104,6 +106,32 @@ def test_round_tire_names_its_modes(launch, folder):
         pair = frequency[(wave == n) & (section == 0)]
         assert len(pair) == 2
         assert pair[1] == pytest.approx(pair[0], rel=1e-6)
+
+
+def test_full_states_in_a_window(launch, folder):
+    """All of the projected ones between two frequencies, and none beside them."""
+    run(launch, folder, "window", method="full", more="window = [60.0, 100.0]")
+    run(launch, folder, "projected")
+    inside = read(folder, "window", "rotating.h5", "frequency")
+    every = read(folder, "projected", "rotating.h5", "frequency")
+    wanted = np.sort(every[(every >= 60.0) & (every <= 100.0)])
+    assert len(wanted) > 4
+    np.testing.assert_allclose(np.sort(inside), wanted, rtol=1e-3)
+    indicators = json.loads((folder / "window" / "summary.json").read_text())["stages"]["rotating"]
+    error = indicators["indicators"]["truncation error of the projected eigenvalues"]["value"]
+    assert 0 < error < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("method", "window", "words"),
+    [("full", "[9.0, 3.0]", "ascend"), ("projected", "[3.0, 9.0]", "method")],
+)
+def test_windows_that_mean_nothing(launch, folder, method, window, words):
+    scene = folder / "nothing.toml"
+    scene.write_text(TIRE.format(method=method, more=f"window = {window}", residual="none"))
+    done = launch("-m", "runs", "check", scene)
+    assert done.returncode == 2
+    assert words in done.stderr
 
 
 def test_full_method_refuses_attachment_modes(launch, folder):

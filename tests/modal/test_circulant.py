@@ -1,0 +1,119 @@
+"""Rings of equal segments: split by wave number against the dense problem, and refused when not equal."""
+
+import numpy as np
+import pytest
+from chains import distributed, own_rows
+from mpi4py import MPI
+from scipy import sparse
+
+from fem.errors import ConvergenceError
+from modal import undamped
+from modal.circulant import repeated
+from modal.symmetry import Sites
+
+COMM = MPI.COMM_WORLD
+
+
+def ring(segments: int, mirrored: bool, soft: float = 0.0) -> tuple[sparse.csr_matrix, np.ndarray]:
+    """A made-up tire: 2 nodes a segment on 2 circles, springs of any direction to all of the next segment.
+
+    `mirrored`: the same run the other way round the ring. `soft` is added to the diagonal.
+    """
+    random = np.random.default_rng(2)
+    angle = 2 * np.pi * (np.arange(segments)[:, None] + np.array([0.0, 0.3, 0.0, 0.3])) / segments
+    if mirrored:
+        angle = (
+            2 * np.pi * (np.arange(segments)[:, None] + np.array([0.0, 0.5, 0.0, 0.5])) / segments
+        )
+    reach = np.array([1.0, 1.0, 1.3, 1.3])
+    points = np.stack(
+        [
+            reach * np.sin(angle),
+            np.tile([0.0, 0.1, 0.2, 0.1], (segments, 1)),
+            -reach * np.cos(angle),
+        ],
+        axis=-1,
+    )
+    size = 12 * segments
+    matrix = np.zeros((size, size))
+    stiffness = random.uniform(0.5, 2.0, (4, 8))
+    for s in range(segments):
+        for a in range(4):
+            for b in range(8):
+                one, other = (s, a), ((s + b // 4) % segments, b % 4)
+                apart = b // 4 + (b % 2 - a % 2) / 2  # in segments
+                if one == other or (mirrored and not 0 <= apart <= 1):
+                    continue
+                way = points[one] - points[other]
+                length = np.linalg.norm(way)
+                rule = stiffness[a, b] if not mirrored else np.rint(4 * length) / 4 + 0.2
+                spring = rule * np.outer(way, way) / length**2
+                i, j = (12 * k[0] + 3 * k[1] + np.arange(3) for k in (one, other))
+                matrix[np.ix_(i, i)] += spring
+                matrix[np.ix_(j, j)] += spring
+                matrix[np.ix_(i, j)] -= spring
+                matrix[np.ix_(j, i)] -= spring
+    matrix += (0.05 + soft) * np.eye(size)
+    return sparse.csr_matrix(matrix), points.reshape(-1, 3)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("mirrored", [True, False])
+@pytest.mark.parametrize("segments", [8, 9])
+@pytest.mark.parametrize("count", [1, 20, 10**6])
+def test_against_the_dense_problem(segments, mirrored, count):
+    matrix, points = ring(segments, mirrored)
+    low, high = own_rows(matrix.shape[0], unit=3)
+    mine = Sites.of_nodes(points[low // 3 : high // 3])
+    stiffness = distributed(matrix, unit=3)
+    modes = undamped.solve(stiffness, np.ones(high - low), count, sites=mine)
+    exact, shapes = np.linalg.eigh(matrix.toarray())
+    m = len(modes.squares)
+    assert modes.segments == segments
+    assert m == min(count, len(exact))
+    np.testing.assert_allclose(modes.squares, exact[:m], rtol=1e-9)
+    assert modes.inertia_count == (exact < modes.counted_below).sum() >= m
+    assert modes.residual.max() < 1e-9
+    assert modes.orthonormality < 1e-12
+    if count == 20:
+        whole = np.concatenate(COMM.allgather(modes.vectors))
+        end = 20 if exact[20] - exact[19] > 1e-6 else 19
+        expected = shapes[:, :end] @ shapes[:, :end].T
+        np.testing.assert_allclose(whole[:, :end] @ whole[:, :end].T, expected, atol=1e-8)
+
+
+def test_the_mirrored_ring_needs_no_complex_numbers():
+    for mirrored in (True, False):
+        matrix, points = ring(8, mirrored)
+        found = repeated(matrix, Sites.of_nodes(points))
+        assert all(np.isrealobj(found.matrix(n)[0]) == mirrored for n in (1, 2, 3))
+
+
+def test_one_odd_spring_is_noticed():
+    matrix, points = ring(8, True)
+    assert repeated(matrix, Sites.of_nodes(points)).segments == 8
+    matrix[30, 30] += 1e-8
+    assert repeated(matrix, Sites.of_nodes(points)) is None
+    matrix, points = ring(8, True)
+    assert repeated(matrix, Sites.of_nodes(points + [0.01, 0.0, 0.0])) is None
+
+
+def test_all_below_a_frequency_and_none():
+    matrix, points = ring(9, False)
+    exact = np.linalg.eigvalsh(matrix.toarray())
+    sites, ones, stiffness = Sites.of_nodes(points), np.ones(matrix.shape[0]), distributed(matrix)
+    limit = np.sqrt((exact[24] + exact[25]) / 2) / (2 * np.pi)
+    wanted = exact[exact < (2 * np.pi * limit) ** 2]
+    modes = undamped.solve(stiffness, ones, up_to=limit, sites=sites)
+    np.testing.assert_allclose(modes.squares, wanted, rtol=1e-9)
+    assert modes.inertia_count == len(wanted)
+    with pytest.raises(ConvergenceError, match="no mode below 0.001"):
+        undamped.solve(stiffness, ones, up_to=1e-3, sites=sites)
+
+
+def test_negative_stiffness_is_named():
+    matrix, points = ring(8, True, soft=-0.3)
+    count = int((np.linalg.eigvalsh(matrix.toarray()) < 0).sum())
+    assert count > 0
+    with pytest.raises(ConvergenceError, match=f"{count} negative eigenvalue.*buckles"):
+        undamped.solve(distributed(matrix), np.ones(96), 4, sites=Sites.of_nodes(points))
