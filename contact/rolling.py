@@ -130,7 +130,7 @@ def roll(
     iterated = isinstance(tire, NonlinearTire)
     for time, road in _roads(drive, patch, step, steps, done):
         free = tire.predict()
-        past = friction.state() if friction else {}
+        past = friction.state() if friction and iterated else {}
         while True:
             q = patch.gap + free[:count] - road
             if friction is None:

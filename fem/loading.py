@@ -72,7 +72,7 @@ class Loader:
 
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
-        self._raise_road(0.0, deflection)
+        self._raise_road(0.0, deflection, [])
 
     def carry(self, load: float) -> float:
         """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket."""
@@ -82,7 +82,6 @@ class Loader:
         trial = 0.1 * self.body.tire.section.thickness
         for _ in range(60):
             self._try_deflection(trial, known)
-            known.append(_Known(trial, self.load(), self.body.u.x.array.copy()))
             if abs(known[-1].load - load) <= max(LOAD_TOLERANCE * load, self.equilibrium.rounding):
                 return trial
             trial = self._next_deflection(known, load)
@@ -114,16 +113,23 @@ class Loader:
         return True
 
     def _try_deflection(self, trial: float, known: list[_Known]) -> None:
-        """Solve at the trial deflection from a line through the two nearest states, else by steps."""
+        """Solve at the trial deflection from a line through the two nearest states, else by steps.
+
+        What converges on the way is known from then on.
+        """
         if self._guess(trial, known):
             step = self.equilibrium.solve(self.touch + trial)
             self.newton_steps += step.iterations
             if step.converged:
                 self._report("deflection", trial, "m", step)
+                known.append(self._reached(trial))
                 return
         below = max((k for k in known if k.deflection <= trial), key=lambda k: k.deflection)
         self.body.u.x.array[:] = below.displacement
-        self._raise_road(below.deflection, trial)
+        self._raise_road(below.deflection, trial, known)
+
+    def _reached(self, deflection: float) -> _Known:
+        return _Known(deflection, self.load(), self.body.u.x.array.copy())
 
     def _next_deflection(self, known: list[_Known], load: float) -> float:
         """Secant through the two loads nearest to the wanted one, kept inside the bracket."""
@@ -149,9 +155,14 @@ class Loader:
         """Total vertical force of the road, N. Collective."""
         return self.body.comm.allreduce(self.equilibrium.contact_force().sum())
 
-    def _raise_road(self, start: float, end: float) -> None:
+    def _raise_road(self, start: float, end: float, known: list[_Known]) -> None:
+        """In steps, each of which is entered in `known`."""
+
         def attempt(deflection: float) -> Step:
-            return self.equilibrium.solve(self.touch + deflection)
+            step = self.equilibrium.solve(self.touch + deflection)
+            if step.converged:
+                known.append(self._reached(deflection))
+            return step
 
         largest = 0.25 * self.body.tire.section.thickness
         self._march(attempt, start, end, largest, "deflection", 1.0, "m")

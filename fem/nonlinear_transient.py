@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from fem import compat, kinematics
-from fem.errors import ConvergenceError
+from fem.errors import ConvergenceError, InputError
 from fem.operators import Operators
 from fem.transient import FullTire
 from fem.virtual_work import AT_REST, static_residual
@@ -46,6 +46,8 @@ class NonlinearTire(FullTire):
         loads: sparse.csr_matrix,
         spectral_radius: float = 0.0,
     ):
+        if operators.unknowns.rim:
+            raise InputError('nonlinear tire in time: modal.rim = "free" is linear; take "fixed"')
         super().__init__(
             operators, None, 0.0, damping, step, outputs, loads, spectral_radius=spectral_radius
         )

@@ -8,7 +8,8 @@ so the diagonal mass stays diagonal. The static state is that of the clamped rim
 taking the rim's static forces r, which turn with it, and a constant force at the axle's centre. Turned
 forces do work of the second order: K has W_ab = sum_i (r_a x_b + r_b x_a) / 2 - delta_ab r . x besides on
 the rotations. A free tire without a road then has its six rigid modes at any inflation (uniform pressure on two
-equal bead circles of a rigid rim has no resultant), and K is symmetric.
+equal bead circles of a rigid rim has no resultant), and K is symmetric. Damping by the mass acts against
+the ground then, for want of a wheel on an axle.
 """
 
 from __future__ import annotations

@@ -56,6 +56,7 @@ def solve(
     *,
     up_to: float = np.inf,
     sites: Sites | None = None,
+    waves: bool = True,
 ) -> Modes:
     """The `count` lowest modes, or all below `up_to` (Hz), of a stiffness (n, n) in N/m and a diagonal
     mass (own rows) in kg; at least one of the two is given.
@@ -63,7 +64,8 @@ def solve(
     The diagonal mass turns the pencil into the standard problem of A = M^-1/2 K M^-1/2. With the
     `sites` of its own unknowns, equal segments split it by wave number into small dense problems
     (modal.circulant), or else mirror planes (modal.symmetry) into parts that are sliced by inertia
-    (modal.spectrum) and solved by block Lanczos (modal.lanczos). Every process holds a copy of A.
+    (modal.spectrum) and solved by block Lanczos (modal.lanczos); `waves` False: these always. Every
+    process holds a copy of A.
     Raises ConvergenceError when a mode is missing, inaccurate or unstable. Collective.
     """
     comm = stiffness.comm.tompi4py()
@@ -74,7 +76,7 @@ def solve(
     bases, modes = [sparse.identity(size, format="csr")], None
     if sites is not None:
         all_sites = sites.everywhere(comm)
-        ring = repeated(whole, all_sites)
+        ring = repeated(whole, all_sites) if waves else None
         if ring is not None:
             modes = _by_waves(scaled, whole, ring, mass, *wanted)
         if modes is not None and modes.residual.max(initial=0.0) <= RESIDUAL_TOLERANCE:

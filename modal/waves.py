@@ -35,17 +35,19 @@ def label(
     counted over all processes; `mass` (own rows) kg. Collective.
     """
     angle = np.arctan2(points[:, 0], -points[:, 2])
-    moved = _along_ring(angle, vectors * np.sqrt(mass)[:, None])
-    nodal = np.sqrt(mass[::3])
     circles = comm.allreduce(int(ring.max(initial=-1)), op=MPI.MAX) + 1
-    total = _on_circles(comm, ring, circles, nodal**2)
-    places = comm.allreduce(len(angle)) // circles
-    shares = np.stack(
-        [
-            _share(comm, ring, total, moved, nodal * np.exp(-1j * n * angle), n)
-            for n in range(places // 2)
-        ]
-    )
+    number = np.arange(comm.allreduce(len(angle)) // circles // 2)
+    shares = np.zeros((len(number), vectors.shape[1]))
+    # Circle by circle, all wave numbers in one product: no copy of all fields.
+    for circle in range(circles):
+        on = np.flatnonzero(ring == circle)
+        root = np.sqrt(mass[3 * on])
+        field = _along_ring(angle[on], vectors.reshape(len(angle), 3, -1)[on]) * root[:, None, None]
+        waves = root * np.exp(-1j * number[:, None] * angle[on])
+        amplitude = comm.allreduce(waves @ field.reshape(len(on), -1))
+        square = (np.abs(amplitude) ** 2).reshape(len(number), 3, -1).sum(axis=1)
+        shares += square / comm.allreduce(float((root**2).sum()))
+    shares[1:] *= 2
     wave, share = shares.argmax(axis=0), shares.max(axis=0)
     wave = np.where(share >= PURE, wave, -1)
     section = np.full(len(wave), -1)
@@ -56,21 +58,7 @@ def label(
 
 
 def _along_ring(angle: np.ndarray, field: np.ndarray) -> np.ndarray:
-    """Components tangential, along the axle and radial, (nodes, 3, m)."""
-    x, y, z = field.reshape(len(angle), 3, -1).transpose(1, 0, 2)
+    """Components tangential, along the axle and radial, of (nodes, 3, m)."""
+    x, y, z = field.transpose(1, 0, 2)
     sine, cosine = np.sin(angle)[:, None], np.cos(angle)[:, None]
     return np.stack([cosine * x + sine * z, y, sine * x - cosine * z], axis=1)
-
-
-def _on_circles(comm: MPI.Comm, ring: np.ndarray, circles: int, values: np.ndarray) -> np.ndarray:
-    """Sums over the nodes of each circle. Collective."""
-    out = np.zeros((circles, *values.shape[1:]), values.dtype)
-    np.add.at(out, ring, values)
-    return comm.allreduce(out)
-
-
-def _share(comm, ring, total, moved, wave, n: int) -> np.ndarray:
-    """Part of each mode's mass norm (m,) that one wave number holds. Collective."""
-    amplitude = _on_circles(comm, ring, len(total), wave[:, None, None] * moved)
-    energy = (np.abs(amplitude) ** 2 / total[:, None, None]).sum(axis=(0, 1))
-    return energy * (2 if n else 1)

@@ -59,6 +59,7 @@ class ContactFile:
 
     def _open(self, stack: ExitStack, path: Path) -> tuple[int, dict[str, np.ndarray] | None]:
         self._path, self._packer = path, packed.Packer()
+        stack.callback(self._packer.close)
         provenance = self._session.provenance("contact")
         usable = store.stored_hash(self._checkpoint) == provenance.input_hash
         going_on = usable and not self._session.fresh

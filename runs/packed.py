@@ -34,7 +34,8 @@ def create(file: h5py.File, name: str, rows: int, width: tuple[int, ...]) -> h5p
 
 
 class Packer:
-    """Writes rows at the end of datasets that `create` made; `wait` before the file is read."""
+    """Writes rows at the end of datasets that `create` made; `wait` before the file is read, and `close`
+    in the end."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1)
@@ -58,6 +59,10 @@ class Packer:
         for write, offset, packed in self._put:
             write(offset, packed.result())
         self._put.clear()
+
+    def close(self) -> None:
+        """End the thread; what was not waited for is lost."""
+        self._thread.shutdown(cancel_futures=True)
 
 
 def _packed(values: np.ndarray, kind: np.dtype) -> bytes:

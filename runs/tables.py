@@ -74,6 +74,11 @@ class Region:
     material: Material = table(Material, "what the region is made of")
 
 
+# The mesh's defaults are from `bench discretisation`, soft torus, 5 mm on the road, errors of the first
+# and the 20th frequency and of the load. 100 x 16 of order 2, graded at the beads: 0.4, 0.15 and 0.4 %.
+# 50 x 16 with footprint_size 0.25 has half the unknowns: 0.65, 0.2 and 1.4 %. Without grading at the
+# beads 1.7 % in the first frequency; two elements through the wall gain nothing; order 3, 20 x 10: 0.5,
+# 0.1 and 0.8 % of fewer unknowns in about the same time, but the fewest nodes under the road.
 @dataclass(frozen=True)
 class Tire:
     section: str = choice("torus", ("torus",), "shape of the section")

@@ -91,11 +91,15 @@ def modes(results: Results) -> Section:
     columns = [[quantity(float(value), "Hz") for value in frequency[:LISTED]]]
     if residual is not None:
         columns.append([quantity(float(value)) for value in residual[:LISTED]])
-    head = ("mode", "frequency", "residual")[: 1 + len(columns)]
+    head = ["mode", "frequency", "residual"][: 1 + len(columns)]
+    wave, number = (results.optional(name, key) for key in ("wave_number", "section_mode"))
+    if wave is not None and number is not None:
+        columns.append([_named(*pair) for pair in zip(wave[:LISTED], number[:LISTED], strict=True)])
+        head.append("wave number, section mode")
     if len(frequency) > LISTED:
         section.notes.append(f"The table lists {LISTED} of {len(frequency)} modes.")
     numbers = [str(n + 1) for n in range(min(LISTED, len(frequency)))]
-    section.table = Table(head, list(zip(numbers, *columns, strict=True)))
+    section.table = Table(tuple(head), list(zip(numbers, *columns, strict=True)))
     points, quads = (
         results.array(name, "surface/points"),
         results.borrowed("static.h5", "surface/quads"),
@@ -108,6 +112,11 @@ def modes(results: Results) -> Section:
     picture = surface_figures.modes(points, quads, shapes, titles)
     section.figures.append((picture, "The lowest mode shapes, exaggerated."))
     return section
+
+
+def _named(wave: int, number: int) -> str:
+    """A mode of a round tire by its wave number and its number in the section; -: of none."""
+    return f"{wave}, {number}" if wave >= 0 else "-"
 
 
 def rotating(results: Results) -> Section:

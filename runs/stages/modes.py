@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from modal.symmetry import Sites
+from runs import observe
 from runs.session import Session
 from runs.store import put
+
+_NAMED = 8  # modes of a round tire shown by name
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,18 @@ def compute(session: Session, path: Path) -> None:
         "slices": (modes.slices, "-"),
         "rigid modes": (modes.rigid, "-"),
     }
+    if labels is not None:
+        _say_names(modes.frequency, labels)
     session.write(path, "modes", lambda file: _fill(file, session, modes, labels))
+
+
+def _say_names(frequency: np.ndarray, labels) -> None:
+    """The lowest modes of a round tire by name, each of a pair once."""
+    named = zip(labels.wave, labels.section, frequency, strict=True)
+    first = {(n, k): f for n, k, f in reversed(list(named)) if n >= 0}
+    lowest = sorted(first.items(), key=lambda item: item[1])[:_NAMED]
+    shown = ", ".join(f"({n}, {k}) {f:.4g}" for (n, k), f in lowest)
+    observe.say(f"  (wave number, section mode) in Hz: {shown}")
 
 
 def solve(session: Session):

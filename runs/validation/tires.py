@@ -52,7 +52,7 @@ class Tires:
             self.session: Session = run_scene(
                 load(self._file),
                 folder,
-                MPI.COMM_WORLD,
+                MPI.COMM_SELF,
                 until="modes",
                 fresh=False,
                 petsc_options=[],

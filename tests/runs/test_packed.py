@@ -18,6 +18,7 @@ def test_rows_come_back_whatever_the_blocks(tmp_path, shape, blocks) -> None:
         for part in parts:
             packer.append(dataset, part)
         packer.wait()
+        packer.close()
     with h5py.File(tmp_path / "rows.h5") as file:
         assert np.array_equal(file["rows"][:], whole)
 
@@ -32,5 +33,6 @@ def test_thread_and_hdf5_make_the_same_bytes(tmp_path) -> None:
         packer = Packer()
         packer.append(packed, values)
         packer.wait()
+        packer.close()
         file.flush()
         assert own.id.read_direct_chunk((0, 0)) == packed.id.read_direct_chunk((0, 0))

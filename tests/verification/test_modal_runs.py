@@ -98,6 +98,8 @@ def test_round_tire_names_its_modes(launch, folder):
     scene.write_text("[tire]\nsegments = 16\nelements_arc = 4\n[modal]\ncount = 20\n")
     done = launch("-m", "runs", "run", scene, "--out", folder / "round", "--until", "modes")
     assert done.returncode == 0, done.stderr
+    assert "solved by wave number 16" in done.stdout
+    assert "(wave number, section mode) in Hz: (" in done.stdout
     wave = read(folder, "round", "modes.h5", "wave_number")
     section = read(folder, "round", "modes.h5", "section_mode")
     frequency = read(folder, "round", "modes.h5", "frequency")

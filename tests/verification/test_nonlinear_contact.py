@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy import sparse
 
+from contact.brush import Brush, BrushLaw
 from contact.complementarity import ActiveSet
+from contact.friction import Friction
 from contact.patch import Patch
 from contact.rolling import Drive, roll
 from fem.body import Body
@@ -47,6 +50,33 @@ def risen(full, patch) -> float:
     solver = ActiveSet(full.same_step)
     *_, last = roll(full, solver, patch, drive, STEP, 500)
     return float(last.force.sum())
+
+
+def shaken(full, patch) -> np.ndarray:
+    """Forces (n, 3 c) N of small shakes by a road with stick and slip."""
+    count = len(patch.points)
+    drive = Drive(lambda x, y: np.zeros(x.shape), lambda t: 1e-5 * np.sin(2 * np.pi * 100 * t), 0.0)
+    solver = ActiveSet(full.same_step[:count, :count])
+    brush = Brush(BrushLaw(1e5, 0.5, kind="spring"), patch.points[:, 0], patch.line, 0.0, STEP)
+    friction = Friction(brush, full.same_step, None)
+    steps = roll(full, solver, patch, drive, STEP, 50, friction)
+    return np.array([instant.change for instant in steps])
+
+
+def test_small_shakes_with_friction_are_those_of_the_linear_tire():
+    loader = pressed(0.003)
+    state = static_state(loader.equilibrium, loader.touch)
+    patch = patch_of(state)
+    operators = Operators(loader.body, INFLATION)
+    points = sparse.vstack([nodes(patch.index, len(state.points), k) for k in (2, 0, 1)]).tocsr()
+    full = NonlinearTire(operators, INFLATION, DAMPING, STEP, points, points)
+    straight = shaken(FullTire(operators, None, 0.0, DAMPING, STEP, points, points), patch)
+    bent = shaken(full, patch)
+    count = len(patch.points)
+    assert abs(straight[:, count:]).max() > 1e-3 * abs(straight).max()
+    assert full.turns > 50
+    assert np.linalg.norm(bent - straight) < 5e-3 * np.linalg.norm(straight)
+    assert np.linalg.norm((bent - straight)[:, count:]) < 2e-2 * np.linalg.norm(straight[:, count:])
 
 
 def test_a_road_that_has_risen_carries_the_static_load():
