@@ -236,3 +236,13 @@ def test_options_that_petsc_did_not_read_are_told(monkeypatch) -> None:
     assert told == ["PETSc options that nothing read: -made_up_unread"]
     for name in ("made_up_read", "made_up_unread"):
         options.delValue(name)
+
+
+def test_the_estimated_memory_is_about_what_a_run_takes(run):
+    from runs.estimate import memory
+    from runs.scene import load
+
+    folder, stages = run("again", FLAT + "[rotation]\nspeed = 40.0\n")
+    taken = stages["contact"]["indicators"]["largest memory of a process so far"]["value"]
+    estimate = sum(memory(load(folder / "scene.toml")).values()) * 1e-9
+    assert taken / 2 < estimate < 2 * taken
