@@ -16,6 +16,7 @@ from runs.figures import canvas, encode, styled
 COLOURS = ("#2f6db5", "#c8502d", "#2e8b6a", "#7a4fa3", "#b58a1f", "#52606d")
 MARKS = ("o", "s", "^", "D", "v", "P")
 INK, MUTED = "#1d2733", "#9aa5b1"
+MOST_MARKS = 40  # points of a curve from which on it is a line only
 SIZES = (4.0, 9.0)  # points, of the marks for the fewest and for the most
 
 
@@ -69,7 +70,8 @@ def _lines(table: Any) -> str:
                 continue
             parts = [str(group) if by else "", name if several or not by else ""]
             colour, mark = COLOURS[curves % len(COLOURS)], MARKS[curves % len(MARKS)]
-            style = {"color": colour, "marker": mark, "markersize": 4.5, "linewidth": 1.3}
+            dense = len(points) > MOST_MARKS
+            style = {"color": colour, "marker": "" if dense else mark, "ms": 4.5, "lw": 1.3}
             here.plot(*zip(*points, strict=True), label=", ".join(filter(None, parts)), **style)
             curves += 1
     _scales(here, plot.get("log", ""))
@@ -116,8 +118,8 @@ def _front(table: Any) -> str:
     if plot["beside"]:
         far = list(zip(*map(place, plot["beside"]), strict=True))
         here.plot(*far, "*--", color=INK, ms=9, lw=0.9, label=plot["beside_name"])
-    best = list(zip(*map(place, plot["front"]), strict=True))
-    here.step(*best, where="post", color=INK, lw=1.3, zorder=2)
+    best = [place(row) for row in plot["front"]]
+    here.step([x for x, _ in best], [y for _, y in best], where="post", color=INK, lw=1.3, zorder=2)
     for k, row in enumerate(plot["front"]):
         # Every other letter on the other side: neighbours on a front may be close.
         aside = {"ha": "left", "va": "bottom"} if k % 2 else {"ha": "right", "va": "top"}

@@ -20,7 +20,7 @@ from contact.rolling import Drive, roll
 from contact.synthetic import Strip, oval_patch
 from contact.tread import half_space_compliance, half_space_influence
 from greens.recursion import Recursion
-from runs.bench.contact_points import large, median, rough
+from runs.bench.contact_points import large, rough
 from runs.bench.contact_steps import convolution, orders
 from runs.tabulate import Table
 
@@ -101,52 +101,53 @@ def _loop(shape, modes: int, height, brush: float | None = None, steps: int = 10
     return roll(tire, solver, patch, drive, STEP, steps, coupling), solver, response
 
 
-def _beside(loop, other, blocks: int = 40) -> tuple[float, float, float, int]:
-    """Median seconds of a step and of `other()`, the ratio's median over blocks run in turns, and the
-    most points that touched."""
-    steps, others, most = [], [], 0
+def _beside(loop, *others, blocks: int = 40) -> tuple[float, list[float], list[float], int]:
+    """Median seconds of a step and of each of `others`, the medians over blocks, run in turns, of the
+    ratios to them, and the most points that touched."""
+    steps, times, most = [], [], 0
     for _ in range(blocks):
         began = time.perf_counter()
         most = max(most, *(next(loop).active for _ in range(BLOCK)))
-        between = time.perf_counter()
-        for _ in range(BLOCK):
-            other()
-        steps.append((between - began) / BLOCK)
-        others.append((time.perf_counter() - between) / BLOCK)
-    ratio = np.median(np.array(steps) / others)
-    return float(np.median(steps)), float(np.median(others)), float(ratio), most
+        steps.append((time.perf_counter() - began) / BLOCK)
+        times.append([_mean(other) for other in others])
+    ratios = np.median(np.array(steps)[:, None] / times, axis=0)
+    return float(np.median(steps)), np.median(times, axis=0).tolist(), ratios.tolist(), most
+
+
+def _mean(function) -> float:
+    """Seconds a call, over as many as there are steps in a block: whatever disturbs one disturbs both."""
+    began = time.perf_counter()
+    for _ in range(BLOCK):
+        function()
+    return (time.perf_counter() - began) / BLOCK
 
 
 def _step() -> Table:
-    rows = []
+    rows, long = [], np.ones(4_000_000)
     for name, height in (("flat road at rest", Flat().height), ("wavy road", _wavy)):
         loop, solver, response = _loop((25, 20), 500, height)
         states = len(response.eigenvalue)
         matrices, vector, force = np.ones((2, 500, 2 * states)), np.ones(2 * states), np.ones(500)
-        step, floor, ratio, most = _beside(
-            loop, lambda m=matrices, v=vector, f=force: (m[0] @ v, f @ m[1])
+        step, floors, ratios, most = _beside(
+            loop,
+            lambda m=matrices, v=vector, f=force: (m[0] @ v, f @ m[1]),
+            lambda: long @ long,
         )
-        memory = matrices.nbytes / _bandwidth()
-        rows.append([name, most, step * 1e6, floor * 1e6, ratio, memory * 1e6, step / memory,
-                     solver.factorisations])  # fmt: skip
+        share = matrices.nbytes / long.nbytes  # of the long sum's bytes that a pass has
+        rows.append([name, most, step * 1e6, floors[0] * 1e6, ratios[0], share * floors[1] * 1e6,
+                     ratios[1] / share, solver.factorisations])  # fmt: skip
     columns = [("case", ""), ("touching", "-"), ("time a step", "us"), ("a pass", "us"),
                ("passes", "-"), ("a pass from memory", "us"), ("passes from memory", "-"),
                ("factorisations", "-")]  # fmt: skip
     notes = [
-        f"500 points, {states} complex states, {BLOCK} steps and {BLOCK} passes in turns. A pass reads "
-        f"both matrices once, states to points and points to states, 500 x {2 * states} doubles each "
+        f"500 points, {states} complex states, {BLOCK} steps and {BLOCK} passes in turns. A pass reads both "
+        f"matrices once, states to points and points to states, 500 x {2 * states} doubles each "
         f"({matrices.nbytes / 1e6:.1f} MB), in two products; they stay in the cache if it is large "
-        "enough. From memory: their bytes at the bandwidth of a long sum of products.",
+        "enough. From memory: their bytes at the bandwidth of a sum of products of 32 MB.",
         "A step has to read the first matrix, and of the second, of the tire's answer within the step and "
         "of the compliance the columns of loaded points. Asked: 2 passes; one factorisation at rest.",
     ]
     return Table("One step", columns, rows, notes)
-
-
-def _bandwidth() -> float:
-    """Bytes a second that one process reads from memory."""
-    long = np.ones(10_000_000)
-    return long.nbytes / median(lambda: long @ long, 9)
 
 
 def _friction() -> Table:
@@ -155,13 +156,15 @@ def _friction() -> Table:
         plain = _loop(shape, modes, _wavy, steps=10**6)[0]
         for brush in (2e4, 2e5):
             rubbing, _, response = _loop(shape, modes, _wavy, brush)
-            step, without, ratio, most = _beside(rubbing, lambda loop=plain: next(loop), 8)
+            step, (without,), (ratio,), most = _beside(
+                rubbing, lambda loop=plain: next(loop), blocks=15
+            )
             rows.append([shape[0] * shape[1], most, len(response.eigenvalue), brush, step * 1e3,
                          without * 1e3, 1 / ratio])  # fmt: skip
     fine = _on_a_grid((12, 9), 200, 4, None)
     for brush in (3e3, 3e4):
         rubbing = _on_a_grid((12, 9), 200, 4, brush)
-        step, without, ratio, most = _beside(rubbing, lambda: next(fine), 8)
+        step, (without,), (ratio,), most = _beside(rubbing, lambda: next(fine), blocks=15)
         rows.append([45 * 33, most, 220, brush, step * 1e3, without * 1e3, 1 / ratio])
     columns = [("points", "-"), ("touching", "-"), ("states", "-"), ("brush", "N/m"),
                ("with friction", "ms"), ("frictionless", "ms"), ("ratio", "-")]  # fmt: skip

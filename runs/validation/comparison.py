@@ -13,8 +13,8 @@ NOTES = [
     "there in time over the largest variation. All against the full finite elements at their smallest "
     "step, whose own error is estimated: a third of its distance from the step before (second order).",
     "Ratio: loop of the full finite elements, at the largest step at which they are as accurate, over "
-    "the loop of the row. Set-up: second eigenproblem (once for all roads) and residual, or "
-    "factorisation; static state and modes are shared.",
+    "the loop of the row, both in processor seconds of one thread. Set-up: second eigenproblem (once for "
+    "all roads) and residual, or factorisation; static state and modes are shared.",
 ]
 
 
