@@ -13,7 +13,7 @@ from runs.validation.histories import distance
 ABOUT = "one simulated second of rolling on a rough road: wall time at 1 % error"
 
 MESH = Mesh(32, 12, 0.3)
-MODES = 600
+MODES = 600  # differ from 900 by 0.05 % in the contact and 0.09 % in the axle force, same error
 RESIDUAL = "attachment"
 FINEST = 2.5e-5  # s, step of the reference
 DURATION = 1.0  # s
