@@ -6,7 +6,8 @@ from typing import Any
 
 from fem.errors import InputError
 from runs.schema import described
-from runs.tables import Scene, Tire
+from runs.tables import Scene
+from runs.tire_tables import Tire
 
 Where = Callable[[tuple[str, ...], str], InputError]
 
