@@ -6,6 +6,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from fem.errors import ConvergenceError, InputError
 from runs import observe
 from runs.bench.rough_road import (
@@ -19,7 +21,6 @@ from runs.bench.rough_road import (
 )
 from runs.session import Session
 from runs.tabulate import Table
-from runs.threads import one_blas_thread
 from runs.validation.histories import History, follow
 
 ABOUT = "modes x residual x step x mesh against a far finer run: the Pareto front of rolling"
@@ -123,7 +124,7 @@ def _full(session: Session, exact: History, mesh: str, step: float) -> Choice:
         points,
         points,
     )
-    with one_blas_thread():
+    with threadpool_limits(1, "blas"):
         found = follow(session, tire, step, 0.0)
     size = session.operators.stiffness.getSize()[0]
     off = errors(exact, found, DURATION)

@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from mpi4py import MPI
+from threadpoolctl import threadpool_limits
 
 from contact.grid_patch import settle
 from contact.model import step_solver
@@ -17,7 +18,6 @@ from greens.recursion import Recursion
 from greens.response import Response
 from runs import observe
 from runs.session import Session
-from runs.threads import one_blas_thread
 from runs.validation.histories import History, distance, follow
 
 BAND = 500.0  # Hz, up to which errors are told
@@ -165,7 +165,7 @@ def fewer_modes(session: Session, count: int, residual: str) -> Response:
 def modal(session: Session, response: Response, step: float) -> History:
     """The loop on the states that the step resolves."""
     tire = Recursion(response.resolved(step), step, "linear", MPI.COMM_SELF)
-    with one_blas_thread():
+    with threadpool_limits(1, "blas"):
         return follow(session, tire, step, 0.0)
 
 

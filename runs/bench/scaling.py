@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
+from threadpoolctl import threadpool_limits
 
 from contact.complementarity import ActiveSet
 from contact.rolling import Drive, roll
@@ -22,7 +23,6 @@ from runs import observe
 from runs.bench.floors import bandwidth, exponent, fastest, flop_rate
 from runs.bench.rough_road import Mesh, prepared, write_scene
 from runs.tabulate import Table
-from runs.threads import one_blas_thread
 
 ABOUT = "cost exponents over unknowns, modes, points, steps; processes; memory; floors"
 
@@ -123,7 +123,7 @@ def _size(folder: Path, mesh: Mesh, modes: int) -> list:
     ]
 
 
-@one_blas_thread()
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def loop(sizes, states, steps) -> Table:
     """Steps of the contact loop over points, states and their number, beside a pass over memory."""
     rows = []

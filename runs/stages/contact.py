@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from contact.brush import Brush, BrushLaw
 from contact.driven import Driven
@@ -25,7 +26,6 @@ from runs.contact_totals import Figures, Totals
 from runs.mpi import Deferred, Stopped
 from runs.point_forces import directions, histories, shortest_period
 from runs.session import Session
-from runs.threads import one_blas_thread
 
 # Radians a kept mode may turn in one automatic step: 0.3 leaves less than a percent in its phase.
 _TURN = 0.3
@@ -89,7 +89,13 @@ def _run(session: Session, loop: Loop, driven, file: ContactFile, totals, step, 
     drive = Drive(session.road.height, session.motion, session.road_speed)
     instants = roll(loop.tire, loop.solver, session.patch, drive, step, steps, loop.friction, done)
     watch = _Watch(session)
-    with Deferred() as deferred, observe.Progress("contact", steps) as bar, one_blas_thread():
+    with (
+        Deferred() as deferred,
+        observe.Progress("contact", steps) as bar,
+        # A step's matrices, a megabyte, are read as fast by one core as by two; threads that wait for
+        # each other in every product took ten times as long where cores are shared.
+        threadpool_limits(1, "blas"),
+    ):
         bar.advance(done)
         for instant in instants:
             full = file.add(instant, driven.reading if driven else None)

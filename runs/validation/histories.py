@@ -6,12 +6,12 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from contact.grid_patch import OnPoints
 from contact.model import step_solver
 from contact.rolling import Drive, roll
 from runs.session import Session
-from runs.threads import one_blas_thread
 
 BAND = 300.0  # Hz, up to which errors are measured
 
@@ -41,7 +41,7 @@ def follow(session: Session, tire, step: float, setup: float) -> History:
     steps = round(session.scene.time.duration / step)
     contact, axle = np.zeros((2, steps, 3))
     moved = np.zeros((steps, len(patch.points)))
-    with one_blas_thread():
+    with threadpool_limits(1, "blas"):
         began = time.process_time()
         for k, instant in enumerate(roll(tire, solver, patch, drive, step, steps)):
             contact[k, 2], axle[k] = instant.force.sum(), instant.axle_force

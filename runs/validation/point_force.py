@@ -7,9 +7,9 @@ import time
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from runs.tabulate import Table
-from runs.threads import one_blas_thread
 from runs.validation.comparison import Comparison, verdicts
 from runs.validation.histories import History
 from runs.validation.tires import Choice, Tires
@@ -78,7 +78,7 @@ def _history(tire, step: float, setup: float, frequency: float) -> History:
     force = np.sin(2 * np.pi * frequency * step * np.arange(steps + 1))[:, None]
     moved, axle = np.zeros((2, steps, 3))
     tire.start(force[0])
-    with one_blas_thread():
+    with threadpool_limits(1, "blas"):
         began = time.process_time()
         for k in range(steps):
             free = tire.predict()
