@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import time
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from contact.road import make_road
 from runs import observe, store
 from runs.disk import write_text
 from runs.folder import Summary
+from runs.memory import peak_memory
 from runs.mpi import on_root
 from runs.plan import STAGES, skipped
 from runs.resolved import dumps
@@ -99,7 +99,7 @@ def _run_stage(session: Session, stage: str, summary: Summary, fresh: bool) -> N
 
 def _peak(comm: MPI.Comm) -> float:
     """Largest resident memory of any process since it began, GB. Collective."""
-    return 1024e-9 * comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, MPI.MAX)
+    return 1e-9 * comm.allreduce(peak_memory(), MPI.MAX)
 
 
 def _report(directory: Path, summary: Summary) -> None:

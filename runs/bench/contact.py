@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 from scipy import sparse
+from threadpoolctl import threadpool_limits
 
 from contact.brush import Brush, BrushLaw
 from contact.complementarity import ActiveSet
@@ -30,8 +31,9 @@ ELASTIC = 5e6, 0.45
 BLOCK = 20  # steps between two looks at the floor
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def run() -> list[Table]:
-    """The tables; ratios are of times measured in one run, in turns."""
+    """The tables; ratios are of times measured in one run, in turns, with one BLAS thread as in a run."""
     tables = [_step(), _friction(), convolution(), orders(), large(), rough()]
     return [_asked(*tables), *tables]
 

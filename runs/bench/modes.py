@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import time
 from collections.abc import Callable
 
@@ -10,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from runs import observe
+from runs.memory import peak_memory
 from runs.tabulate import Table
 
 ABOUT = (
@@ -102,7 +102,7 @@ def _standing(comm: MPI.Comm, operators):
                 operators.stiffness, operators.mass, count, sites=sites(operators)
             ),
         )
-        gigabytes = comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) / 1e6
+        gigabytes = 1e-9 * comm.allreduce(peak_memory())
         worst = float(found.residual.max())
         highest = float(found.frequency[-1])
         rows.append([count, highest, seconds, gigabytes, worst, found.orthonormality, found.slices])

@@ -20,7 +20,7 @@ NOTE = (
     "Targets: less than 60 s on 2 processes, factorisation the largest part, less than 3 GB. A tangent "
     "of 27-node elements takes 0.3 ms each to compute and 0.1 ms to enter in the matrix; what is left to "
     "gain is in needing fewer: one serves while steps with it leave a fifth of the error, and the load "
-    "is met along with equilibrium (14 tangents where there were 25)."
+    "is met along with equilibrium."
 )
 SCENE = """
 name = "static"
