@@ -12,9 +12,7 @@ from runs import observe
 from runs.memory import peak_memory
 from runs.tabulate import Table
 
-ABOUT = (
-    "time, memory and accuracy of standing and rolling modes; 5 minutes on 2 processes, with mpirun"
-)
+ABOUT = "time, memory and accuracy of standing and rolling modes"
 COUNTS = (250, 500, 1000, 2000)
 RATIO = 500  # modes of the comparison
 
