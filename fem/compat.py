@@ -20,7 +20,6 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
-from petsc4py import PETSc
 
 
 def _cpu() -> str:
@@ -117,11 +116,6 @@ def cell_space(mesh):
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, ("DG", 0))
     return fem.FunctionSpace(mesh, ("DG", 0))
-
-
-def petsc_vector(function: fem.Function) -> PETSc.Vec:
-    """The ghosted PETSc vector behind a function."""
-    return function.x.petsc_vec if hasattr(function.x, "petsc_vec") else function.vector
 
 
 @_quietly

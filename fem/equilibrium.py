@@ -89,7 +89,7 @@ class Equilibrium:
         f - c gap > 0, with c the dof's own stiffness; that is the complementarity condition for any
         c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Held dofs are put on
         the road by the linearised step: lifting them first strains the wall beyond any sense.
-        A tangent serves for as long as each step with it leaves a third of the error or less.
+        A tangent serves for as long as each step with it leaves a fifth of the error or less.
         """
         body = self.body
         kept = body.u.x.array.copy(), self._active.copy(), self._force.copy()

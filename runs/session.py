@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +13,7 @@ import h5py
 import numpy as np
 from mpi4py import MPI
 
+from fem.timing import Timing
 from runs import store
 from runs.mpi import on_root
 from runs.resolved import dumps
@@ -27,7 +27,7 @@ class Record:
     headline: dict[str, tuple[Any, str]] = field(default_factory=dict)
     indicators: dict[str, tuple[Any, str]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
-    cost: dict[str, float] = field(default_factory=dict)
+    cost: Timing = field(default_factory=Timing)
 
     def line(self) -> str:
         """The headline figures in one line."""
@@ -35,12 +35,9 @@ class Record:
             f"{name} {_shown(v)} {unit}".rstrip(" -") for name, (v, unit) in self.headline.items()
         )
 
-    @contextmanager
-    def timing(self, part: str) -> Iterator[None]:
+    def timing(self, part: str) -> AbstractContextManager[None]:
         """Add the seconds spent inside to a part of the stage's cost."""
-        began = time.perf_counter()
-        yield
-        self.cost[part] = self.cost.get(part, 0.0) + time.perf_counter() - began
+        return self.cost(part)
 
 
 def _shown(value: Any) -> str:

@@ -15,6 +15,7 @@ from contact.kernel import GridPlaces, KernelTread
 from contact.projected_cg import ProjectedCG
 from contact.texture import Texture
 from contact.tread import half_space_influence
+from runs.bench.floors import durations
 from runs.tabulate import Table
 
 ELASTIC = 5e6, 0.45
@@ -22,12 +23,7 @@ ELASTIC = 5e6, 0.45
 
 def median(function: Callable[[], object], repeats: int) -> float:
     """Median of several runs, s: the loops it is compared with are medians too."""
-    times = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        function()
-        times.append(time.perf_counter() - began)
-    return float(np.median(times))
+    return float(np.median(durations(function, repeats)))
 
 
 def _grid_case(n: int):

@@ -8,14 +8,19 @@ from collections.abc import Callable
 import numpy as np
 
 
-def fastest(work: Callable[[], object], repeats: int) -> float:
-    """Shortest of several runs, s: what a floor is."""
+def durations(work: Callable[[], object], repeats: int) -> list[float]:
+    """What each of several runs takes, s."""
     times = []
     for _ in range(repeats):
         began = time.perf_counter()
         work()
         times.append(time.perf_counter() - began)
-    return min(times)
+    return times
+
+
+def fastest(work: Callable[[], object], repeats: int) -> float:
+    """Shortest of several runs, s: what a floor is."""
+    return min(durations(work, repeats))
 
 
 def bandwidth() -> float:

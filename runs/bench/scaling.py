@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import tempfile
 import time
 from pathlib import Path
@@ -17,16 +16,15 @@ from contact.complementarity import ActiveSet
 from contact.rolling import Drive, roll
 from contact.synthetic import Strip, oval_patch
 from contact.tread import half_space_compliance
-from fem.errors import ConvergenceError
 from greens.recursion import Recursion
 from runs import observe
 from runs.bench.floors import bandwidth, exponent, fastest, flop_rate
+from runs.bench.launched import launched
 from runs.bench.rough_road import Mesh, prepared, write_scene
 from runs.tabulate import Table
 
 ABOUT = "cost exponents over unknowns, modes, points, steps; processes; memory; floors"
 
-ROOT = Path(__file__).resolve().parents[2]
 MESHES = Mesh(16, 8, 0.4), Mesh(24, 10, 0.35), Mesh(32, 12, 0.3), Mesh(40, 14, 0.3)
 STRONG = Mesh(32, 12, 0.3)
 MODES = 150
@@ -228,13 +226,7 @@ def _on(folder: Path, kind: str, mesh: Mesh, modes: int, count: int) -> list:
     place = folder / f"{kind}-{count}"
     place.mkdir()
     scene = write_scene(place / "given.toml", mesh, modes=modes, duration=0.05)
-    command = [str(ROOT / "tireroad"), "run", str(scene), "--until", "contact"]
-    command += ["--out", str(place / "out"), "-n", str(count)]
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
-    if done.returncode:
-        raise ConvergenceError(f"bench: {' '.join(command)} failed:\n{done.stderr[-2000:]}")
-    stages = json.loads((place / "out/summary.json").read_text(encoding="utf-8"))["stages"]
+    stages = launched(scene, place / "out", "contact", count)
     seconds = [stages[name]["seconds"] for name in ("static", "modes", "greens")]
     memory = stages["greens"]["indicators"]["largest memory of a process so far"]["value"]
     size = stages["static"]["headline"]["unknowns"]["value"]

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
 import tempfile
 from pathlib import Path
 
-from fem.errors import ConvergenceError
 from runs import observe
+from runs.bench.launched import launched
 from runs.tabulate import Table
 
 ABOUT = "a static state of 45,000 unknowns under load, rolling: time by part, memory, processes"
-ROOT = Path(__file__).resolve().parents[2]
 RUNS = ((0.0, 1), (0.0, 2), (50.0, 1), (50.0, 2))  # rad/s, processes
 PARTS = ("factorisation", "assembly", "solve", "road", "other", "error estimate", "mesh and forms")
 NOTE = (
@@ -66,8 +62,8 @@ def _figures(folder: Path, speed: float, count: int) -> list:
     scene = folder / "static.toml"
     scene.write_text(SCENE.format(speed=speed), encoding="utf-8")
     small = ("--set", "tire.segments=12", "--set", "tire.elements_arc=6")
-    _launch(scene, folder / "small", count, *small)
-    stage = _launch(scene, folder / f"{speed:g}-{count}", count)
+    launched(scene, folder / "small", "static", count, "--fresh", *small)
+    stage = launched(scene, folder / f"{speed:g}-{count}", "static", count, "--fresh")["static"]
     figures, cost = stage["indicators"], stage["cost"]
     return [
         stage["seconds"],
@@ -77,14 +73,3 @@ def _figures(folder: Path, speed: float, count: int) -> list:
         figures["largest memory of a process so far"]["value"],
         figures["estimated error of the load"]["value"],
     ]
-
-
-def _launch(scene: Path, out: Path, count: int, *more: str) -> dict:
-    """The static stage's entry in the summary of a run by the launcher."""
-    command = [str(ROOT / "tireroad"), "run", str(scene), "--until", "static", "--fresh"]
-    command += ["--out", str(out), "-n", str(count), *more]
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
-    if done.returncode:
-        raise ConvergenceError(f"bench: {' '.join(command)} failed:\n{done.stderr[-2000:]}")
-    return json.loads((out / "summary.json").read_text(encoding="utf-8"))["stages"]["static"]

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from runs.tabulate import Table
-from runs.validation.histories import BAND, Distance, History, distance
-from runs.validation.tires import Choice
+from runs.validation.histories import BAND, Distance, History, distance, follow
+from runs.validation.tires import Choice, Tires
+
+TIMES = 3  # a modal loop lasts a tenth of a second: its processor time scatters threefold
 
 NOTES = [
     f"Errors: relative L2 of what varies in 0 to {BAND:g} Hz (Hann window); worst: largest difference "
     "there in time over the largest variation. All against the full finite elements at their smallest "
     "step, whose own error is estimated: a third of its distance from the step before (second order).",
     "Ratio: loop of the full finite elements, at the largest step at which they are as accurate, over "
-    "the loop of the row, both in processor seconds of one thread. Set-up: second eigenproblem (once for "
+    f"the loop of the row, both in processor seconds of one thread, of modes the least of {TIMES}. Set-up: second eigenproblem (once for "
     "all roads) and residual, or factorisation; static state and modes are shared.",
 ]
 
@@ -108,6 +111,18 @@ class Comparison:
         """Simulated time, s."""
         first = next(iter(self._reference.values.values()))
         return self._reference.step * len(first)
+
+
+def compare(
+    tires: Tires, steps: Sequence[float], choices: Sequence[Choice], counts: tuple[str, ...]
+) -> Comparison:
+    """Full finite elements at the steps (s), and the choices, over the road the tires have at present."""
+    session = tires.session
+    found = Comparison([follow(session, *tires.full(step)) for step in steps], counts)
+    for choice in choices:
+        alike = (follow(session, *tires.modal(choice)) for _ in range(TIMES))
+        found.add(choice, min(alike, key=lambda history: history.seconds))
+    return found
 
 
 def verdicts(title: str, rows: list[list], notes: list[str]) -> Table:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from runs.tabulate import Table
-from runs.validation.comparison import Comparison, digits, percent, verdicts
+from runs.validation.comparison import compare, digits, percent, verdicts
 from runs.validation.histories import distance, follow
 from runs.validation.tires import Choice, Tires
 
@@ -64,20 +64,11 @@ def run() -> list[Table]:
         tires = Tires(scenes[0], Path(folder))
         for amplitude, scene in zip(AMPLITUDES, scenes, strict=True):
             tires.change(scene)
-            found = _compare(tires)
+            found = compare(tires, STEPS, CHOICES, QUANTITIES)
             name = f"flat road moved by {1e3 * amplitude:g} mm at 50 Hz"
             tables.append(found.table(f"Standing, {name}: {tires.setting}"))
             rows.append(found.verdict(name, 0.005, 1.0, tires.modes_seconds))
     return [*tables, verdicts("Moved flat road: what was asked for", rows, []), _linearised()]
-
-
-def _compare(tires: Tires) -> Comparison:
-    session = tires.session
-    full = [follow(session, *tires.full(step)) for step in STEPS]
-    found = Comparison(full, QUANTITIES)
-    for choice in CHOICES:
-        found.add(choice, follow(session, *tires.modal(choice)))
-    return found
 
 
 def _linearised() -> Table:

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from runs.tabulate import Table
-from runs.validation.comparison import Comparison, verdicts
-from runs.validation.histories import BAND, follow
+from runs.validation.comparison import Comparison, compare, verdicts
+from runs.validation.histories import BAND
 from runs.validation.tires import Choice, Tires
 
 ABOUT = "contact and axle force while rolling, modes against full finite elements of the same mesh"
@@ -95,7 +95,7 @@ def _run(mesh: dict[str, int], steps: Sequence[float], roads: dict[str, str]) ->
         tires = Tires(next(iter(scenes.values())), Path(folder))
         for name, scene in scenes.items():
             tires.change(scene)
-            found = _compare(tires, steps)
+            found = compare(tires, steps, CHOICES, ("contact force", "axle force"))
             points = len(tires.session.patch.points)
             tables.append(found.table(f"{name}: {points} contact points, {tires.setting}"))
             tables[-1].notes.append(_beyond(found))
@@ -116,12 +116,3 @@ def _beyond(found: Comparison) -> str:
         f"Contact force: {within:.3g} N rms up to {BAND:g} Hz, {above:.3g} N above. Points that touch and "
         "leave bring part of what is above, where modes are missing, down into the band."
     )
-
-
-def _compare(tires: Tires, steps: Sequence[float]) -> Comparison:
-    session = tires.session
-    full = [follow(session, *tires.full(step)) for step in steps]
-    found = Comparison(full, ("contact force", "axle force"))
-    for choice in CHOICES:
-        found.add(choice, follow(session, *tires.modal(choice)))
-    return found

@@ -1,0 +1,23 @@
+"""Runs of the program by its launcher, as a user starts them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+from fem.errors import ConvergenceError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def launched(scene: Path, out: Path, until: str, processes: int, *more: str) -> dict:
+    """The stages in the summary of a run up to a stage, one BLAS thread a process."""
+    command = [str(ROOT / "tireroad"), "run", str(scene), "--until", until]
+    command += ["--out", str(out), "-n", str(processes), *more]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    if done.returncode:
+        raise ConvergenceError(f"bench: {' '.join(command)} failed:\n{done.stderr[-2000:]}")
+    return json.loads((out / "summary.json").read_text(encoding="utf-8"))["stages"]
