@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contact.rolling import Tire
+from tireroad.contact.rolling import Tire
 
 
 class Driven:

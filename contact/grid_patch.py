@@ -18,11 +18,11 @@ from scipy import sparse
 from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator
 
-from contact.complementarity import ContactSolver
-from contact.kernel import GridPlaces
-from contact.patch import Patch
-from fem.errors import ConvergenceError, InputError
-from greens.loaded import LoadedColumns
+from tireroad.contact.patch import Patch
+from tireroad.contact.solver.complementarity import ContactSolver
+from tireroad.contact.tread.kernel import GridPlaces
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.greens.sparse_columns import LoadedColumns
 
 # Points of the largest grid that is laid out before the reach is known.
 MOST_POINTS = 1_000_000

@@ -5,13 +5,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.complementarity import ContactSolver, checked_compliance, make_solver
-from contact.compliance import Compliance, MatrixCompliance, SpreadCompliance
-from contact.kernel import KernelTread
-from contact.layer import LayerInfluence
-from contact.patch import Patch
-from contact.projected_cg import ProjectedCG
-from contact.tread import (
+from tireroad.contact.patch import Patch
+from tireroad.contact.solver.complementarity import ContactSolver, checked_compliance, make_solver
+from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance, SpreadCompliance
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.tread.compliance import (
     Influence,
     check_half_space,
     dense_compliance,
@@ -19,7 +17,9 @@ from contact.tread import (
     no_tread,
     winkler_compliance,
 )
-from fem.errors import InputError
+from tireroad.contact.tread.kernel import KernelTread
+from tireroad.contact.tread.layer import LayerInfluence
+from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
 

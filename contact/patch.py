@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from contact.kernel import GridPlaces
-from fem.errors import ConvergenceError
+from tireroad.contact.tread.kernel import GridPlaces
+from tireroad.fem.errors import ConvergenceError
 
 
 @dataclass(frozen=True)

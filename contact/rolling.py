@@ -15,10 +15,10 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from contact.complementarity import ContactSolver
-from contact.friction import Friction
-from contact.patch import Patch
-from greens.loaded import LoadedColumns
+from tireroad.contact.patch import Patch
+from tireroad.contact.solver.complementarity import ContactSolver
+from tireroad.contact.solver.friction import Friction
+from tireroad.greens.sparse_columns import LoadedColumns
 
 # Road heights that are found at once: as many steps as make this many points, so that what a call
 # costs is shared; and at most so many steps.

@@ -15,8 +15,8 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from modal.fields import gram, multiply
-from modal.undamped import Modes
+from tireroad.modal.fields import gram, multiply
+from tireroad.modal.undamped import Modes
 
 # Share of the largest squared length below which a direction is rounding of the orthogonalisation.
 _ROUNDING = 1e-12

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.errors import InputError
-from greens.response import Response
+from tireroad.fem.errors import InputError
+from tireroad.greens.response import Response
 
 LARGEST = 4e9  # bytes of sampled Green's functions
 

@@ -16,8 +16,8 @@ import numpy as np
 from mpi4py import MPI
 from scipy import linalg
 
-from greens.loaded import LoadedColumns
-from greens.response import Response
+from tireroad.greens.response import Response
+from tireroad.greens.sparse_columns import LoadedColumns
 
 
 class Recursion:

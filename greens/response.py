@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg
 
-from modal.rotating import StateModes
+from tireroad.modal.rotating import StateModes
 
 # Radians a state may turn in a step and stay dynamic. Undamped and bouncing on a stiff tread, up to 3
 # gained no energy and 5 blew up: from pi on a turn is not seen any more. Rolling on a rough road in

@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from greens.response import Response, couple
-from modal.rotating import GROWS, StateModes, rotating
+from tireroad.greens.response import Response, couple
+from tireroad.modal.rotating import GROWS, StateModes, rotating
 
 # Share of the largest static flexibility below which a direction is the solver's rounding.
 _ROUNDING = 1e-9

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from greens.response import Response
+from tireroad.greens.response import Response
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modal.fields import gram, multiply
-from modal.undamped import Modes
+from tireroad.modal.fields import gram, multiply
+from tireroad.modal.undamped import Modes
 
 
 @dataclass(frozen=True)

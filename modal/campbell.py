@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, optimize
 
-from modal.basis import Projection
-from modal.rotating import GROWS, StateModes, matrices, overlap, rotating
+from tireroad.modal.basis import Projection
+from tireroad.modal.rotating import GROWS, StateModes, matrices, overlap, rotating
 
 
 @dataclass(frozen=True)

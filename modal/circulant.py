@@ -18,7 +18,7 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.spatial import cKDTree
 
-from modal.symmetry import TOLERANCE, Sites
+from tireroad.modal.symmetry import TOLERANCE, Sites
 
 _NEAR = 1e-6  # of the body's size: nodes are each other's images
 _LARGEST = 2000  # unknowns a segment: dense problems of this size cost as much as slices

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from fem.errors import ConvergenceError
-from modal.shifted import Shifted
+from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.shifted import Shifted
 
 # Residual of a Ritz pair of Op relative to theta: as small as vectors of neighbouring slices must
 # be orthogonal to each other, a few digits above rounding.

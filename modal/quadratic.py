@@ -16,8 +16,8 @@ from petsc4py import PETSc
 from scipy import optimize
 from slepc4py import SLEPc
 
-from fem.errors import ConvergenceError
-from modal.fields import multiply
+from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.fields import multiply
 
 RESIDUAL_TOLERANCE = 1e-8
 _EXTRA = 10  # states beyond the wanted ones, to end in a gap and never inside a cluster

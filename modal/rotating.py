@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from fem.errors import ConvergenceError
-from modal.basis import Projection
+from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.basis import Projection
 
 # Above this condition an eigenvector loses ten of sixteen digits; such eigenvalues go to the block.
 DEFECTIVE = 1e6

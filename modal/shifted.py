@@ -6,7 +6,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from fem.errors import ConvergenceError
+from tireroad.fem.errors import ConvergenceError
 
 
 class Shifted:

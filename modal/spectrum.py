@@ -13,8 +13,8 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from modal.lanczos import Interval, eigenpairs
-from modal.shifted import Shifted
+from tireroad.modal.lanczos import Interval, eigenpairs
+from tireroad.modal.shifted import Shifted
 
 ZERO = 1e-12  # of the matrix norm: eigenvalues nearer to zero are rigid modes, rounding is 1e-16
 _SLICE = 64  # eigenvalues a slice and matrix: the basis stays small, factorisations few

@@ -9,12 +9,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
-from fem.errors import ConvergenceError
-from modal.circulant import Ring, Wave, repeated
-from modal.fields import CHUNK, collect, everywhere, gram, multiply, scaled_by
-from modal.lanczos import Interval
-from modal.spectrum import ZERO, Bottom, Slice, Spectrum
-from modal.symmetry import Sites, sectors
+from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.circulant import Ring, Wave, repeated
+from tireroad.modal.fields import CHUNK, collect, everywhere, gram, multiply, scaled_by
+from tireroad.modal.lanczos import Interval
+from tireroad.modal.spectrum import ZERO, Bottom, Slice, Spectrum
+from tireroad.modal.symmetry import Sites, sectors
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
 MOST = 1e-6  # where rounding alone is more than the tolerance

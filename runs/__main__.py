@@ -1,9 +1,5 @@
-"""`python3 -m runs`: the program, without the launcher."""
+"""`python3 -m runs` in a checkout, `python3 -m tireroad.runs` where it is installed."""
 
-import sys
+from tireroad.runs.cli import program
 
-from runs.cli import main
-
-for stream in (sys.stdout, sys.stderr):
-    stream.reconfigure(errors="replace")
-sys.exit(main(sys.argv[1:]))
+program()

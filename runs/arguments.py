@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from runs.plan import STAGES
-from runs.version import PROGRAM, VERSION
+from tireroad.runs.scene.plan import STAGES
+from tireroad.runs.version import PROGRAM, VERSION
 
 EXIT = """\
 exit status:

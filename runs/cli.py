@@ -8,9 +8,9 @@ from collections.abc import Callable
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from pathlib import Path
 
-from fem.errors import ConvergenceError, InputError
-from runs import mpi, observe
-from runs.arguments import parser
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.arguments import parser
+from tireroad.runs.process import mpi, observe
 
 
 def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
@@ -32,8 +32,8 @@ def _only_warnings() -> None:
 
 
 def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
-    from runs.folder import claimed
-    from runs.scene import load
+    from tireroad.runs.files.folder import claimed
+    from tireroad.runs.scene.load import load
 
     if args.processes not in (None, comm.size):
         raise InputError(
@@ -51,7 +51,7 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
 
         mpi.on_root(comm, claim)
         stack.enter_context(observe.log_to(directory / "log.txt"))
-        from runs.pipeline import run_scene
+        from tireroad.runs.stages.pipeline import run_scene
 
         try:
             run_scene(
@@ -75,43 +75,43 @@ def _resumed(args: argparse.Namespace) -> argparse.Namespace:
 
 
 def _check(args: argparse.Namespace) -> None:
-    from runs.check import explain
-    from runs.scene import load
+    from tireroad.runs.scene.check import explain
+    from tireroad.runs.scene.load import load
 
     print(explain(load(args.scene, args.set)))
 
 
 def _report(args: argparse.Namespace) -> None:
     directory = _results(args.directory)
-    from runs.report import write_report
+    from tireroad.runs.report.page import write_report
 
     print(write_report(directory))
 
 
 def _export(args: argparse.Namespace) -> None:
     directory = _results(args.directory)
-    from runs.export import export
+    from tireroad.runs.files.export import export
 
     for path in export(directory):
         print(path)
 
 
 def _info(args: argparse.Namespace) -> None:
-    from runs.info import describe
+    from tireroad.runs.files.info import describe
 
     print(describe(args.file))
 
 
 def _bench(args: argparse.Namespace) -> None:
-    from runs.tabulate import run_all
+    from tireroad.runs.measure.tabulate import run_all
 
-    run_all("runs.bench", args.names, args.out)
+    run_all("tireroad.runs.bench", args.names, args.out)
 
 
 def _validate(args: argparse.Namespace) -> None:
-    from runs.tabulate import run_all
+    from tireroad.runs.measure.tabulate import run_all
 
-    run_all("runs.validation", args.names, args.out, args.large)
+    run_all("tireroad.runs.validation", args.names, args.out, args.large)
 
 
 def _results(directory: Path) -> Path:
@@ -144,7 +144,7 @@ def _alone(function: Callable[[], None]) -> int:
 def main(argv: list[str]) -> int:
     """The exit status of a command line."""
     if argv[:1] == ["test"] and argv[1:] not in (["-h"], ["--help"]):
-        from runs.testing import run_tests
+        from tireroad.runs.process.testing import run_tests
 
         return run_tests(argv[1:])  # all of it is pytest's
     options: list[str] = []
@@ -168,3 +168,10 @@ def main(argv: list[str]) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return mpi.DONE
+
+
+def program() -> None:
+    """The command `tireroad`: the process's own arguments and exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="replace")
+    sys.exit(main(sys.argv[1:]))

@@ -10,20 +10,20 @@ from mpi4py import MPI
 from scipy import sparse
 from threadpoolctl import threadpool_limits
 
-from contact.brush import Brush, BrushLaw
-from contact.complementarity import ActiveSet
-from contact.compliance import SpreadCompliance
-from contact.flat import Flat
-from contact.friction import Friction
-from contact.grid_patch import OnPoints
-from contact.kernel import GridPlaces, KernelTread
-from contact.rolling import Drive, roll
-from contact.synthetic import Strip, oval_patch
-from contact.tread import half_space_compliance, half_space_influence
-from greens.recursion import Recursion
-from runs.bench.contact_points import large, rough
-from runs.bench.contact_steps import convolution, orders
-from runs.tabulate import Table
+from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.roads.flat import Flat
+from tireroad.contact.rolling import Drive, roll
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.grid_compliance import SpreadCompliance
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.contact.tread.compliance import half_space_compliance, half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
+from tireroad.greens.recursion import Recursion
+from tireroad.runs.bench.contact_points import large, rough
+from tireroad.runs.bench.contact_steps import convolution, orders
+from tireroad.runs.measure.synthetic import Strip, oval_patch
+from tireroad.runs.measure.tabulate import Table
 
 ABOUT = "the contact loop: cost of a step, friction, convolution, many points; asked and measured"
 STEP = 1e-4

@@ -9,14 +9,14 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
-from contact.complementarity import ActiveSet
-from contact.compliance import SpreadCompliance
-from contact.kernel import GridPlaces, KernelTread
-from contact.projected_cg import ProjectedCG
-from contact.texture import Texture
-from contact.tread import half_space_influence
-from runs.bench.floors import durations
-from runs.tabulate import Table
+from tireroad.contact.roads.texture import Texture
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.grid_compliance import SpreadCompliance
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.tread.compliance import half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
+from tireroad.runs.bench.floors import durations
+from tireroad.runs.measure.tabulate import Table
 
 ELASTIC = 5e6, 0.45
 

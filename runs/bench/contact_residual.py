@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from runs.tabulate import Table
-from runs.validation.histories import History, follow
-from runs.validation.tires import Choice, Tires
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.validation.histories import History, follow
+from tireroad.runs.validation.tires import Choice, Tires
 
 ABOUT = "10 to 200 modes in contact, without and with residual, against all modes of a small tire"
 

@@ -7,15 +7,15 @@ import time
 import numpy as np
 from mpi4py import MPI
 
-from contact.complementarity import ActiveSet
-from contact.flat import Flat
-from contact.rolling import Drive, roll
-from contact.synthetic import Strip, oval_patch
-from contact.tread import half_space_compliance
-from greens.convolution import Convolution
-from greens.recursion import Recursion
-from runs.bench.contact_points import median
-from runs.tabulate import Table
+from tireroad.contact.roads.flat import Flat
+from tireroad.contact.rolling import Drive, roll
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.tread.compliance import half_space_compliance
+from tireroad.greens.convolution import Convolution
+from tireroad.greens.recursion import Recursion
+from tireroad.runs.bench.contact_points import median
+from tireroad.runs.measure.synthetic import Strip, oval_patch
+from tireroad.runs.measure.tabulate import Table
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 DURATION = 0.01  # s

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from runs import observe
-from runs.tabulate import Table
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.process import observe
 
 ABOUT = "element order, mesh, grading, near-incompressibility and mass on the clamped torus"
 INFLATION, DEFLECTION = 2e5, 0.005  # Pa, m
@@ -69,26 +69,26 @@ def run() -> list[Table]:
 
 
 def _section(order, segments, arc, thickness, grading, size):
-    from fem.mesh import Torus
+    from tireroad.fem.tire.mesh import Torus
 
     return Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, thickness, order, grading, size)
 
 
 def _body(section, ratio: float = 0.45):
-    from fem.body import Body
-    from fem.material import Material
+    from tireroad.fem.tire.body import Body
+    from tireroad.fem.tire.material import Material
 
     return Body(MPI.COMM_WORLD, section, Material("neo-hookean", 1200.0, 48e6, ratio))
 
 
 def _answer(section, consistent: bool = False) -> Answer:
     """Inflation, the lowest modes there, then the road. Collective."""
-    from fem.companion import load_error
-    from fem.equilibrium import Equilibrium
-    from fem.loading import Loader
-    from fem.operators import Operators
-    from fem.state import static_state
-    from fem.virtual_work import AT_REST
+    from tireroad.fem.matrices.operators import Operators
+    from tireroad.fem.static.equilibrium import Equilibrium
+    from tireroad.fem.static.load_error import load_error
+    from tireroad.fem.static.loading import Loader
+    from tireroad.fem.static.state import static_state
+    from tireroad.fem.static.virtual_work import AT_REST
 
     began = time.perf_counter()
     body = _body(section)
@@ -108,8 +108,8 @@ def _answer(section, consistent: bool = False) -> Answer:
 
 
 def _frequencies(operators, count: int = COUNT) -> np.ndarray:
-    from modal import undamped
-    from runs.stages.modes import sites
+    from tireroad.modal import undamped
+    from tireroad.runs.stages.modes import sites
 
     where = sites(operators)
     return undamped.solve(operators.stiffness, operators.mass, count, sites=where).frequency
@@ -202,7 +202,7 @@ def _locking() -> Table:
 
 
 def _first(section, ratio: float, full: bool) -> float:
-    from fem.operators import Operators
+    from tireroad.fem.matrices.operators import Operators
 
     body = _body(section, ratio)
     if full:

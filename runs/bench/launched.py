@@ -7,7 +7,7 @@ import os
 import subprocess
 from pathlib import Path
 
-from fem.errors import ConvergenceError
+from tireroad.fem.errors import ConvergenceError
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -7,8 +7,8 @@ import time
 import numpy as np
 from mpi4py import MPI
 
-from runs.stages.modes import sites
-from runs.tabulate import Table
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.stages.modes import sites
 
 ABOUT = "error of the modes over mesh and order; round tires by wave number against the general way"
 MESHES = ((12, 4), (16, 6), (24, 9), (32, 12), (48, 18))  # elements around, along
@@ -24,10 +24,10 @@ def run() -> list[Table]:
 
 def _operators(around: int, along: int, order: int):
     """The undeformed torus. Collective."""
-    from fem.body import Body
-    from fem.material import Material
-    from fem.mesh import Torus
-    from fem.operators import Operators
+    from tireroad.fem.matrices.operators import Operators
+    from tireroad.fem.tire.body import Body
+    from tireroad.fem.tire.material import Material
+    from tireroad.fem.tire.mesh import Torus
 
     section = Torus(0.32, 0.1, 0.012, np.radians(120), around, along, 1, order)
     rubber = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
@@ -35,7 +35,7 @@ def _operators(around: int, along: int, order: int):
 
 
 def _solve(operators, count: int, waves: bool = True):
-    from modal import undamped
+    from tireroad.modal import undamped
 
     return undamped.solve(
         operators.stiffness, operators.mass, count, sites=sites(operators), waves=waves

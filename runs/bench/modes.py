@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 from mpi4py import MPI
 
-from runs import observe
-from runs.memory import peak_memory
-from runs.tabulate import Table
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.process import observe
+from tireroad.runs.process.memory import peak_memory
 
 ABOUT = "time, memory and accuracy of standing and rolling modes"
 COUNTS = (250, 500, 1000, 2000)
@@ -62,12 +62,12 @@ def _met(sign: str, asked: float, value: float) -> str:
 
 
 def _tire(comm: MPI.Comm):
-    from fem.body import Body
-    from fem.equilibrium import Equilibrium
-    from fem.loading import Loader
-    from fem.material import Material
-    from fem.mesh import Torus
-    from fem.operators import Operators
+    from tireroad.fem.matrices.operators import Operators
+    from tireroad.fem.static.equilibrium import Equilibrium
+    from tireroad.fem.static.loading import Loader
+    from tireroad.fem.tire.body import Body
+    from tireroad.fem.tire.material import Material
+    from tireroad.fem.tire.mesh import Torus
 
     section = Torus(0.32, 0.1, 0.012, np.radians(120), 80, 16, 1, 2, footprint_size=0.25)
     material = Material(
@@ -89,8 +89,8 @@ def _timed(comm: MPI.Comm, work: Callable):
 
 
 def _standing(comm: MPI.Comm, operators):
-    from modal import undamped
-    from runs.stages.modes import sites
+    from tireroad.modal import undamped
+    from tireroad.runs.stages.modes import sites
 
     rows, modes = [], None
     for count in COUNTS:
@@ -164,9 +164,9 @@ def _plain(comm: MPI.Comm, operators, rows: list[list]) -> Table:
 
 def _rolling(comm: MPI.Comm, operators, modes) -> tuple[Table, float]:
     """The projected problem at 50 rad/s on leading parts of one basis: time, and error of the lowest states."""
-    from modal.basis import project
-    from modal.quadratic import truncation
-    from modal.rotating import checks, matrices, rotating
+    from tireroad.modal.basis import project
+    from tireroad.modal.quadratic import truncation
+    from tireroad.modal.rotating import checks, matrices, rotating
 
     observe.say("projected states ...")
     projection = project(modes, operators.rotation(), operators.carried, comm)

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from fem.errors import ConvergenceError, InputError
-from runs import observe
-from runs.bench.rough_road import (
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.bench.rough_road import (
     BAND,
     SPEED,
     Mesh,
@@ -19,9 +18,10 @@ from runs.bench.rough_road import (
     modal,
     prepared,
 )
-from runs.session import Session
-from runs.tabulate import Table
-from runs.validation.histories import History, follow
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.process import observe
+from tireroad.runs.stages.session import Session
+from tireroad.runs.validation.histories import History, follow
 
 ABOUT = "modes x residual x step x mesh against a far finer run: the Pareto front of rolling"
 
@@ -110,8 +110,8 @@ def _choices(session: Session, exact: History, mesh: str, counts, residuals, ste
 
 def _full(session: Session, exact: History, mesh: str, step: float) -> Choice:
     """Every degree of freedom of the same mesh in time."""
-    from fem.probe import nodes
-    from fem.transient import FullTire
+    from tireroad.fem.matrices.probe import nodes
+    from tireroad.fem.transient.linear import FullTire
 
     observe.say(f"  full finite elements, {step:g} s ...")
     points = nodes(session.patch.index, len(session.static.points))

@@ -8,22 +8,22 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from fem import probe
-from fem.body import Body
-from fem.equilibrium import Equilibrium
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from greens.choice import keep
-from greens.recursion import Recursion
-from greens.truncation import Cutoff, estimate
-from modal import undamped
-from modal.basis import project
-from modal.undamped import Modes
-from runs.coupling import Basis, Wheel
-from runs.stages.modes import sites
-from runs.tabulate import Table
+from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.state_selection import keep
+from tireroad.greens.truncation import Cutoff, estimate
+from tireroad.modal import undamped
+from tireroad.modal.basis import project
+from tireroad.modal.undamped import Modes
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.stages.modes import sites
 
 ABOUT = "receptance of few modes with each residual against the full matrices; set-up times"
 

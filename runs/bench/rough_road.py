@@ -12,13 +12,13 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from contact.grid_patch import settle
-from contact.model import step_solver
-from greens.recursion import Recursion
-from greens.response import Response
-from runs import observe
-from runs.session import Session
-from runs.validation.histories import History, distance, follow
+from tireroad.contact.grid_patch import settle
+from tireroad.contact.model import step_solver
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
+from tireroad.runs.process import observe
+from tireroad.runs.stages.session import Session
+from tireroad.runs.validation.histories import History, distance, follow
 
 BAND = 500.0  # Hz, up to which errors are told
 SPEED = 100.0  # rad/s
@@ -77,8 +77,8 @@ def write_scene(file: Path, mesh: Mesh, **keys: object) -> Path:
 
 def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Session:
     """A run up to its Green's functions, its points settled; `sets` as of --set. Collective."""
-    from runs.pipeline import run_scene
-    from runs.scene import load
+    from tireroad.runs.scene.load import load
+    from tireroad.runs.stages.pipeline import run_scene
 
     folder.mkdir(parents=True, exist_ok=True)
     scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
@@ -110,8 +110,8 @@ class Rolled:
 
 def rolled(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Rolled:
     """A run up to its contact forces; stages that the folder holds are reused. Collective."""
-    from runs.pipeline import run_scene
-    from runs.scene import load
+    from tireroad.runs.scene.load import load
+    from tireroad.runs.stages.pipeline import run_scene
 
     folder.mkdir(parents=True, exist_ok=True)
     scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
@@ -135,10 +135,10 @@ def settle_on_points(session: Session) -> None:
 
 def fewer_modes(session: Session, count: int, residual: str) -> Response:
     """The response that the session would have with its first modes and another residual. Collective."""
-    from fem.probe import nodes
-    from modal.undamped import Modes
-    from runs.responses import make
-    from runs.stages.modes import ModalBasis
+    from tireroad.fem.matrices.probe import nodes
+    from tireroad.modal.undamped import Modes
+    from tireroad.runs.stages.modes import ModalBasis
+    from tireroad.runs.stages.responses import make
 
     few, modes, basis = copy.copy(session), session.modes, session.modal
     greens = replace(session.scene.greens, residual=residual)

@@ -12,16 +12,16 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from contact.complementarity import ActiveSet
-from contact.rolling import Drive, roll
-from contact.synthetic import Strip, oval_patch
-from contact.tread import half_space_compliance
-from greens.recursion import Recursion
-from runs import observe
-from runs.bench.floors import bandwidth, exponent, fastest, flop_rate
-from runs.bench.launched import launched
-from runs.bench.rough_road import Mesh, prepared, write_scene
-from runs.tabulate import Table
+from tireroad.contact.rolling import Drive, roll
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.tread.compliance import half_space_compliance
+from tireroad.greens.recursion import Recursion
+from tireroad.runs.bench.floors import bandwidth, exponent, fastest, flop_rate
+from tireroad.runs.bench.launched import launched
+from tireroad.runs.bench.rough_road import Mesh, prepared, write_scene
+from tireroad.runs.measure.synthetic import Strip, oval_patch
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.process import observe
 
 ABOUT = "cost exponents over unknowns, modes, points, steps; processes; memory; floors"
 
@@ -89,7 +89,7 @@ def unknowns(folder: Path, meshes: tuple[Mesh, ...], modes: int) -> Table:
 
 
 def _size(folder: Path, mesh: Mesh, modes: int) -> list:
-    from fem.direct import factorise, solve_columns
+    from tireroad.fem.matrices.direct import factorise, solve_columns
 
     session = prepared(folder, mesh, modes=modes)
     stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]

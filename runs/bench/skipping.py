@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from runs import observe
-from runs.bench.rough_road import SPEED, Mesh, Rolled, prepared, rolled
-from runs.tabulate import Table
+from tireroad.runs.bench.rough_road import SPEED, Mesh, Rolled, prepared, rolled
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.process import observe
 
 ABOUT = (
     "standing, frictionless, flat, symmetric, points out of reach, stages known: what each saves"
@@ -86,8 +86,8 @@ def _seconds(run: Rolled, stages: tuple[str, ...]) -> float:
 
 def _mirrors(folder: Path, mesh: Mesh, keys: dict) -> list:
     """The modes of a tire whose mirror plane is used, and is not."""
-    from modal import undamped
-    from runs.stages.modes import solve
+    from tireroad.modal import undamped
+    from tireroad.runs.stages.modes import solve
 
     session = prepared(folder / "rolling", mesh, **keys)
     operators, count = session.operators, keys["modes"]

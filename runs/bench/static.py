@@ -5,9 +5,9 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from runs import observe
-from runs.bench.launched import launched
-from runs.tabulate import Table
+from tireroad.runs.bench.launched import launched
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.process import observe
 
 ABOUT = "a static state of 45,000 unknowns under load, rolling: time by part, memory, processes"
 RUNS = ((0.0, 1), (0.0, 2), (50.0, 1), (50.0, 2))  # rad/s, processes

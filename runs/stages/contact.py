@@ -10,22 +10,23 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from contact.brush import Brush, BrushLaw
-from contact.driven import Driven
-from contact.friction import Friction
-from contact.grid_patch import OnPoints, settle
-from contact.model import solver_name, step_solver
-from contact.rolling import Drive, Loop, roll
-from greens.convolution import Convolution
-from greens.recursion import Recursion
-from greens.response import Response
-from runs import observe, store
-from runs.contact_balance import balance
-from runs.contact_file import ContactFile
-from runs.contact_totals import Figures, Totals
-from runs.mpi import Deferred, Stopped
-from runs.point_forces import directions, histories, shortest_period
-from runs.session import Session
+from tireroad.contact.driven import Driven
+from tireroad.contact.grid_patch import OnPoints, settle
+from tireroad.contact.model import solver_name, step_solver
+from tireroad.contact.rolling import Drive, Loop, roll
+from tireroad.contact.solver.friction import Friction
+from tireroad.contact.totals import Figures, Totals
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.greens.convolution import Convolution
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
+from tireroad.runs.files import store
+from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import Deferred, Stopped
+from tireroad.runs.stages.contact_balance import balance
+from tireroad.runs.stages.contact_file import ContactFile
+from tireroad.runs.stages.point_forces import directions, histories, shortest_period
+from tireroad.runs.stages.session import Session
 
 # Radians a kept mode may turn in one automatic step: 0.3 leaves less than a percent in its phase.
 _TURN = 0.3

@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from modal import quadratic
-from modal.fields import gram
-from modal.quadratic import FullModes, truncation
-from modal.rotating import StateModes
-from runs.session import Session
+from tireroad.modal import quadratic
+from tireroad.modal.fields import gram
+from tireroad.modal.quadratic import FullModes, truncation
+from tireroad.modal.rotating import StateModes
+from tireroad.runs.stages.session import Session
 
 _ROUNDING = 1e-14  # of the largest squared length: directions below are the fields' rounding
 

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from contact.grid_patch import make_grid_patch
-from contact.motion import make_motion
-from contact.patch import Patch, make_patch
-from contact.road import make_road
-from greens.response import Response
-from modal.rotating import standing
-from runs.responses import chosen, fill_response, judge, make, read_responses
-from runs.session import Session
-from runs.store import put
+from tireroad.contact.grid_patch import make_grid_patch
+from tireroad.contact.patch import Patch, make_patch
+from tireroad.contact.roads.motion import make_motion
+from tireroad.contact.roads.road import make_road
+from tireroad.greens.response import Response
+from tireroad.modal.rotating import standing
+from tireroad.runs.files.store import put
+from tireroad.runs.stages.responses import chosen, fill_response, judge, make, read_responses
+from tireroad.runs.stages.session import Session
 
 # What the tire may give way beyond the road's own height, m: the smallest reach of the patch.
 _MARGIN = 5e-3
@@ -75,7 +75,7 @@ def _points(session: Session) -> Patch:
     nodes, wanted = _patch(session, session.reach), session.scene.contact.points
     if wanted == "nodes":
         return nodes
-    from fem.tread_surface import TreadSurface
+    from tireroad.fem.static.tread_surface import TreadSurface
 
     state = session.static
     surface = TreadSurface(session.lattice, state.positions)
@@ -109,7 +109,7 @@ def _reach(session: Session, road) -> float:
 
 
 def _prepare_forces(session: Session) -> None:
-    from fem import probe
+    from tireroad.fem.matrices import probe
 
     lattice = session.lattice
     loads, readings = [], []
@@ -146,7 +146,7 @@ def compute(session: Session, path: Path) -> None:
 def probes(session: Session) -> tuple:
     """(name, outputs, loads) on the outer face: of the contact patch with what prescribed forces add
     to it, or of the prescribed forces alone."""
-    from fem.probe import nodes
+    from tireroad.fem.matrices.probe import nodes
 
     if not session.scene.contact:
         return "force", session.readings, session.loads

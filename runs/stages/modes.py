@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from modal.symmetry import Sites
-from runs import observe
-from runs.session import Session
-from runs.store import put
+from tireroad.modal.symmetry import Sites
+from tireroad.runs.files.store import put
+from tireroad.runs.process import observe
+from tireroad.runs.stages.session import Session
 
 _NAMED = 8  # modes of a round tire shown by name
 
@@ -37,7 +37,7 @@ def inputs(session: Session) -> dict:
 
 def compute(session: Session, path: Path) -> None:
     """Solve, project and store. Collective."""
-    from modal.basis import project
+    from tireroad.modal.basis import project
 
     record, operators = session.record, session.operators
     with record.timing("eigensolver"):
@@ -82,7 +82,7 @@ def _say_names(frequency: np.ndarray, labels) -> None:
 
 def solve(session: Session):
     """The modes the scene wants, on all unknowns. Collective."""
-    from modal import undamped
+    from tireroad.modal import undamped
 
     operators, wanted = session.operators, session.scene.modal
     return undamped.solve(
@@ -101,7 +101,7 @@ def sites(operators) -> Sites:
 
 def _labels(session: Session, vectors: np.ndarray):
     """Wave and section numbers of the modes without a road; None with one. Collective."""
-    from modal.waves import label
+    from tireroad.modal.waves import label
 
     if session.static.road_height is not None:
         return None
@@ -147,7 +147,7 @@ _UNITS = {
 
 def reuse(session: Session, path: Path) -> None:
     """Read the basis back. Collective."""
-    from modal.basis import Projection
+    from tireroad.modal.basis import Projection
 
     def pick(file):
         parts = [file["surface/shape"][:]]

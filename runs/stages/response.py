@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from greens.recursion import Recursion
-from greens.response import Response
-from runs import observe
-from runs.contact_file import DRIVEN
-from runs.point_forces import directions, histories, shortest_period
-from runs.session import Session
-from runs.stages.contact import integration
-from runs.store import put
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
+from tireroad.runs.files.store import put
+from tireroad.runs.process import observe
+from tireroad.runs.stages.contact import integration
+from tireroad.runs.stages.contact_file import DRIVEN
+from tireroad.runs.stages.point_forces import directions, histories, shortest_period
+from tireroad.runs.stages.session import Session
 
 
 def inputs(session: Session) -> dict:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from modal.campbell import Campbell, critical_speed, growth, onset, sweep
-from modal.rotating import StateModes, checks, matrices, rotating
-from runs.mpi import on_root
-from runs.session import Session
-from runs.stages import full_states
-from runs.store import put
+from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
+from tireroad.modal.rotating import StateModes, checks, matrices, rotating
+from tireroad.runs.files.store import put
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages import full_states
+from tireroad.runs.stages.session import Session
 
 _UNITS = {
     "eigenvalue": "1/s",

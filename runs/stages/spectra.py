@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from contact.spectra import amplitudes, third_octaves
-from runs.session import Session
-from runs.store import put
+from tireroad.contact.spectra import amplitudes, third_octaves
+from tireroad.runs.files.store import put
+from tireroad.runs.stages.session import Session
 
 
 def inputs(session: Session) -> dict:

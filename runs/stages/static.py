@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.errors import ConvergenceError
-from runs import observe
-from runs.mpi import on_root
-from runs.session import Session
-from runs.store import put
+from tireroad.fem.errors import ConvergenceError
+from tireroad.runs.files.store import put
+from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.session import Session
 
 COARSE = 0.02  # estimated error of the load above which the user is warned
 
@@ -29,10 +29,10 @@ def inputs(session: Session) -> dict:
 
 def compute(session: Session, path: Path) -> None:
     """Solve and store. Collective."""
-    from fem.equilibrium import Equilibrium
-    from fem.loading import Loader
-    from fem.state import static_state
-    from fem.virtual_work import Rolling
+    from tireroad.fem.static.equilibrium import Equilibrium
+    from tireroad.fem.static.loading import Loader
+    from tireroad.fem.static.state import static_state
+    from tireroad.fem.static.virtual_work import Rolling
 
     record, wanted = session.record, session.scene.static
     with record.timing("mesh and forms"):
@@ -71,8 +71,8 @@ def _place(loader, wanted) -> None:
 
 def _estimate(session: Session, loader) -> None:
     """Print and keep how far the load is from that of finer elements. Collective."""
-    from fem.companion import load_error
-    from fem.virtual_work import Rolling
+    from tireroad.fem.static.load_error import load_error
+    from tireroad.fem.static.virtual_work import Rolling
 
     found = load_error(loader, Rolling(*session.rolling))
     if isinstance(found, str):
@@ -167,7 +167,7 @@ def _fill(file, session: Session, equilibrium) -> None:
 
 def reuse(session: Session, path: Path) -> None:
     """Read the state back. Collective."""
-    from fem.state import StaticState
+    from tireroad.fem.static.state import StaticState
 
     def pick(file):
         surface = file["surface"]

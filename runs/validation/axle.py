@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from fem.operators import Operators
-from fem.receptance import receptance
-from fem.support import Support
-from fem.virtual_work import Rolling
-from greens.response import Response
-from modal import undamped
-from runs.coupling import Wheel
-from runs.stages import greens
-from runs.stages.modes import sites
-from runs.tabulate import Table
-from runs.validation.tires import Tires
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.receptance import receptance
+from tireroad.fem.matrices.support import Support
+from tireroad.fem.static.virtual_work import Rolling
+from tireroad.greens.coupling import Wheel
+from tireroad.greens.response import Response
+from tireroad.modal import undamped
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.stages import greens
+from tireroad.runs.stages.modes import sites
+from tireroad.runs.validation.tires import Tires
 
 ABOUT = "axle force per force on the tread: by momentum, by the free rim's modes, by full finite elements"
 FREQUENCY = np.array([10.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0])  # Hz

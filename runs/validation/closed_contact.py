@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from contact import closed_forms as exact
-from contact.brush import Brush, BrushLaw
-from contact.complementarity import ActiveSet
-from contact.friction import Friction
-from contact.tangential import Stiffness, stick_slip
-from contact.tread import half_space_compliance, rectangle_potential
+from tireroad.contact import closed_forms as exact
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.tangential import Stiffness, stick_slip
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.contact.tread.compliance import half_space_compliance, rectangle_potential
 
 YOUNG, POISSON = 3.4e6, 0.49
 MODULUS = exact.contact_modulus(YOUNG, POISSON)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from runs.tabulate import Table
-from runs.validation import closed_contact, closed_tire
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.validation import closed_contact, closed_tire
 
 ABOUT = "tube, rings, oscillator, Hertz, punch, friction and brush against closed forms"
 

@@ -9,17 +9,17 @@ from mpi4py import MPI
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
-from fem.body import Body
-from fem.equilibrium import Equilibrium
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from greens.recursion import Recursion
-from greens.response import couple
-from modal.basis import Projection, project
-from modal.rotating import matrices, rotating, standing
-from modal.undamped import Modes
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import couple
+from tireroad.modal.basis import Projection, project
+from tireroad.modal.rotating import matrices, rotating, standing
+from tireroad.modal.undamped import Modes
 
 FLAT = 1e6  # m, radius of the section circle: what is used of the torus is a cylinder
 COMM = MPI.COMM_SELF

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from contact.grid_patch import OnPoints
-from contact.model import step_solver
-from contact.rolling import Drive, roll
-from runs.session import Session
+from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.model import step_solver
+from tireroad.contact.rolling import Drive, roll
+from tireroad.runs.stages.session import Session
 
 BAND = 300.0  # Hz, up to which errors are measured
 

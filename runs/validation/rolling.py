@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from runs.tabulate import Table
-from runs.validation.comparison import Comparison, compare, verdicts
-from runs.validation.histories import BAND
-from runs.validation.tires import Choice, Tires
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.validation.comparison import Comparison, compare, verdicts
+from tireroad.runs.validation.histories import BAND
+from tireroad.runs.validation.tires import Choice, Tires
 
 ABOUT = "contact and axle force while rolling, modes against full finite elements of the same mesh"
 

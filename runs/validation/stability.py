@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from runs.tabulate import Table
-from runs.validation import stress_contact, stress_fem, stress_greens, stress_modal
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.validation import stress_contact, stress_fem, stress_greens, stress_modal
 
 ABOUT = "finite elements, modes, Green's functions and the contact loop under stress"
 

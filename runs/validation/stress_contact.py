@@ -9,21 +9,25 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from contact.brush import Brush, BrushLaw
-from contact.complementarity import ActiveSet
-from contact.compliance import SpreadCompliance
-from contact.flat import Flat
-from contact.friction import Friction
-from contact.grid_patch import OnPoints
-from contact.kernel import GridPlaces, KernelTread
-from contact.obstacle import Obstacle
-from contact.projected_cg import ProjectedCG
-from contact.rolling import Drive, roll
-from contact.synthetic import Strip, oval_patch
-from contact.tread import half_space_compliance, half_space_influence, winkler_compliance
-from fem.errors import ConvergenceError, InputError
-from greens.recursion import Recursion
-from runs.tabulate import Table
+from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.roads.flat import Flat
+from tireroad.contact.roads.obstacle import Obstacle
+from tireroad.contact.rolling import Drive, roll
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.grid_compliance import SpreadCompliance
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.contact.tread.compliance import (
+    half_space_compliance,
+    half_space_influence,
+    winkler_compliance,
+)
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.greens.recursion import Recursion
+from tireroad.runs.measure.synthetic import Strip, oval_patch
+from tireroad.runs.measure.tabulate import Table
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 HALF_SPACE = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body
-from fem.equilibrium import Equilibrium
-from fem.errors import ConvergenceError
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.state import StaticState, static_state
-from fem.virtual_work import Rolling
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.state import StaticState, static_state
+from tireroad.fem.static.virtual_work import Rolling
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
 
 
 @dataclass(frozen=True)

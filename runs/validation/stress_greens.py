@@ -6,10 +6,10 @@ import numpy as np
 from mpi4py import MPI
 from scipy import linalg
 
-from greens.recursion import Recursion
-from greens.response import Response, couple
-from modal.basis import Projection
-from modal.rotating import StateModes, rotating, standing
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response, couple
+from tireroad.modal.basis import Projection
+from tireroad.modal.rotating import StateModes, rotating, standing
 
 SQUARES = np.array([50.0, 400.0, 2.6e4]) ** 2  # 1/s2
 SHAPE = np.random.default_rng(3).normal(size=(3, 3))  # kg^-1/2

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from fem.body import Body
-from fem.equilibrium import Equilibrium
-from fem.errors import ConvergenceError
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from modal import undamped
-from modal.basis import Projection, project
-from modal.campbell import critical_speed, growth, onset
-from modal.rotating import checks, matrices, rotating
-from runs.stages.modes import sites
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.modal import undamped
+from tireroad.modal.basis import Projection, project
+from tireroad.modal.campbell import critical_speed, growth, onset
+from tireroad.modal.rotating import checks, matrices, rotating
+from tireroad.runs.stages.modes import sites
 
 COUNT = 120
 DAMPING = (0.0, 500.0, 5e3, 1e5)  # gamma1, 1/s

@@ -10,20 +10,20 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fem.nonlinear_transient import NonlinearTire
-from fem.transient import FullTire
-from greens.recursion import Recursion
-from greens.response import Response
-from modal.basis import Projection
-from modal.rotating import StateModes
-from modal.undamped import Modes
-from runs import observe
-from runs.pipeline import run_scene
-from runs.responses import make
-from runs.scene import load
-from runs.session import Session
-from runs.stages import greens
-from runs.stages.modes import ModalBasis
+from tireroad.fem.transient.linear import FullTire
+from tireroad.fem.transient.nonlinear import NonlinearTire
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
+from tireroad.modal.basis import Projection
+from tireroad.modal.rotating import StateModes
+from tireroad.modal.undamped import Modes
+from tireroad.runs.process import observe
+from tireroad.runs.scene.load import load
+from tireroad.runs.stages import greens
+from tireroad.runs.stages.modes import ModalBasis
+from tireroad.runs.stages.pipeline import run_scene
+from tireroad.runs.stages.responses import make
+from tireroad.runs.stages.session import Session
 
 # Of the full finite elements' scheme. Axle force on a cleat at steps of 1e-4 s with 0, 0.5 and 0.8: 5.4, 2.8
 # and 2.1 % off; contact force on cobblestones at 2.5e-5 s: 0 and 0.5 are 0.08 % apart, 0.8 is 0.2 % off.

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from contact.cobblestones import Blocks, Cobblestones
-from fem.errors import InputError
+from tireroad.contact.roads.cobblestones import Blocks, Cobblestones
+from tireroad.fem.errors import InputError
 
 BLOCKS = Blocks(0.10, 0.08, 0.01, 0.012, edge_radius=0.005, scatter=0.002, seed=4)
 

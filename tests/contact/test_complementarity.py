@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from contact.complementarity import ActiveSet, make_solver
-from contact.tread import half_space_compliance
-from fem.errors import ConvergenceError, InputError
+from tireroad.contact.solver.complementarity import ActiveSet, make_solver
+from tireroad.contact.tread.compliance import half_space_compliance
+from tireroad.fem.errors import ConvergenceError, InputError
 
 SOLVERS = ("active-set", "snes-vi")
 

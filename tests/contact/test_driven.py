@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.complementarity import ActiveSet
-from contact.driven import Driven
-from contact.flat import Flat
-from contact.patch import Patch
-from contact.rolling import Drive, roll
-from greens.recursion import Recursion
-from greens.response import Response
+from tireroad.contact.driven import Driven
+from tireroad.contact.patch import Patch
+from tireroad.contact.roads.flat import Flat
+from tireroad.contact.rolling import Drive, roll
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
 
 MASS, STIFFNESS, TREAD, FORCE = 2.0, 3e4, 5e-5, 8.0
 STEP, STEPS = 2e-5, 2000

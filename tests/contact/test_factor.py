@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from contact.complementarity import ActiveSet
-from contact.compliance import MatrixCompliance
-from contact.factor import ActiveFactor
-from fem.errors import ConvergenceError
-from greens.loaded import LoadedColumns
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.factor import ActiveFactor
+from tireroad.contact.solver.grid_compliance import MatrixCompliance
+from tireroad.fem.errors import ConvergenceError
+from tireroad.greens.sparse_columns import LoadedColumns
 
 
 def compliance(rng: np.random.Generator, n: int) -> np.ndarray:

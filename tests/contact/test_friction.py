@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.brush import Brush, BrushLaw, upstream
-from contact.complementarity import ActiveSet
-from contact.compliance import MatrixCompliance
-from contact.flat import Flat
-from contact.friction import Friction
-from contact.projected_cg import ProjectedCG
-from contact.rolling import Drive, Loop, roll
-from contact.synthetic import Strip, oval_patch
-from contact.tangential import Stiffness, stick_slip
-from contact.tread import half_space_compliance, rectangle_potential
-from fem.errors import ConvergenceError
-from greens.recursion import Recursion
+from tireroad.contact.roads.flat import Flat
+from tireroad.contact.rolling import Drive, Loop, roll
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.grid_compliance import MatrixCompliance
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.tangential import Stiffness, stick_slip
+from tireroad.contact.tread.brush import Brush, BrushLaw, upstream
+from tireroad.contact.tread.compliance import half_space_compliance, rectangle_potential
+from tireroad.fem.errors import ConvergenceError
+from tireroad.greens.recursion import Recursion
+from tireroad.runs.measure.synthetic import Strip, oval_patch
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 TREAD = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from contact.grid import Grid
-from contact.grid_file import read_grid
-from contact.window import fill_holes
-from fem.errors import InputError
+from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.grid_file import read_grid
+from tireroad.contact.roads.window import fill_holes
+from tireroad.fem.errors import InputError
 
 X, Y = 5.0 + 0.1 * np.arange(31), np.linspace(-0.5, 0.5, 11)
 Z = np.random.default_rng(2).standard_normal((31, 11))

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from contact.complementarity import ActiveSet
-from contact.grid_patch import OnPoints, make_grid_patch, settle
-from contact.model import step_solver
-from contact.patch import make_patch
-from contact.projected_cg import ProjectedCG
-from fem.errors import InputError
-from fem.mesh import Torus, field_lattice
-from fem.tread_surface import TreadSurface
-from runs.schema import Pitch
-from runs.tables import Contact
+from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle
+from tireroad.contact.model import step_solver
+from tireroad.contact.patch import make_patch
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.fem.errors import InputError
+from tireroad.fem.static.tread_surface import TreadSurface
+from tireroad.fem.tire.mesh import Torus, field_lattice
+from tireroad.runs.scene.schema import Pitch
+from tireroad.runs.scene.tables import Contact
 
 SECTION = Torus(0.32, 0.10, 0.012, np.radians(120), 60, 16, 1, 2, "bead", 0.3)
 
@@ -21,7 +21,7 @@ SECTION = Torus(0.32, 0.10, 0.012, np.radians(120), 60, 16, 1, 2, "bead", 0.3)
 def tread():
     """A torus flattened a little towards the road plane at z = -0.318 m: lattice, positions."""
     lattice = field_lattice(SECTION)
-    from fem.surface import outer_face
+    from tireroad.fem.tire.surface import outer_face
 
     points = lattice.points(outer_face(lattice))
     road = -0.318

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from contact.complementarity import ActiveSet
-from contact.compliance import MatrixCompliance, SpreadCompliance
-from contact.kernel import GridPlaces, KernelTread
-from contact.layer import LayerInfluence, transform_ratio
-from contact.projected_cg import ProjectedCG
-from contact.tread import dense_compliance, half_space_influence
-from fem.errors import ConvergenceError, InputError
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.grid_compliance import MatrixCompliance, SpreadCompliance
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.tread.compliance import dense_compliance, half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
+from tireroad.contact.tread.layer import LayerInfluence, transform_ratio
+from tireroad.fem.errors import ConvergenceError, InputError
 
 SHAPE, SPACING = (13, 10), (0.002, 0.003)
 

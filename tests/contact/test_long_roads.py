@@ -7,12 +7,12 @@ import h5py
 import numpy as np
 import pytest
 
-from contact import grid_file, rows, window
-from contact.grid import Grid
-from contact.grid_file import read_grid
-from contact.road import make_road
-from contact.rows import ArrayRows, FileRows, pieces
-from fem.errors import InputError
+from tireroad.contact.roads import grid_file, rows, window
+from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.grid_file import read_grid
+from tireroad.contact.roads.road import make_road
+from tireroad.contact.roads.rows import ArrayRows, FileRows, pieces
+from tireroad.fem.errors import InputError
 
 LENGTH, STEP, WIDTH = 10_000.0, 0.01, 41
 HEADER = """$ROAD_CRG

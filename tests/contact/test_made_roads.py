@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from contact.iso8608 import CHUNK, CLASSES, Iso8608
-from contact.obstacle import Obstacle
-from contact.road import make_road
-from contact.texture import Texture
-from fem.errors import InputError
+from tireroad.contact.roads.iso8608 import CHUNK, CLASSES, Iso8608
+from tireroad.contact.roads.obstacle import Obstacle
+from tireroad.contact.roads.road import make_road
+from tireroad.contact.roads.texture import Texture
+from tireroad.fem.errors import InputError
 
 
 def test_cleat_and_step() -> None:

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contact.opencrg import read_opencrg
-from contact.road import make_road
-from fem.errors import InputError
+from tireroad.contact.roads.opencrg import read_opencrg
+from tireroad.contact.roads.road import make_road
+from tireroad.fem.errors import InputError
 
 ROADS = Path(os.environ.get("TIREROAD_ROADS", Path(__file__).parents[3] / "shared" / "roads"))
 needs_roads = pytest.mark.skipif(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contact.patch import make_patch
+from tireroad.contact.patch import make_patch
 
 
 def test_points_within_reach_and_their_border() -> None:

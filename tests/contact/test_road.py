@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from contact.grid import Grid
-from contact.motion import make_motion
-from contact.road import make_road
-from contact.sine import Sine
-from contact.strip import PreparedRoad, RoadUnderTire
-from fem.errors import InputError
+from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.motion import make_motion
+from tireroad.contact.roads.road import make_road
+from tireroad.contact.roads.sine import Sine
+from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
+from tireroad.fem.errors import InputError
 
 STRIP = (0.1, 5.0, -0.1, 0.1)
 STONES = {

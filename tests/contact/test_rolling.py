@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.complementarity import ActiveSet
-from contact.energy import Work
-from contact.flat import Flat
-from contact.rolling import Drive, _roads, roll
-from contact.synthetic import Strip, oval_patch
-from contact.tread import half_space_compliance
-from fem.errors import ConvergenceError
-from greens.convolution import Convolution
-from greens.recursion import Recursion
+from tireroad.contact.energy import Work
+from tireroad.contact.roads.flat import Flat
+from tireroad.contact.rolling import Drive, _roads, roll
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.tread.compliance import half_space_compliance
+from tireroad.fem.errors import ConvergenceError
+from tireroad.greens.convolution import Convolution
+from tireroad.greens.recursion import Recursion
+from tireroad.runs.measure.synthetic import Strip, oval_patch
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 TREAD = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)

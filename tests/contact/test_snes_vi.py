@@ -5,13 +5,13 @@ import pytest
 from petsc4py import PETSc
 from scipy import sparse
 
-from contact.complementarity import ActiveSet, make_solver
-from contact.compliance import SpreadCompliance
-from contact.kernel import GridPlaces, KernelTread
-from contact.model import DENSE_POINTS
-from contact.projected_cg import ProjectedCG
-from contact.snes_vi import PREFIX, SnesVI
-from contact.tread import half_space_influence
+from tireroad.contact.model import DENSE_POINTS
+from tireroad.contact.solver.complementarity import ActiveSet, make_solver
+from tireroad.contact.solver.grid_compliance import SpreadCompliance
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.snes_vi import PREFIX, SnesVI
+from tireroad.contact.tread.compliance import half_space_influence
+from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 
 
 @pytest.fixture(params=["vinewtonrsls", "vinewtonssls"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from contact.spectra import amplitudes, third_octaves
+from tireroad.contact.spectra import amplitudes, third_octaves
 
 STEP = 1e-4
 TIME = STEP * np.arange(20000)

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad
 
-from contact.closed_forms import LOVE_SQUARE_CENTRE
-from contact.tread import (
+from tireroad.contact.closed_forms import LOVE_SQUARE_CENTRE
+from tireroad.contact.tread.compliance import (
     half_space_compliance,
     no_tread,
     rectangle_potential,
     winkler_compliance,
 )
-from fem.errors import InputError
+from tireroad.fem.errors import InputError
 
 
 def potential(x: float, y: float, a: float = 1.0, b: float = 1.0) -> float:

@@ -7,9 +7,9 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from fem.body import Body
-from fem.material import Material
-from fem.mesh import Torus
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
 
 RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
 

@@ -6,13 +6,13 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem import compat
-from fem.equilibrium import Equilibrium
-from fem.errors import ConvergenceError, InputError
-from fem.loading import Loader
-from fem.material import Material
-from fem.state import static_state
-from fem.virtual_work import Rolling, static_residual, tangent
+from tireroad.fem import compat
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.state import static_state
+from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
+from tireroad.fem.tire.material import Material
 
 TERMS = {
     "stress": (0.0, Rolling()),

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fem.compat import field_nodes
-from fem.footprint import Footprint, footprint, nodal_area
-from fem.mesh import Lattice, Torus, _edge
+from tireroad.fem.compat import field_nodes
+from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
+from tireroad.fem.tire.mesh import Lattice, Torus, _edge
 
 A, B = 0.03, 0.02  # m, half axes of the known footprint
 

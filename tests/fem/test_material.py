@@ -7,10 +7,10 @@ import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from fem import compat
-from fem.errors import InputError
-from fem.material import LAWS, Material
-from fem.wall import Region
+from tireroad.fem import compat
+from tireroad.fem.errors import InputError
+from tireroad.fem.tire.material import LAWS, Material
+from tireroad.fem.tire.wall import Region
 
 F = np.array([[1.2, 0.1, -0.05], [0.2, 0.9, 0.1], [0.0, -0.15, 1.1]])
 

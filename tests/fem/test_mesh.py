@@ -6,8 +6,8 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from fem import compat
-from fem.mesh import INNER, RIM, TREAD
+from tireroad.fem import compat
+from tireroad.fem.tire.mesh import INNER, RIM, TREAD
 
 
 @pytest.mark.mpi

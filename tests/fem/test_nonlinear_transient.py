@@ -5,16 +5,16 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from fem import probe
-from fem.body import Body
-from fem.equilibrium import Equilibrium
-from fem.errors import ConvergenceError
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.nonlinear_transient import NonlinearTire
-from fem.operators import Operators
-from fem.transient import FullTire
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.fem.transient.linear import FullTire
+from tireroad.fem.transient.nonlinear import NonlinearTire
 
 INFLATION = 1e5
 DAMPING = (400.0, 1e-6)

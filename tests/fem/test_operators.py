@@ -8,9 +8,9 @@ from mpi4py import MPI
 from scipy.sparse import diags
 from scipy.sparse.linalg import eigsh
 
-from fem import compat
-from fem.equilibrium import Equilibrium
-from fem.operators import Operators
+from tireroad.fem import compat
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
 
 
 @pytest.fixture

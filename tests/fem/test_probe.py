@@ -6,10 +6,10 @@ from mpi4py import MPI
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from fem import probe
-from fem.compliance import compliance, rotating_stiffness
-from fem.errors import ConvergenceError
-from fem.operators import Operators
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.compliance import compliance, rotating_stiffness
+from tireroad.fem.matrices.operators import Operators
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

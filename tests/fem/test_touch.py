@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fem.equilibrium import Equilibrium
-from fem.loading import Loader
-from fem.mesh import Lattice, Torus
-from fem.tread_surface import TreadSurface
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.tread_surface import TreadSurface
+from tireroad.fem.tire.mesh import Lattice, Torus
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

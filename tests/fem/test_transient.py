@@ -5,15 +5,15 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from fem import probe
-from fem.body import Body
-from fem.compliance import compliance, rotating_stiffness
-from fem.equilibrium import Equilibrium
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from fem.transient import FullTire
+from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.compliance import compliance, rotating_stiffness
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.fem.transient.linear import FullTire
 
 DAMPING = (400.0, 0.0)
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from greens.response import Response, couple
-from modal.rotating import rotating
+from tireroad.greens.response import Response, couple
+from tireroad.modal.rotating import rotating
 
 
 @dataclass(frozen=True)

@@ -7,21 +7,21 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from fem import probe
-from fem.body import Body
-from fem.equilibrium import Equilibrium
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from fem.relief import rigid_space
-from fem.support import Support
-from fem.virtual_work import Rolling
-from greens.response import couple
-from modal import undamped
-from modal.basis import project
-from runs.coupling import Basis, Wheel
-from runs.stages.modes import sites
+from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.inertia_relief import rigid_space
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.support import Support
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.virtual_work import Rolling
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.response import couple
+from tireroad.modal import undamped
+from tireroad.modal.basis import project
+from tireroad.runs.stages.modes import sites
 
 COMM = MPI.COMM_WORLD
 RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)

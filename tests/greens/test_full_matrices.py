@@ -7,18 +7,18 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from fem import probe
-from fem.body import Body
-from fem.equilibrium import Equilibrium
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from greens.truncation import Cutoff, estimate
-from modal import undamped
-from modal.basis import project
-from modal.fields import gram, multiply
-from runs.coupling import Basis, Wheel
+from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.truncation import Cutoff, estimate
+from tireroad.modal import undamped
+from tireroad.modal.basis import project
+from tireroad.modal.fields import gram, multiply
 
 MATERIAL = {
     "model": "neo-hookean",
@@ -125,8 +125,8 @@ def test_estimates_are_of_the_size_of_the_errors() -> None:
 
 
 def test_attachments_keep_the_modes_and_the_orthonormality() -> None:
-    from fem.compliance import static_shapes
-    from greens.attachment import with_attachments
+    from tireroad.fem.matrices.compliance import static_shapes
+    from tireroad.greens.attachment import with_attachments
 
     operators, _, modes, _, loads = tire()
     made, _ = wheel(60.0)

@@ -8,9 +8,9 @@ from mpi4py import MPI
 from scipy import linalg
 from systems import make
 
-from fem.errors import InputError
-from greens.convolution import Convolution
-from greens.recursion import Recursion
+from tireroad.fem.errors import InputError
+from tireroad.greens.convolution import Convolution
+from tireroad.greens.recursion import Recursion
 
 STEPS = 60
 

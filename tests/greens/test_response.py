@@ -5,7 +5,7 @@ import pytest
 from scipy import linalg
 from systems import make
 
-from greens.response import RESOLVED
+from tireroad.greens.response import RESOLVED
 
 TIMES = np.array([0.0, 1e-4, 3e-3, 0.02, 0.1])
 

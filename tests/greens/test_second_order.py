@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from systems import make
 
-from greens.response import couple
-from greens.second_order import Moments, second_order
-from modal.rotating import rotating
+from tireroad.greens.response import couple
+from tireroad.greens.second_order import Moments, second_order
+from tireroad.modal.rotating import rotating
 
 KEPT = 6
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from modal.basis import Projection
+from tireroad.modal.basis import Projection
 
 _THETA = np.linspace(0, 2 * np.pi, 128, endpoint=False)
 

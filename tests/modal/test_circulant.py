@@ -6,10 +6,10 @@ from chains import distributed, own_rows
 from mpi4py import MPI
 from scipy import sparse
 
-from fem.errors import ConvergenceError
-from modal import undamped
-from modal.circulant import repeated
-from modal.symmetry import Sites
+from tireroad.fem.errors import ConvergenceError
+from tireroad.modal import undamped
+from tireroad.modal.circulant import repeated
+from tireroad.modal.symmetry import Sites
 
 COMM = MPI.COMM_WORLD
 

@@ -7,9 +7,9 @@ from mpi4py import MPI
 from rings import random_tire, wave_ring
 from scipy import sparse
 
-from modal.fields import multiply
-from modal.quadratic import solve, truncation
-from modal.rotating import matrices, rotating
+from tireroad.modal.fields import multiply
+from tireroad.modal.quadratic import solve, truncation
+from tireroad.modal.rotating import matrices, rotating
 
 COMM = MPI.COMM_WORLD
 

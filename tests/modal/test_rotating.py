@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from rings import inextensional_ring, random_tire, wave_ring
 
-from fem.errors import ConvergenceError
-from modal.campbell import critical_speed, growth, onset, sweep
-from modal.rotating import checks, matrices, rotating, standing
+from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.campbell import critical_speed, growth, onset, sweep
+from tireroad.modal.rotating import checks, matrices, rotating, standing
 
 WAVES = {0: 300.0, 1: 420.0, 2: 500.0, 3: 800.0, 4: 1300.0}
 

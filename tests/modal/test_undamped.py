@@ -6,10 +6,10 @@ from chains import chain, distributed, own_rows, ring, spatial
 from mpi4py import MPI
 from scipy import sparse
 
-from fem.errors import ConvergenceError
-from modal import undamped
-from modal.fields import gram, multiply
-from modal.symmetry import Sites
+from tireroad.fem.errors import ConvergenceError
+from tireroad.modal import undamped
+from tireroad.modal.fields import gram, multiply
+from tireroad.modal.symmetry import Sites
 
 COMM = MPI.COMM_WORLD
 ROUNDING = 1e-9  # relative error of an eigenvalue of a well-scaled chain

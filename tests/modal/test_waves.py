@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from modal.waves import label
+from tireroad.modal.waves import label
 
 COMM = MPI.COMM_WORLD
 

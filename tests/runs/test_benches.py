@@ -6,13 +6,13 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from runs import tabulate
-from runs.bench import headline, pareto, scaling, skipping
-from runs.bench.floors import exponent
-from runs.bench.rough_road import Mesh
-from runs.measured_page import _shown, page
-from runs.plots import drawn
-from runs.tabulate import Table
+from tireroad.runs.bench import headline, pareto, scaling, skipping
+from tireroad.runs.bench.floors import exponent
+from tireroad.runs.bench.rough_road import Mesh
+from tireroad.runs.measure import tabulate
+from tireroad.runs.measure.measured_page import _shown, page
+from tireroad.runs.measure.plots import drawn
+from tireroad.runs.measure.tabulate import Table
 
 TINY = Mesh(10, 5, 0.5)
 VOID = {"meta", "img", "link", "br"}
@@ -143,7 +143,7 @@ def test_kept_as_json_and_page(tmp_path, monkeypatch) -> None:
     ]  # fmt: skip
     module = type("M", (), {"ABOUT": "it", "run": staticmethod(lambda: tables)})
     monkeypatch.setattr(tabulate, "modules", lambda package: {"it": module})
-    tabulate.run_all("runs.bench", ["it"], tmp_path / "out.json")
+    tabulate.run_all("tireroad.runs.bench", ["it"], tmp_path / "out.json")
     data = json.loads((tmp_path / "out.json").read_text())
     assert data["results"]["it"][0]["rows"] == [[1, 1e-5], [2, 2.0]] and "core" in data["machine"]
     text = (tmp_path / "out.html").read_text()

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from runs import cli
-from runs.plan import STAGES, skipped
-from runs.scene import load
-from runs.version import VERSION
+from tireroad.runs import cli
+from tireroad.runs.scene.load import load
+from tireroad.runs.scene.plan import STAGES, skipped
+from tireroad.runs.version import VERSION
 
 LIGHT = """
 import sys
-from runs.cli import main
+from tireroad.runs.cli import main
 try:
     status = main(sys.argv[1:])
 except SystemExit as ending:
@@ -95,7 +95,7 @@ def test_wrong_process_count_is_explained(launch, scene: Path) -> None:
 
 
 def test_folder_of_another_scene_is_left_alone(launch, scene: Path, tmp_path: Path) -> None:
-    from runs.folder import Summary
+    from tireroad.runs.files.folder import Summary
 
     Summary(tmp_path, "other", 1).record("static", "computed")
     before = (tmp_path / "summary.json").read_bytes()

@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from synthetic_results import write_results
 
-from fem.errors import InputError
-from runs.export import export
-from runs.xdmf import INSTANTS, SHAPES
+from tireroad.fem.errors import InputError
+from tireroad.runs.files.export import export
+from tireroad.runs.files.xdmf import INSTANTS, SHAPES
 
 CSV = {
     "footprint.csv",

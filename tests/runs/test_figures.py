@@ -8,8 +8,8 @@ import pytest
 from matplotlib import image
 from synthetic_results import lattice
 
-from runs import figures, surface_figures
-from runs.quantities import quantity
+from tireroad.runs.report import figures, surface_figures
+from tireroad.runs.report.quantities import quantity
 
 
 @pytest.mark.parametrize(

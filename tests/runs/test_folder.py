@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fem.errors import InputError
-from runs.folder import Summary, check_owner, claimed
-from runs.resolved import dumps
-from runs.scene import load
+from tireroad.fem.errors import InputError
+from tireroad.runs.files.folder import Summary, check_owner, claimed
+from tireroad.runs.scene.load import load
+from tireroad.runs.scene.resolved import dumps
 
 
 def test_new_folder_is_made(tmp_path: Path) -> None:

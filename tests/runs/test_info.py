@@ -6,8 +6,8 @@ import h5py
 import pytest
 from synthetic_results import write_results
 
-from fem.errors import InputError
-from runs.info import describe
+from tireroad.fem.errors import InputError
+from tireroad.runs.files.info import describe
 
 
 @pytest.fixture(scope="module")

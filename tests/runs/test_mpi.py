@@ -9,14 +9,14 @@ import pytest
 from mpi4py import MPI
 from started import environment
 
-from fem.errors import ConvergenceError, InputError
-from runs import mpi
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.process import mpi
 
 CASE = """
 import sys, time
 from mpi4py import MPI
-from fem.errors import ConvergenceError, InputError
-from runs import mpi
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.process import mpi
 
 def fail(error):
     raise error

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from runs import observe
+from tireroad.runs.process import observe
 
 
 def late(bar: observe.Progress) -> None:

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from runs import pipeline
+from tireroad.runs.stages import pipeline
 
 TIRE = """
 [tire]
@@ -239,8 +239,8 @@ def test_options_that_petsc_did_not_read_are_told(monkeypatch) -> None:
 
 
 def test_the_estimated_memory_is_about_what_a_run_takes(run):
-    from runs.estimate import memory
-    from runs.scene import load
+    from tireroad.runs.scene.estimate import memory
+    from tireroad.runs.scene.load import load
 
     folder, stages = run("again", FLAT + "[rotation]\nspeed = 40.0\n")
     taken = stages["contact"]["indicators"]["largest memory of a process so far"]["value"]

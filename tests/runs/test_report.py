@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from synthetic_results import write_results, write_rotating
 
-from fem.errors import InputError
-from runs import figures, surface_figures
-from runs.report import write_report
+from tireroad.fem.errors import InputError
+from tireroad.runs.report import figures, surface_figures
+from tireroad.runs.report.page import write_report
 
 TITLES = {
     "static.h5": "Loaded tire and footprint",
@@ -202,7 +202,7 @@ def test_a_folder_without_results_is_an_input_error(tmp_path: Path, name: str) -
 def test_a_typical_run_takes_seconds_and_a_small_page_without_dolfinx(tmp_path: Path) -> None:
     directory = write_results(tmp_path / "run", around=120, across=33, steps=10000, modes=60)
     program = (
-        "import sys; from pathlib import Path; from runs.report import write_report;"
+        "import sys; from pathlib import Path; from tireroad.runs.report.page import write_report;"
         f"write_report(Path({str(directory)!r}));"
         "sys.exit(any(m.split('.')[0] in ('dolfinx', 'petsc4py', 'pyplot') for m in sys.modules))"
     )

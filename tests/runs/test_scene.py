@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from fem.errors import InputError
-from runs.resolved import dumps
-from runs.scene import load
-from runs.schema import key_of, table_of
-from runs.tables import Scene
+from tireroad.fem.errors import InputError
+from tireroad.runs.scene.load import load
+from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.schema import key_of, table_of
+from tireroad.runs.scene.tables import Scene
 
 FULL = """
 [static]

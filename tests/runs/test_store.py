@@ -9,10 +9,10 @@ import h5py
 import numpy as np
 import pytest
 
-from fem.errors import InputError
-from runs.disk import write_text
-from runs.store import Provenance, put, stage_hash, stored_hash, writing
-from runs.version import VERSION
+from tireroad.fem.errors import InputError
+from tireroad.runs.files.disk import write_text
+from tireroad.runs.files.store import Provenance, put, stage_hash, stored_hash, writing
+from tireroad.runs.version import VERSION
 
 ORIGIN = Provenance("scene", 'name = "scene"\n', "static", "abc", 2)
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from contact.model import step_solver
-from contact.rolling import Drive, Loop, roll
-from runs.tabulate import modules
-from runs.validation import rolling
-from runs.validation.comparison import Comparison
-from runs.validation.histories import History, distance, follow
-from runs.validation.moved_road import SCENE
-from runs.validation.tires import Choice, Tires
+from tireroad.contact.model import step_solver
+from tireroad.contact.rolling import Drive, Loop, roll
+from tireroad.runs.measure.tabulate import modules
+from tireroad.runs.validation import rolling
+from tireroad.runs.validation.comparison import Comparison
+from tireroad.runs.validation.histories import History, distance, follow
+from tireroad.runs.validation.moved_road import SCENE
+from tireroad.runs.validation.tires import Choice, Tires
 
 DURATION = 0.1
 
@@ -59,7 +59,7 @@ def test_the_fastest_run_within_an_error_is_held_against_full_elements_within_it
 
 
 def test_every_validation_says_what_it_is_about() -> None:
-    known = modules("runs.validation")
+    known = modules("tireroad.runs.validation")
     assert {"point_force", "moved_road", "rolling", "axle", "closed_forms", "stability"} <= set(
         known
     )

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.complementarity import ActiveSet
-from contact.flat import Flat
-from contact.rolling import Drive, roll
-from contact.synthetic import Strip, oval_patch
-from contact.tread import half_space_compliance
-from greens.recursion import Recursion
-from runs.validation.stress_contact import (
+from tireroad.contact.roads.flat import Flat
+from tireroad.contact.rolling import Drive, roll
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.tread.compliance import half_space_compliance
+from tireroad.greens.recursion import Recursion
+from tireroad.runs.measure.synthetic import Strip, oval_patch
+from tireroad.runs.validation.stress_contact import (
     CRITICAL,
     Ended,
     cases,

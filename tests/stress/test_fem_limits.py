@@ -4,8 +4,8 @@ import h5py
 import numpy as np
 import pytest
 
-from fem.state import StaticState
-from runs.validation.stress_fem import Attempt, result
+from tireroad.fem.static.state import StaticState
+from tireroad.runs.validation.stress_fem import Attempt, result
 
 
 def attempt(**asked) -> tuple[StaticState, str]:

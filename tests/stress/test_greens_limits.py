@@ -7,10 +7,10 @@ import pytest
 from mpi4py import MPI
 from scipy import linalg
 
-from greens.recursion import Recursion, _phi
-from greens.response import couple
-from modal.basis import Projection
-from modal.rotating import rotating, standing
+from tireroad.greens.recursion import Recursion, _phi
+from tireroad.greens.response import couple
+from tireroad.modal.basis import Projection
+from tireroad.modal.rotating import rotating, standing
 
 
 def phi_exact(x: complex) -> tuple[complex, complex]:

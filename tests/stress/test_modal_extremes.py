@@ -6,17 +6,17 @@ from mpi4py import MPI
 from scipy import sparse
 from scipy.linalg import eigh
 
-from fem.body import Body
-from fem.equilibrium import Equilibrium
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from modal import undamped
-from modal.basis import project
-from modal.campbell import critical_speed, growth, onset
-from modal.rotating import checks, matrices, rotating
-from runs.stages.modes import sites
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.modal import undamped
+from tireroad.modal.basis import project
+from tireroad.modal.campbell import critical_speed, growth, onset
+from tireroad.modal.rotating import checks, matrices, rotating
+from tireroad.runs.stages.modes import sites
 
 COMM = MPI.COMM_WORLD
 SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}

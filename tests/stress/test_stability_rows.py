@@ -2,7 +2,7 @@
 
 import pytest
 
-from runs.validation import stress_greens, stress_modal
+from tireroad.runs.validation import stress_greens, stress_modal
 
 
 @pytest.mark.parametrize("package", [stress_modal, stress_greens], ids=["modal", "greens"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from contact.closed_forms import (
+from tireroad.contact.closed_forms import (
     SQUARE_PUNCH,
     contact_modulus,
     hertz_cylinder,
@@ -14,10 +14,10 @@ from contact.closed_forms import (
     westergaard_mean,
     westergaard_pressure,
 )
-from contact.complementarity import ActiveSet
-from contact.compliance import MatrixCompliance
-from contact.projected_cg import ProjectedCG
-from contact.tread import half_space_compliance
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.grid_compliance import MatrixCompliance
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.tread.compliance import half_space_compliance
 
 YOUNG, POISSON = 3.4e6, 0.49
 MODULUS = contact_modulus(YOUNG, POISSON)

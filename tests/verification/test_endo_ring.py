@@ -13,16 +13,16 @@ from mpi4py import MPI
 from scipy import sparse
 from scipy.sparse.linalg import eigsh, spsolve
 
-from fem import compat
-from fem.body import Body
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from fem.virtual_work import Rolling, static_residual, tangent
-from modal.basis import project
-from modal.rotating import matrices, rotating
-from modal.undamped import Modes
-from modal.waves import label
+from tireroad.fem import compat
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.modal.basis import project
+from tireroad.modal.rotating import matrices, rotating
+from tireroad.modal.undamped import Modes
+from tireroad.modal.waves import label
 
 R, H, E, RHO = 0.3, 0.003, 4.8e8, 1200.0
 FLAT = 1e3  # m, radius of the section circle: the strip of it in use is flat

@@ -11,12 +11,12 @@ from mpi4py import MPI
 from scipy import sparse
 from scipy.sparse.linalg import eigsh, spsolve
 
-from fem import compat
-from fem.body import Body
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from fem.virtual_work import Rolling, static_residual, tangent
+from tireroad.fem import compat
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
 
 FLAT = 1e3  # m, radius of the section circle
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from greens.recursion import Recursion
-from greens.response import Response, couple
-from modal.basis import Projection
-from modal.rotating import rotating, standing
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response, couple
+from tireroad.modal.basis import Projection
+from tireroad.modal.rotating import rotating, standing
 
 ONE = np.ones((1, 1))
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.body import Body
-from fem.companion import load_error
-from fem.equilibrium import Equilibrium
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.virtual_work import AT_REST, Rolling
-from fem.wall import Region
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.load_error import load_error
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.fem.tire.wall import Region
 
 RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
 

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fem.body import Body
-from fem.compliance import rotating_stiffness
-from fem.equilibrium import Equilibrium
-from fem.errors import ConvergenceError
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from modal import quadratic, undamped
-from modal.basis import project
-from modal.rotating import checks, matrices, rotating
-from runs.stages.modes import sites
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.matrices.compliance import rotating_stiffness
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.modal import quadratic, undamped
+from tireroad.modal.basis import project
+from tireroad.modal.rotating import checks, matrices, rotating
+from tireroad.runs.stages.modes import sites
 
 COMM = MPI.COMM_WORLD
 INFLATION = 2e5

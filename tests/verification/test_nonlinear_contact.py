@@ -5,21 +5,21 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from contact.brush import Brush, BrushLaw
-from contact.complementarity import ActiveSet
-from contact.friction import Friction
-from contact.patch import Patch
-from contact.rolling import Drive, roll
-from fem.body import Body
-from fem.equilibrium import Equilibrium
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.nonlinear_transient import NonlinearTire
-from fem.operators import Operators
-from fem.probe import nodes
-from fem.state import static_state
-from fem.transient import FullTire
+from tireroad.contact.patch import Patch
+from tireroad.contact.rolling import Drive, roll
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.friction import Friction
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.probe import nodes
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.state import static_state
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.fem.transient.linear import FullTire
+from tireroad.fem.transient.nonlinear import NonlinearTire
 
 INFLATION, STEP = 2e5, 2e-4
 DAMPING = (400.0, 0.0)

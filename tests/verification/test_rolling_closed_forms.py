@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from contact.brush import Brush, BrushLaw
-from contact.closed_forms import brush_force, carter_force, carter_traction, hertz_cylinder
-from contact.complementarity import ActiveSet
-from contact.friction import Friction
-from contact.tread import rectangle_potential
+from tireroad.contact.closed_forms import brush_force, carter_force, carter_traction, hertz_cylinder
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.friction import Friction
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.contact.tread.compliance import rectangle_potential
 
 FRICTION, LOAD, HALF = 0.4, 1000.0, 0.02
 

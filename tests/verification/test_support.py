@@ -6,17 +6,17 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem.body import Body
-from fem.equilibrium import Equilibrium
-from fem.errors import ConvergenceError
-from fem.loading import Loader
-from fem.material import Material
-from fem.mesh import Torus
-from fem.operators import Operators
-from fem.support import Support
-from fem.virtual_work import Rolling
-from modal import undamped
-from runs.stages.modes import sites
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.support import Support
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.virtual_work import Rolling
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.modal import undamped
+from tireroad.runs.stages.modes import sites
 
 COMM = MPI.COMM_WORLD
 RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)

@@ -1,0 +1,1 @@
+"""Roads, a kind a file, and how one passes under the tire."""

@@ -1,0 +1,170 @@
+"""A road placed under the tire: the strip of a run, eased in and levelled."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.roads.levelling import Level, mean_level, wave_level
+from tireroad.fem.errors import InputError
+
+Array = NDArray[np.float64]
+
+# Pieces a strip is cut into for its bounds, at least: the level changes slowly over one.
+PIECES = 64
+LONGEST = 0.25  # m
+
+
+class Road(Protocol):
+    """Heights (m) at x in rolling direction from the road's beginning and y to the left (m).
+
+    `extent` ((x0, x1), (y0, y1)) in m, may be infinite; `spacing` (m) the shortest length resolved.
+    """
+
+    @property
+    def extent(self) -> tuple[tuple[float, float], tuple[float, float]]: ...
+
+    @property
+    def spacing(self) -> float: ...
+
+    def height(self, x: Array, y: Array) -> Array: ...
+
+    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float: ...
+
+    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float: ...
+
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Road": ...
+
+
+class RoadUnderTire:
+    """A road placed under the axle; `prepare` cuts out the strip a run drives over.
+
+    start (m): the road's x under the axle at t = 0; lateral (m): the road's y under the tire's
+    middle; run_in (m): the length over which heights are eased in, so that the run starts at rest;
+    offset (m): added to all heights; datum: "mean" subtracts the strip's mean height, "zero"
+    nothing; longest_wave (m): longer waves are taken out too, as an axle that follows them does.
+    """
+
+    def __init__(
+        self,
+        road: Road,
+        *,
+        start: float = 0.0,
+        lateral: float = 0.0,
+        run_in: float = 0.1,
+        offset: float = 0.0,
+        datum: str = "zero",
+        longest_wave: float | None = None,
+    ) -> None:
+        if datum not in ("mean", "zero"):
+            raise InputError(f'road: datum = "{datum}" is unknown: take "mean" or "zero"')
+        if not run_in >= 0.0:
+            raise InputError(f"road: run_in {run_in:g} m must not be negative")
+        self.road, self._datum = road, datum
+        self._start, self._lateral, self._run_in, self._offset = start, lateral, run_in, offset
+        self._longest_wave = longest_wave
+
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "PreparedRoad":
+        """The strip of a run, in distances (m) from the axle's start and from the tire's middle.
+
+        x0 is the foremost point of the patch at t = 0, ahead of the axle, x1 the farthest it gets,
+        y0 and y1 its sides. Up to x0 the road is flat, whatever the file holds there: the tire
+        stands on it at t = 0. InputError when the road is too short, too narrow or has holes there.
+        """
+        if not (x0 <= x1 and y0 <= y1):
+            raise InputError(f"road: empty strip, x {x0:g} to {x1:g} m, y {y0:g} to {y1:g} m")
+        strip = (
+            x0 + self._start,
+            x1 + self._start,
+            y0 + self._lateral,
+            y1 + self._lateral,
+        )
+        road = self.road.prepare(*strip)
+        return PreparedRoad(
+            road,
+            shift=(self._start, self._lateral),
+            level=self._level(road, strip),
+            offset=self._offset,
+            reach=(x0, x1),
+            run_in=self._run_in,
+        )
+
+    def _level(self, road: Road, strip: tuple[float, float, float, float]) -> Level | None:
+        if self._longest_wave is not None:
+            return wave_level(road, *strip, self._longest_wave)
+        return mean_level(road, *strip) if self._datum == "mean" else None
+
+
+class PreparedRoad:
+    """z(x, y) = s((x - lead)/run_in) [h(x + start, y + lateral) + offset - level] in m.
+
+    s is the smoothstep, x the distance from the axle's starting point, y from the tire's middle.
+    Also a `Road`, apart from `prepare`. `filled` counts the holes that were filled.
+    """
+
+    def __init__(
+        self,
+        road: Road,
+        shift: tuple[float, float],
+        level: Level | None,
+        offset: float,
+        reach: tuple[float, float],
+        run_in: float,
+    ) -> None:
+        self._road, self._shift, self._level, self._offset = road, shift, level, offset
+        self._lead, self._run_in = reach[0], run_in
+        self._span = (reach[1] - reach[0]) * (1.0 + 1e-9)
+        self.spacing = road.spacing
+        self.filled: int = getattr(road, "filled", 0)
+
+    @property
+    def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """((x0, x1), (y0, y1)) of the road in the axle's coordinates, m."""
+        (x0, x1), (y0, y1) = self._road.extent
+        dx, dy = self._shift
+        return (x0 - dx, x1 - dx), (y0 - dy, y1 - dy)
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Heights (m) over the static road plane at x, y (m) of equal shape.
+
+        ValueError for x beyond the strip that was prepared: the border would pass for the road.
+        """
+        ahead = np.asarray(x) - self._lead
+        farthest = ahead.max(initial=0.0)
+        if farthest > self._span:
+            raise ValueError(f"x = {farthest + self._lead:g} m lies beyond the prepared strip")
+        first = self._lead + self._shift[0]
+        along = np.maximum(ahead, 0.0) + first
+        z = self._road.height(along, np.asarray(y) + self._shift[1])
+        if self._offset != 0.0:
+            z = z + self._offset
+        if self._level is not None:
+            z = z - self._level(along)
+        if ahead.min(initial=np.inf) >= self._run_in:
+            return z
+        return z * self._share(ahead)
+
+    def _share(self, ahead: Array) -> Array:
+        if self._run_in == 0.0:
+            return (ahead > 0.0).astype(float)
+        s = np.minimum(np.maximum(ahead / self._run_in, 0.0), 1.0)
+        return s * s * s * (10.0 + s * (6.0 * s - 15.0))
+
+    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Upper bound (m) of the heights in a strip, the flat start included."""
+        pieces = self._pieces(x0, x1, y0, y1)
+        return max(0.0, *(self._road.highest(*piece) - low for piece, low, _ in pieces))
+
+    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Lower bound (m) of the heights in a strip, the flat start included."""
+        pieces = self._pieces(x0, x1, y0, y1)
+        return min(0.0, *(self._road.lowest(*piece) - high for piece, _, high in pieces))
+
+    def _pieces(self, x0: float, x1: float, y0: float, y1: float):
+        """The strip in the road's own coordinates, piece by piece with bounds of what is taken off."""
+        dx, dy = self._shift
+        count = max(PIECES, int(np.ceil((x1 - x0) / LONGEST))) if self._level else 1
+        edges = np.linspace(x0 + dx, x1 + dx, count + 1)
+        for start, end in zip(edges[:-1], edges[1:], strict=True):
+            low, high = self._level.bounds(start, end) if self._level else (0.0, 0.0)
+            yield (start, end, y0 + dy, y1 + dy), low - self._offset, high - self._offset

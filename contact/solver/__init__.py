@@ -1,0 +1,1 @@
+"""Solvers of one time step: complementarity, friction, large patches."""

@@ -1,0 +1,231 @@
+"""The contact problem of one time step: f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0.
+
+A (n, n) m/N is the same-step compliance, possibly slightly unsymmetric (rolling); f (n,) N the
+total contact forces, g (n,) m the gaps, q (n,) m the gaps at f = f_ref. A positive definite
+symmetric part makes A a P-matrix, and the solution unique (Cottle, Pang and Stone, The Linear
+Complementarity Problem, 3.1.6 and 3.3.7). Serial: every process that calls solves the same small
+problem for itself.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.solver.factor import ActiveFactor
+from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
+from tireroad.fem.errors import ConvergenceError, InputError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
+
+# A sign error below this share of the scale is rounding: without it a point whose force and gap are
+# both 0 flips in and out for ever.
+ROUNDING = 1e-12
+# Share of the scale the complementarity residual may reach in the end.
+TOLERANCE = 1e-9
+# Full exchanges that may fail to reduce the wrong signs before single exchanges take over.
+PATIENCE = 10
+
+
+class ContactSolver(Protocol):
+    """What the time loop needs; `active`, `gap` (m), `residual`, ... are of the last solve."""
+
+    active: Mask
+    gap: Array
+    residual: float
+    iterations: int
+
+    @property
+    def factorisations(self) -> int: ...
+
+    def solve(
+        self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
+    ) -> Array: ...
+
+    def block(self, index: Index) -> Array: ...
+
+    def state(self) -> dict[str, Array]: ...
+
+    def set_state(self, kept: dict[str, Array]) -> None: ...
+
+
+class ActiveSet:
+    """Semismooth Newton (primal-dual active set), made safe as block principal pivoting.
+
+    A step exchanges every point of wrong sign (f < 0 where active, g < 0 where not). When
+    `PATIENCE` steps in a row do not reduce their number, only the last wrong point is exchanged
+    (Murty's rule) until it falls: finite for every P-matrix. Of random matrices, n = 200, one whose
+    skew part is three times the symmetric one takes 15 steps, ten times that runs out of them.
+    Source: Judice and Pires, Computers Ops Res. 21 (1994) 587.
+
+    The factor is kept and bordered while points come and go (contact.factor): a step that ends in
+    the set it began with factorises nothing.
+    """
+
+    def __init__(self, matrix: Array | Compliance) -> None:
+        if isinstance(matrix, np.ndarray):
+            matrix = MatrixCompliance(checked_compliance(matrix))
+        self._compliance = matrix
+        self._diagonal = matrix.diagonal
+        self._scale = float(self._diagonal.max())
+        n = len(self._diagonal)
+        self.active: Mask = np.zeros(n, dtype=bool)
+        self.gap: Array = np.zeros(n)
+        self.residual = 0.0
+        self.iterations = 0
+        self._factor = ActiveFactor(matrix)
+        self._lifted, self._reference = (b"", b""), None
+        self._signs = self._before = np.zeros(n)
+
+    def solve(
+        self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
+    ) -> Array:
+        """Forces f (n,) N with f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0.
+
+        q (n,) m; guess_active (n,) bool, by default the last active set, carried on linearly; reference f_ref (n,) N, by
+        default 0. With a reference, q = 0 where f_ref > 0 and q >= 0 elsewhere returns f_ref bit
+        for bit: the state at rest cannot drift. ConvergenceError when q is not finite or the
+        residual max |min(diag(A) f, g)| exceeds 1e-9 of max |q| + max diag(A) max f.
+        """
+        n = len(self._diagonal)
+        active = self._guess() if guess_active is None else np.asarray(guess_active, dtype=bool)
+        largest = float(np.abs(q).max())
+        if not np.isfinite(largest):
+            check_residual("active-set", np.nan)
+        best, patience = n + 1, PATIENCE
+        for self.iterations in range(1, 20 * n + 100):
+            force, gap = self._at(active, q, reference)
+            scale = largest + self._scale * float(np.abs(force).max())
+            wrong = np.where(active, force * self._diagonal, gap) < -ROUNDING * scale
+            count = np.count_nonzero(wrong)
+            if count == 0:
+                return self._finish(active, force, gap, scale)
+            if count < best:
+                best, patience = count, PATIENCE
+            else:
+                patience -= 1
+            if patience < 0:
+                last = np.flatnonzero(wrong)[-1]
+                wrong = np.zeros(n, dtype=bool)
+                wrong[last] = True
+            active = active ^ wrong
+        raise ConvergenceError(
+            f"contact: no consistent set of the {n} points in {self.iterations} exchanges; A is "
+            "close to singular or far from symmetric: add tread compliance or a residual "
+            'flexibility, or take solver = "snes-vi"'
+        )
+
+    def state(self) -> dict[str, Array]:
+        """What the next solve starts from."""
+        signs = {"signs": self._signs, "signs_before": self._before}
+        return {"active": self.active, "factorised": self._factor.base} | signs
+
+    def set_state(self, kept: dict[str, Array]) -> None:
+        """Go on from `state`."""
+        self.active = np.asarray(kept["active"], dtype=bool)
+        self._signs, self._before = kept["signs"], kept["signs_before"]
+        self._factor.rebase(np.asarray(kept["factorised"], dtype=bool))
+
+    @property
+    def factorisations(self) -> int:
+        """Factors made so far; the changes in between only bordered them."""
+        return self._factor.factorisations
+
+    def block(self, index: Index) -> Array:
+        """A between the points `index`, (a, a) m/N."""
+        return self._compliance.block(index, index)
+
+    def _guess(self) -> Mask:
+        """The last active set, without the points about to lift and with those about to touch.
+
+        On a rolling patch that is the right set in four steps of five, the last one in one of five.
+        """
+        ahead = 2.0 * self._signs - self._before
+        return (ahead > 0.0) | ((ahead == 0.0) & self.active)
+
+    def _at(self, active: Mask, q: Array, reference: Array | None) -> tuple[Array, Array]:
+        """Forces and gaps when exactly the active points touch (g = 0 there, f = 0 elsewhere)."""
+        self._factor.take(active)
+        index, force = self._factor.index, np.zeros(len(q))
+        change, right = np.zeros(len(q)), -q[index]
+        if reference is not None:
+            lifted = np.flatnonzero(~active & (reference != 0.0))
+            change[lifted] = -reference[lifted]
+            if len(lifted):
+                right += self._missed(index, lifted, reference)
+        change[index] = self._factor.solve(right)
+        gap = q + self._compliance.spread(change)
+        force[index] = change[index] if reference is None else reference[index] + change[index]
+        return force, gap
+
+    def _missed(self, index: Index, lifted: Index, reference: Array) -> Array:
+        """What the reference forces of points that do not touch gave way to at those that do, m."""
+        key = index.tobytes(), lifted.tobytes()
+        if key != self._lifted or reference is not self._reference:
+            self._lifted, self._reference = key, reference
+            self._gone = self._compliance.block(index, lifted) @ reference[lifted]
+        return self._gone
+
+    def _finish(self, active: Mask, force: Array, gap: Array, scale: float) -> Array:
+        """Drop signs at rounding level, measure the residual, keep the state for the next step."""
+        np.maximum(force, 0.0, out=force)
+        self.residual = complementarity_residual(force, gap, self._diagonal, scale)
+        check_residual("active-set", self.residual)
+        gap[active] = 0.0
+        self.active, self.gap = active, gap
+        self._before, self._signs = self._signs, force * self._diagonal - gap
+        return force
+
+
+def make_solver(name: str, matrix: Array | Compliance) -> ContactSolver:
+    """The solver named "active-set" or "snes-vi" (`contact.solver`). InputError for another."""
+    if name == "active-set":
+        return ActiveSet(matrix)
+    if name == "snes-vi":
+        from tireroad.contact.solver.snes_vi import SnesVI  # PETSc only where it is asked for
+
+        return SnesVI(matrix)
+    raise InputError(f'contact.solver = "{name}" is unknown: take "active-set" or "snes-vi"')
+
+
+def checked_compliance(matrix: Array) -> Array:
+    """The matrix (n, n) m/N as a C-ordered copy; InputError if the solution would not be unique."""
+    matrix = np.array(matrix, dtype=float, order="C")
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
+        raise InputError(f"contact: the compliance must be a square matrix, not {matrix.shape}")
+    if not np.all(np.isfinite(matrix)):
+        raise InputError("contact: the compliance has entries that are not finite (m/N)")
+    symmetric = 0.5 * (matrix + matrix.T)
+    try:
+        np.linalg.cholesky(symmetric)
+    except np.linalg.LinAlgError:
+        eigenvalues = np.linalg.eigvalsh(symmetric)
+        raise InputError(
+            "contact: the compliance is not positive definite (eigenvalues of its symmetric part "
+            f"from {eigenvalues[0]:.3g} to {eigenvalues[-1]:.3g} m/N), so the contact forces are "
+            "not unique; add tread compliance ([contact] tread) or a residual flexibility "
+            '([greens] residual = "static")'
+        ) from None
+    return matrix
+
+
+def complementarity_residual(force: Array, gap: Array, diagonal: Array, scale: float) -> float:
+    """max |min(diag(A) f, g)| over `scale` (m); 0 at the solution, also when the scale is 0."""
+    worst = float(np.abs(np.minimum(force * diagonal, gap)).max())
+    return worst / scale if scale > 0.0 else worst
+
+
+def check_residual(name: str, residual: float) -> None:
+    """ConvergenceError when the relative residual is above the tolerance or not a number."""
+    if np.isnan(residual):
+        raise ConvergenceError(
+            f"contact ({name}): the gaps are not finite: the motion has grown without bound; take "
+            'a smaller [time] step or scheme = "constant"'
+        )
+    if residual > TOLERANCE:
+        raise ConvergenceError(
+            f"contact ({name}): complementarity residual {residual:.2g} of the largest gap, above "
+            f"{TOLERANCE:g}; add tread compliance or a residual flexibility, or take another solver"
+        )

@@ -1,0 +1,125 @@
+"""One step with horizontal forces: the normal problem and stick/slip in turn, until both hold.
+
+Normal: f >= 0, g = A_zz (f - f_static) + A_zh t + q >= 0, f . g = 0. Horizontal, at the touching
+points: t = -K_b (share u + past) cut to |t| <= mu f, u = u_free + A_hz (f - f_static) + A_hh t.
+Without slip this is block Gauss-Seidel on a positive definite problem and converges always; with
+slip it is sure for mu ||A_zz^-1 A_zh|| < 1, where the answer is unique too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from tireroad.contact.solver.complementarity import ContactSolver
+from tireroad.contact.solver.tangential import Stiffness, stick_slip
+from tireroad.contact.tread.brush import Brush
+from tireroad.fem.errors import ConvergenceError
+from tireroad.greens.sparse_columns import LoadedColumns
+
+Array = NDArray[np.float64]
+
+TURNS = 100
+TOLERANCE = 1e-8  # change of a turn, of the largest normal force
+
+
+class Friction:
+    """The brush on a tire with same-step response `tire` (3p, 3p) m/N, ordered z, x, y of the nodes.
+
+    `weights` W (c, p) takes nodes to points (None: they are the same). `horizontal` (c, 2) N is the
+    last answer, `turns` its number of rounds.
+    """
+
+    def __init__(self, brush: Brush, tire: Array, weights: sparse.csr_matrix | None) -> None:
+        p = len(tire) // 3
+        self._nodal = weights is None
+        w = sparse.identity(p, format="csr") if weights is None else weights
+        self._brush = brush
+        self._w, self._w2 = w, sparse.block_diag([w, w], format="csr")
+        self._down, self._down2 = self._w.T.tocsr(), self._w2.T.tocsr()
+        self._zh, self._hz = LoadedColumns(tire[:p, p:]), LoadedColumns(tire[p:, :p])
+        self._hh = LoadedColumns(tire[p:, p:])
+        self.horizontal = self._before = np.zeros((w.shape[0], 2))
+        self.turns = 0
+        self._key = b""
+
+    def largest_unique(self, touching: NDArray[np.bool_], normal: ContactSolver) -> float:
+        """The friction up to which the step's answer is unique with these points touching."""
+        index = np.flatnonzero(touching)
+        count = len(touching)
+        own = normal.block(index)
+        w, w2 = self._w[index], self._w2[np.concatenate([index, index + count])]
+        coupling = np.linalg.solve(own, w @ (w2 @ self._zh.columns).T)
+        return 1.0 / max(float(np.linalg.norm(coupling, 2)), 1e-300)
+
+    def state(self) -> dict[str, Array]:
+        """What a checkpoint keeps."""
+        kept = {"horizontal": self.horizontal, "horizontal_before": self._before}
+        return self._brush.state() | kept
+
+    def set_state(self, kept: dict[str, Array]) -> None:
+        """Go on from `state`."""
+        self.horizontal, self._before = kept["horizontal"], kept["horizontal_before"]
+        self._brush.set_state(kept)
+
+    def solve(
+        self, normal: ContactSolver, q: Array, guess: Array | None, static: Array, free: Array
+    ) -> tuple[Array, Array]:
+        """Normal (c,) and horizontal (c, 2) forces, N; `free` (2c,) m, x then y.
+
+        ConvergenceError when 100 turns do not settle.
+        """
+        share, past = self._brush.offer()
+        horizontal = 2.0 * self.horizontal - self._before  # carried on linearly: a turn less
+        for self.turns in range(1, TURNS + 1):
+            pulled = self._w @ (self._zh @ (self._down2 @ horizontal.T.ravel()))
+            force = normal.solve(q + pulled, guess, reference=static)
+            guess = None
+            pushed = self._w2 @ (self._hz @ (self._down @ (force - static)))
+            moved = (free + pushed).reshape(2, -1).T
+            new = self._stick_slip(force, moved, (share, past), horizontal)
+            change = np.abs(new - horizontal).max()
+            horizontal = new
+            if change <= TOLERANCE * force.max(initial=0.0):
+                self._finish(force, moved, horizontal)
+                return force, horizontal
+        raise ConvergenceError(
+            f"contact: normal and horizontal forces do not settle in {TURNS} turns; the friction "
+            "is too large for this step: lower contact.friction, contact.brush_stiffness or "
+            "time.step"
+        )
+
+    def _finish(self, force: Array, moved: Array, horizontal: Array) -> None:
+        answer = self._w2 @ (self._hh @ (self._down2 @ horizontal.T.ravel()))
+        self._before, self.horizontal = self.horizontal, horizontal
+        self._brush.take(horizontal, moved + answer.reshape(2, -1).T, force > 0)
+
+    def _stick_slip(
+        self, force: Array, moved: Array, bristles: tuple[Array, Array], guess: Array
+    ) -> Array:
+        """t (c, 2): B t + c = 0 with B = A_hh + 1/(K share), c = u_other + past/share, or slip."""
+        share, past = bristles
+        law = self._brush.law
+        out = np.zeros((len(force), 2))
+        index = np.flatnonzero((force > 0) & (share > 1e-9))
+        if len(index) == 0:
+            return out
+        stiffness = Stiffness(*self._between(index), 1.0 / (law.stiffness * share[index]))
+        constant = moved[index] + past[index] / share[index, None]
+        bound = np.full(len(index), np.inf)
+        if law.friction is not None:
+            bound = law.friction * force[index]
+        out[index] = stick_slip(stiffness, constant, bound, guess[index])
+        return out
+
+    def _between(self, index: NDArray[np.intp]) -> tuple[Array, Array | None]:
+        """A_hh between the points, through the nodes that carry them."""
+        key = index.tobytes()
+        if key != self._key:
+            own, p = self._w[index], self._w.shape[1]
+            nodes = np.unique(own.indices)
+            both = np.stack([nodes, nodes + p], axis=-1).ravel()
+            own = None if self._nodal else own[:, nodes].toarray()
+            self._carried, self._key = (self._hh.between(both, both), own), key
+        return self._carried

@@ -1,0 +1,85 @@
+"""The same-step compliance of a patch, A = W A_tire W^T + C~, as a matrix or as a product."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from tireroad.contact.tread.kernel import KernelTread
+from tireroad.greens.sparse_columns import LoadedColumns
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+class Compliance(Protocol):
+    """What the solvers need of A (c, c) m/N.
+
+    `block` is its part between given points, column-major as LAPACK takes it; `spread` is
+    `apply` for forces of which few are not zero; `precondition` roughly its inverse.
+    """
+
+    diagonal: Array
+
+    def block(self, rows: Index, columns: Index) -> Array: ...
+
+    def spread(self, force: Array) -> Array: ...
+
+    def apply(self, force: Array) -> Array: ...
+
+    def precondition(self, approach: Array) -> Array: ...
+
+
+class SpreadCompliance:
+    """`tire` (p, p) m/N between nodes, `weights` W (c, p), the tread a convolution; nothing dense.
+
+    Preconditioned by the tread alone: the tire adds few large eigenvalues, one iteration each.
+    """
+
+    def __init__(self, tire: Array, weights: sparse.csr_matrix, tread: KernelTread) -> None:
+        self._tire, self._weights, self._tread = tire, weights, tread
+        self._transposed = weights.T.tocsr()
+        own = weights.multiply(weights @ tire).sum(axis=1)
+        self.diagonal = tread.diagonal + np.asarray(own).ravel()
+        self.precondition = tread.precondition
+
+    def block(self, rows: Index, columns: Index) -> Array:
+        """A between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
+        ahead = self._weights[columns] @ self._tire.T
+        return np.asfortranarray(self._weights[rows] @ ahead.T + self._tread.block(rows, columns))
+
+    def spread(self, force: Array) -> Array:
+        """Approach (c,) m under forces (c,) N."""
+        return self.apply(force)
+
+    def apply(self, force: Array) -> Array:
+        """Approach (c,) m under forces (c,) N."""
+        return self._weights @ (self._tire @ (self._transposed @ force)) + self._tread.apply(force)
+
+
+class MatrixCompliance:
+    """A given matrix (c, c) m/N, preconditioned by its diagonal."""
+
+    def __init__(self, matrix: Array) -> None:
+        self._matrix = matrix
+        self._columns = LoadedColumns(matrix)
+        self.diagonal = matrix.diagonal().copy()
+
+    def block(self, rows: Index, columns: Index) -> Array:
+        """A between the points `rows` (a,) and `columns` (b,), (a, b) m/N."""
+        return self._columns.between(rows, columns)
+
+    def spread(self, force: Array) -> Array:
+        """Approach (c,) m under forces (c,) N, few of them not zero."""
+        return self._columns @ force
+
+    def apply(self, force: Array) -> Array:
+        """Approach (c,) m under forces (c,) N."""
+        return self._matrix @ force
+
+    def precondition(self, approach: Array) -> Array:
+        """Forces (c,) N of an approach (c,) m, point by point."""
+        return approach / self.diagonal

@@ -1,0 +1,169 @@
+"""The same contact problem through PETSc's SNES VI: an independent check, slower."""
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from tireroad.contact.solver.complementarity import (
+    TOLERANCE,
+    check_residual,
+    checked_compliance,
+    complementarity_residual,
+)
+from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
+from tireroad.contact.solver.snes_product import Preconditioner, Product
+from tireroad.fem.errors import ConvergenceError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+PREFIX = "contact_"
+MAX_ITERATIONS = 200
+
+
+class SnesVI:
+    """Reduced-space Newton (vinewtonrsls) for f >= 0, A (f - f_ref) + q >= 0, on this process.
+
+    PETSc sees it without units, A / max diag(A) and q / max |q|, because SNES VI's own tolerance of
+    what lies on a bound is absolute. PETSc options with the prefix `contact_` are read last and
+    win: `-contact_snes_type vinewtonssls` is the semismooth method, which takes several times the
+    steps and gives the same forces. A matrix is factorised anew in every Newton step; a product
+    (thousands of points) is solved with by GMRES, preconditioned by the tread's inverse, and never
+    made. The line search can give up when the skew part of A outweighs the symmetric one; the
+    tire's does not.
+    Sources: Benson and Munson, Optim. Methods Softw. 21 (2006) 575; Munson, Facchinei, Ferris,
+    Fischer and Kanzow, INFORMS J. Comput. 13 (2001) 294.
+    """
+
+    def __init__(self, matrix: Array | Compliance) -> None:
+        if isinstance(matrix, np.ndarray):
+            matrix = MatrixCompliance(checked_compliance(matrix))
+        self._compliance = matrix
+        n = len(matrix.diagonal)
+        self._diagonal = matrix.diagonal.copy()
+        self._unit = float(self._diagonal.max())
+        self.active: Mask = np.zeros(n, dtype=bool)
+        self.gap: Array = np.zeros(n)
+        self.residual = 0.0
+        self.iterations = 0
+        self.factorisations = 0
+        self._offset = np.zeros(n)
+        self._make_jacobian(n)
+        self._make_vectors(n)
+        self._make_snes()
+
+    def _make_jacobian(self, n: int) -> None:
+        every = np.arange(n)
+        self._product = None
+        if isinstance(self._compliance, MatrixCompliance):
+            # By rows: petsc4py takes a matrix by columns for its transpose.
+            self._dense = np.ascontiguousarray(self._compliance.block(every, every)) / self._unit
+            self._jacobian = PETSc.Mat().createDense((n, n), comm=PETSc.COMM_SELF)
+            self._jacobian.setUp()
+        else:
+            self._product = Product(self._compliance, self._unit, every)
+            self._jacobian = self._product.matrix()
+
+    def _make_vectors(self, n: int) -> None:
+        self._force = PETSc.Vec().createSeq(n, comm=PETSc.COMM_SELF)
+        self._function = self._force.duplicate()
+        self._bounds = self._force.duplicate(), self._force.duplicate()
+        self._bounds[0].set(0.0)
+        self._bounds[1].set(PETSc.INFINITY)
+
+    def _make_snes(self) -> None:
+        snes = PETSc.SNES().create(comm=PETSc.COMM_SELF)
+        snes.setType(PETSc.SNES.Type.VINEWTONRSLS)
+        snes.setFunction(self._evaluate, self._function)
+        snes.setJacobian(self._fill, self._jacobian)
+        snes.setVariableBounds(*self._bounds)
+        snes.setTolerances(rtol=0.0, atol=1e-12, stol=0.0, max_it=MAX_ITERATIONS)
+        if self._product is None:
+            snes.ksp.setType(PETSc.KSP.Type.PREONLY)
+            snes.ksp.pc.setType(PETSc.PC.Type.LU)
+        else:
+            snes.ksp.setType(PETSc.KSP.Type.GMRES)
+            snes.ksp.setTolerances(rtol=1e-10, max_it=500)
+            snes.ksp.setGMRESRestart(100)
+            snes.ksp.pc.setType(PETSc.PC.Type.PYTHON)
+            snes.ksp.pc.setPythonContext(Preconditioner())
+        snes.setOptionsPrefix(PREFIX)
+        # 1e-8 by default: forces below it would count as none, above our tolerance.
+        options = PETSc.Options(PREFIX)
+        if not options.hasName("snes_vi_zero_tolerance"):
+            options["snes_vi_zero_tolerance"] = 1e-12
+        snes.setFromOptions()
+        self._snes = snes
+
+    def _fill(self, _snes: PETSc.SNES, _force: PETSc.Vec, jacobian: PETSc.Mat, _p) -> None:
+        """A anew: the semismooth solver scales it in place."""
+        if self._product is not None:
+            self._product.reset()
+            return
+        every = np.arange(len(self._diagonal), dtype=PETSc.IntType)
+        jacobian.setValues(every, every, self._dense)
+        jacobian.assemble()
+
+    def _evaluate(self, _snes: PETSc.SNES, force: PETSc.Vec, function: PETSc.Vec) -> None:
+        function.array[:] = self._moved(force.array_r)
+
+    def _moved(self, force: Array) -> Array:
+        """Gaps without units."""
+        return self._compliance.apply(force) / self._unit + self._offset
+
+    def solve(
+        self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
+    ) -> Array:
+        """Forces f (n,) N with f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0; see ActiveSet.solve.
+
+        `guess_active` limits the first guess to those points. ConvergenceError when SNES gives up.
+        """
+        q = np.asarray(q, dtype=float)
+        if not np.all(np.isfinite(q)):
+            check_residual("snes-vi", np.nan)
+        offset = q if reference is None else q - self._compliance.apply(reference)
+        length = float(np.abs(offset).max()) or 1.0
+        self._offset = offset / length
+        if guess_active is not None:
+            self._force.array[~np.asarray(guess_active, dtype=bool)] = 0.0
+        self._snes.solve(None, self._force)
+        self.iterations = self._snes.getIterationNumber()
+        self.factorisations += self.iterations if self._product is None else 0
+        return self._finish(length)
+
+    def state(self) -> dict[str, Array]:
+        """What the next solve starts from."""
+        return {"scaled": self._force.array_r.copy()}
+
+    def set_state(self, kept: dict[str, Array]) -> None:
+        """Go on from `state`."""
+        self._force.array[:] = kept["scaled"]
+
+    def block(self, index: NDArray[np.intp]) -> Array:
+        """A between the points `index`, (a, a) m/N."""
+        return self._compliance.block(index, index)
+
+    def _finish(self, length: float) -> Array:
+        """Back to newtons and metres, and the residual by the same measure as ActiveSet's."""
+        force = np.maximum(self._force.array_r, 0.0)
+        gap = self._moved(force)
+        scale = float(np.abs(self._offset).max() + force.max())
+        diagonal = self._diagonal / self._unit
+        self.residual = complementarity_residual(force, gap, diagonal, scale)
+        reason = self._snes.getConvergedReason()
+        if reason < 0 and not self.residual <= TOLERANCE:
+            raise ConvergenceError(
+                f"contact (snes-vi): PETSc gave up after {self.iterations} iterations (reason "
+                f"{reason}, residual {self.residual:.2g} of the largest gap); take solver = "
+                '"active-set", or pass -contact_snes_monitor to watch it'
+            )
+        check_residual("snes-vi", self.residual)
+        # The semismooth method leaves forces of rounding size on points that do not touch.
+        self.active = diagonal * force > gap
+        self.gap = length * np.where(self.active, 0.0, gap)
+        return np.where(self.active, force, 0.0) * (length / self._unit)
+
+    def destroy(self) -> None:
+        """Free PETSc's objects."""
+        for thing in (self._snes, self._jacobian, self._force, self._function, *self._bounds):
+            thing.destroy()

@@ -1,0 +1,1 @@
+"""The tread's compliance and its bristles."""

@@ -1,0 +1,1 @@
+"""Matrices of small motions about a static state, and solutions of them."""

@@ -1,0 +1,138 @@
+"""Exact static flexibility in the rotating frame: one factorisation, all loads as right-hand sides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+from scipy import sparse
+
+from tireroad.fem.matrices.direct import multiply, solve_all, symmetric
+from tireroad.fem.matrices.inertia_relief import statics
+from tireroad.fem.matrices.operators import Operators, Rotation
+
+
+def rotating_stiffness(
+    operators: Operators,
+    rotation: Rotation | None,
+    speed: float,
+    damping: tuple[float, float],
+    inertia: str = "full",
+) -> PETSc.Mat:
+    """K_Omega = K + Omega^2 S + gamma1 Omega B + gamma2 Omega K M^-1 B; doppler: S_B for S. Collective."""
+    stiffness = operators.stiffness.copy()
+    if speed == 0:
+        stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # not every copy knows it
+        return stiffness
+    different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
+    convective = rotation.convective if inertia == "full" else rotation.body_convective
+    stiffness.axpy(speed**2, convective, different)
+    stiffness.axpy(speed * damping[0], rotation.body, different)
+    if damping[1]:
+        scaled = rotation.body.copy()
+        inverse_mass = scaled.createVecLeft()
+        inverse_mass.array[:] = 1 / operators.mass
+        scaled.diagonalScale(inverse_mass, None)
+        product = operators.stiffness.matMult(scaled)
+        stiffness.axpy(speed * damping[1], product, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, damping[0] == 0 and damping[1] == 0)
+    return stiffness
+
+
+def rotating_damping(
+    operators: Operators,
+    rotation: Rotation | None,
+    speed: float,
+    damping: tuple[float, float],
+    inertia: str = "full",
+) -> PETSc.Mat:
+    """D + 2 Omega G, D = gamma1 M + gamma2 K; doppler: B for G. Collective."""
+    matrix = operators.stiffness.copy()
+    matrix.scale(damping[1])
+    if speed:
+        gyroscopic = rotation.gyroscopic if inertia == "full" else rotation.body
+        matrix.axpy(2 * speed, gyroscopic, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    add_diagonal(matrix, damping[0] * operators.mass)
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, speed == 0)
+    return matrix
+
+
+def add_diagonal(matrix: PETSc.Mat, values: np.ndarray) -> None:
+    """Add this process's values to the diagonal. Collective."""
+    diagonal = matrix.createVecLeft()
+    diagonal.array[:] = values
+    matrix.setDiagonal(diagonal, PETSc.InsertMode.ADD)
+    diagonal.destroy()
+
+
+@dataclass(frozen=True)
+class StaticShapes:
+    """Shapes under constant unit loads and what the full matrices say of them.
+
+    `columns` this process's rows (n, p) of x = K_Omega^-1 b; with y = K_Omega^-T b, all (p, p) and on
+    every process: `compliance` b^T x m/N, `damping` y^T (D + 2 Omega G) x m s/N, `inertia` y^T M x
+    m s2/N; `momentum` (3, p) int rho x, kg m/N.
+    """
+
+    columns: np.ndarray
+    compliance: np.ndarray
+    damping: np.ndarray
+    inertia: np.ndarray
+    momentum: np.ndarray
+
+
+def static_shapes(
+    operators: Operators, stiffness: PETSc.Mat, damping: PETSc.Mat, probes: sparse.csr_matrix
+) -> StaticShapes:
+    """Static shapes of the probes (p, 3 s), each a load and a reading. Collective.
+
+    An unsymmetric stiffness is factorised a second time, transposed; a free tire that stands answers
+    by inertia relief (fem.matrices.inertia_relief).
+    """
+    comm = operators.body.comm
+    loads = on_own_rows(operators, probes)
+    x = statics(operators, stiffness, loads)
+    if symmetric(stiffness):
+        y = x
+    else:
+        transposed = stiffness.transpose(PETSc.Mat())
+        y = solve_all(transposed, loads)
+        transposed.destroy()
+    return StaticShapes(
+        x,
+        comm.allreduce(loads.T @ x),
+        comm.allreduce(y.T @ multiply(damping, x)),
+        comm.allreduce(y.T @ (operators.mass[:, None] * x)),
+        comm.allreduce(operators.carried @ x),
+    )
+
+
+def compliance(
+    operators: Operators, stiffness: PETSc.Mat, outputs: sparse.csr_matrix, loads: sparse.csr_matrix
+) -> np.ndarray:
+    """Displacement at the outputs per unit load, (r, k) m/N, on every process. Collective.
+
+    `outputs` (r, 3 s) and `loads` (k, 3 s) weigh the nodes of the outer face, three dofs a node.
+    Raises ConvergenceError when a solve leaves a relative residual above 1e-8.
+    """
+    rows = on_own_rows(operators, outputs).T.tocsr()
+    solution = statics(operators, stiffness, on_own_rows(operators, loads))
+    return operators.body.comm.allreduce(rows @ solution)
+
+
+def on_own_rows(operators: Operators, probes: sparse.csr_matrix) -> sparse.csr_matrix:
+    """The probes as columns over this process's unknowns, (n, k). Collective.
+
+    Weights (k, 3 s) of the outer face's nodes, or (k, 3 s + 6) with those of a free rim's translation
+    and rotation.
+    """
+    body = operators.body
+    face = body.surface
+    own = sparse.csr_matrix(
+        (np.ones(len(face.local)), (face.local, face.place)), shape=(body.nodes, len(face.ids))
+    )
+    weights = probes.T.tocsr()
+    on_face, on_rim = weights[: 3 * len(face.ids)], weights[3 * len(face.ids) :]
+    nodal = sparse.kron(own, sparse.identity(3), format="csr") @ on_face
+    return operators.unknowns.loads(nodal, on_rim.toarray() if on_rim.shape[0] else None)

@@ -1,0 +1,83 @@
+"""Direct solves by MUMPS: one factorisation, many right-hand sides together, each answer checked."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+from scipy import sparse
+
+from tireroad.fem.errors import ConvergenceError
+
+_CHUNK = 64  # right-hand sides a solve: enough for BLAS 3 in MUMPS, little memory
+RESIDUAL_TOLERANCE = 1e-8
+
+
+def solve_all(matrix: PETSc.Mat, loads: sparse.csc_matrix) -> np.ndarray:
+    """Own rows of matrix^-1 loads (n, p), by one factorisation. Collective."""
+    pc = factorise(matrix)
+    solution = solve_columns(pc, matrix, loads.toarray())
+    pc.destroy()
+    return solution
+
+
+def solve_columns(pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray) -> np.ndarray:
+    """Own rows of matrix^-1 columns, (n, k), by the matrix's factorisation; checked. Collective."""
+    factor = pc.getFactorMatrix()
+    chunks = range(0, columns.shape[1], _CHUNK)
+    out = np.hstack([_solve(factor, matrix, columns[:, k : k + _CHUNK]) for k in chunks])
+    factor.destroy()  # this hold on it, which petsc4py would keep for ever
+    return out
+
+
+def symmetric(matrix: PETSc.Mat) -> bool:
+    """Whether the matrix is marked so."""
+    known, symmetric = matrix.isSymmetricKnown()
+    return bool(known and symmetric)
+
+
+def factorise(stiffness: PETSc.Mat) -> PETSc.PC:
+    """A direct factorisation by MUMPS: L D L^T where the matrix is marked symmetric. Collective."""
+    pc = PETSc.PC().create(stiffness.comm)
+    pc.setOperators(stiffness)
+    pc.setType(PETSc.PC.Type.CHOLESKY if symmetric(stiffness) else PETSc.PC.Type.LU)
+    pc.setFactorSolverType("mumps")
+    pc.setFactorSetUpSolverType()
+    factor = pc.getFactorMatrix()
+    factor.setMumpsIcntl(14, 100)  # room for pivots that MUMPS did not foresee
+    factor.destroy()
+    pc.setUp()
+    return pc
+
+
+def _solve(factor: PETSc.Mat, stiffness: PETSc.Mat, loads: np.ndarray) -> np.ndarray:
+    """Own rows of stiffness^-1 loads, checked. Collective."""
+    right = _dense(loads, stiffness.comm)
+    solution = right.duplicate()
+    factor.matSolve(right, solution)
+    out = solution.getDenseArray().copy()
+    right.destroy()
+    solution.destroy()
+    comm, defect = stiffness.comm.tompi4py(), multiply(stiffness, out) - loads
+    worst, scale = comm.allreduce(np.array([(defect**2).sum(), (loads**2).sum()]))
+    if not worst <= (RESIDUAL_TOLERANCE**2) * max(scale, np.finfo(float).tiny):
+        raise ConvergenceError(
+            f"greens: static flexibility has a relative residual of {np.sqrt(worst / scale):.1e}: the "
+            "stiffness of the rotating tire is singular or nearly so (critical speed). Lower the speed."
+        )
+    return out
+
+
+def multiply(matrix: PETSc.Mat, columns: np.ndarray) -> np.ndarray:
+    """Own rows of matrix @ columns. Collective."""
+    given = _dense(columns, matrix.comm)
+    product = matrix.matMult(given)
+    out = product.getDenseArray().copy()
+    product.destroy()
+    given.destroy()
+    return out
+
+
+def _dense(columns: np.ndarray, comm: PETSc.Comm) -> PETSc.Mat:
+    rows, count = columns.shape
+    sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, count))
+    return PETSc.Mat().createDense(sizes, array=np.asfortranarray(columns), comm=comm)

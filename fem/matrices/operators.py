@@ -1,0 +1,126 @@
+"""Matrices of small motions about a static state, on the unknowns that its support leaves.
+
+For basis functions phi on the undeformed mesh, w = e_y x X (speed taken out), K the tangent with
+geometric and follower-pressure stiffness:
+
+    M_ij = int rho phi_i . phi_j                    G_ij = skew part of int rho phi_i . (grad phi_j w)
+    S_ij = -int rho (grad phi_i w) . (grad phi_j w) Q_ij = int rho phi_i . (e_y x phi_j),  B = G - Q
+    S_B_ij = -int rho (grad phi_i w - e_y x phi_i) . (grad phi_j w - e_y x phi_j)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from tireroad.fem import compat, kinematics
+from tireroad.fem.matrices.support import FIXED, Support, Unknowns
+from tireroad.fem.static.virtual_work import (
+    AT_REST,
+    Rolling,
+    body_rate_form,
+    convection_form,
+    static_residual,
+    tangent,
+)
+from tireroad.fem.tire.body import Body
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """G, S and B of the full inertia, and S_B of the doppler one; Omega is taken out of all."""
+
+    gyroscopic: PETSc.Mat
+    convective: PETSc.Mat
+    body: PETSc.Mat
+    body_convective: PETSc.Mat
+
+
+class Operators:
+    """Matrices on the unknowns of a body at its present displacement. Collective.
+
+    `mass` is the diagonal of the Gauss-Lobatto mass matrix, kg: positive, and of the full order of
+    the elements (the quadrature points are the nodes); `carried` (3, n) kg the momentum per rate of
+    each. `unknowns` says what they are. With a free
+    rim the static forces on it count, those of the `rolling` shape too (mass damping only).
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        inflation: float,
+        support: Support = FIXED,
+        rolling: Rolling = AT_REST,
+    ):
+        self.body = body
+        self.unknowns = Unknowns(body, support)
+        self.mass, self.carried = self.unknowns.mass, self.unknowns.carried
+        self.stiffness = self._assemble(self._tangent(inflation))
+        if self.unknowns.rim:
+            self._add_turning(inflation, rolling)
+        self.stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+
+    def _add_turning(self, inflation: float, rolling: Rolling) -> None:
+        """What the rim's static forces add to the stiffness of its rotations. Collective."""
+        body, rim = self.body, self.unknowns.rim
+        pressure = fem.Constant(body.mesh, inflation)
+        out = fem.petsc.assemble_vector(compat.form(static_residual(body, pressure, rolling)))
+        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        turning = rim.turning_stiffness(out.array_r[rim.dofs])
+        if rim.mine:
+            end = self.stiffness.getOwnershipRange()[1]
+            six = np.arange(end - 6, end, dtype=PETSc.IntType)
+            self.stiffness.setValues(six, six, turning, PETSc.InsertMode.ADD)
+        self.stiffness.assemble()
+
+    def _tangent(self, inflation: float):
+        pressure = fem.Constant(self.body.mesh, inflation)
+        return tangent(self.body, static_residual(self.body, pressure, AT_REST))
+
+    def rotation(self) -> Rotation:
+        """The matrices of the rotating frame. Collective."""
+        body = self.body
+        u, v = body.trial, body.test
+        w = kinematics.wheel_velocity(body.mesh)
+        density, convect = body.wall.density, kinematics.convective
+        rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
+        forms = (
+            convection_form(body),
+            -density * ufl.inner(convect(v, w), convect(u, w)) * body.dx,
+            body_rate_form(body),
+            -density * ufl.inner(test_rate, rate) * body.dx,
+        )
+        return Rotation(*(self._assemble(form) for form in forms))
+
+    def consistent_mass(self) -> PETSc.Mat:
+        """int rho phi_i . phi_j by full integration, kg: what the diagonal `mass` is compared to. Collective."""
+        body = self.body
+        return self._assemble(body.wall.density * ufl.inner(body.trial, body.test) * body.dx)
+
+    def _assemble(self, form) -> PETSc.Mat:
+        matrix = fem.petsc.assemble_matrix(compat.form(form))
+        matrix.assemble()
+        reduced = self.unknowns.reduced(matrix)
+        matrix.destroy()
+        return reduced
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """Owned nodal values (nodes, 3, ...) from own unknowns (n, ...). Collective."""
+        return self.unknowns.spread(values)
+
+    def restrict(self, nodal: np.ndarray) -> np.ndarray:
+        """Own unknowns (n, ...) from owned nodal values (nodes, 3, ...) of such a motion. Collective."""
+        return self.unknowns.restrict(nodal)
+
+    def trace(self, values: np.ndarray) -> np.ndarray:
+        """What is seen of motions (n, m) outside, on every process: the outer face (3 s, m), and after
+        it the translation and rotation of a free rim (6, m). Collective.
+        """
+        face = self.body.surface(self.spread(values)).reshape(-1, values.shape[1])
+        if self.unknowns.rim is None:
+            return face
+        return np.vstack([face, self.unknowns.rim_motion(values)])

@@ -1,0 +1,80 @@
+"""Forces and readings on the outer face: weights of its nodes, from the element's own shape functions."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from tireroad.fem.tire.mesh import Lattice
+
+_POINTS = 6  # Gauss points a direction for each element a spread force covers
+
+
+def nodes(index: np.ndarray, count: int, component: int = 2) -> sparse.csr_matrix:
+    """One component at single nodes: (k, 3 count), for `index` (k,) into the outer face."""
+    k = len(index)
+    return sparse.csr_matrix(
+        (np.ones(k), (np.arange(k), 3 * index + component)), shape=(k, 3 * count)
+    )
+
+
+def spot(
+    lattice: Lattice, ring: float, arc: float, spread: tuple[float, float] = (0.0, 0.0)
+) -> np.ndarray:
+    """Weights (s,) of the outer-face nodes for a point, or a uniform traction of total 1 around it.
+
+    Angles in rad: around the axle from the lowest point, along the section from the crown; `spread`
+    are the half widths. A reading with spread is the mean over the spot.
+    """
+    around, ring_weight = _line_rule(lattice.section.ring_corners, ring, spread[0])
+    along, arc_weight = _line_rule(lattice.section.arc_corners, arc, spread[1])
+    # Area per angles of the torus: the outer parts of a spread spot are the longer ones.
+    section = lattice.section
+    reach = section.outer_radius - section.minor_radius + section.minor_radius * np.cos(along)
+    arc_weight = arc_weight * reach / (arc_weight @ reach)
+    shape_ring = ring_weight @ _shape(section.ring_corners, lattice.edge, around % (2 * np.pi))
+    shape_ring[0] += shape_ring[-1]
+    shape_arc = arc_weight @ _shape(section.arc_corners, lattice.edge, along)
+    return np.outer(shape_ring[:-1], shape_arc).ravel()
+
+
+def directed(weights: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Weights over the three dofs a node, (3 s,), of a unit vector in the given direction."""
+    return np.outer(weights, np.asarray(direction) / np.linalg.norm(direction)).ravel()
+
+
+def _line_rule(corners: np.ndarray, centre: float, half: float) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points and weights (sum 1) over centre +- half, split where elements meet."""
+    if half == 0:
+        return np.array([centre]), np.ones(1)
+    turn = 2 * np.pi * np.arange(-1, 2)[:, None] if corners[0] == 0 else 0.0
+    inner = np.unique(corners + turn)
+    low, high = centre - half, centre + half
+    edges = np.concatenate([[low], inner[(inner > low) & (inner < high)], [high]])
+    t, weight = np.polynomial.legendre.leggauss(_POINTS)
+    length = np.diff(edges)[:, None] / 2
+    points = (edges[:-1, None] + edges[1:, None]) / 2 + length * t
+    return points.ravel(), (length * weight).ravel() / (2 * half)
+
+
+def _shape(corners: np.ndarray, edge: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Lagrange shape functions of all nodes on a line of elements at the points, (points, nodes)."""
+    first, values = line_shape(corners, edge, points)
+    order = len(edge) - 1
+    out = np.zeros((len(points), order * (len(corners) - 1) + 1))
+    out[np.arange(len(points))[:, None], first[:, None] + np.arange(order + 1)] = values
+    return out
+
+
+def line_shape(
+    corners: np.ndarray, edge: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """First node (k,) of each point's element on a line, and its shape functions (k, order + 1)."""
+    order = len(edge) - 1
+    element = np.clip(np.searchsorted(corners, points, side="right") - 1, 0, len(corners) - 2)
+    local = (points - corners[element]) / np.diff(corners)[element]
+    values = np.empty((len(points), order + 1))
+    for a in range(order + 1):
+        others = np.delete(edge, a)
+        values[:, a] = np.prod((local[:, None] - others) / (edge[a] - others), axis=1)
+    return order * element, values

@@ -1,0 +1,61 @@
+"""Receptance from the full matrices, frequency by frequency: the reference for every modal one.
+
+(K_Omega - w^2 M + i w E) u = b in real arithmetic, u = a + i c:  [[A, -w E], [w E, A]] [a; c] = [b; 0]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+from scipy import sparse
+
+from tireroad.fem.matrices.compliance import add_diagonal, on_own_rows
+from tireroad.fem.matrices.direct import solve_all
+from tireroad.fem.matrices.operators import Operators
+
+
+def receptance(
+    operators: Operators,
+    stiffness: PETSc.Mat,
+    damping: PETSc.Mat,
+    outputs: sparse.csr_matrix,
+    loads: sparse.csr_matrix,
+    frequency: np.ndarray,
+    moment: bool = False,
+) -> np.ndarray:
+    """H (f, r, k) complex, m/N, on every process, at the frequencies in Hz. Collective.
+
+    With `moment` three rows more: the first moment int rho u, kg m/N.
+    `stiffness` K_Omega and `damping` E as in fem.matrices.compliance. One unsymmetric factorisation of twice
+    the unknowns a frequency. Raises ConvergenceError when a solve leaves a residual above 1e-8.
+    """
+    comm = operators.body.comm
+    rows = on_own_rows(operators, outputs).T.tocsr()
+    if moment:
+        rows = sparse.vstack([rows, sparse.csr_matrix(operators.carried)], format="csr")
+    columns = on_own_rows(operators, loads)
+    n = columns.shape[0]
+    both = sparse.vstack([columns, sparse.csc_matrix(columns.shape)], format="csc")
+    H = np.empty((len(frequency), rows.shape[0], loads.shape[0]), complex)
+    for k, omega in enumerate(2 * np.pi * frequency):
+        dynamic = _dynamic_stiffness(stiffness, damping, operators.mass, omega)
+        solution = solve_all(dynamic, both)
+        dynamic.destroy()
+        H[k] = comm.allreduce(rows @ (solution[:n] + 1j * solution[n:]))
+    return H
+
+
+def _dynamic_stiffness(
+    stiffness: PETSc.Mat, damping: PETSc.Mat, mass: np.ndarray, omega: float
+) -> PETSc.Mat:
+    """The real matrix of twice the size; each process holds its rows of both halves. Collective."""
+    diagonal, coupling = stiffness.copy(), damping.copy()
+    add_diagonal(diagonal, -(omega**2) * mass)
+    coupling.scale(omega)
+    opposite = coupling.copy()
+    opposite.scale(-1)
+    nest = PETSc.Mat().createNest([[diagonal, opposite], [coupling, diagonal]], comm=stiffness.comm)
+    out = nest.convert("aij", PETSc.Mat())
+    for matrix in (nest, diagonal, coupling, opposite):
+        matrix.destroy()
+    return out

@@ -1,0 +1,182 @@
+"""What holds the tire in its small motions: the rim, fixed or free, and the road, away or held.
+
+A free rim is a rigid body without mass of its own that nothing holds: on its nodes
+
+    u_i = a + theta x x_i,   six unknowns R eta with R^T M R = 1,
+
+so the diagonal mass stays diagonal. The static state is that of the clamped rim; the wheel goes on
+taking the rim's static forces r, which turn with it, and a constant force at the axle's centre. Turned
+forces do work of the second order: K has W_ab = sum_i (r_a x_b + r_b x_a) / 2 - delta_ab r . x besides on
+the rotations. A free tire without a road then has its six rigid modes at any inflation (uniform pressure on two
+equal bead circles of a rigid rim has no resultant), and K is symmetric. Damping by the mass acts against
+the ground then, for want of a wheel on an axle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from petsc4py import PETSc
+from scipy import sparse
+
+from tireroad.fem.tire.body import Body
+
+TURN = 3  # components 3, 4, 5 of an unknown: rotations about x, y, z
+
+
+@dataclass(frozen=True)
+class Support:
+    """`rim` "fixed" or "free"; `held` this process's nodes whose vertical motion the road holds."""
+
+    rim: str = "fixed"
+    held: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+
+
+FIXED = Support()
+
+
+class Unknowns:
+    """The unknowns of a supported body and the map T from them to its nodes. Collective to make.
+
+    `free` (k,) are this process's nodal dofs that are unknowns; the six of a free rim follow them on the
+    last process. For own unknowns: `mass` (n,) kg, the diagonal of T^T M T; `place` (n, 3) m, undeformed;
+    `component` (n,) 0, 1, 2 for x, y, z and 3, 4, 5 for rotations; `carried` (3, n) kg: momentum per rate.
+    """
+
+    def __init__(self, body: Body, support: Support):
+        self._body = body
+        rim = body.rim[body.rim < body.nodes]
+        known = np.zeros((body.nodes, 3), bool)
+        known[rim] = True
+        known[support.held, 2] = True
+        self.free = np.flatnonzero(~known)
+        nodal = body.nodal_mass()
+        self.rim = Rim(body, rim, nodal.reshape(-1, 3)[rim, 0]) if support.rim == "free" else None
+        points = body.lattice.points(body.ids)
+        self.mass, self.place = nodal[self.free], points[self.free // 3]
+        self.component = self.free % 3
+        self.carried = self.mass * (self.component == np.arange(3)[:, None])
+        if self.rim and self.rim.mine:
+            self.mass = np.append(self.mass, np.ones(6))
+            self.place = np.vstack([self.place, np.zeros((6, 3))])
+            self.component = np.append(self.component, np.arange(6))
+        if self.rim:
+            moved = self.rim.momentum()
+            self.carried = np.hstack([self.carried, moved[:, : 6 if self.rim.mine else 0]])
+        self._prolongation = self._make_prolongation() if self.rim else None
+        first = 3 * body.space.dofmap.index_map.local_range[0]
+        self._rows = PETSc.IS().createGeneral(
+            (self.free + first).astype(PETSc.IntType), comm=body.comm
+        )
+
+    def _make_prolongation(self) -> PETSc.Mat:
+        """T as a distributed matrix. Collective."""
+        comm, rows = self._body.comm, 3 * self._body.nodes
+        own = len(self.mass)
+        last = comm.allreduce(own)
+        first = comm.exscan(own) or 0
+        unit = sparse.csr_matrix(
+            (np.ones(len(self.free)), (self.free, first + np.arange(len(self.free)))), (rows, last)
+        )
+        columns = np.tile(np.arange(last - 6, last), len(self.rim.dofs))
+        values = (self.rim.shape.ravel(), (np.repeat(self.rim.dofs, 6), columns))
+        csr = sparse.csr_matrix(unit + sparse.csr_matrix(values, (rows, last)))
+        index = [part.astype(PETSc.IntType) for part in (csr.indptr, csr.indices)]
+        sizes = ((rows, PETSc.DETERMINE), (own, PETSc.DETERMINE))
+        return PETSc.Mat().createAIJ(sizes, csr=(*index, csr.data), comm=comm)
+
+    def reduced(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """T^T X T of a matrix over all dofs of the body. Collective."""
+        if self._prolongation is None:
+            return matrix.createSubMatrix(self._rows, self._rows)
+        return matrix.ptap(self._prolongation)
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """Owned nodal values (nodes, 3, ...) from own unknowns (n, ...). Collective."""
+        out = np.zeros((3 * self._body.nodes, *values.shape[1:]))
+        out[self.free] = values[: len(self.free)]
+        if self.rim:
+            out[self.rim.dofs] = self.rim.shape @ self._rim_values(values)
+        return out.reshape(self._body.nodes, 3, *values.shape[1:])
+
+    def restrict(self, nodal: np.ndarray) -> np.ndarray:
+        """Own unknowns (n, ...) from owned nodal values (nodes, 3, ...) of such a motion. Collective."""
+        flat = nodal.reshape(-1, *nodal.shape[2:])
+        own = flat[self.free]
+        if self.rim is None:
+            return own
+        on_rim = self.rim.unknowns(flat[self.rim.dofs])
+        return np.concatenate([own, on_rim]) if self.rim.mine else own
+
+    def _rim_values(self, values: np.ndarray) -> np.ndarray:
+        """The rim's six unknowns (6, ...), on every process. Collective."""
+        return self.rim.shared(values[len(self.free) :])
+
+    def rim_motion(self, values: np.ndarray) -> np.ndarray:
+        """Translation of the axle's centre and rotation of the rim (6, ...), on every process. Collective."""
+        return self.rim.coordinates @ self._rim_values(values)
+
+    def loads(
+        self, nodal: sparse.csr_matrix, on_rim: np.ndarray | None = None
+    ) -> sparse.csr_matrix:
+        """T^T of forces on own nodal dofs (3 nodes, k), and forces and moments (6, k) on the rim. Collective."""
+        nodal = nodal.tocsr()
+        own = nodal[self.free]
+        if self.rim is None:
+            return own
+        taken = self._body.comm.allreduce(self.rim.shape.T @ nodal[self.rim.dofs].toarray())
+        if on_rim is not None:
+            taken = taken + self.rim.coordinates.T @ on_rim
+        return (
+            sparse.vstack([own, sparse.csr_matrix(taken)], format="csr") if self.rim.mine else own
+        )
+
+
+class Rim:
+    """The bead faces as one rigid body: own `dofs` (d,), their motion `shape` (d, 6) per unknown, and
+    `coordinates` (6, 6): translation and rotation per unknown. `mine`: this process has the unknowns.
+    """
+
+    def __init__(self, body: Body, nodes: np.ndarray, mass: np.ndarray):
+        self._comm = body.comm
+        self._points = body.lattice.points(body.ids[nodes])
+        self._mass = np.repeat(mass, 3)
+        self.dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+        self.mine = body.comm.rank == body.comm.size - 1
+        motions = rigid_motions(self._points)
+        inertia = body.comm.allreduce(motions.T @ (self._mass[:, None] * motions))
+        # By Cholesky's factor a motion takes in those before it alone: mirror planes keep it.
+        self.coordinates = np.linalg.inv(np.linalg.cholesky(inertia)).T
+        self.shape = motions @ self.coordinates
+
+    def shared(self, values: np.ndarray) -> np.ndarray:
+        """The owner's (6, ...) values on every process. Collective."""
+        return self._comm.bcast(values if self.mine else None, root=self._comm.size - 1)
+
+    def unknowns(self, motion: np.ndarray) -> np.ndarray:
+        """The six (6, ...) of a rigid motion of the rim's own dofs (d, ...). Collective."""
+        weighted = self._mass.reshape(-1, *[1] * (motion.ndim - 1)) * motion
+        return self._comm.allreduce(self.shape.T @ weighted)
+
+    def momentum(self) -> np.ndarray:
+        """Momentum (3, 6) kg per rate of the six unknowns. Collective."""
+        weighted = self._mass[:, None] * self.shape
+        return self._comm.allreduce(np.stack([weighted[d::3].sum(axis=0) for d in range(3)]))
+
+    def turning_stiffness(self, force: np.ndarray) -> np.ndarray:
+        """W (6, 6) of static forces (d,) N on the rim's dofs that turn with it. Collective."""
+        force = force.reshape(-1, 3)
+        product = self._comm.allreduce(force.T @ self._points)
+        whole = np.zeros((6, 6))
+        whole[TURN:, TURN:] = (product + product.T) / 2 - np.trace(product) * np.eye(3)
+        return self.coordinates.T @ whole @ self.coordinates
+
+
+def rigid_motions(points: np.ndarray) -> np.ndarray:
+    """Translations and rotations about the origin, (3 k, 6), of points (k, 3) m."""
+    out = np.zeros((len(points), 3, 6))
+    out[:, :, :3] = np.eye(3)
+    for axis, unit in enumerate(np.eye(3)):
+        out[:, :, TURN + axis] = np.cross(unit, points)
+    return out.reshape(-1, 6)

@@ -1,0 +1,236 @@
+"""Static equilibrium under inflation, steady rolling and a flat, frictionless road.
+
+F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f, with f >= 0 on the tread dofs,
+z + u_z >= z_road and one of both zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from tireroad.fem import compat, kinematics
+from tireroad.fem.static.held_system import HeldSystem, Moved
+from tireroad.fem.static.shape_damping import ShapeDamping
+from tireroad.fem.static.virtual_work import (
+    AT_REST,
+    Rolling,
+    static_residual,
+    stress_prediction,
+    tangent,
+)
+from tireroad.fem.timing import Timing
+from tireroad.fem.tire.body import Body
+
+MOST_STEPS = 25  # tangents; a load step that needs more is better halved
+TOLERANCE = 1e-12  # of the force scale
+_SERVES = 0.2  # a step with an old tangent costs a twentieth of one with a new tangent
+_DIVERGED = 1e8  # times the force scale: nothing comes back from there
+
+
+@dataclass(frozen=True)
+class Step:
+    """How one equilibrium solve ended: `iterations` tangents, `residual` relative to the force scale."""
+
+    converged: bool
+    iterations: int
+    residual: float
+    reason: str
+
+
+class Equilibrium:
+    """The nonlinear problem of one body. Forms, matrix and solver are made once. Collective.
+
+    `inflation` (Pa) may be changed between solves; `solve` starts from the body's displacement and
+    puts it back when it does not converge. `road_height` (m) is that of the last state that did;
+    `cost`: seconds by part.
+    """
+
+    def __init__(self, body: Body, rolling: Rolling = AT_REST):
+        self.body = body
+        self.cost = Timing()
+        self.road_height: float | None = None
+        self.pressure = fem.Constant(body.mesh, 0.0)
+        self._before = fem.Function(body.space)
+        residual = static_residual(body, self.pressure, rolling)
+        self._damping: ShapeDamping | None = None
+        if rolling.speed * rolling.stiffness_damping:
+            self._damping = ShapeDamping(body, self.pressure, rolling)
+            residual += self._damping.work
+        self._residual = compat.form(residual)
+        self._tangent = compat.form(tangent(body, residual) + stress_prediction(body, self._before))
+        self._inverted = compat.form(_inverted_volume(body))
+        self._clamp = [body.clamp()]
+        self._local_tangent = fem.petsc.create_matrix(self._tangent)
+        self.matrix = self._local_tangent
+        self._work = fem.petsc.create_vector(self._residual)
+        rim = body.rim[body.rim < body.nodes]
+        self._rim = (3 * rim[:, None] + np.arange(3)).ravel()
+        self._tread_z = body.space.tabulate_dof_coordinates()[body.tread, 2]
+        self._vertical = 3 * body.tread + 2  # owned dofs that can meet the road
+        self._height = -np.inf
+        self._active = np.zeros(len(body.tread), dtype=bool)
+        self._force = np.zeros(len(body.tread))
+        self._scale, self._stiffness = self._yardsticks()
+        damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
+        kind = "lu" if damped else "cholesky"
+        self._system = HeldSystem(body.comm, self.matrix, kind, self.cost)
+
+    @property
+    def rounding(self) -> float:
+        """Force below which nothing is balanced, N."""
+        return TOLERANCE * self._scale
+
+    def solve(self, road_height: float | None = None, load: float | None = None) -> Step:
+        """Equilibrium with the road plane at the given height (m), or without a road. Collective.
+
+        With a `load` (N) the road is moved, from the given height on, until it carries that.
+
+        Newton's method and the active set of the road in one loop: a dof is held where
+        f - c gap > 0, with c the dof's own stiffness; that is the complementarity condition for any
+        c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Held dofs are put on
+        the road by the linearised step: lifting them first strains the wall beyond any sense.
+        A tangent serves for as long as each step with it leaves a fifth of the error or less.
+        """
+        body = self.body
+        kept = body.u.x.array.copy(), self._active.copy(), self._force.copy()
+        self._height = -np.inf if road_height is None else road_height
+        self._before.x.array[:] = body.u.x.array
+        error, tangents = 0.0, 0
+        while True:
+            changed, last = self._choose_active(), error
+            error = self._error(load)
+            reason = self._stopped(error, changed, tangents)
+            if reason == "converged":
+                self.road_height = None if road_height is None else self._height
+                return Step(True, tangents, error, reason)
+            closing = None
+            if not reason and (changed or not error < _SERVES * last):
+                tangents += 1
+                reason = "" if self._take_tangent() else "the tangent is singular"
+                closing = self._system.closing
+            reason = reason or self._move(closing, load)
+            if reason:
+                break
+        body.u.x.array[:], self._active, self._force = kept
+        return Step(False, tangents, error, reason)
+
+    def _stopped(self, error: float, changed: bool, tangents: int) -> str:
+        """Why not to go on; empty while there is hope. Collective."""
+        if not error < _DIVERGED:
+            return "the residual grows without bound"
+        if error <= TOLERANCE and not changed:
+            return "an element is inside out" if self._inside_out() else "converged"
+        return "" if tangents < MOST_STEPS else f"no convergence in {MOST_STEPS} Newton steps"
+
+    def _choose_active(self) -> bool:
+        """Take the active set of the present state; whether it is another one on any process."""
+        wanted = self._force > self._stiffness * self._gap()
+        changed = bool((wanted != self._active).any())
+        self._active = wanted
+        self._force[~wanted] = 0.0
+        return self.body.comm.allreduce(changed, op=MPI.LOR)
+
+    def _gap(self) -> np.ndarray:
+        """Height of the owned tread dofs above the road, m; infinite without one."""
+        return self.tread_height() - self._height
+
+    def _error(self, load: float | None) -> float:
+        """Norm of what is out of balance over the force scale, distance to the road as the dof's force."""
+        with self.cost("assembly"):
+            out = self._assemble_residual().copy()
+        out[self._vertical] -= self._force
+        distance = (self._stiffness * self._gap())[self._active]
+        parts = np.array([out @ out + distance @ distance, self._force.sum()])
+        square, total = self.body.comm.allreduce(parts)
+        missing = 0.0 if load is None else load - total
+        return float(np.hypot(np.sqrt(square), missing)) / self._scale
+
+    def _take_tangent(self) -> bool:
+        """Assemble and factorise at the present state, the held dofs on their way to the road."""
+        with self.cost("assembly"):
+            self._assemble_tangent()
+        held = self._vertical[self._active]
+        return self._system.take(self.matrix, held, -self._gap()[self._active])
+
+    def _move(self, closing: Moved | None, load: float | None) -> str:
+        """One linearised step to balance, held dofs to the road; with a load, the road to that.
+
+        Why it cannot be taken, or nothing. Collective.
+        The road's force is the reaction of the linearised problem; what the new state is out of
+        balance is no force of the road (seen: held dofs let go and caught again for ever).
+        """
+        field, held = self.body.u.x, self._vertical[self._active]
+        out = self._work.array_r.copy()
+        change, force = self._system.solve(-out, closing)
+        force += out[held]
+        if load is not None:
+            further, more = self._system.solve(np.zeros_like(out), self._system.raising)
+            total, rate = self.body.comm.allreduce(np.array([force.sum(), more.sum()]))
+            if not rate > 0:
+                return "the road meets nothing that resists"
+            rise = (load - total) / rate
+            self._height += rise
+            change, force = change + rise * further, force + rise * more
+        self._force[self._active] = force
+        self._before.x.array[:] = field.array
+        field.array[: len(change)] += change
+        # To the last bit on the road: rounding of the solve would leave a gap or a penetration.
+        field.array[held] = (self._height - self._tread_z)[self._active]
+        field.scatter_forward()
+        return ""
+
+    def contact_force(self) -> np.ndarray:
+        """Vertical force of the road on the owned nodes (nodes,), N; not negative. Not collective."""
+        force = np.zeros(self.body.nodes)
+        force[self.body.tread] = self._force
+        return force
+
+    def tread_height(self) -> np.ndarray:
+        """Height z + u_z of the owned tread nodes, m, in the order of `body.tread`."""
+        return self._tread_z + self.body.u.x.array[self._vertical]
+
+    def _yardsticks(self) -> tuple[float, np.ndarray]:
+        """Force scale, N, and stiffness of each owned tread dof, N/m, of the undeformed body.
+
+        The scale is the typical stiffness of a dof times the wall, so that 1e-12 of it is far below
+        any load of interest.
+        """
+        self._before.x.array[:] = self.body.u.x.array
+        self._assemble_tangent()
+        diagonal = self.matrix.getDiagonal()
+        typical = diagonal.norm() / np.sqrt(diagonal.size)
+        return self.body.tire.section.thickness * typical, diagonal.array[self._vertical].copy()
+
+    def _assemble_residual(self) -> np.ndarray:
+        """Forces out of balance at the owned dofs, N; on the rim 0, where the wheel takes them."""
+        if self._damping:
+            self._damping.update()
+        with self._work.localForm() as local:
+            local.set(0.0)
+        fem.petsc.assemble_vector(self._work, self._residual)
+        self._work.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        self._work.array[self._rim] = 0.0
+        return self._work.array_r
+
+    def _assemble_tangent(self) -> None:
+        self._local_tangent.zeroEntries()
+        fem.petsc.assemble_matrix(self._local_tangent, self._tangent, bcs=self._clamp)
+        self._local_tangent.assemble()
+        if self._damping:
+            self.matrix = self._damping.added_to(self._local_tangent)
+
+    def _inside_out(self) -> bool:
+        """Whether the wall is turned inside out in some Gauss point; no energy tells J from -J."""
+        return self.body.comm.allreduce(fem.assemble_scalar(self._inverted)) > 0
+
+
+def _inverted_volume(body: Body):
+    """Volume in which det F is not positive, m3, in UFL."""
+    J = ufl.det(kinematics.deformation_gradient(body.u))
+    return ufl.conditional(ufl.le(J, 0.0), 1.0, 0.0) * body.dx

@@ -1,0 +1,115 @@
+"""The linearised equilibrium with some dofs held: factorised once, solved as often as it serves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.timing import Timing
+
+_SINGULAR = (-6, -10)  # MUMPS's INFOG(1): structurally, numerically
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A motion (m) of the owned dofs, not 0 at held ones alone, and the force (N) it takes at all."""
+
+    change: np.ndarray
+    force: np.ndarray
+
+
+class HeldSystem:
+    """K du = right, with du given at the held dofs. All methods are collective.
+
+    `take` factorises; `solve` then costs two triangular solves, and stays of use as long as the
+    tangent is near the one taken and the same dofs are held. `closing` is the motion given to `take`,
+    `raising` that of all held dofs by one.
+    """
+
+    def __init__(self, comm: MPI.Comm, matrix: PETSc.Mat, factorisation: str, timing: Timing):
+        self._comm, self._timing = comm, timing
+        self._ksp = _solver(comm, matrix, factorisation)
+        self._right, self._x = matrix.createVecs()
+        self._reaction: PETSc.Mat | None = None
+
+    def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
+        """Factorise `matrix` without the owned dofs `held`, which move by `closing` (m) in the next step.
+
+        False when it is singular; ConvergenceError when the factorisation fails by other causes. What
+        it does to the matrix makes it useless for anything else.
+        """
+        rows = (held + matrix.getOwnershipRange()[0]).astype(PETSc.IntType)
+        self._held = held
+        with self._timing("road"):
+            self._keep_reaction(matrix, rows)
+            self.closing = self._moved(matrix, closing)
+            self.raising = self._moved(matrix, np.ones(len(held)))
+            matrix.zeroRowsColumns(rows, 1.0)
+        with self._timing("factorisation"):
+            self._ksp.getPC().setUp()
+        return self._checked()
+
+    def _keep_reaction(self, matrix: PETSc.Mat, rows: np.ndarray) -> None:
+        if self._reaction is not None:
+            self._reaction.destroy()
+        own = PETSc.IS().createGeneral(rows, comm=self._comm)
+        self._reaction = matrix.createSubMatrix(own, None)
+        own.destroy()
+
+    def _moved(self, matrix: PETSc.Mat, at_held: np.ndarray) -> Moved:
+        self._x.set(0.0)
+        self._x.array[self._held] = at_held
+        matrix.mult(self._x, self._right)
+        return Moved(self._x.array_r.copy(), self._right.array_r.copy())
+
+    def _checked(self) -> bool:
+        factors = self._ksp.getPC().getFactorMatrix()
+        code, detail = factors.getMumpsInfog(1), factors.getMumpsInfog(2)
+        factors.destroy()  # this hold on them, which petsc4py would keep for ever
+        if code < 0 and code not in _SINGULAR:
+            raise ConvergenceError(
+                f"static: MUMPS could not factorise the tangent, INFOG(1) = {code}, INFOG(2) = "
+                f"{detail}. At -8 and -9 its workspace is too small: add -- -static_mat_mumps_icntl_14 "
+                "400. At -13 memory is: take more processes or fewer elements. The rest is in MUMPS's "
+                "users' guide."
+            )
+        return code >= 0
+
+    def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Motion (m) of the owned dofs under forces (N) on them, and force (N) it takes at the held ones.
+
+        The held dofs move as in `moved`, `closing` or `raising`, or stay.
+        """
+        with self._timing("solve"):
+            self._right.array[:] = right if moved is None else right - moved.force
+            self._right.array[self._held] = 0.0
+            self._ksp.solve(self._right, self._x)
+        change = self._x.array_r.copy()
+        if moved is not None:
+            change += moved.change
+            self._x.array[:] = change
+        force = self._reaction.createVecLeft()
+        self._reaction.mult(self._x, force)
+        at_held = force.array_r.copy()
+        force.destroy()
+        return change, at_held
+
+
+def _solver(comm: MPI.Comm, matrix: PETSc.Mat, factorisation: str) -> PETSc.KSP:
+    ksp = PETSc.KSP().create(comm)
+    ksp.setOptionsPrefix("static_")
+    ksp.setOperators(matrix)
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    pc = ksp.getPC()
+    pc.setType(factorisation)
+    pc.setFactorSolverType("mumps")
+    # Room for pivots that MUMPS did not foresee: a turning tire's tangent is not symmetric.
+    room = PETSc.Options("static_")
+    if not room.hasName("mat_mumps_icntl_14"):
+        room["mat_mumps_icntl_14"] = 100
+    ksp.setFromOptions()
+    return ksp

@@ -1,0 +1,197 @@
+"""Load steps to a wanted state: inflation, then the road by height, deflection or load.
+
+Steps are cut back when Newton fails and grow again when it is easy; a step that cannot be made
+small enough is an error that names the last good state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.static.equilibrium import Equilibrium, Step
+from tireroad.fem.static.tread_surface import TreadSurface
+from tireroad.fem.tire.surface import outer_face
+
+LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
+_SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
+_LARGEST = 4  # times the first step
+_REACH = 1.9  # times the largest deflection so far: a load is sought no further away
+_EASY = 6  # tangents up to which the next load step may grow
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One load step done: what was stepped to, and the road's total force (N) on how many points."""
+
+    what: str
+    value: float
+    unit: str
+    load: float
+    active: int
+    step: Step
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A converged state on the way to a load."""
+
+    deflection: float
+    load: float
+    displacement: np.ndarray
+
+
+class Loader:
+    """Brings the body of one equilibrium problem to the wanted state. All methods are collective."""
+
+    def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]):
+        self.equilibrium = equilibrium
+        self.body = equilibrium.body
+        self.report = report
+        self.newton_steps = 0
+        self.touch: float | None = None
+
+    def inflate(self, pressure: float) -> None:
+        """Inflation from 0 to `pressure` (Pa), without a road; also the steady-rolling loads alone."""
+
+        def attempt(fraction: float) -> Step:
+            self.equilibrium.pressure.value = fraction * pressure
+            return self.equilibrium.solve()
+
+        self._march(attempt, 0.0, 1.0, 1.0, "inflation", pressure, "Pa")
+        self.touch = self.lowest()
+
+    def lowest(self) -> float:
+        """Height of the lowest point of the outer face between its nodes, m. Collective."""
+        lattice = self.body.lattice
+        moved = self.body.surface(self.body.owned(self.body.u.x.array))
+        return TreadSurface(lattice, lattice.points(outer_face(lattice)) + moved).lowest()
+
+    def deflect(self, deflection: float) -> None:
+        """Raise the road by `deflection` (m) from first touch of the inflated tire."""
+        self._raise_road(0.0, deflection, [])
+
+    def carry(self, load: float) -> float:
+        """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket."""
+        if load <= 0:
+            raise InputError(f"static.load = {load:g} N: a road carries a positive load")
+        known = [_Known(0.0, 0.0, self.body.u.x.array.copy())]
+        trial = 0.1 * self.body.tire.section.thickness
+        for _ in range(60):
+            self._try_deflection(trial, known)
+            if abs(known[-1].load - load) <= max(LOAD_TOLERANCE * load, self.equilibrium.rounding):
+                return trial
+            trial = self._next_deflection(known, load)
+            if trial < _REACH * max(k.deflection for k in known) and self._meet(load, trial, known):
+                return self.equilibrium.road_height - self.touch
+        nearest = min(known, key=lambda k: abs(k.load - load))
+        raise ConvergenceError(
+            f"static: the load of {load:g} N was not met in 60 trials; nearest is {nearest.load:g} N. "
+            "Give static.deflection instead, or refine the mesh."
+        )
+
+    def _meet(self, load: float, trial: float, known: list[_Known]) -> bool:
+        """Solve for the load and the road's height at once, from the state guessed at a deflection."""
+        self._guess(trial, known)
+        step = self.equilibrium.solve(self.touch + trial, load)
+        self.newton_steps += step.iterations
+        if step.converged:
+            self._report("deflection", self.equilibrium.road_height - self.touch, "m", step)
+        return step.converged
+
+    def _guess(self, trial: float, known: list[_Known]) -> bool:
+        """Put the body on a line through the two states nearest to a deflection, if there are two."""
+        near = sorted(known, key=lambda k: abs(k.deflection - trial))[:2]
+        if len(near) < 2:
+            return False
+        reach = (trial - near[0].deflection) / (near[0].deflection - near[1].deflection)
+        change = near[0].displacement - near[1].displacement
+        self.body.u.x.array[:] = near[0].displacement + reach * change
+        return True
+
+    def _try_deflection(self, trial: float, known: list[_Known]) -> None:
+        """Solve at the trial deflection from a line through the two nearest states, else by steps.
+
+        What converges on the way is known from then on.
+        """
+        if self._guess(trial, known):
+            step = self.equilibrium.solve(self.touch + trial)
+            self.newton_steps += step.iterations
+            if step.converged:
+                self._report("deflection", trial, "m", step)
+                known.append(self._reached(trial))
+                return
+        below = max((k for k in known if k.deflection <= trial), key=lambda k: k.deflection)
+        self.body.u.x.array[:] = below.displacement
+        self._raise_road(below.deflection, trial, known)
+
+    def _reached(self, deflection: float) -> _Known:
+        return _Known(deflection, self.load(), self.body.u.x.array.copy())
+
+    def _next_deflection(self, known: list[_Known], load: float) -> float:
+        """Secant through the two loads nearest to the wanted one, kept inside the bracket."""
+        below = max((k for k in known if k.load <= load), key=lambda k: k.deflection)
+        above = [k.deflection for k in known if k.load > load]
+        far, near = sorted(known, key=lambda k: -abs(k.load - load))[-2:]
+        rise, run = near.load - far.load, near.deflection - far.deflection
+        slope = rise / run if run else 0.0
+        secant = near.deflection + (load - near.load) / slope if slope > 0 else np.inf
+        if above:
+            low, high = below.deflection, min(above)
+            return secant if low < secant < high else (low + high) / 2
+        if below.deflection > self.body.tire.section.minor_radius:
+            raise ConvergenceError(
+                f"static: the tire carries {below.load:.4g} N at {below.deflection:.4g} m of "
+                f"deflection, beyond its section; {load:g} N is out of reach. Lower static.load or "
+                "raise static.inflation."
+            )
+        # Beyond what was tried the curve is not known: at most double the deflection.
+        return float(np.clip(secant, 1.01 * below.deflection, 2 * below.deflection))
+
+    def load(self) -> float:
+        """Total vertical force of the road, N. Collective."""
+        return self.body.comm.allreduce(self.equilibrium.contact_force().sum())
+
+    def _raise_road(self, start: float, end: float, known: list[_Known]) -> None:
+        """In steps, each of which is entered in `known`."""
+
+        def attempt(deflection: float) -> Step:
+            step = self.equilibrium.solve(self.touch + deflection)
+            if step.converged:
+                known.append(self._reached(deflection))
+            return step
+
+        largest = 0.25 * self.body.tire.section.thickness
+        self._march(attempt, start, end, largest, "deflection", 1.0, "m")
+
+    def _march(self, attempt, start, end, first, what, scale, unit) -> None:
+        """From a converged `start` to `end` in steps from `first` on: grown when easy, cut back on failure."""
+        done, size = start, first
+        while True:
+            target = end if abs(end - done) <= size * (1 + 1e-12) else done + size
+            step = attempt(target)
+            self.newton_steps += step.iterations
+            if step.converged:
+                self._report(what, target * scale, unit, step)
+                done = target
+                if done == end:
+                    return
+                size = min(_LARGEST * first, 2 * size) if step.iterations <= _EASY else size
+                continue
+            size = 0.5 * min(size, abs(target - done))
+            if size < _SMALLEST * first:
+                raise ConvergenceError(
+                    f"static: {what} stops at {done * scale:.6g} {unit} of {end * scale:.6g} {unit}; "
+                    f"a further step of {size * scale:.2g} {unit} does not converge "
+                    f"({step.reason}). The tire may fold or buckle here: lower the load or raise "
+                    "the inflation, stiffen the material or refine the mesh around the footprint."
+                )
+
+    def _report(self, what: str, value: float, unit: str, step: Step) -> None:
+        force = self.equilibrium.contact_force()
+        total = self.body.comm.allreduce(force.sum())
+        active = self.body.comm.allreduce(int((force > 0).sum()))
+        self.report(Progress(what, value, unit, total, active, step))

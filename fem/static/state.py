@@ -1,0 +1,114 @@
+"""What the static solve leaves behind: small arrays that every process holds, and no dolfinx object."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
+from tireroad.fem.tire.mesh import Lattice
+from tireroad.fem.tire.surface import outer_face
+
+
+@dataclass(frozen=True)
+class StaticState:
+    """The tire at rest on the road.
+
+    `displacement` (n, 3) m of all lattice nodes; of the outer face, in the order of its ids:
+    `points` (s, 3) m undeformed, `moved` (s, 3) m displacement, `force` (s,) N of the road on the
+    tire, `area` (s,) m2 that a uniform pressure is shared out by, `half_sizes` (s, 2) m of the deformed rectangle each node stands for (x and y),
+    `ring_rate` (s,) m/rad the derivative of the deformed x by the angle around the axle.
+    `road_height` (m) is None without a road.
+    """
+
+    displacement: np.ndarray
+    points: np.ndarray
+    moved: np.ndarray
+    force: np.ndarray
+    area: np.ndarray
+    half_sizes: np.ndarray
+    ring_rate: np.ndarray
+    shape: tuple[int, int]
+    touch_height: float
+    road_height: float | None
+
+    @property
+    def load(self) -> float:
+        """Total vertical force, N."""
+        return float(self.force.sum())
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Deformed positions of the outer face, (s, 3) m."""
+        return self.points + self.moved
+
+    @property
+    def gap(self) -> np.ndarray:
+        """Height of the outer face above the road plane, (s,) m; 0 where it touches."""
+        gap = self.positions[:, 2] - self.road_height
+        return np.where(self.force > 0, 0.0, gap)
+
+    def rolling_radius(self) -> float:
+        """Effective rolling radius, m: material speed over the road per unit speed of rotation.
+
+        r_e = dx/dtheta of the deformed surface, averaged over the footprint with the contact force,
+        or at the lowest crown point without a road: the speed at which that material would stick.
+        """
+        if self.force.any():
+            return float(self.ring_rate @ self.force / self.load)
+        crown = np.argmin(self.positions[:, 2])
+        return float(self.ring_rate[crown])
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """Contact pressure, (s,) Pa."""
+        touching = self.force > 0
+        return np.divide(self.force, self.area, out=np.zeros_like(self.force), where=touching)
+
+    def footprint(self) -> Footprint:
+        """Extent of the contact; zeros without a road."""
+        if self.road_height is None:
+            return Footprint(0.0, 0.0, 0.0)
+        return footprint(self.shape, self.positions, self.pressure, self.gap, self.area)
+
+
+def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
+    """Collect the converged state on every process. Collective."""
+    body, road_height = equilibrium.body, equilibrium.road_height
+    displacement = body.displacement()
+    face = outer_face(body.lattice)
+    points = body.lattice.points(face)
+    moved = displacement[face]
+    force = (
+        body.surface(equilibrium.contact_force())
+        if road_height is not None
+        else np.zeros(len(face))
+    )
+    return StaticState(
+        displacement,
+        points,
+        moved,
+        force,
+        nodal_area(body.lattice, points + moved),
+        *_surface_metric(body.lattice, points + moved),
+        touch_height=touch_height,
+        road_height=road_height,
+    )
+
+
+def _surface_metric(lattice: Lattice, positions: np.ndarray):
+    """Half sizes of each node's rectangle, dx/dtheta, and the shape (around, along) of the face."""
+    shape = (lattice.shape[0], lattice.shape[2])
+    grid = positions.reshape(*shape, 3)
+    ring = np.concatenate([grid[-1:], grid, grid[:1]])
+    angle = np.concatenate(
+        [lattice.ring[-1:] - 2 * np.pi, lattice.ring, lattice.ring[:1] + 2 * np.pi]
+    )
+    rate = np.gradient(ring[..., 0], angle, axis=0)[1:-1]
+    around = np.linalg.norm(np.diff(ring, axis=0), axis=-1)
+    along = np.linalg.norm(np.diff(grid, axis=1), axis=-1)
+    along = np.pad(along, ((0, 0), (1, 1)))
+    half = np.stack([around[1:] + around[:-1], along[:, 1:] + along[:, :-1]], axis=-1) / 4
+    return half.reshape(-1, 2), rate.ravel(), shape

@@ -1,0 +1,1 @@
+"""The tire as a body: section, mesh, wall, material, and its displacement."""

@@ -1,0 +1,95 @@
+"""The tire as a discretised body: mesh, displacement field, clamped rim and integration measures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from tireroad.fem import compat
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import INNER, RIM, TREAD, Torus, build
+from tireroad.fem.tire.surface import Gather, outer_face
+from tireroad.fem.tire.wall import Region, Wall
+
+
+class Body:
+    """A section and what it is made of, with its displacement `u` about the undeformed shape.
+
+    Collective to make. `ids` are the lattice ids of this process's owned nodes; `rim` and `tread`
+    its blocked dofs there (ghosts included in `rim`, as boundary conditions want them).
+    """
+
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        section: Torus,
+        material: Material,
+        regions: Sequence[Region] = (),
+    ):
+        self.comm, self.material, self.regions = comm, material, tuple(regions)
+        self.tire = build(comm, section)
+        self.mesh, self.lattice = self.tire.mesh, self.tire.lattice
+        self.space = compat.vector_space(self.mesh, section.order)
+        self.wall = Wall(self.tire, self.space, material, regions)
+        self.u = fem.Function(self.space)
+        # One of each for all forms: UFL does not always take two of the same space for equal
+        # (seen with dolfinx 0.5.2, from one run to the next).
+        self.test, self.trial = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
+        self.nodes = self.space.dofmap.index_map.size_local
+        self.ids = self.lattice.ids(self.space.tabulate_dof_coordinates()[: self.nodes])
+        self.rim = self._face_dofs(RIM)
+        tread = self._face_dofs(TREAD)
+        self.tread = np.setdiff1d(tread[tread < self.nodes], self.rim)
+        # 2 x order integrates the quadratic form of an affine element exactly: full integration.
+        measure = {"metadata": {"quadrature_degree": 2 * section.order}}
+        self.dx = ufl.Measure("dx", domain=self.mesh, **measure)
+        # One Gauss point a direction less: what the dilatation is integrated with (static_residual).
+        reduced = {"quadrature_degree": 2 * section.order - 1}
+        self.reduced_dx = ufl.Measure("dx", domain=self.mesh, metadata=reduced)
+        # Two surface tangents and a test function: what exactly makes the pressure's stiffness
+        # symmetric. At order 3 with 2 x order, 7e-8 was left, and no mode was as soft as that.
+        exact = {"quadrature_degree": 3 * section.order - 1}
+        self.inner_ds = ufl.Measure(
+            "ds", domain=self.mesh, subdomain_data=self.tire.facets, metadata=exact
+        )(INNER)
+        self.everywhere = Gather(comm, self.ids, np.arange(self.lattice.size))
+        self.surface = Gather(comm, self.ids, outer_face(self.lattice))
+
+    def _face_dofs(self, tag: int) -> np.ndarray:
+        facets = self.tire.facets.indices[self.tire.facets.values == tag]
+        return fem.locate_dofs_topological(self.space, 2, facets)
+
+    def clamp(self):
+        """Boundary condition: all components zero on the rim."""
+        return fem.dirichletbc(np.zeros(3), self.rim, self.space)
+
+    def nodal_mass(self) -> np.ndarray:
+        """Owned entries (3 nodes,) of int rho phi_i . (1, 1, 1) by the rule whose points are the nodes.
+
+        kg; positive, rim included. Collective.
+        """
+        lobatto = {"quadrature_rule": "GLL", "quadrature_degree": 2 * self.tire.section.order - 1}
+        dx = ufl.Measure("dx", domain=self.mesh, metadata=lobatto)
+        ones = ufl.as_vector((1.0, 1.0, 1.0))
+        weight = self.wall.density * ufl.inner(self.test, ones) * dx
+        vector = fem.petsc.assemble_vector(compat.form(weight))
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return vector.array_r.copy()
+
+    def owned(self, vector: np.ndarray) -> np.ndarray:
+        """The owned part of a dof array as (nodes, 3)."""
+        return vector[: 3 * self.nodes].reshape(-1, 3)
+
+    def displacement(self) -> np.ndarray:
+        """Displacement of all lattice nodes (n, 3), m, on every process. Collective."""
+        return self.everywhere(self.owned(self.u.x.array))
+
+    def set_displacement(self, values: np.ndarray) -> None:
+        """Take the displacement of all lattice nodes (n, 3), m. Collective."""
+        self.owned(self.u.x.array)[:] = values[self.ids]
+        self.u.x.scatter_forward()

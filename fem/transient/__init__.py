@@ -1,0 +1,1 @@
+"""Full finite elements in time: the reference that modal runs are held to."""

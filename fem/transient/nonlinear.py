@@ -1,0 +1,154 @@
+"""Full finite elements in time with large motions, the wheel at rest: what linearising leaves out.
+
+    M u'' + D u' + F(u) = W^T f + f_static,   D = gamma1 M + gamma2 K,
+
+F the forces of the hyperelastic wall and of the follower pressure at the total displacement, K their
+tangent at the static state, by the same method of Wood, Bossak and Zienkiewicz as `fem.transient.linear`: the
+two differ in F alone. Each step is solved by iterations on the one factorisation of the linear step,
+which inertia keeps near the true one; contact is solved anew in each.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
+
+from tireroad.fem import compat, kinematics
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.virtual_work import AT_REST, static_residual
+from tireroad.fem.transient.linear import FullTire
+
+TOLERANCE = 1e-9  # of the largest displacement
+_FLOOR = 1e-11  # of the wall's thickness: rounding of F
+MOST_TURNS = 60
+
+
+class NonlinearTire(FullTire):
+    """The nonlinear tire between the patch's forces and displacements, about its static state.
+
+    The interface of FullTire and one call more: after each contact solve `settle` says whether the
+    motion balances, or for which free displacement to solve the contact again. `operators` are those
+    of the static state, at `inflation` (Pa). `turns`: iterations so far. All methods are collective.
+    """
+
+    def __init__(
+        self,
+        operators: Operators,
+        inflation: float,
+        damping: tuple[float, float],
+        step: float,
+        outputs: sparse.csr_matrix,
+        loads: sparse.csr_matrix,
+        spectral_radius: float = 0.0,
+    ):
+        if operators.unknowns.rim:
+            raise InputError('nonlinear tire in time: modal.rim = "free" is linear; take "fixed"')
+        super().__init__(
+            operators, None, 0.0, damping, step, outputs, loads, spectral_radius=spectral_radius
+        )
+        body = operators.body
+        self._body, self._small = body, _FLOOR * body.tire.section.thickness
+        self._static = body.u.x.array.copy()
+        pressure = fem.Constant(body.mesh, float(inflation))
+        self._force_form = compat.form(static_residual(body, pressure, AT_REST))
+        self._potential_form = compat.form(_potential(body, pressure))
+        self._assembled = fem.petsc.create_vector(self._force_form)
+        n = len(self._mass)
+        self._rest = self._at(np.zeros(n), self._forces)
+        self._rest_potential = self._at(np.zeros(n), self._stored)
+        self._elastic = np.zeros(n)
+        self.turns = 0
+
+    def predict(self) -> np.ndarray:
+        """Displacement (r,) m at the end of the step with no new force, in a first approximation."""
+        self._tried = 0
+        here = self.displacement
+        return self._freed(here - self._solved(self._dynamic(here) + self._elastic))
+
+    def settle(self, force: np.ndarray) -> np.ndarray | None:
+        """None when the motion under a force (k,) N balances, to TOLERANCE; then `advance` takes it.
+
+        Else a better displacement (r,) m with no new force, for which to solve the contact again.
+        ConvergenceError after MOST_TURNS of them.
+        """
+        new = self._free + self._answer @ force
+        elastic = self._at(new, self._forces) - self._rest
+        defect = self._dynamic(new) + elastic - self._columns @ force
+        change = self._solved(defect)
+        largest = (float(abs(v).max(initial=0.0)) for v in (change, new))
+        off, size = (self._comm.allreduce(v, op=MPI.MAX) for v in largest)
+        self.turns += 1
+        if off <= TOLERANCE * size + self._small:
+            self._elastic = elastic
+            return None
+        self._tried += 1
+        if self._tried > MOST_TURNS or not np.isfinite(off):
+            raise ConvergenceError(
+                f"full finite elements: a step of {self._step:g} s leaves {off:.1e} m of "
+                f"{size:.1e} m out of balance after {self._tried} turns; the motion is too large for "
+                "the step or the tire buckles: take a smaller step or a smaller motion."
+            )
+        return self._freed(new - change - self._answer @ force)
+
+    def _freed(self, free: np.ndarray) -> np.ndarray:
+        self._free = free
+        return self._comm.allreduce(self._outputs @ free)
+
+    def _dynamic(self, new: np.ndarray) -> np.ndarray:
+        """Forces of inertia and damping, N, when the step ends at a displacement (own rows)."""
+        h, a, beta, gamma = self._step, self._a, self._beta, self._gamma
+        moved = new - self.displacement - h * self.velocity
+        acceleration = moved / (beta * h**2) - (0.5 / beta - 1) * self.acceleration
+        rate = self.velocity + h * ((1 - gamma) * self.acceleration + gamma * acceleration)
+        balanced = (1 - a) * acceleration + a * self.acceleration
+        return self._mass * balanced + self._product(rate)
+
+    def _solved(self, right: np.ndarray) -> np.ndarray:
+        b, x = self._vectors
+        b.array[:] = right
+        self._solver.apply(b, x)
+        return x.array_r.copy()
+
+    def _at(self, motion: np.ndarray, work):
+        """What `work()` says at the static state plus a motion; the body is put back."""
+        field = self._body.u.x
+        field.array[self._operators.unknowns.free] += motion
+        field.scatter_forward()
+        result = work()
+        field.array[:] = self._static
+        return result
+
+    def _forces(self) -> np.ndarray:
+        """F at the body's displacement, own free rows, N."""
+        with self._assembled.localForm() as local:
+            local.set(0.0)
+        fem.petsc.assemble_vector(self._assembled, self._force_form)
+        self._assembled.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return self._assembled.array_r[self._operators.unknowns.free]
+
+    def _stored(self) -> float:
+        return self._comm.allreduce(fem.assemble_scalar(self._potential_form))
+
+    def restore(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on from a snapshot, between `advance` and `predict`; written on any number of processes."""
+        super().restore(kept)
+        self._elastic = self._at(self.displacement, self._forces) - self._rest
+
+    def energy(self) -> float:
+        """Kinetic energy and what wall and inflation have stored since the static state, J."""
+        kinetic = self._comm.allreduce(self._mass @ self.velocity**2) / 2
+        return kinetic + self._at(self.displacement, self._stored) - self._rest_potential
+
+
+def _potential(body, pressure):
+    """Strain energy and p V, J, in UFL; V(u) the volume behind the inner face, whose edges stand still."""
+    F = kinematics.deformation_gradient(body.u)
+    distortion, dilatation = body.wall.energy(F.T * F)
+    place = ufl.SpatialCoordinate(body.mesh) + body.u
+    swept = kinematics.pressure_virtual_work(body.u, place, ufl.FacetNormal(body.mesh)) / 3
+    return distortion * body.dx + dilatation * body.reduced_dx + pressure * swept * body.inner_ds

@@ -1,0 +1,160 @@
+"""Responses between chosen probes of a turning tire, with the wanted residual flexibility."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from tireroad.fem.matrices.compliance import (
+    StaticShapes,
+    compliance,
+    on_own_rows,
+    rotating_damping,
+    rotating_stiffness,
+    static_shapes,
+)
+from tireroad.fem.matrices.inertia_relief import statics
+from tireroad.fem.matrices.operators import Operators, Rotation
+from tireroad.fem.matrices.receptance import receptance
+from tireroad.greens.attachment import with_attachments
+from tireroad.greens.axle import axle_transfer
+from tireroad.greens.response import Response, couple
+from tireroad.greens.second_order import Moments, second_order
+from tireroad.modal.basis import Projection, project
+from tireroad.modal.rotating import StateModes, matrices, rotating, standing
+from tireroad.modal.undamped import Modes
+from tireroad.runs.process.mpi import on_root
+
+
+@dataclass(frozen=True)
+class Basis:
+    """`shape` kg^-1/2 of the outer face (3 s, m), of a free rim after it (+ 6); the projected matrices;
+    the decoupled states.
+    """
+
+    shape: np.ndarray
+    projection: Projection
+    states: StateModes
+
+    def couple(self, outputs, loads, flexibility: np.ndarray | None = None) -> Response:
+        """Response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s), or 3 s + 6 wide."""
+        momentum = self.projection.momentum
+        return couple(self.states, self.seen(outputs), self.seen(loads), momentum, flexibility)
+
+    def seen(self, probes: sparse.csr_matrix) -> np.ndarray:
+        """The modes (k, m) as the probes read them."""
+        return probes @ self.shape[: probes.shape[1]]
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """The full matrices of a tire that turns: `damping` is (gamma1 1/s, gamma2 s), `rotation` None
+    when it stands. Its properties are collective at their first use."""
+
+    operators: Operators
+    rotation: Rotation | None
+    speed: float
+    damping: tuple[float, float]
+    inertia: str
+
+    @cached_property
+    def rotating_stiffness(self):
+        """K_Omega."""
+        return rotating_stiffness(*self._given)
+
+    @cached_property
+    def rotating_damping(self):
+        """D + 2 Omega G."""
+        return rotating_damping(*self._given)
+
+    @property
+    def _given(self) -> tuple:
+        return self.operators, self.rotation, self.speed, self.damping, self.inertia
+
+    def respond(
+        self,
+        basis: Basis,
+        modes: Modes | None,
+        outputs: sparse.csr_matrix,
+        loads: sparse.csr_matrix,
+        option: str,
+    ) -> Response:
+        """Response with the residual `option`; `modes` (all rows) for "attachment" only. Collective."""
+        if option in ("static", "dirac"):
+            flexibility = compliance(self.operators, self.rotating_stiffness, outputs, loads)
+            return replace(basis.couple(outputs, loads, flexibility), pulse=option == "dirac")
+        r, k = outputs.shape[0], loads.shape[0]
+        same = outputs is loads
+        probes = loads if same else sparse.vstack([outputs, loads], format="csr")
+        if option == "attachment":
+            whole = self._attached(basis, modes, probes)
+        else:
+            shapes = self._static_shapes(probes)
+            moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
+            poles = basis.couple(probes, probes)
+            carried = basis.projection.momentum
+            whole = second_order(poles, basis.states, basis.seen(probes), carried, moments)
+        return whole if same else whole.between(slice(r), slice(r, r + k))
+
+    def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
+        full = self.rotating_stiffness, self.rotating_damping
+        return static_shapes(self.operators, *full, probes)
+
+    def _attached(self, basis: Basis, modes: Modes, probes: sparse.csr_matrix) -> Response:
+        """Response of the modes and the attachment modes of all probes. Collective."""
+        if not self._drifts:
+            shapes = self._static_shapes(probes)
+            grown = self._grown(modes, shapes.columns, basis.projection)
+            return grown.couple(probes, probes, shapes.compliance)
+        return self._standing_attachments(modes, probes).couple(probes, probes)
+
+    @property
+    def _drifts(self) -> bool:
+        """Whether the turning tire has no static answer: with a free rim K_Omega has no inverse."""
+        return self.rotation is not None and self.operators.unknowns.rim is not None
+
+    def _standing_attachments(self, modes: Modes, probes: sparse.csr_matrix) -> Basis:
+        """Modes with the static shapes, relieved where nothing holds the tire, of K. Collective."""
+        loads = on_own_rows(self.operators, probes)
+        return self._grown(modes, statics(self.operators, self.operators.stiffness, loads))
+
+    def axle(self, modes: Modes, loads: sparse.csr_matrix, frequency: np.ndarray) -> np.ndarray:
+        """Force on the held axle per unit load (f, 3, k), -, by the modes of the free rim (greens.axle).
+
+        `loads` (k, 3 s); the rim's and the loads' attachment modes join the basis. Collective.
+        """
+        width = loads.shape[1]
+        rim = sparse.hstack([sparse.csr_matrix((6, width)), sparse.identity(6)])
+        apart = sparse.hstack([loads, sparse.csr_matrix((loads.shape[0], 6))])
+        probes = sparse.vstack([rim, apart], format="csr")
+        grown = self._standing_attachments(modes, probes)
+        seen, momentum = grown.seen(probes), grown.projection.momentum
+        response = couple(grown.states, np.vstack([seen[:6], momentum]), seen, momentum)
+        turning = self.speed, self.damping[0]
+        return axle_transfer(response.receptance(frequency), frequency, *turning)
+
+    def _grown(self, modes: Modes, columns: np.ndarray, known: Projection | None = None) -> Basis:
+        """The basis with attachment modes; `known` is the projection on the modes. Collective."""
+        operators, comm = self.operators, self.operators.body.comm
+        grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
+        projection = project(grown, self.rotation, operators.carried, comm, known)
+        shape = operators.trace(grown.vectors)
+        return Basis(shape, projection, self.decouple(projection, comm))
+
+    def decouple(self, projection: Projection, comm) -> StateModes:
+        """The second eigenproblem, or the closed formula when the wheel stands. Collective."""
+        if self.speed == 0:
+            return standing(projection, self.damping)
+        pencil = matrices(projection, self.speed, self.damping, self.inertia)
+        # One process solves: LAPACK on another could order repeated eigenvalues differently.
+        return on_root(comm, lambda: rotating(*pencil))
+
+    def receptance(
+        self, outputs: sparse.csr_matrix, loads: sparse.csr_matrix, frequency: np.ndarray
+    ) -> np.ndarray:
+        """H (f, r, k) m/N without any modes, at the frequencies in Hz. Collective."""
+        full = self.rotating_stiffness, self.rotating_damping
+        return receptance(self.operators, *full, outputs, loads, frequency)

@@ -1,0 +1,1 @@
+"""Result files: written whole, reused by hash, read, exported."""

@@ -1,0 +1,65 @@
+"""Files that are whole or not there, and what to say when a disk refuses."""
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from tireroad.fem.errors import InputError
+
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG}
+
+
+def explained(error: BaseException, path: Path | str) -> InputError | None:
+    """A full disk or a refused write as one message, or None when it is neither.
+
+    HDF5 reports the operating system's error inside its own text, hence the search.
+    """
+    number = getattr(error, "errno", None)
+    text = str(error)
+    if number in FULL or any(f"errno = {code}," in text for code in FULL):
+        reason = "the disk is full (or the file too large for it): free some space and run again"
+    elif number in REFUSED or any(f"errno = {code}," in text for code in REFUSED):
+        reason = "the folder is not writable: choose another with --out"
+    else:
+        return None
+    return InputError(f"{path}: cannot be written, {reason}; what was there before is kept")
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def part_of(path: Path) -> Path:
+    """The temporary name of this process beside `path`."""
+    return path.with_name(f".{path.name}.{os.getpid()}.part")
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path` that takes its place at the end, or vanishes on failure."""
+    part = part_of(path)
+    try:
+        yield part
+        _sync(part)
+        os.replace(part, path)
+        _sync(path.parent)
+    except BaseException as error:
+        with suppress(OSError):
+            part.unlink()
+        clear = explained(error, path) if isinstance(error, OSError | RuntimeError) else None
+        if clear is not None:
+            raise clear from error
+        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a small text file at once or not at all."""
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")

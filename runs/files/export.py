@@ -1,0 +1,157 @@
+"""Results for other programs: CSV for spreadsheets, and XDMF (runs/xdmf.py) for ParaView."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.files import xdmf
+from tireroad.runs.files.disk import replacing
+
+AXES = ("x", "y", "z")
+Columns = dict[str, NDArray]  # heading with unit -> values (n)
+
+
+def export(directory: Path) -> list[Path]:
+    """Writes directory/export/*.csv and *.xdmf from the result files there are; returns the paths.
+
+    XDMF files point into the HDF5 results beside `export` and copy no data: leave it where it is.
+    Every column of a CSV names its unit. Each file is written to a temporary name and renamed. Not
+    collective: call it on one process. Raises InputError where there is nothing to export, where a
+    result file is damaged (nothing is written then), or where `export` cannot be written.
+    """
+    if not directory.is_dir():
+        raise InputError(f"{directory} is no folder: give the result folder of a run")
+    files: dict[str, Callable[[Path], object]] = {}
+    for name, reader in READERS.items():
+        if (directory / name).is_file():
+            files |= _read(directory / name, reader)
+    if not files:
+        raise InputError(
+            f"{directory} holds nothing to export (none of {', '.join(READERS)}): "
+            "give the result folder of a run"
+        )
+    folder = directory / "export"
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: the folder cannot be made ({error.strerror})") from error
+    for name, write in files.items():
+        with replacing(folder / name) as part:
+            write(part)
+    return [folder / name for name in files]
+
+
+def _read(path: Path, reader: Callable[[h5py.File], dict]) -> dict:
+    try:
+        with h5py.File(path, "r") as file:
+            return reader(file)
+    except (OSError, KeyError, RuntimeError, ValueError) as error:
+        raise InputError(
+            f"{path} is damaged or incomplete: {error}; run its scene again with --fresh"
+        ) from error
+
+
+def write_csv(path: Path, columns: Columns) -> None:
+    """One row of headings, then the numbers to 10 digits, commas between."""
+    header = ",".join(f'"{heading}"' for heading in columns)
+    values = np.column_stack(list(columns.values()))
+    np.savetxt(path, values, fmt="%.10g", delimiter=",", header=header, comments="")
+
+
+def _table(name: str, columns: Columns) -> dict[str, Callable[[Path], object]]:
+    return {name: partial(write_csv, columns=columns)}
+
+
+def _components(name: str, values: NDArray, unit: str) -> Columns:
+    """Columns of a vector (n, 3); a complex one gives real and imaginary parts."""
+    columns: Columns = {}
+    for axis, column in zip(AXES, values.T, strict=True):
+        columns |= _parts(f"{name} {axis}", column, unit)
+    return columns
+
+
+def _parts(name: str, values: NDArray, unit: str) -> Columns:
+    if not np.iscomplexobj(values):
+        return {f"{name} [{unit}]": values}
+    return {f"Re {name} [{unit}]": values.real, f"Im {name} [{unit}]": values.imag}
+
+
+def modes(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """modes.csv: number, frequency, residual; modes.xdmf: the first shapes."""
+    frequency = file["frequency"][()]
+    columns = {"mode": np.arange(1, len(frequency) + 1), "frequency [Hz]": frequency}
+    columns["residual [-]"] = file["residual"][()]
+    return _table("modes.csv", columns) | _page("modes.xdmf", xdmf.modes(file))
+
+
+def static(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """footprint.csv: deformed contact points and their forces; static.xdmf: the loaded surface."""
+    points, force = file["contact/points"][()], file["contact/force"][()]
+    files = _page("static.xdmf", xdmf.static(file))
+    if not len(points):
+        return files
+    columns = _components("position", points, "m") | _components("force", force, "N")
+    return _table("footprint.csv", columns) | files
+
+
+def contact(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """contact_force.csv: total force, and axle force, over time."""
+    columns = {"time [s]": file["time"][()]}
+    columns |= _components("contact force", file["total_force"][()], "N")
+    if "axle_force" in file:
+        columns |= _components("axle force", file["axle_force"][()], "N")
+    if "active" in file:
+        columns["points in contact [-]"] = file["active"][()]
+    return _table("contact_force.csv", columns) | _page("contact.xdmf", xdmf.contact(file))
+
+
+def spectra(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """spectra.csv: complex spectra; third_octave.csv: bands of the axle force."""
+    columns = {"frequency [Hz]": file["frequency"][()]}
+    for name in ("axle_force", "contact_force"):
+        if name in file:
+            columns |= _components(name.replace("_", " "), file[name][()], "N")
+    files = _table("spectra.csv", columns)
+    if "third_octave/centre" in file:
+        bands = {"band centre [Hz]": file["third_octave/centre"][()]}
+        level = file["third_octave/level"][()]
+        files |= _table("third_octave.csv", bands | _components("level", level, "dB re 1 N"))
+    return files
+
+
+def response(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """response.csv: force, displacement, axle force over time; receptance.csv over frequency."""
+    files: dict[str, Callable[[Path], object]] = {}
+    if "time" in file:
+        columns = {"time [s]": file["time"][()]}
+        force, moved = file["force"][()], file["displacement"][()]
+        for point in range(moved.shape[1]):
+            columns[f"force {point + 1} [N]"] = force[:, point]
+            columns |= _components(f"displacement {point + 1}", moved[:, point], "m")
+        if "axle_force" in file:
+            columns |= _components("axle force", file["axle_force"][()], "N")
+        files |= _table("response.csv", columns)
+    if "receptance" in file:
+        columns, values = {"frequency [Hz]": file["frequency"][()]}, file["receptance"][()]
+        for i, j in np.ndindex(values.shape[1:]):
+            columns |= _parts(f"receptance {i + 1},{j + 1}", values[:, i, j], "m/N")
+        files |= _table("receptance.csv", columns)
+    return files
+
+
+def _page(name: str, text: str | None) -> dict[str, Callable[[Path], object]]:
+    return {} if text is None else {name: partial(Path.write_text, data=text, encoding="utf-8")}
+
+
+READERS: dict[str, Callable[[h5py.File], dict[str, Callable[[Path], object]]]] = {
+    "static.h5": static,
+    "modes.h5": modes,
+    "contact.h5": contact,
+    "spectra.h5": spectra,
+    "response.h5": response,
+}

@@ -1,0 +1,167 @@
+"""The result folder: whose it is, that it can be written, and its summary."""
+
+import fcntl
+import json
+import math
+import os
+import tempfile
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.files.disk import explained, write_text
+from tireroad.runs.files.store import plain
+from tireroad.runs.scene.resolved import MARK
+from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
+
+OTHER = "choose another folder with --out, or remove this one; nothing was written"
+
+
+def _earlier(directory: Path) -> dict[str, Any] | None:
+    """The summary of an earlier run, None when there is none."""
+    path = directory / "summary.json"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error}); {OTHER}") from None
+    try:
+        found = json.loads(text)
+        found["program"]["version"], found["scene"], found["stages"].items()
+    except (ValueError, TypeError, KeyError, AttributeError):
+        raise InputError(f"{path}: is not a summary of {PROGRAM}; {OTHER}") from None
+    return found
+
+
+def _check_name(directory: Path, found: Any, scene_name: str) -> None:
+    if found != scene_name:
+        raise InputError(
+            f'{directory}: holds results of the scene "{found}", not of "{scene_name}"; {OTHER}'
+        )
+
+
+def _check_scene(directory: Path, scene_name: str) -> None:
+    """A folder without summary: its scene.toml must be one that a run of this scene left."""
+    try:
+        text = (directory / "scene.toml").read_text(encoding="utf-8")
+        name = tomllib.loads(text).get("name")
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError):
+        text, name = "", None
+    if not text.startswith(MARK):
+        raise InputError(f"{directory}: holds a scene.toml that is not a result; {OTHER}")
+    _check_name(directory, name, scene_name)
+
+
+def check_owner(directory: Path, scene_name: str) -> None:
+    """Raise InputError where the folder holds results of another scene or another version."""
+    found = _earlier(directory)
+    if found is None:
+        _check_scene(directory, scene_name)
+        return
+    _check_name(directory, found["scene"], scene_name)
+    program = found["program"]
+    if (program["version"], program.get("format")) != (VERSION, RESULT_FORMAT):
+        raise InputError(
+            f"{directory}: holds results of {PROGRAM} {program['version']}"
+            f" (format {program.get('format')}), this is {VERSION} (format {RESULT_FORMAT});"
+            f" {OTHER}"
+        )
+
+
+@contextmanager
+def claimed(directory: Path, scene_name: str) -> Iterator[None]:
+    """The folder made, checked, and held against a second run while inside. Root process only."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        handle = os.open(directory, os.O_RDONLY)
+    except OSError as error:
+        raise _unusable(directory, error) from None
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                f"{directory}: another run is writing here: wait for it, or use --out"
+            ) from None
+        except OSError:
+            pass  # a file system without locks
+        check_owner(directory, scene_name)
+        try:
+            tempfile.TemporaryFile(dir=directory).close()
+        except OSError as error:
+            raise _unusable(directory, error) from None
+        yield
+    finally:
+        os.close(handle)
+
+
+def _unusable(directory: Path, error: OSError) -> InputError:
+    if isinstance(error, FileExistsError | NotADirectoryError):
+        return InputError(f"{directory}: is not a folder; choose another with --out")
+    return explained(error, directory) or InputError(
+        f"{directory}: cannot be written: {error.strerror}; choose another with --out"
+    )
+
+
+class Summary:
+    """`summary.json`: one entry a stage, rewritten whole after each of them. Root process only."""
+
+    def __init__(self, directory: Path, scene_name: str, processes: int) -> None:
+        self.path = directory / "summary.json"
+        self.earlier: dict[str, Any] = (_earlier(directory) or {"stages": {}})["stages"]
+        self.data: dict[str, Any] = {
+            "program": {"name": PROGRAM, "version": VERSION, "format": RESULT_FORMAT},
+            "scene": scene_name,
+            "processes": processes,
+            "stages": {},
+        }
+
+    def record(
+        self,
+        stage: str,
+        status: str,
+        *,
+        reason: str = "",
+        seconds: float = 0.0,
+        headline: dict[str, tuple[Any, str]] | None = None,
+        indicators: dict[str, tuple[Any, str]] | None = None,
+        warnings: list[str] | None = None,
+        cost: dict[str, float] | None = None,
+    ) -> None:
+        """Enter a stage and write the file. Figures are given as name: (value, unit).
+
+        A reused stage keeps the figures of the run that computed it.
+        """
+        kept = self.earlier.get(stage, {}) if status == "reused" else {}
+        self.data["stages"][stage] = {
+            "status": status,
+            "reason": reason,
+            "seconds": seconds,
+            "headline": _figures(headline) or kept.get("headline", {}),
+            "indicators": _figures(indicators) or kept.get("indicators", {}),
+            "warnings": warnings or kept.get("warnings", []),
+            "cost": cost or kept.get("cost", {}),
+        }
+        text = json.dumps(_finite(self.data), indent=1, ensure_ascii=False, default=plain)
+        write_text(self.path, text + "\n")
+
+
+def _figures(given: dict[str, tuple[Any, str]] | None) -> dict[str, Any]:
+    return {name: {"value": value, "unit": unit} for name, (value, unit) in (given or {}).items()}
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no infinities: they become null."""
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(part) for part in value]
+    if hasattr(value, "item") and getattr(value, "ndim", 1) == 0:
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,124 @@
+"""What a result file holds, as text."""
+
+import json
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from tireroad.fem.errors import InputError
+
+LONG = 96  # characters of an attribute printed on one line
+
+
+def describe(file: Path) -> str:
+    """Provenance, attributes, datasets (shape, type, unit, size in the file) of an HDF5 result.
+
+    Reads no dataset, so it takes no time for files of any size. Not collective. Raises InputError
+    where the file is absent, is no HDF5 or is damaged.
+    """
+    if not file.is_file():
+        raise InputError(f"{file}: there is no such file")
+    if not h5py.is_hdf5(file):
+        raise InputError(f"{file} is no HDF5 file: give a result file of a run, such as static.h5")
+    try:
+        with h5py.File(file, "r") as opened:
+            return "\n".join((*_head(file, opened), *_attributes(opened), *_datasets(opened)))
+    except (OSError, RuntimeError, KeyError) as error:
+        raise InputError(
+            f"{file} is damaged or truncated: {error}; run its scene again with --fresh"
+        ) from error
+
+
+def _head(path: Path, file: h5py.File) -> Iterator[str]:
+    stage = file.attrs.get("stage")
+    origin = f": stage {stage}" if isinstance(stage, str) else ""
+    yield f"{path} ({_size(path.stat().st_size)}){origin}"
+
+
+def _attributes(file: h5py.File) -> Iterator[str]:
+    """Provenance and results kept as attributes, one a line; texts of many lines are summarised."""
+    if not len(file.attrs):
+        return
+    yield ""
+    yield "attributes"
+    width = max(len(name) for name in file.attrs)
+    for name in file.attrs:
+        yield f"  {name:<{width}}  {_value(name, file.attrs[name])}"
+
+
+def _value(name: str, value: object) -> str:
+    if isinstance(value, bytes):
+        value = value.decode(errors="replace")
+    if name == "scene" and isinstance(value, str) and "\n" in value:
+        return _scene(value)
+    if name == "libraries" and isinstance(value, str):
+        try:
+            return ", ".join(f"{key} {version}" for key, version in json.loads(value).items())
+        except (ValueError, AttributeError):
+            return value
+    if isinstance(value, (float, np.floating)):
+        return f"{value:.10g}"
+    text = " ".join(str(value).split())
+    return text if len(text) <= LONG else f"{text[:LONG]}… ({len(text)} characters)"
+
+
+def _scene(text: str) -> str:
+    """Name and tables of the resolved scene, which is 100 lines long."""
+    lines = len(text.splitlines())
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        return f"{lines} lines that are no TOML"
+    names = ", ".join(key for key, value in tables.items() if isinstance(value, (dict, list)))
+    return f"{tables.get('name', 'without a name')}, {lines} lines ({names})"
+
+
+def _datasets(file: h5py.File) -> Iterator[str]:
+    found: list[tuple[str, ...]] = []
+
+    def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
+        if isinstance(item, h5py.Dataset):
+            found.append((name, _shape(item), _kind(item), _unit(item), _stored(item)))
+
+    file.visititems(visit)
+    yield ""
+    if not found:
+        yield "no datasets"
+        return
+    rows = [("dataset", "shape", "type", "unit", "stored"), *found]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    for row in rows:
+        cells = (f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True))
+        yield "  ".join(cells).rstrip()
+
+
+def _shape(dataset: h5py.Dataset) -> str:
+    if dataset.shape is None:
+        return "empty"
+    return f"({', '.join(str(size) for size in dataset.shape)})"
+
+
+def _kind(dataset: h5py.Dataset) -> str:
+    kind = h5py.check_string_dtype(dataset.dtype)
+    return "text" if kind is not None else str(dataset.dtype)
+
+
+def _unit(dataset: h5py.Dataset) -> str:
+    unit = dataset.attrs.get("unit", "none given")
+    return unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)
+
+
+def _stored(dataset: h5py.Dataset) -> str:
+    packing = f", {dataset.compression}" if dataset.compression else ""
+    return _size(dataset.id.get_storage_size()) + packing
+
+
+def _size(size: float) -> str:
+    for unit in ("B", "kB", "MB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.4g} GB"

@@ -1,0 +1,88 @@
+"""The result files of one folder, for reading, and one section of the report made of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.runs.report.quantities import quantity
+
+
+@dataclass
+class Table:
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+@dataclass
+class Section:
+    title: str
+    lead: str = ""
+    facts: list[tuple[str, str]] = field(default_factory=list)
+    figures: list[tuple[str, str]] = field(default_factory=list)  # data URI, caption
+    table: Table | None = None
+    notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+
+class Absent(LookupError):
+    """A file or dataset a section needs is not there; the message names it."""
+
+
+class Results:
+    """The result files of one folder, opened when first asked for; a context manager."""
+
+    def __init__(self, directory: Path, scene: Mapping) -> None:
+        self.directory, self.scene = directory, scene
+        self._open: dict[str, h5py.File] = {}
+
+    def __enter__(self) -> "Results":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for file in self._open.values():
+            file.close()
+
+    def file(self, name: str) -> h5py.File:
+        """The open HDF5 file; Absent where there is none, OSError where it is damaged."""
+        if name not in self._open:
+            path = self.directory / name
+            if not path.is_file():
+                raise Absent(f"there is no {name}")
+            self._open[name] = h5py.File(path, "r")
+        return self._open[name]
+
+    def dataset(self, name: str, path: str) -> h5py.Dataset:
+        found = self.file(name).get(path)
+        if not isinstance(found, h5py.Dataset):
+            raise Absent(f"{name} holds no dataset {path}")
+        return found
+
+    def array(self, name: str, path: str) -> NDArray:
+        return self.dataset(name, path)[()]
+
+    def optional(self, name: str, path: str) -> NDArray | None:
+        try:
+            return self.array(name, path)
+        except Absent:
+            return None
+
+    def borrowed(self, name: str, path: str) -> NDArray | None:
+        """An optional array of another section's file, whose damage is that section's to report."""
+        try:
+            return self.optional(name, path)
+        except OSError:
+            return None
+
+    def attribute(self, name: str, key: str) -> float | str | None:
+        value = self.file(name).attrs.get(key)
+        return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
+
+
+def attributes(results: Results, name: str, wanted: tuple[tuple[str, str], ...]) -> list:
+    """Facts from the attributes (key, unit) the file has."""
+    found = [(key, unit, results.attribute(name, key)) for key, unit in wanted]
+    return [(key.replace("_", " "), quantity(v, unit)) for key, unit, v in found if v is not None]

@@ -1,0 +1,1 @@
+"""What benches and validation share: tables, pages, pictures, a synthetic tire."""

@@ -1,0 +1,104 @@
+"""Tables of measured figures: printed, kept as JSON, and drawn on a page of their own."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import json
+import pkgutil
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from types import ModuleType
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.files.disk import write_text
+from tireroad.runs.process import observe
+from tireroad.runs.version import PROGRAM, VERSION
+
+
+@dataclass
+class Table:
+    """Rows under (name, unit) columns; notes say what was measured and what the target is.
+
+    `plot`: what runs.measure.plots draws of it.
+    """
+
+    title: str
+    columns: list[tuple[str, str]]
+    rows: list[list]
+    notes: list[str] = field(default_factory=list)
+    plot: dict | None = None
+
+
+def modules(package: str) -> dict[str, ModuleType]:
+    """The modules of a package by name, each with ABOUT (a line) and run() -> list[Table].
+
+    Some have run_large() too: the same on a mesh that takes longer than one would wait for.
+    """
+    path = Path(importlib.import_module(package).__file__).parent
+    names = sorted(found.name for found in pkgutil.iter_modules([str(path)]))
+    loaded = {name: importlib.import_module(f"{package}.{name}") for name in names}
+    return {name: module for name, module in loaded.items() if hasattr(module, "run")}
+
+
+def run_all(package: str, names: list[str], out: Path | None, large: bool = False) -> None:
+    """Run the named modules of a package (all by default), show their tables, keep them in files.
+
+    With `large` those that can run at full size, and by default only those.
+    """
+    known = modules(package)
+    if large:
+        known = {name: module for name, module in known.items() if hasattr(module, "run_large")}
+    for name in names:
+        if name not in known:
+            raise InputError(f"{name!r} is none of: {', '.join(known)}")
+    results = {}
+    for name in names or known:
+        observe.say(f"{name}: {known[name].ABOUT}")
+        began = time.perf_counter()
+        tables = known[name].run_large() if large else known[name].run()
+        for table in tables:
+            show(table)
+        observe.say(f"{name}: {time.perf_counter() - began:.1f} s\n")
+        results[name] = tables
+    if out is not None:
+        _keep(results, {name: known[name].ABOUT for name in results}, out)
+
+
+def show(table: Table) -> None:
+    """Print a table as text."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table as Grid
+
+    grid = Grid(title=table.title, title_justify="left", header_style="bold")
+    for name, unit in table.columns:
+        grid.add_column(
+            name if unit in ("", "-") else f"{name} [{unit}]".replace("[", r"\["), overflow="fold"
+        )
+    for row in table.rows:
+        grid.add_row(*(escape(_shown(value)) for value in row))
+    text = io.StringIO()
+    Console(file=text, width=120).print(grid)
+    observe.say(text.getvalue().rstrip())
+    for note in table.notes:
+        observe.say(f"  {note}")
+
+
+def _shown(value) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _keep(results: dict[str, list[Table]], about: dict[str, str], out: Path) -> None:
+    """JSON at `out`, and a page with plots beside it."""
+    from tireroad.runs.measure.measured_page import machine, page
+
+    data = {name: [asdict(table) for table in tables] for name, tables in results.items()}
+    head = {"program": PROGRAM, "version": VERSION, "machine": machine()}
+    write_text(out, json.dumps(head | {"results": data}, indent=1) + "\n")
+    beside = out.with_suffix(".html")
+    write_text(beside, page(results, about))
+    observe.say(f"{out} and {beside}")

@@ -1,0 +1,1 @@
+"""Processes, signals, memory, printing, and the test runner."""

@@ -1,0 +1,199 @@
+"""report.html: one self-contained page about a result folder."""
+
+import json
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from datetime import UTC, datetime
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.files.disk import write_text
+from tireroad.runs.files.read import Absent, Results, Section
+from tireroad.runs.report import force_sections, tire_sections
+from tireroad.runs.report.quantities import quantity
+from tireroad.runs.scene.plan import STAGES
+from tireroad.runs.scene.schema import key_of, table_of
+from tireroad.runs.scene.tables import Scene
+from tireroad.runs.version import PROGRAM
+
+SECTIONS: Mapping[str, Callable[[Results], Section]] = {
+    "static.h5": tire_sections.static,
+    "modes.h5": tire_sections.modes,
+    "rotating.h5": tire_sections.rotating,
+    "response.h5": force_sections.response,
+    "contact.h5": force_sections.contact,
+    "spectra.h5": force_sections.spectra,
+}
+
+
+def write_report(directory: Path) -> Path:
+    """Writes directory/report.html from the result files that are there; returns its path.
+
+    The page needs no network and no other file. A file that is absent or damaged leaves its section
+    out, and the page says so. It is written to a temporary name and renamed. Not collective: call
+    it on one process. Raises InputError where the folder holds no results or cannot be written to.
+    """
+    if not directory.is_dir():
+        raise InputError(f"{directory} is no folder: give the result folder of a run")
+    if not any((directory / name).is_file() for name in (*SECTIONS, "summary.json", "scene.toml")):
+        raise InputError(
+            f"{directory} holds no results (no summary.json, scene.toml or *.h5 of a run): "
+            "give the result folder of a run"
+        )
+    target = directory / "report.html"
+    write_text(target, render(directory))
+    return target
+
+
+def render(directory: Path) -> str:
+    """The page as text."""
+    problems: list[str] = []
+    summary = read_summary(directory / "summary.json", problems)
+    text, scene = read_scene(directory / "scene.toml", problems)
+    stages = summary.get("stages", {})
+    sections, left_out, provenance = build_sections(directory, scene, stages, problems)
+    told = [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
+    told += [(section.title, warning) for section in sections for warning in section.warnings]
+    loader = FileSystemLoader(Path(__file__).parent)
+    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    pages.filters["quantity"] = quantity
+    return pages.get_template("report.html.j2").render(
+        name=summary.get("scene") or scene.get("name") or directory.resolve().name,
+        program={"name": PROGRAM, "version": ""} | summary.get("program", {}),
+        processes=summary.get("processes"),
+        computed=computed(directory),
+        warnings=[("report", problem) for problem in problems] + told,
+        stages=stages,
+        costs=costs(stages),
+        parameters=parameters(scene),
+        provenance=provenance,
+        sections=sections,
+        left_out=left_out,
+        scene_text=text,
+    )
+
+
+def read_summary(path: Path, problems: list[str]) -> dict:
+    """summary.json with every key a stage may lack filled in, stages in order; {} if unreadable."""
+    if not path.is_file():
+        problems.append(
+            "There is no summary.json: times, warnings and error indicators are unknown."
+        )
+        return {}
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+        stages = summary.get("stages", {})
+        known = sorted(stages, key=lambda name: (*STAGES, name).index(name))
+        summary["stages"] = {name: whole_stage(stages[name]) for name in known}
+    except (ValueError, AttributeError, TypeError, KeyError) as error:
+        problems.append(f"summary.json cannot be read ({error}).")
+        return {}
+    return summary
+
+
+def whole_stage(stage: Mapping) -> dict:
+    return {
+        "status": str(stage.get("status", "computed")),
+        "reason": str(stage.get("reason") or ""),
+        "seconds": float(stage.get("seconds") or 0.0),
+        "headline": quantities(stage.get("headline") or {}),
+        "indicators": quantities(stage.get("indicators") or {}),
+        "warnings": [str(warning) for warning in stage.get("warnings") or []],
+        "cost": {key: float(value) for key, value in (stage.get("cost") or {}).items()},
+    }
+
+
+def quantities(named: Mapping) -> dict[str, str]:
+    """{name: {"value": v, "unit": u}} as {name: text}."""
+    return {key: quantity(entry["value"], entry.get("unit", "")) for key, entry in named.items()}
+
+
+def read_scene(path: Path, problems: list[str]) -> tuple[str, dict]:
+    """The resolved scene as text and as tables; both empty if it is unreadable."""
+    if not path.is_file():
+        problems.append("There is no scene.toml: the settings of this run are unknown.")
+        return "", {}
+    try:
+        text = path.read_text(encoding="utf-8")
+        return text, tomllib.loads(text)
+    except ValueError as error:  # UnicodeDecodeError and TOMLDecodeError are both of it
+        problems.append(f"scene.toml cannot be read ({error}).")
+        return "", {}
+
+
+def build_sections(
+    directory: Path, scene: Mapping, stages: Mapping, problems: list[str]
+) -> tuple[list[Section], list[tuple[str, str]], list[tuple[str, str]]]:
+    """Sections of the files there are; what is left out and why; provenance of the first file."""
+    sections, left_out, provenance = [], [], []
+    with Results(directory, scene) as results:
+        for name, build in SECTIONS.items():
+            try:
+                sections.append(build(results))
+                provenance = provenance or short_attributes(results, name)
+            except Absent as absence:
+                reason = stages.get(name.removesuffix(".h5"), {}).get("reason")
+                left_out.append((name, reason or str(absence)))
+            except OSError as error:
+                problems.append(f"{name} is damaged and left out: {error}")
+                left_out.append((name, "the file is damaged"))
+    return sections, left_out, provenance
+
+
+def short_attributes(results: Results, name: str) -> list[tuple[str, str]]:
+    """Attributes of the file that are one line of text: versions, hash; libraries spelled out."""
+    values = ((key, results.attribute(name, key)) for key in results.file(name).attrs)
+    lines = {key: v for key, v in values if isinstance(v, str) and "\n" not in v}
+    if lines.get("libraries", "").startswith("{"):
+        versions = json.loads(lines["libraries"])
+        lines["libraries"] = ", ".join(f"{key} {version}" for key, version in versions.items())
+    return [(key.replace("_", " "), value) for key, value in lines.items()]
+
+
+def computed(directory: Path) -> str:
+    """When the newest result was written, UTC."""
+    files = [directory / name for name in (*SECTIONS, "summary.json", "scene.toml")]
+    newest = max(file.stat().st_mtime for file in files if file.is_file())
+    return datetime.fromtimestamp(newest, UTC).strftime("%Y-%m-%d %H:%M UTC")
+
+
+def costs(stages: Mapping) -> list[dict]:
+    """Seconds of every stage that ran, its share of the slowest in percent, and its parts."""
+    slowest = max((stage["seconds"] for stage in stages.values()), default=0.0) or 1.0
+    rows = []
+    for name, stage in stages.items():
+        if stage["status"] == "skipped":
+            continue
+        parts = sorted(stage["cost"].items(), key=lambda part: -part[1])
+        widths = [(key, seconds, 100.0 * seconds / slowest) for key, seconds in parts]
+        rest = max(stage["seconds"] - sum(stage["cost"].values()), 0.0)
+        rows.append({"name": name, "stage": stage, "parts": widths, "rest": 100.0 * rest / slowest})
+    return rows
+
+
+def parameters(scene: Mapping) -> list[tuple[str, list[tuple[str, str]]]]:
+    """The scene's tables as (title, [(key, value with its unit)]), sub-tables on their own."""
+    found: list[tuple[str, list[tuple[str, str]]]] = []
+
+    def visit(title: str, table: Mapping, kind: type | None) -> None:
+        known = {item.name: item for item in fields(kind)} if kind else {}
+        rows: list[tuple[str, str]] = []
+        if title:
+            found.append((title, rows))
+        for name, value in table.items():
+            part = table_of(known[name]) if name in known else None
+            below, path = part.of if part else None, f"{title}.{name}" if title else name
+            if isinstance(value, dict):
+                visit(path, value, below)
+            elif isinstance(value, list) and value and isinstance(value[0], dict):
+                for number, one in enumerate(value):
+                    visit(f"{path} {number + 1}", one, below)
+            else:
+                key = key_of(known[name]) if name in known else None
+                rows.append((name.replace("_", " "), quantity(value, key.unit if key else "")))
+
+    visit("", scene, Scene)
+    return [(title, rows) for title, rows in found if rows]

@@ -1,0 +1,161 @@
+"""What the report says of the loaded tire and its modes: facts, tables and pictures."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.runs.files.read import Results, Section, Table, attributes
+from tireroad.runs.report import figures, surface_figures
+from tireroad.runs.report.quantities import quantity
+
+LISTED = 16  # rows of a table of modes; the files hold them all
+PICTURED = 6
+
+
+def static(results: Results) -> Section:
+    """The tire at rest on the road (static.h5)."""
+    section = Section("Loaded tire and footprint", "The static state everything later starts from.")
+    name = "static.h5"
+    section.facts = attributes(
+        results,
+        name,
+        (
+            ("inflation", "Pa"),
+            ("load", "N"),
+            ("deflection", "m"),
+            ("rolling_radius", "m"),
+            ("road_height", "m"),
+            ("touch_height", "m"),
+            ("footprint_length", "m"),
+            ("footprint_width", "m"),
+        ),
+    )
+    speed = results.scene.get("rotation", {}).get("speed")
+    radius = results.attribute(name, "rolling_radius")
+    if speed and radius:
+        pace = quantity(3.6 * speed * radius, "km/h")
+        section.facts.append(("travelling speed", pace))
+    points, quads = results.array(name, "surface/points"), results.array(name, "surface/quads")
+    moved, road = (
+        results.array(name, "surface/displacement"),
+        results.attribute(name, "road_height"),
+    )
+    size = 1e3 * np.linalg.norm(moved, axis=1).max()
+    section.figures.append(
+        (
+            surface_figures.deformed(points, moved, quads, road),
+            f"Displacement at its true scale, {size:.3g} mm at most. Grey: as made.",
+        )
+    )
+    footprint(results, section)
+    return section
+
+
+def footprint(results: Results, section: Section) -> None:
+    """Adds the map of the static contact pressure, where the tire stands on a road."""
+    force, points = (results.optional("static.h5", f"contact/{n}") for n in ("force", "points"))
+    if force is None or points is None or not (force[:, 2] > 0).any():
+        section.notes.append("No road: there is no footprint.")
+        return
+    area = results.optional("static.h5", "contact/area")
+    values, unit = pressure(force[:, 2], area)
+    active = force[:, 2] > 0
+    section.facts.append(("points in contact", quantity(int(active.sum()))))
+    caption = f"Contact force, {quantity(float(force[:, 2].sum()), 'N')} in all"
+    if area is not None:
+        section.facts.append(("contact area", f"{1e4 * area[active].sum():.4g} cm²"))
+        mean = float(force[active, 2].sum() / area[active].sum())
+        section.facts.append(("mean contact pressure", quantity(mean, "Pa")))
+        caption = f"Contact pressure of {quantity(float(force[:, 2].sum()), 'N')}"
+    picture = surface_figures.footprints(points, [values], ["footprint at rest"], unit, 6.2)
+    section.figures.append((picture, caption + ". Grey dots: surface points that do not touch."))
+
+
+def pressure(force: NDArray, area: NDArray | None) -> tuple[NDArray, str]:
+    """Pressure (c) kPa where the area of every point is known, else the force (c) N."""
+    if area is None or area.shape != force.shape[-1:]:
+        return force, "force in N"
+    return np.divide(
+        1e-3 * force, area, out=np.zeros_like(force), where=area > 0
+    ), "pressure in kPa"
+
+
+def modes(results: Results) -> Section:
+    """Modes of the loaded, standing tire (modes.h5)."""
+    name = "modes.h5"
+    section = Section("Modes of the loaded tire", "Undamped, not rotating, about the static state.")
+    frequency, residual = results.array(name, "frequency"), results.optional(name, "residual")
+    top = quantity(float(frequency.max()), "Hz")
+    section.facts = [("modes", quantity(len(frequency))), ("highest frequency", top)]
+    wanted = (("inertia_count", ""), ("rigid_modes", ""))
+    section.facts += attributes(results, name, wanted)
+    columns = [[quantity(float(value), "Hz") for value in frequency[:LISTED]]]
+    if residual is not None:
+        columns.append([quantity(float(value)) for value in residual[:LISTED]])
+    head = ["mode", "frequency", "residual"][: 1 + len(columns)]
+    wave, number = (results.optional(name, key) for key in ("wave_number", "section_mode"))
+    if wave is not None and number is not None:
+        columns.append([_named(*pair) for pair in zip(wave[:LISTED], number[:LISTED], strict=True)])
+        head.append("wave number, section mode")
+    if len(frequency) > LISTED:
+        section.notes.append(f"The table lists {LISTED} of {len(frequency)} modes.")
+    numbers = [str(n + 1) for n in range(min(LISTED, len(frequency)))]
+    section.table = Table(tuple(head), list(zip(numbers, *columns, strict=True)))
+    points, quads = (
+        results.array(name, "surface/points"),
+        results.borrowed("static.h5", "surface/quads"),
+    )
+    if quads is None or quads.max(initial=-1) >= len(points):
+        section.notes.append("No pictures: static.h5 holds no quads for this surface.")
+        return section
+    shapes = results.dataset(name, "surface/shape")[:PICTURED]
+    titles = [f"{n + 1}: {quantity(float(f), 'Hz')}" for n, f in enumerate(frequency[:PICTURED])]
+    picture = surface_figures.modes(points, quads, shapes, titles)
+    section.figures.append((picture, "The lowest mode shapes, exaggerated."))
+    return section
+
+
+def _named(wave: int, number: int) -> str:
+    """A mode of a round tire by its wave number and its number in the section; -: of none."""
+    return f"{wave}, {number}" if wave >= 0 else "-"
+
+
+def rotating(results: Results) -> Section:
+    """Eigenvalues of the rolling tire (rotating.h5)."""
+    name = "rotating.h5"
+    section = Section("Modes of the rolling tire", "Eigenvalues s of the rotating, damped tire.")
+    value = results.array(name, "eigenvalue")
+    growing = int((value.real > 0).sum())
+    section.facts = attributes(results, name, (("speed", "rad/s"), ("basis_condition", "")))
+    section.facts.append(("growing (Re s > 0)", quantity(growing)))
+    if growing:
+        worst = value[value.real.argmax()]
+        section.warnings.append(
+            f"The rolling tire is unstable: {growing} eigenvalues have Re s > 0, the worst "
+            f"{quantity(float(worst.real), '1/s')} at "
+            f"{quantity(float(abs(worst.imag) / 2 / np.pi), 'Hz')}."
+        )
+    rising = np.flatnonzero(value.imag > 0)
+    rising = rising[np.argsort(value.imag[rising])]
+    columns = {"residual": results.optional(name, "residual")}
+    columns["left residual"] = results.optional(name, "left_residual")
+    present = {key: column for key, column in columns.items() if column is not None}
+    rows = [
+        (
+            quantity(float(value[q].imag / 2 / np.pi), "Hz"),
+            quantity(float(value[q].real), "1/s"),
+            f"{-100.0 * value[q].real / abs(value[q]):.3g} %".replace("-", "−"),
+            *(quantity(float(column[q])) for column in present.values()),
+        )
+        for q in rising[:LISTED]
+    ]
+    section.table = Table(("frequency", "Re s", "of critical damping", *present), rows)
+    if len(rising) > LISTED:
+        listed = f"The table lists {LISTED} of {len(rising)} pairs, by frequency."
+        section.notes.append(listed)
+    section.figures.append((figures.eigenvalues(value), "Eigenvalues with Im s ≥ 0."))
+    speed = results.optional(name, "campbell/speed")
+    if speed is not None:
+        lines = figures.campbell(speed, results.array(name, "campbell/frequency"))
+        text = "Branches followed over speed, on one static state; dashed: n Ω/2π, n = 1 to 8."
+        section.figures.append((lines, text))
+    return section

@@ -1,0 +1,1 @@
+"""The scene file: keys, ranges, rules, what will run and what it takes."""

@@ -1,0 +1,65 @@
+"""`tireroad check`: the resolved scene, the stages, the memory; no solver runs."""
+
+from dataclasses import fields
+from typing import Any
+
+from tireroad.runs.scene.estimate import memory
+from tireroad.runs.scene.load import applies
+from tireroad.runs.scene.plan import STAGES, skipped
+from tireroad.runs.scene.resolved import literal
+from tireroad.runs.scene.schema import key_of, table_of
+from tireroad.runs.scene.tables import Scene
+
+Row = tuple[str, str, str, str, str]
+HEAD: Row = ("key", "value", "unit", "range", "meaning")
+
+
+def _rows(holder: Any, path: str, title: str) -> list[tuple[str, list[Row]]]:
+    """One (title, rows) for each table, in the order of the scene."""
+    own: list[Row] = []
+    below: list[tuple[str, list[Row]]] = []
+    for item in fields(holder):
+        value = getattr(holder, item.name)
+        part = table_of(item)
+        inner = f"{path}.{item.name}" if path else item.name
+        if part is None:
+            key = key_of(item)
+            if applies(key, holder):
+                shown = "absent" if value is None else literal(value)
+                own.append((item.name, shown, key.unit, key.allowed, key.doc))
+        elif part.many:
+            for number, one in enumerate(value):
+                below += _rows(one, f"{inner}.{number}", f"[[{inner}]] {number}: {part.doc}")
+        elif value is None:
+            below.append((f"[{inner}] absent: {part.doc}", []))
+        else:
+            below += _rows(value, inner, f"[{inner}] {part.doc}")
+    return [(title, own), *below]
+
+
+def _aligned(rows: list[Row], widths: list[int]) -> list[str]:
+    return [
+        "  "
+        + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def explain(scene: Scene) -> str:
+    """What `check` prints."""
+    groups = _rows(scene, "", "scene")
+    everything = [HEAD, *(row for _, rows in groups for row in rows)]
+    widths = [min(max(len(row[column]) for row in everything), 44) for column in range(len(HEAD))]
+    lines = _aligned([HEAD], widths)
+    for title, rows in groups:
+        lines += ["", title, *_aligned(rows, widths)]
+    reasons = skipped(scene)
+    lines += ["", "stages"]
+    for stage in STAGES:
+        lines.append(
+            f"  {stage:10}" + (f"skipped: {reasons[stage]}" if stage in reasons else "runs")
+        )
+    parts = memory(scene)
+    lines += ["", f"estimated memory  {sum(parts.values()) / 1e9:.2f} GB in one process"]
+    lines += [f"  {name:26}{size / 1e9:6.2f} GB" for name, size in parts.items()]
+    return "\n".join(lines)

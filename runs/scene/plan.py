@@ -1,0 +1,36 @@
+"""Which stages a scene needs, and why the others are skipped."""
+
+from tireroad.runs.scene.tables import Scene
+
+STAGES = (
+    "static",
+    "modes",
+    "rotating",
+    "greens",
+    "contact",
+    "response",
+    "spectra",
+    "report",
+)
+
+
+def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
+    """The stages that will not run, each with its reason."""
+    reasons: dict[str, str] = {}
+    if scene.rotation is None:
+        reasons["rotating"] = "no [rotation]: the wheel stands"
+    elif scene.rotation.speed == 0:
+        reasons["rotating"] = "rotation.speed is 0: the wheel stands"
+    if not scene.force:
+        reasons["response"] = "no [[force]]"
+    if scene.contact is None:
+        reasons["contact"] = "no [contact]"
+        reasons["spectra"] = "no [contact], hence no contact forces"
+        if not scene.force:
+            reasons["greens"] = "neither [[force]] nor [contact]"
+    elif not scene.output.spectra:
+        reasons["spectra"] = "output.spectra is false"
+    if until is not None:
+        for stage in STAGES[STAGES.index(until) + 1 :]:
+            reasons.setdefault(stage, f"--until {until}")
+    return reasons

@@ -1,0 +1,65 @@
+"""The resolved scene as text: every default written back, units and meaning beside each key."""
+
+import json
+from dataclasses import fields
+from typing import Any
+
+from tireroad.runs.scene.load import applies
+from tireroad.runs.scene.schema import Key, Pitch, key_of, table_of
+from tireroad.runs.scene.tables import Scene
+from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
+
+MARK = f"# {PROGRAM} "
+HEADER = f"{MARK}{VERSION}, format {RESULT_FORMAT}: the resolved scene, every default written back"
+
+
+def literal(value: Any) -> str:
+    """A value in TOML."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, tuple):
+        return f"[{', '.join(literal(part) for part in value)}]"
+    if isinstance(value, Pitch):
+        return f"{{ dx = {literal(value.dx)}, dy = {literal(value.dy)} }}"
+    if isinstance(value, float):
+        text = repr(value)
+        return text if "." in text or "e" in text else f"{text}.0"
+    return str(value)
+
+
+def note(key: Key) -> str:
+    """Unit, range and meaning of a key, for a comment."""
+    unit = "" if key.unit == "-" else key.unit
+    return "; ".join(part for part in (unit, key.allowed, key.doc) if part)
+
+
+def _lines(holder: Any, path: str) -> list[str]:
+    """The keys of one table, then its tables."""
+    own, below = [], []
+    for item in fields(holder):
+        value = getattr(holder, item.name)
+        part = table_of(item)
+        inner = f"{path}.{item.name}" if path else item.name
+        if part is None:
+            key = key_of(item)
+            if not applies(key, holder):
+                continue
+            if value is None:
+                own.append(f"# {item.name} absent  # {note(key)}")
+            else:
+                own.append(f"{item.name} = {literal(value)}  # {note(key)}")
+        elif part.many:
+            for one in value:
+                below += ["", f"[[{inner}]]  # {part.doc}", *_lines(one, inner)]
+        elif value is None:
+            below += ["", f"# [{inner}] absent: {part.doc}"]
+        else:
+            below += ["", f"[{inner}]  # {part.doc}", *_lines(value, inner)]
+    return own + below
+
+
+def dumps(scene: Scene) -> str:
+    """The scene as TOML that `load` reads back to an equal scene."""
+    return "\n".join([HEADER, *_lines(scene, "")]) + "\n"

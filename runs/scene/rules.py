@@ -1,0 +1,238 @@
+"""What no single key can tell: contradictions between tables, and what this version leaves out."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.scene.schema import described
+from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tire_tables import Tire
+
+Where = Callable[[tuple[str, ...], str], InputError]
+
+# Keys of the public interface that this version does not compute, with the values it does take and
+# what to write instead. A later version takes its lines out.
+LATER: dict[str, tuple[tuple[Any, ...], str]] = {
+    "tire.mesh": ((), 'only section = "torus" is supported in this version'),
+    "tire.section": (("torus",), 'only "torus" is supported in this version'),
+    "output.vibration": ((False,), "only false is supported in this version"),
+    "output.fields": ((False,), "only false is supported in this version"),
+}
+
+
+def refuse_later(raw: dict[str, Any], error: Where) -> None:
+    """Raise for the first value in `raw` that is of the interface but not of this version."""
+    for dotted, (supported, message) in LATER.items():
+        path = tuple(dotted.split("."))
+        here: Any = raw
+        for part in path:
+            here = here.get(part) if isinstance(here, dict) else None
+        if here is not None and here not in supported:
+            raise error(path, f"= {described(here)}: {message}")
+
+
+def free_unknowns(tire: Tire) -> int:
+    """Displacement unknowns of the torus without the clamped bead faces."""
+    around = tire.segments * tire.order
+    inner_arc = tire.elements_arc * tire.order - 1
+    through = tire.elements_thickness * tire.order + 1
+    return 3 * around * inner_arc * through
+
+
+def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Raise InputError for the first contradiction between keys or tables."""
+    _geometry(scene, error)
+    _static(scene, raw, error)
+    _rotation(scene, error)
+    _modal(scene, error)
+    if scene.contact is not None:
+        _contact(scene, error)
+    _force(scene, error)
+    _greens(scene, error)
+    if scene.road is not None:
+        _road(scene, error)
+    _time(scene, error)
+
+
+def _geometry(scene: Scene, error: Where) -> None:
+    tire = scene.tire
+    if tire.thickness >= tire.minor_radius:
+        raise error(
+            ("tire", "thickness"),
+            f"= {tire.thickness:g} m must be less than minor_radius = {tire.minor_radius:g} m",
+        )
+    if tire.minor_radius >= tire.outer_radius:
+        raise error(
+            ("tire", "minor_radius"),
+            f"= {tire.minor_radius:g} m must be less than outer_radius = {tire.outer_radius:g} m",
+        )
+    bead = (
+        tire.outer_radius
+        - tire.minor_radius
+        + tire.minor_radius * math.cos(math.radians(tire.half_angle))
+    )
+    if bead <= 0:
+        raise error(
+            ("tire", "half_angle"),
+            f"= {tire.half_angle:g} deg puts the beads at {bead:g} m from the axle:"
+            " make it or minor_radius smaller",
+        )
+    for number, region in enumerate(tire.region):
+        for key in ("arc", "depth"):
+            low, high = getattr(region, key)
+            if low >= high:
+                raise error(
+                    ("tire", "region", str(number), key), f"= [{low:g}, {high:g}] must ascend"
+                )
+    free = free_unknowns(tire)
+    if scene.modal.up_to is None and scene.modal.count >= free:
+        raise error(
+            ("modal", "count"),
+            f"= {scene.modal.count} must be less than the {free} free unknowns of the mesh",
+        )
+
+
+def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
+    if len(given) > 1:
+        raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
+
+
+def _rotation(scene: Scene, error: Where) -> None:
+    rotation = scene.rotation
+    if rotation is None or not any(rotation.window):
+        return
+    low, high = rotation.window
+    if low >= high:
+        raise error(("rotation", "window"), f"= [{low:g}, {high:g}] Hz must ascend")
+    if rotation.method != "full":
+        raise error(
+            ("rotation", "window"), 'is of method = "full": the projected one finds all states'
+        )
+
+
+def _modal(scene: Scene, error: Where) -> None:
+    modal, static, rotation = scene.modal, scene.static, scene.rotation
+    road = (static.load, static.deflection, static.road_height) != (None, None, None)
+    if modal.road == "held" and not road:
+        raise error(("modal", "road"), '= "held" needs a road: add load (N) to [static]')
+    if scene.contact is not None and modal.road == "held":
+        raise error(
+            ("modal", "road"),
+            '= "held" fixes the nodes whose contact is to be computed: [contact] needs "forces"',
+        )
+    if scene.contact is not None and modal.rim == "free":
+        raise error(
+            ("modal", "rim"),
+            '= "free" leaves nothing to carry the load: [contact] needs "fixed"',
+        )
+    if modal.rim == "fixed" or rotation is None or rotation.speed == 0:
+        return
+    if rotation.method == "full":
+        raise error(
+            ("rotation", "method"),
+            '= "full" is solved about K^-1, which a free rim does not have: take "projected"',
+        )
+    if not static.steady_rolling:
+        raise error(
+            ("static", "steady_rolling"),
+            "= false leaves out the centrifugal tension that keeps a free turning wheel upright",
+        )
+    if scene.damping.mass:
+        raise error(
+            ("damping", "mass"),
+            f"= {scene.damping.mass:g} 1/s acts against a wheel that turns about a fixed axle; a free one"
+            " would be driven round by it: take 0, and damping.stiffness (s) instead",
+        )
+    if scene.greens.residual not in ("none", "attachment"):
+        raise error(
+            ("greens", "residual"),
+            f'= "{scene.greens.residual}" needs the static answer of the turning tire, which with a'
+            ' free rim does not exist: take "attachment" or "none"',
+        )
+
+
+def _force(scene: Scene, error: Where) -> None:
+    receptance = scene.output.receptance
+    if receptance is not None and not scene.force:
+        raise error(("output", "receptance"), "is read at driven points: add a [[force]]")
+    if receptance is not None and receptance.step > receptance.to:
+        raise error(
+            ("output", "receptance", "step"),
+            f"= {receptance.step:g} Hz must not be more than to = {receptance.to:g} Hz",
+        )
+    for key in ("velocity", "acceleration"):
+        if scene.contact is not None and getattr(scene.output, key):
+            raise error(
+                ("output", key), "is not told in contact: leave it out, or take out [contact]"
+            )
+    if scene.force and scene.time is None and receptance is None:
+        raise error(("force",), "has nothing to drive: add [time] or output.receptance")
+    for number, force in enumerate(scene.force):
+        if not any(force.direction):
+            raise error(("force", str(number), "direction"), "must not be all zeros")
+        if abs(force.arc) >= scene.tire.half_angle:
+            raise error(
+                ("force", str(number), "arc"),
+                f"= {force.arc:g} deg lies beyond the bead at {scene.tire.half_angle:g} deg",
+            )
+
+
+def _greens(scene: Scene, error: Where) -> None:
+    rotation, residual = scene.rotation, scene.greens.residual
+    full = rotation is not None and rotation.speed > 0 and rotation.method == "full"
+    if full and residual == "attachment":
+        raise error(
+            ("greens", "residual"),
+            '= "attachment" completes the modes: it needs rotation.method = "projected"',
+        )
+
+
+def _contact(scene: Scene, error: Where) -> None:
+    static = scene.static
+    if scene.road is None:
+        raise error(("contact",), 'needs a road: add [road], e.g. kind = "flat"')
+    if scene.time is None:
+        raise error(("contact",), "needs a time to run: add [time] with duration")
+    if static.load is None and static.deflection is None and static.road_height is None:
+        raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
+    contact = scene.contact
+    if contact.brush_stiffness is None and contact.friction is not None:
+        raise error(("contact", "friction"), "needs brush_stiffness (N/m), which carries it")
+    standing = scene.rotation is None or scene.rotation.speed == 0
+    if any(contact.slip) and (contact.brush_stiffness is None or standing):
+        raise error(("contact", "slip"), "needs brush_stiffness (N/m) and a rolling tire")
+
+
+def _road(scene: Scene, error: Where) -> None:
+    road = scene.road
+    if road.kind == "cleat" and road.ramp >= road.length:
+        raise error(("road", "ramp"), f"must be less than length = {road.length:g} m")
+    if road.kind == "texture" and road.cut_off >= road.roll_off:
+        raise error(("road", "cut_off"), f"must be less than roll_off = {road.roll_off:g} m")
+    if road.kind != "cobblestones":
+        return
+    for side in ("block_length", "block_width"):
+        if road.joint_width >= getattr(road, side):
+            raise error(
+                ("road", "joint_width"),
+                f"= {road.joint_width:g} m must be less than"
+                f" {side} = {getattr(road, side):g} m, the pitch of the blocks",
+            )
+
+
+def _time(scene: Scene, error: Where) -> None:
+    time = scene.time
+    if time is None or time.step == "auto":
+        return
+    if time.step > time.duration:
+        raise error(
+            ("time", "step"),
+            f"= {time.step:g} s must not be more than duration = {time.duration:g} s",
+        )
+    if time.duration / time.step > 1e8:
+        raise error(
+            ("time", "step"),
+            f"= {time.step:g} s makes {time.duration / time.step:.3g} steps; at most 1e8",
+        )
