@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from tireroad.contact.solver.complementarity import (
+from tireroad.contact.solver.conditions import (
     TOLERANCE,
     check_residual,
     checked_compliance,

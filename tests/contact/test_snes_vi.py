@@ -6,7 +6,8 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.contact.model import DENSE_POINTS
-from tireroad.contact.solver.complementarity import ActiveSet, make_solver
+from tireroad.contact.solver.choose import make_solver
+from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.grid_compliance import SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.snes_vi import PREFIX, SnesVI
