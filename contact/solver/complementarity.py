@@ -30,10 +30,15 @@ PATIENCE = 10
 
 
 class ContactSolver(Protocol):
-    """What the time loop needs; `active`, `gap` (m), `residual`, ... are of the last solve."""
+    """What the time loop needs; `active`, `gap` (m), `residual`, ... are of the last solve.
+
+    `gap` is 0 at the points that touch; `penetration` (m) is how far the answer as it was solved has
+    any point inside the road.
+    """
 
     active: Mask
     gap: Array
+    penetration: float
     residual: float
     iterations: int
 
@@ -73,6 +78,7 @@ class ActiveSet:
         n = len(self._diagonal)
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
+        self.penetration = 0.0
         self.residual = 0.0
         self.iterations = 0
         self._factor = ActiveFactor(matrix)
@@ -173,6 +179,7 @@ class ActiveSet:
         np.maximum(force, 0.0, out=force)
         self.residual = complementarity_residual(force, gap, self._diagonal, scale)
         check_residual("active-set", self.residual)
+        self.penetration = penetration(gap)
         gap[active] = 0.0
         self.active, self.gap = active, gap
         self._before, self._signs = self._signs, force * self._diagonal - gap
@@ -188,6 +195,11 @@ def make_solver(name: str, matrix: Array | Compliance) -> ContactSolver:
 
         return SnesVI(matrix)
     raise InputError(f'contact.solver = "{name}" is unknown: take "active-set" or "snes-vi"')
+
+
+def penetration(gap: Array) -> float:
+    """How far (m) the deepest of the gaps (n,) m is below 0."""
+    return max(-float(gap.min(initial=0.0)), 0.0)
 
 
 def checked_compliance(matrix: Array) -> Array:
