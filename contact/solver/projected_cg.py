@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.solver.complementarity import check_residual, complementarity_residual
+from tireroad.contact.solver.conditions import check_residual, complementarity_residual
 from tireroad.contact.solver.grid_compliance import Compliance
 from tireroad.fem.errors import ConvergenceError
 

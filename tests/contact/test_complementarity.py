@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from tireroad.contact.solver.complementarity import ActiveSet, make_solver
+from tireroad.contact.solver.choose import make_solver
+from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError, InputError
 
