@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.solver.complementarity import ContactSolver
+from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.sparse_columns import LoadedColumns

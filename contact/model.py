@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.solver.complementarity import ContactSolver, checked_compliance, make_solver
+from tireroad.contact.solver.choose import make_solver
+from tireroad.contact.solver.conditions import ContactSolver, checked_compliance
 from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance, SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.tread.compliance import (

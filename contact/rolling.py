@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.solver.complementarity import ContactSolver
+from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.friction import Friction
 from tireroad.greens.sparse_columns import LoadedColumns
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.solver.complementarity import (
+from tireroad.contact.solver.conditions import (
     check_residual,
     complementarity_residual,
     penetration,

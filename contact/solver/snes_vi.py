@@ -1,10 +1,12 @@
 """The same contact problem through PETSc's SNES VI: an independent check, slower."""
 
+import weakref
+
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from tireroad.contact.solver.complementarity import (
+from tireroad.contact.solver.conditions import (
     TOLERANCE,
     check_residual,
     checked_compliance,
@@ -76,8 +78,10 @@ class SnesVI:
     def _make_snes(self) -> None:
         snes = PETSc.SNES().create(comm=PETSc.COMM_SELF)
         snes.setType(PETSc.SNES.Type.VINEWTONRSLS)
-        snes.setFunction(self._evaluate, self._function)
-        snes.setJacobian(self._fill, self._jacobian)
+        # Not bound methods: the circle they close would outlive PETSc and crash the interpreter's exit.
+        own = weakref.proxy(self)
+        snes.setFunction(lambda *given: own._evaluate(*given), self._function)
+        snes.setJacobian(lambda *given: own._fill(*given), self._jacobian)
         snes.setVariableBounds(*self._bounds)
         snes.setTolerances(rtol=0.0, atol=1e-12, stol=0.0, max_it=MAX_ITERATIONS)
         if self._product is None:

@@ -1,12 +1,17 @@
 """PETSc's two solvers for bounds, on a matrix and on a product, against the active set."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from petsc4py import PETSc
 from scipy import sparse
+from started import environment
 
 from tireroad.contact.model import DENSE_POINTS
-from tireroad.contact.solver.complementarity import ActiveSet, make_solver
+from tireroad.contact.solver.choose import make_solver
+from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.grid_compliance import SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.snes_vi import PREFIX, SnesVI
@@ -57,3 +62,22 @@ def test_thousands_of_points_without_a_matrix() -> None:
     force = found.solve(bowl - 3e-4)
     assert np.abs(force - wanted).max() < 1e-6 * wanted.max()
     assert found.factorisations == 0 and found.residual < 1e-9
+
+
+def test_a_solver_left_at_exit_does_not_crash_the_interpreter() -> None:
+    code = (
+        "import numpy as np\n"
+        "from tireroad.contact.solver.snes_vi import SnesVI\n"
+        "kept = [SnesVI(np.eye(3)) for _ in range(3)]\n"
+        "[solver.solve(-np.ones(3)) for solver in kept]\n"
+        "kept[0].itself = kept[0]\n"
+        "def failing():\n"
+        "    solver = SnesVI(np.eye(3))\n"
+        "    try:\n"
+        "        solver.solve(np.full(3, np.nan))\n"
+        "    except Exception as error:\n"
+        "        kept.append(error)\n"
+        "failing()\n"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", code], env=environment(), timeout=300)
+    assert done.returncode == 0
