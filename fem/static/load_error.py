@@ -39,7 +39,7 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
     if section is None:
         return "the mesh is too coarse to be halved"
     try:
-        body = Body(fine.comm, section, fine.material, fine.regions)
+        body = Body(fine.comm, section, fine.material, fine.regions, fine.plies.cords)
     except InputError as error:
         return f"on twice the size, {error}"
     coarse = Equilibrium(body, rolling)

@@ -11,8 +11,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from tireroad.fem import compat
+from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import INNER, RIM, TREAD, Torus, build
+from tireroad.fem.tire.plies import Plies, laid_in_torus
 from tireroad.fem.tire.surface import Gather, outer_face
 from tireroad.fem.tire.wall import Region, Wall
 
@@ -30,12 +32,15 @@ class Body:
         section: Torus,
         material: Material,
         regions: Sequence[Region] = (),
+        cords: Sequence[Cords] = (),
     ):
         self.comm, self.material, self.regions = comm, material, tuple(regions)
         self.tire = build(comm, section)
         self.mesh, self.lattice = self.tire.mesh, self.tire.lattice
         self.space = compat.vector_space(self.mesh, section.order)
         self.wall = Wall(self.tire, self.space, material, regions)
+        laid = laid_in_torus(self.tire, self.space, cords)
+        self.plies = Plies(self.mesh, section.order, cords, laid)
         self.u = fem.Function(self.space)
         # One of each for all forms: UFL does not always take two of the same space for equal
         # (seen with dolfinx 0.5.2, from one run to the next).
@@ -69,7 +74,7 @@ class Body:
         return fem.dirichletbc(np.zeros(3), self.rim, self.space)
 
     def nodal_mass(self) -> np.ndarray:
-        """Owned entries (3 nodes,) of int rho phi_i . (1, 1, 1) by the rule whose points are the nodes.
+        """Owned entries (3 nodes,) of int rho phi_i . (1, 1, 1) by the rule whose points are the nodes, cords too.
 
         kg; positive, rim included. Collective.
         """
@@ -77,9 +82,14 @@ class Body:
         dx = ufl.Measure("dx", domain=self.mesh, metadata=lobatto)
         ones = ufl.as_vector((1.0, 1.0, 1.0))
         weight = self.wall.density * ufl.inner(self.test, ones) * dx
+        weight += self.plies.inertia(ufl.inner(self.test, ones), "nodes")
         vector = fem.petsc.assemble_vector(compat.form(weight))
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         return vector.array_r.copy()
+
+    def inertia(self, integrand):
+        """int rho0 integrand over wall and cords by full integration, a UFL form."""
+        return self.wall.density * integrand * self.dx + self.plies.inertia(integrand)
 
     def owned(self, vector: np.ndarray) -> np.ndarray:
         """The owned part of a dof array as (nodes, 3)."""

@@ -44,7 +44,7 @@ class Wall:
 
     def __init__(self, tire: TireMesh, space, material: Material, regions: Sequence[Region] = ()):
         self._space = compat.cell_space(tire.mesh)
-        arc, depth = _middles(tire.section, space)
+        arc, depth = middles(tire.section, space)
         owner = np.zeros(len(arc), dtype=int)
         for number, region in enumerate(regions):
             covered = region.covers(arc, depth)
@@ -77,7 +77,7 @@ class Wall:
         return sum(part[0] for part in parts), sum(part[1] for part in parts)
 
 
-def _middles(section: Torus, space) -> tuple[np.ndarray, np.ndarray]:
+def middles(section: Torus, space) -> tuple[np.ndarray, np.ndarray]:
     """Section angle (rad) and depth (0 inner face, 1 outer) of the middle of each cell, ghosts too.
 
     From the cell's own nodes: the middle in space of a flat-faced element lies inside the curve.

@@ -29,6 +29,7 @@ def make_lattice(section):
 def make_body(comm: MPI.Comm, tire: Tire, section):
     """The finite-element body, undeformed. Collective."""
     from tireroad.fem.tire.body import Body
+    from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
     from tireroad.fem.tire.wall import Region
 
@@ -36,4 +37,8 @@ def make_body(comm: MPI.Comm, tire: Tire, section):
         Region(Material(**vars(r.material)), tuple(np.radians(r.arc)), r.depth, r.side)
         for r in tire.region
     ]
-    return Body(comm, section, Material(**vars(tire.material)), regions)
+    cords = [
+        Cords(**vars(c) | {"arc": tuple(np.radians(c.arc)), "angle": float(np.radians(c.angle))})
+        for c in tire.cords
+    ]
+    return Body(comm, section, Material(**vars(tire.material)), regions, cords)

@@ -20,8 +20,9 @@ def make_body() -> Callable[..., Body]:
 
     def make(order=2, segments=12, arc=6, layers=1, comm=MPI.COMM_SELF, free=False, **more):
         material, regions = more.pop("material", RUBBER), more.pop("regions", ())
+        cords = more.pop("cords", ())
         section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, layers, order, **more)
-        body = Body(comm, section, material, regions)
+        body = Body(comm, section, material, regions, cords)
         if free:
             body.rim = np.array([], dtype=np.int32)
         return body
