@@ -120,10 +120,17 @@ def _results(directory: Path) -> Path:
     return directory
 
 
+def _compare(args: argparse.Namespace) -> None:
+    from tireroad.runs.report.compare import compare
+
+    print(compare(args.directories, args.out))
+
+
 ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
     "check": _check,
     "report": _report,
     "export": _export,
+    "compare": _compare,
     "info": _info,
     "bench": _bench,
     "validate": _validate,

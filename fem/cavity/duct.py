@@ -79,7 +79,7 @@ def waves(count: int, angle: np.ndarray, order: int = 0) -> np.ndarray:
 class Duct:
     """Modes of the air between rigid walls, at unit modal mass: a of them, and their pressure shapes.
 
-    `circular` (a,) rad/s standing; `pressure` (1 + a, f) coefficients over `waves` of
+    `circular` (a,) rad/s standing; `pressure` (1 + a, f) the coefficients over `waves` of
     P_j, int rho0 / c^2 A P_i P_j ds = delta_ij, the first the uniform one, which has no motion along the
     ring; `gyroscopic` (a, a) 1/rad skew and `convective` (a, a) 1/rad2, Omega taken out; `momentum`
     (3, a) kg^1/2 per rate; `loss` (a,) 1/s. `density` kg/m3 of the air, `volume` m3.
