@@ -36,7 +36,9 @@ def read_hdf5(file: Path) -> tuple[Array, Array, Rows]:
     datasets = {}
     for name in "xyz":
         if isinstance(store.get(name, getlink=True), h5py.ExternalLink):
-            raise InputError(f"road.file {file}: {name} is a link to another file; copy it into this")
+            raise InputError(
+                f"road.file {file}: {name} is a link to another file; copy it into this"
+            )
         datasets[name] = store.get(name)
     missing = [name for name, found in datasets.items() if not isinstance(found, h5py.Dataset)]
     if missing:

@@ -36,7 +36,7 @@ def check_plausible(
     if lengths and extent[1] > WIDEST:
         raise InputError(
             f"{source}: x and y were read as metres, and the road is {extent[1]:.4g} m wide, which is "
-            f"more than {WIDEST:g} m: if the file is in millimetres say length_unit = \"mm\" in [road]; "
+            f'more than {WIDEST:g} m: if the file is in millimetres say length_unit = "mm" in [road]; '
             'if it really is in metres say length_unit = "m"'
         )
     count = rows.shape[0]

@@ -155,7 +155,6 @@ class Spool:
                 data = data[os.write(self._open, data) :]
         self._blocks, self._held = [], 0
 
-
     def _check_room(self, numbers: int) -> None:
         """InputError unless so many numbers more may go to the disk."""
         if numbers <= PIECE and self._written == 0:
