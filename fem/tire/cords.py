@@ -19,15 +19,14 @@ from tireroad.fem.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class Cords:
-    """One ply or belt. `depth` m under the outer face, `arc` (from, to) rad from the crown, both of the
-    undeformed wall; `angle` rad from the circumference (90 degrees: radial); `youngs_modulus` Pa, `area` m2 of
-    one cord, `spacing` m between cords, `density` kg/m3 of the cord, `compression` modulus in compression
-    over that in tension.
+    """The cords of one ply or belt, by the `name` of its line in the section.
+
+    `angle` rad from the circumference (90 degrees: radial); `youngs_modulus` Pa, `area` m2 of one cord,
+    `spacing` m between cords, `density` kg/m3 of the cord, `compression` modulus in compression over that
+    in tension.
     """
 
     name: str
-    depth: float
-    arc: tuple[float, float]
     angle: float
     youngs_modulus: float
     area: float

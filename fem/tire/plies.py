@@ -17,11 +17,11 @@ from mpi4py import MPI
 
 from tireroad.fem import compat, kinematics
 from tireroad.fem.errors import InputError
+from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.tire import cords as law
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.face_rule import Face
 from tireroad.fem.tire.mesh import TireMesh
-from tireroad.fem.tire.wall import middles
 
 
 @dataclass(frozen=True)
@@ -147,26 +147,34 @@ def _sheets(mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]) -> l
     return [Sheet(faces[key[:2]], *filled[key], cords) for key in sorted(filled)]
 
 
-def laid_in_torus(tire: TireMesh, space, cords: Sequence[Cords]) -> list[Laid]:
-    """Where the cords lie in the wall of a torus. Raises InputError for those on no element face. Collective."""
-    section = tire.section
-    arc, depth = middles(section, space)
-    layers = section.elements_thickness
-    layer = np.floor((1 - depth) * layers).astype(int)  # of a cell, 0 the outermost
+def laid_on(tire: TireMesh, cords: Sequence[Cords]) -> list[Laid]:
+    """Where the cords lie: on the section's plies of their names. Raises InputError where one has no ply, or a
+    ply no cords. Not collective.
+    """
+    section = tire.ring.section
+    names = [one.name for one in cords]
+    for name in section.plies:
+        if name not in names:
+            raise InputError(f"section: ply {name!r} has no cords")
     out = []
-    for number, one in enumerate(cords):
-        row = int(np.rint(one.depth / section.thickness * layers))
-        if abs(row / layers * section.thickness - one.depth) > 1e-6 * section.thickness:
-            raise InputError(
-                f"tire.cords {one.name!r}: no element face lies at depth = {one.depth:g} m; "
-                f"with tire.elements_thickness = {layers} they are "
-                f"{section.thickness / layers:.4g} m apart"
-            )
-        # The cell inside the ply; on the inner face there is none.
-        below = row < layers
-        on = layer == (row if below else row - 1)
-        cells = np.flatnonzero(on & (arc > one.arc[0]) & (arc < one.arc[1]))
-        if not tire.mesh.comm.allreduce(len(cells)):
-            raise InputError(f"tire.cords {one.name!r}: arc holds the middle of no element")
-        out.append(Laid(number, cells, 1, int(below), reverse=not below))
+    for number, name in enumerate(names):
+        if name not in section.plies:
+            raise InputError(f"cords {name!r}: the section has no ply of that name")
+        chain = section.plies[name]
+        reverse = _turned(section, chain)
+        for side, other in itertools.product(range(4), (False, True)):
+            marked = np.zeros(len(section.cells), bool)
+            marked[chain[(chain[:, 1] == side) & (reverse == other), 0]] = True
+            if marked.any():
+                cells = np.flatnonzero(marked[tire.section_cell])
+                out.append(Laid(number, cells, 1 + side // 2, side % 2, other))
     return out
+
+
+def _turned(section: SectionMesh, chain: np.ndarray) -> np.ndarray:
+    """Whether e_arc x e_circ, e_arc along the chain, points into the cell of each edge (k,)."""
+    start = section.chain(chain)[:: section.order][:-1]
+    ascends = section.side(chain)[:, 0] == start
+    # (xi, eta) is right-handed in (r, y): the normal that leaves xi = 1 is eta's direction turned
+    # clockwise, as e_arc x e_circ is e_arc.
+    return ascends != np.isin(chain[:, 1], (1, 2))

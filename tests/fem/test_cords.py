@@ -1,5 +1,7 @@
 """Cords in the wall: against closed forms of laminates and nets, and their own derivatives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import ufl
@@ -12,6 +14,7 @@ from shapes import cylinder
 from tireroad.fem import compat
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
 from tireroad.fem.tire.cords import Cords
@@ -20,10 +23,8 @@ from tireroad.fem.tire.face_rule import Face
 STEEL = {"youngs_modulus": 172.2e9, "area": 2.118e-7, "spacing": 1.16e-3}
 
 
-def cords(angle, name="belt", depth=0.006, arc=40.0, **more):
-    edge = np.radians(arc)
-    given = STEEL | {"name": name, "depth": depth, "arc": (-edge, edge)} | more
-    return Cords(angle=np.radians(angle), **given)
+def cords(angle, name="belt", **more):
+    return Cords(angle=np.radians(angle), **(STEEL | {"name": name} | more))
 
 
 def stored(body) -> float:
@@ -135,11 +136,18 @@ def test_a_net_under_pressure_finds_its_angle(start):
 def belted(make_body):
     """A torus with a radial ply on its inner face and a pair of belts, slack in compression, with mass."""
     wires = {"density": 7850.0, "compression": 0.1}
-    ply = cords(90, "ply", depth=0.012, arc=121, youngs_modulus=9.87e9, area=4.21e-7, spacing=1e-3)
-    lines = [ply, cords(20, "belt 1", 0.006, **wires), cords(-20, "belt 2", 0.0, **wires)]
+    ply = cords(90, "ply", youngs_modulus=9.87e9, area=4.21e-7, spacing=1e-3)
+    lines = [ply, cords(20, "belt 1", **wires), cords(-20, "belt 2", **wires)]
+    edge, half = np.radians(40), np.radians(120)
+    places = [
+        PlyLine("ply", (-half, half), 0.0),
+        PlyLine("belt 1", (-edge, edge), 0.5),
+        PlyLine("belt 2", (-edge, edge), 1.0),
+    ]
 
-    def make(**more):
-        return make_body(layers=2, cords=lines, **more)
+    def make(massless=False, **more):
+        own = [replace(one, density=0.0) for one in lines] if massless else lines
+        return make_body(layers=2, cords=own, plies=places, **more)
 
     return make
 
@@ -173,7 +181,7 @@ def test_the_face_rule_measures_the_surface(make_body):
     """Area of the outer face of the torus, of one and of the sum of its layers; normals all point outwards."""
     body = make_body(segments=24, arc=12, layers=1)
     face = Face(body.mesh, 1, 1, 2)
-    half, reach = body.tire.section.half_angle, 0.32 - 0.1
+    half, reach = np.radians(120), 0.32 - 0.1
     exact = 2 * np.pi * 0.1 * (reach * 2 * half + 0.1 * 2 * np.sin(half))
     for kind in ("reduced", "full", "nodes"):
         area = fem.assemble_scalar(compat.form(face.integral(fem.Constant(body.mesh, 1.0), kind)))
@@ -188,17 +196,13 @@ def test_the_face_rule_measures_the_surface(make_body):
     assert flux == pytest.approx(integrate.trapezoid(density, t), rel=1e-4)
 
 
-def test_the_mass_of_the_cords(belted, make_body):
+def test_the_mass_of_the_cords(belted):
     """Lumped and by full integration rho A_c / s times the area, and every nodal mass positive."""
-    body, bare = belted(segments=24, arc=12, order=2), make_body(segments=24, arc=12, layers=2)
+    body, bare = (belted(segments=24, arc=12, massless=less) for less in (False, True))
     lumped, without = (b.nodal_mass() for b in (body, bare))
     assert lumped.min() > 0
     per_area = 7850.0 * STEEL["area"] / STEEL["spacing"]
-    # The middles of the elements lie within 40 degrees: the belts end at the nearest element edges.
-    corners = body.tire.section.arc_corners
-    middles = (corners[1:] + corners[:-1]) / 2
-    inside = np.flatnonzero(np.abs(middles) < np.radians(40))
-    edge = corners[inside[-1] + 1]
+    edge = np.radians(40)
     area = sum(2 * np.pi * b * (0.22 * 2 * edge + b * 2 * np.sin(edge)) for b in (0.1, 0.094))
     assert (lumped - without)[::3].sum() == pytest.approx(per_area * area, rel=3e-4)
     one = fem.Constant(body.mesh, 1.0)
@@ -238,9 +242,39 @@ def test_inflation_of_a_belted_tire_balances_and_its_tangent_is_symmetric(belted
     assert abs(matrix - matrix.T).max() < 1e-13 * abs(matrix).max()
 
 
-def test_cords_between_element_faces_are_refused(make_body):
-    with pytest.raises(InputError, match="no element face lies at depth = 0.005 m"):
-        make_body(layers=2, cords=[cords(20, depth=0.005)])
+@pytest.mark.parametrize("name", ["ply", "belt 1", "belt 2"])
+def test_a_cord_lies_in_its_direction_whichever_cell_names_the_face(belted, name):
+    """Twist of the tire about z, a motion that tells +20 from -20 degrees: each cord's energy against the sum
+    over the ply's surface of k/2 (|F a| - 1)^2, a from the torus's own coordinates."""
+    body = belted(segments=24, arc=16)
+    number, depth = {"ply": (0, 0.012), "belt 1": (1, 0.006), "belt 2": (2, 0.0)}[name]
+    one, half = body.plies.cords[number], np.radians(120 if name == "ply" else 40)
+    grad = 0.01 * np.array([[0.0, 1.0, 0.2], [0.5, 0.3, 0.0], [0.1, -0.4, 0.6]])
+    body.u.interpolate(lambda x: grad @ x)
+    only = [np.where(sheet.owner == number, 1.0, 0.0) for sheet in body.plies.sheets]
+    for sheet, mask in zip(body.plies.sheets, only, strict=True):
+        sheet.stiffness.x.array[:] *= mask
+    ring = np.linspace(0, 2 * np.pi, 120, endpoint=False)[:, None]
+    t, weight = np.polynomial.legendre.leggauss(40)
+    arc, wall = half * t, 0.1 - depth
+    reach = 0.22 + wall * np.cos(arc)
+    zero = 0 * ring * arc
+    circ = np.stack([np.cos(ring) + zero, zero, np.sin(ring) + zero], axis=-1)
+    outward = np.stack([np.sin(ring) + zero, zero, -np.cos(ring) + zero], axis=-1)
+    along = np.cos(arc)[:, None] * np.eye(3)[1] - np.sin(arc)[:, None] * outward
+    a = np.cos(one.angle) * circ + np.sin(one.angle) * along
+    strain = np.linalg.norm(a @ (np.eye(3) + grad).T, axis=-1) - 1
+    modulus = one.stiffness * np.where(strain < 0, one.compression, 1.0)
+    density = (modulus / 2 * strain**2).mean(axis=0) * 2 * np.pi * reach * wall * half
+    assert stored(body) == pytest.approx(density @ weight, rel=2e-3)
+
+
+def test_cords_without_a_place_and_places_without_cords_are_refused(make_body):
+    line = PlyLine("belt", (-0.5, 0.5), 0.5)
+    with pytest.raises(InputError, match="cords 'other': the section has no ply"):
+        make_body(plies=[line], cords=[cords(20), cords(20, "other")])
+    with pytest.raises(InputError, match="ply 'belt' has no cords"):
+        make_body(plies=[line])
     with pytest.raises(InputError, match="spacing must be above 0"):
         cords(20, spacing=0.0)
 
