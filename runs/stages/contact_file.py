@@ -48,6 +48,9 @@ class ContactFile:
         self._stack: list = []
         self._readings: list[np.ndarray] = []
         self._rubs = session.scene.contact.brush_stiffness is not None
+        self._layout = dict(_LAYOUT)
+        if not session.scene.output.axle_force:
+            del self._layout["axle_force"]
         self._done = 0
 
     def open(self, stack: ExitStack, path: Path) -> dict[str, np.ndarray] | None:
@@ -81,7 +84,7 @@ class ContactFile:
         driven = {DRIVEN: ((forces, 3), "m")} if forces else {}
         # A chunk of many points would be many megabytes: 4 MB at most is read at once.
         rows = 2 ** int(np.log2(np.clip(500_000 // max(c, 1), 1, BLOCK)))
-        for name, (shape, unit) in (_LAYOUT | driven).items():
+        for name, (shape, unit) in (self._layout | driven).items():
             width = tuple(c if n is None else n for n in shape)
             if width[:1] == (c,):
                 dataset = packed.create(self._file, name, rows, width)
@@ -113,7 +116,7 @@ class ContactFile:
     def _write(self, steps: dict[str, np.ndarray]) -> None:
         self._packer.wait()
         driven = {DRIVEN: np.stack(self._readings)} if self._readings else {}
-        for name in _LAYOUT | driven:
+        for name in self._layout | driven:
             dataset, values = self._file[name], (steps | driven)[name]
             if name == "horizontal_force" and not self._rubs:
                 dataset.resize(self._done + len(values), axis=0)  # what is not written is zero

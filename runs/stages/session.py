@@ -71,11 +71,11 @@ class Session:
         return self.scene.damping.mass, self.scene.damping.stiffness
 
     @property
-    def rolling(self) -> tuple[float, float, float]:
-        """Speed and damping of the steady-rolling static state; zeros at rest."""
+    def rolling(self) -> tuple[float, float, float, str]:
+        """Speed, damping and inertia of the steady-rolling static state; zeros at rest."""
         if not self.scene.static.steady_rolling or self.speed == 0:
-            return 0.0, 0.0, 0.0
-        return self.speed, *self.damping
+            return 0.0, 0.0, 0.0, "full"
+        return self.speed, *self.damping, self.scene.rotation.inertia
 
     @cached_property
     def section(self):
