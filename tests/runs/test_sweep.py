@@ -64,7 +64,9 @@ def test_a_latin_hypercube_has_one_sample_in_every_layer(folder: Path) -> None:
     sweep = sweep_of(folder, text)
     loads = np.sort([member.settings["static.load"] for member in sweep.members])
     assert np.array_equal(np.floor((loads - 100) / 25), np.arange(8))
-    assert [m.settings for m in sweep.members] == [m.settings for m in sweep_of(folder, text).members]
+    assert [m.settings for m in sweep.members] == [
+        m.settings for m in sweep_of(folder, text).members
+    ]
 
 
 def test_a_list_names_its_members(folder: Path) -> None:
@@ -108,12 +110,16 @@ def test_a_sweep_runs_gathers_and_shares(folder: Path, launch) -> None:
     assert "a solver gave up" in done.stdout
     with (out / "sweep.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert [row["static.load"] for row in rows] == ["250.0", "1e7", "250.0", "1e7"] or len(rows) == 4
+    assert [row["static.load"] for row in rows] == ["250.0", "1e7", "250.0", "1e7"] or len(
+        rows
+    ) == 4
     assert float(rows[0]["modes: lowest (Hz)"]) == float(rows[2]["modes: lowest (Hz)"]) > 0
     assert rows[1]["modes: lowest (Hz)"] == ""
     with h5py.File(out / "sweep.h5") as file:
         assert file["axis/static.load"][:].tolist() == [250.0, 1e7, 250.0, 1e7]
     # Damping takes no part in the static state and the modes: computed once for both.
-    made = [name for name in (out / "logs").glob("*load-250*") if "modes     done" in name.read_text()]
+    made = [
+        name for name in (out / "logs").glob("*load-250*") if "modes     done" in name.read_text()
+    ]
     assert len(made) == 1
     assert (out / "sweep.html").read_text().count("did not end well") == 1
