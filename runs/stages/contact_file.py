@@ -12,7 +12,9 @@ import numpy as np
 
 from tireroad.contact.rolling import Instant
 from tireroad.runs.files import packed, store
+from tireroad.runs.files.checksum import seal
 from tireroad.runs.files.disk import part_of, replacing
+from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.session import Session
 
@@ -64,8 +66,7 @@ class ContactFile:
         self._path, self._packer = path, packed.Packer()
         stack.callback(self._packer.close)
         provenance = self._session.provenance("contact")
-        usable = store.stored_hash(self._checkpoint) == provenance.input_hash
-        going_on = usable and not self._session.fresh
+        going_on = not self._session.fresh and self._usable(provenance.input_hash)
         begin = self._checkpoint if going_on else None
         self._file = stack.enter_context(store.writing(path, provenance, begin))
         if not going_on:
@@ -74,6 +75,13 @@ class ContactFile:
         state = {name: value[()] for name, value in self._file[STATE].items()}
         del self._file[STATE]
         return len(self._file["time"]), state
+
+    def _usable(self, wanted: str) -> bool:
+        """Whether there is a checkpoint to go on from; one that cannot serve is named."""
+        reason = store.why_not(self._checkpoint, wanted, "contact")
+        if reason and reason != "absent":
+            observe.say(f"  {CHECKPOINT} is there, but {reason}: the loop begins at t = 0")
+        return not reason
 
     def _lay_out(self) -> None:
         patch = self._session.patch
@@ -138,6 +146,7 @@ class ContactFile:
             with h5py.File(part, "r+") as copy:
                 for name, value in state.items():
                     copy.create_dataset(f"{STATE}/{name}", data=value)
+            seal(part)
 
     def finish(self) -> None:
         """All steps are flushed: the checkpoint has had its day. Collective."""

@@ -9,7 +9,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import h5py
 from mpi4py import MPI
 
 from tireroad.fem.timing import Timing
@@ -164,7 +163,7 @@ class Session:
         """What `pick(file)` returns, on every process. Collective."""
 
         def opened():
-            with h5py.File(path, "r") as file:
+            with store.opened(path) as file:
                 return pick(file)
 
         return on_root(self.comm, opened)
