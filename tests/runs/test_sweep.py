@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
@@ -97,29 +95,3 @@ def test_mistakes_are_named(folder: Path, text: str, wanted: str) -> None:
     with pytest.raises(InputError) as caught:
         sweep_of(folder, text)
     assert wanted in str(caught.value)
-
-
-def test_a_sweep_runs_gathers_and_shares(folder: Path, launch) -> None:
-    path = folder / "family.toml"
-    text = 'scene = "base.toml"\n[[axis]]\nkey = "damping.mass"\nvalues = [0.0, 10.0]\n'
-    path.write_text(text + '[[axis]]\nkey = "static.load"\nvalues = [250.0, 1e7]\n')
-    out = folder / "out"
-    done = launch("-m", "runs", "sweep", path, "--out", out, "--local", 2)
-    # A load that no tire carries fails; the others are kept, and the failure is named.
-    assert done.returncode == 3 and "1_mass-0_load-250: done" in done.stdout
-    assert "a solver gave up" in done.stdout
-    with (out / "sweep.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert [row["static.load"] for row in rows] == ["250.0", "1e7", "250.0", "1e7"] or len(
-        rows
-    ) == 4
-    assert float(rows[0]["modes: lowest (Hz)"]) == float(rows[2]["modes: lowest (Hz)"]) > 0
-    assert rows[1]["modes: lowest (Hz)"] == ""
-    with h5py.File(out / "sweep.h5") as file:
-        assert file["axis/static.load"][:].tolist() == [250.0, 1e7, 250.0, 1e7]
-    # Damping takes no part in the static state and the modes: computed once for both.
-    made = [
-        name for name in (out / "logs").glob("*load-250*") if "modes     done" in name.read_text()
-    ]
-    assert len(made) == 1
-    assert (out / "sweep.html").read_text().count("did not end well") == 1
