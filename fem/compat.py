@@ -137,9 +137,7 @@ def _space(mesh, element):
 def form(expression):
     """Compile a UFL form with the program's compiler flags. Collective."""
     comm = expression.ufl_domain().ufl_cargo().comm
-    return form_cache.compiled(
-        comm, lambda folder: fem.form(expression, **_options(folder, **JIT))
-    )
+    return form_cache.compiled(comm, lambda folder: fem.form(expression, **_options(folder, **JIT)))
 
 
 def cell_facets(mesh) -> np.ndarray:
