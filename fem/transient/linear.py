@@ -18,6 +18,7 @@ from scipy import sparse
 from tireroad.fem.matrices.compliance import on_own_rows, rotating_damping, rotating_stiffness
 from tireroad.fem.matrices.direct import factorise, solve_columns
 from tireroad.fem.matrices.operators import Operators, Rotation
+from tireroad.fem.transient.modal_damping import ModalDamping
 
 # What a step needs of the one before; `balanced` is the mean of two accelerations that balances the
 # forces at the step's end.
@@ -28,7 +29,8 @@ class FullTire:
     """All degrees of freedom of the tire between the patch's forces and displacements.
 
     The interface of greens.recursion.Recursion, so the same contact loop runs on it. `outputs` (r,
-    3 s) and `loads` (k, 3 s) weigh the nodes of the outer face. All methods are collective.
+    3 s) and `loads` (k, 3 s) weigh the nodes of the outer face. `modal` damps beside `damping`, (gamma1
+    1/s, gamma2 s). All methods are collective.
     """
 
     def __init__(
@@ -42,6 +44,7 @@ class FullTire:
         loads: sparse.csr_matrix,
         inertia: str = "full",
         spectral_radius: float = 0.0,
+        modal: ModalDamping | None = None,
     ):
         self._set_scheme(step, spectral_radius)
         self._operators, self._comm, self._step = operators, operators.body.comm, step
@@ -51,15 +54,21 @@ class FullTire:
         stiffness = rotating_stiffness(operators, rotation, speed, damping, inertia)
         system = stiffness.copy()
         different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
-        system.axpy(self._gamma / (self._beta * step), self._drag, different)
+        share = self._gamma / (self._beta * step)
+        system.axpy(share, self._drag, different)
         diagonal = system.getDiagonal()
         diagonal.array[:] += (1 - self._a) / (self._beta * step**2) * self._mass
         system.setDiagonal(diagonal)
         system.setOption(PETSc.Mat.Option.SYMMETRIC, speed == 0)
         self._solver = factorise(system)
         columns = on_own_rows(operators, loads).toarray()
+
         # Full motion per unit force at the end of a step: the step's answer is then one product.
-        self._answer = solve_columns(self._solver, system, columns)
+        def solve(right: np.ndarray) -> np.ndarray:
+            return solve_columns(self._solver, system, right)
+
+        self._modal, self._joined = modal, modal.joined(solve, share) if modal else None
+        self._answer = (self._joined or solve)(columns)
         self.same_step = self._comm.allreduce(self._outputs @ self._answer)
         n = len(self._mass)
         self.displacement, self.velocity, self.acceleration, self.balanced = np.zeros((4, n))
@@ -82,19 +91,25 @@ class FullTire:
         right = (1 - a) * (moved / (beta * h**2) + kept) - a * self.acceleration
         rate = gamma / (beta * h) * moved - self.velocity
         rate += h * (gamma * kept - (1 - gamma) * self.acceleration)
-        right = self._mass * right + self._product(rate)
+        self._free = self._solved(self._mass * right + self._product(rate))
+        return self._comm.allreduce(self._outputs @ self._free)
+
+    def _solved(self, right: np.ndarray) -> np.ndarray:
+        """Own rows of the step's system^-1 right."""
+        if self._joined is not None:
+            return self._joined(right[:, None])[:, 0]
         b, x = self._vectors
         b.array[:] = right
         self._solver.apply(b, x)
-        self._free = x.array_r.copy()
-        return self._comm.allreduce(self._outputs @ self._free)
+        return x.array_r.copy()
 
     def _product(self, values: np.ndarray) -> np.ndarray:
         """(D + 2 Omega G) values, own rows."""
         b, x = self._vectors
         b.array[:] = values
         self._drag.mult(b, x)
-        return x.array_r.copy()
+        out = x.array_r.copy()
+        return out if self._modal is None else out + self._modal.force(values)
 
     def advance(self, force: np.ndarray) -> None:
         """Take the force (k,) N at the end of the step; after `predict`."""

@@ -15,7 +15,7 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene import locate, rules
 from tireroad.runs.scene.schema import Key, Table, described, key_of, names, table_of
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables import Damping, Scene
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 LARGEST = 1_000_000
@@ -63,8 +63,16 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
     scene = _with_road_file(scene, source)
+    scene = _with_damping(scene)
     rules.check(scene, raw, source.error)
     return scene
+
+
+def _with_damping(scene: Scene) -> Scene:
+    """The default damping in proportion, where neither it nor the loss factor of a compound is given."""
+    tire = scene.tire
+    loses = any(part.loss_factor for part in (tire, *tire.region))
+    return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
 
 
 def _text(path: Path) -> str:

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.cord_rules import check_cords
 from tireroad.runs.scene.schema import described
 from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tire_rules import check_cords, check_damping
 from tireroad.runs.scene.tire_tables import Tire
 
 Where = Callable[[tuple[str, ...], str], InputError]
@@ -129,6 +129,7 @@ def _modal(scene: Scene, error: Where) -> None:
             ("modal", "rim"),
             '= "free" leaves nothing to carry the load: [contact] needs "fixed"',
         )
+    check_damping(scene, error)
     if modal.rim == "fixed" or rotation is None or rotation.speed == 0:
         return
     if rotation.method == "full":
@@ -141,7 +142,7 @@ def _modal(scene: Scene, error: Where) -> None:
             ("static", "steady_rolling"),
             "= false leaves out the centrifugal tension that keeps a free turning wheel upright",
         )
-    if scene.damping.mass:
+    if scene.damping and scene.damping.mass:
         raise error(
             ("damping", "mass"),
             f"= {scene.damping.mass:g} 1/s acts against a wheel that turns about a fixed axle; a free one"

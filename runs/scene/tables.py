@@ -194,7 +194,12 @@ class Scene:
     tire: Tire = table(Tire, "geometry and mesh")
     static: Static = table(Static, "inflation and road of the static state")
     modal: Modal = table(Modal, "modes at the static state")
-    damping: Damping = table(Damping, "of the material")
+    damping: Damping | None = table(
+        Damping,
+        "in proportion to mass and stiffness; absent: by the loss factors of the compounds, where "
+        "there are any, else with its defaults",
+        optional=True,
+    )
     rotation: Rotation | None = table(Rotation, "of the wheel", optional=True)
     greens: Greens = table(Greens, "Green's functions")
     force: tuple[PointForce, ...] = tables(PointForce, "prescribed point forces")

@@ -154,6 +154,8 @@ def test_a_basis_that_grows_keeps_its_projection() -> None:
     whole = project(modes, rotation, operators.carried, comm)
     grown = project(modes, rotation, operators.carried, comm, known)
     for name, value in vars(whole).items():
+        if value is None:  # no compound has a loss factor
+            continue
         assert np.abs(getattr(grown, name) - value).max() <= 1e-12 * np.abs(value).max(), name
 
 
