@@ -77,7 +77,7 @@ def _out_of_reach(patch: Patch) -> InputError | None:
     The tread's laws are those of a plane: points that rise by more than STEEPEST of their distance
     from the footprint lie above each other as seen by the road.
     """
-    highest = float(patch.gap.max())
+    highest = float(patch.gap[~patch.edge].max(initial=0.0))
     x0, x1, y0, y1 = patch.extent
     if highest <= STEEPEST * 0.5 * min(x1 - x0, y1 - y0):
         return None

@@ -5,6 +5,7 @@ from typing import Any
 from tireroad.runs.scene.estimate import memory
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
+from tireroad.runs.scene.road_check import check_road
 from tireroad.runs.scene.schema import applies, entries, key_of, table_of
 from tireroad.runs.scene.tables import Scene
 
@@ -44,7 +45,8 @@ def _aligned(rows: list[Row], widths: list[int]) -> list[str]:
 
 
 def explain(scene: Scene) -> str:
-    """What `check` prints."""
+    """What `check` prints. InputError where the road cannot be used."""
+    check_road(scene)
     groups = _rows(scene, "", "scene")
     everything = [HEAD, *(row for _, rows in groups for row in rows)]
     widths = [min(max(len(row[column]) for row in everything), 44) for column in range(len(HEAD))]

@@ -9,7 +9,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any
 
@@ -126,8 +126,9 @@ def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:
     known = set(names(of))
     for item in fields(of):
         if variant_of(item) is not None:
-            values[item.name] = _variant(of, item, values, raw, path, source)
-            known |= set(names(type(values[item.name])))
+            kind = _kind(of, item, values)
+            values[item.name] = _variant(kind, raw, path, source)
+            known |= set(names(kind))
     for name in raw:
         if name not in known:
             _unknown(of, path, name, values, source)
@@ -154,14 +155,16 @@ def _without_checks(of: type, values: dict[str, Any]) -> Any:
         return of()
 
 
-def _variant(of: type, item, values: dict, raw: dict, path: tuple[str, ...], source: Source) -> Any:
-    """The object whose class a key of the table names, from that class's own keys."""
+def _kind(of: type, item: Field, values: dict[str, Any]) -> type:
+    """The class that a key of the table names; the default one where the name is wrong."""
     part = variant_of(item)
     default = next(f.default for f in fields(of) if f.name == part.selector)
     selected = values.get(part.selector, default)
-    if selected is _WRONG:
-        return part.registry[default]()
-    kind = part.registry[selected]
+    return part.registry[default if selected is _WRONG else selected]
+
+
+def _variant(kind: type, raw: dict, path: tuple[str, ...], source: Source) -> Any:
+    """An object of the class from that class's own keys; _WRONG where it cannot be made."""
     before = len(source.problems)
     own = {
         f.name: _field(f, raw[f.name], (*path, f.name), source)
@@ -172,11 +175,11 @@ def _variant(of: type, item, values: dict, raw: dict, path: tuple[str, ...], sou
         try:
             return kind(**own)
         except ParameterError as error:
-            missing = error.parameter not in raw
-            where = path if missing else (*path, error.parameter)
-            source.add(where, f'{error.parameter} {error.reason}' if missing else error.reason)
-    values[part.selector] = default
-    return part.registry[default]()
+            if error.parameter in raw:
+                source.add((*path, error.parameter), error.reason)
+            else:
+                source.add(path, f"needs {error.parameter}, which {error.reason}")
+    return _WRONG
 
 
 def _check_kinds(result: Any, raw: dict, path: tuple[str, ...], source: Source) -> None:
@@ -192,7 +195,7 @@ def _of_another_kind(path, selector: str, kinds, this: Any, source: Source) -> N
     source.add(path, f"belongs to {selector} = {' or '.join(kinds)}, and this is {this}")
 
 
-def _field(item, raw: Any, path: tuple[str, ...], source: Source) -> Any:
+def _field(item: Field, raw: Any, path: tuple[str, ...], source: Source) -> Any:
     part = table_of(item)
     return _nested(part, raw, path, source) if part else _key(key_of(item), raw, path, source)
 

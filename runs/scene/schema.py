@@ -185,6 +185,20 @@ def entries(holder: Any) -> Iterator[tuple[Any, Field]]:
             yield from entries(getattr(holder, item.name))
 
 
+def walk(of: type, path: str = "") -> Iterator[tuple[str, type, Field, Key]]:
+    """(dotted name, dataclass, field, description) of every key in every variant; [] marks arrays."""
+    for item in fields(of):
+        name = f"{path}.{item.name}" if path else item.name
+        part, kinds, key = table_of(item), variant_of(item), key_of(item)
+        if part is not None:
+            yield from walk(part.of, f"{name}[]" if part.many else name)
+        elif kinds is not None:
+            for kind in kinds.registry:
+                yield from walk(kinds.registry[kind], path)
+        elif key is not None:
+            yield name, of, item, key
+
+
 def applies(key: Key, holder: Any) -> bool:
     """Whether a key belongs to the kind that its table is."""
     return key.only_for is None or getattr(holder, key.only_for[0]) in key.only_for[1]
@@ -215,4 +229,5 @@ __all__ = [
     "variant",
     "variant_of",
     "vector",
+    "walk",
 ]

@@ -5,6 +5,7 @@ import pytest
 
 from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle
 from tireroad.contact.model import step_solver
+from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.contact.patch import make_patch
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG
@@ -21,9 +22,8 @@ SECTION = Torus(0.32, 0.10, 0.012, np.radians(120), 60, 16, 1, 2, "bead", 0.3)
 def tread():
     """A torus flattened a little towards the road plane at z = -0.318 m: lattice, positions."""
     lattice = field_lattice(SECTION)
-    from tireroad.fem.tire.surface import outer_face
 
-    points = lattice.points(outer_face(lattice))
+    points = lattice.points(lattice.face)
     road = -0.318
     depth = np.maximum(road - points[:, 2], 0.0)
     points = points + np.stack([0.1 * depth, -0.2 * depth, depth], axis=-1)
@@ -36,7 +36,7 @@ def patches(tread, reach: float, pitch: float):
     force = np.where(gap == 0, 1.0, 0.0)
     force *= 500 / force.sum()
     halves = np.full((len(points), 2), 0.01)
-    shape = lattice.shape[0], lattice.shape[2]
+    shape = lattice.face_shape
     nodes = make_patch(points, halves, force, gap, shape, reach)
     surface = TreadSurface(lattice, points)
     return force, surface, make_grid_patch(surface, road, nodes, (pitch, pitch), reach)
@@ -74,7 +74,7 @@ def test_settled_state_keeps_the_load(tread, pitch: float) -> None:
     nodal = force[patch.index]
     p = len(patch.index)
     flexibility = 1e-5 * (np.eye(p) + 0.5)
-    spec = Contact(youngs_modulus=5e6, points=Pitch(pitch, pitch))
+    spec = Contact(law=HalfSpace(youngs_modulus=5e6), points=Pitch(pitch, pitch))
     settled, rise = settle(patch, step_solver(spec, patch, flexibility), flexibility, nodal)
     assert settled.force.sum() == pytest.approx(500.0, rel=1e-7)
     assert settled.force.min() >= 0 and settled.gap.min() >= 0

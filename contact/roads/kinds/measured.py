@@ -17,7 +17,9 @@ _LAYOUT = (
 
 @dataclass(frozen=True, kw_only=True)
 class Measured(Levelled):
-    """What roads in files have in common; `file` is required."""
+    """What roads in files have in common; `file` is required, `what` is what it holds."""
+
+    what = "the road"
 
     holes: str = choice(
         "refuse", ("refuse", "fill"), "heights missing in the strip driven over: an error, or filled"
@@ -29,13 +31,14 @@ class Measured(Levelled):
     def validate(self) -> None:
         """A file is named."""
         if self.file is None:
-            raise ParameterError("file", 'is missing: name the measured road by file = "…"')
+            raise ParameterError("file", f'is missing: name a file for {self.what} by file = "…"')
 
 
 @road_kind("grid", "heights measured on a regular grid, in a .npz, .csv or .h5 file")
 class GridFile(Measured):
     """Heights on a grid, bilinear in between."""
 
+    what = "the measured grid"
     file: str | None = filename(_LAYOUT)
     length_unit: str | None = choice(
         None, tuple(UNITS), "unit of x and y in the file; absent: m, if the sizes can be metres"
@@ -59,6 +62,7 @@ class GridFile(Measured):
 class CrgFile(Measured):
     """Heights along the reference line of an OpenCRG file."""
 
+    what = "the OpenCRG road (crg)"
     file: str | None = filename("measured road in OpenCRG 1.1, text or binary")
 
     def make(self) -> Grid:
