@@ -16,6 +16,7 @@ from tireroad.contact.solver.conditions import (
     check_residual,
     checked_compliance,
     complementarity_residual,
+    penetration,
 )
 from tireroad.contact.solver.factor import ActiveFactor
 from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
@@ -50,6 +51,7 @@ class ActiveSet:
         n = len(self._diagonal)
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
+        self.penetration = 0.0
         self.residual = 0.0
         self.iterations = 0
         self._factor = ActiveFactor(matrix)
@@ -150,6 +152,7 @@ class ActiveSet:
         np.maximum(force, 0.0, out=force)
         self.residual = complementarity_residual(force, gap, self._diagonal, scale)
         check_residual("active-set", self.residual)
+        self.penetration = penetration(gap)
         gap[active] = 0.0
         self.active, self.gap = active, gap
         self._before, self._signs = self._signs, force * self._diagonal - gap

@@ -16,10 +16,15 @@ TOLERANCE = 1e-9
 
 
 class ContactSolver(Protocol):
-    """What the time loop needs; `active`, `gap` (m), `residual`, ... are of the last solve."""
+    """What the time loop needs; `active`, `gap` (m), `residual`, ... are of the last solve.
+
+    `gap` is 0 at the points that touch; `penetration` (m) is how far the answer as it was solved has
+    any point inside the road.
+    """
 
     active: Mask
     gap: Array
+    penetration: float
     residual: float
     iterations: int
 
@@ -35,6 +40,11 @@ class ContactSolver(Protocol):
     def state(self) -> dict[str, Array]: ...
 
     def set_state(self, kept: dict[str, Array]) -> None: ...
+
+
+def penetration(gap: Array) -> float:
+    """How far (m) the deepest of the gaps (n,) m is below 0."""
+    return max(-float(gap.min(initial=0.0)), 0.0)
 
 
 def checked_compliance(matrix: Array) -> Array:

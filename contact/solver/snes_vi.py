@@ -11,6 +11,7 @@ from tireroad.contact.solver.conditions import (
     check_residual,
     checked_compliance,
     complementarity_residual,
+    penetration,
 )
 from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
 from tireroad.contact.solver.snes_product import Preconditioner, Product
@@ -46,6 +47,7 @@ class SnesVI:
         self._unit = float(self._diagonal.max())
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
+        self.penetration = 0.0
         self.residual = 0.0
         self.iterations = 0
         self.factorisations = 0
@@ -164,6 +166,7 @@ class SnesVI:
         check_residual("snes-vi", self.residual)
         # The semismooth method leaves forces of rounding size on points that do not touch.
         self.active = diagonal * force > gap
+        self.penetration = length * penetration(gap)
         self.gap = length * np.where(self.active, 0.0, gap)
         return np.where(self.active, force, 0.0) * (length / self._unit)
 

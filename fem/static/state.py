@@ -50,6 +50,13 @@ class StaticState:
         gap = self.positions[:, 2] - self.road_height
         return np.where(self.force > 0, 0.0, gap)
 
+    @property
+    def penetration(self) -> float:
+        """How far the deepest point of the outer face is inside the road as solved, m; 0 without one."""
+        if self.road_height is None:
+            return 0.0
+        return max(float((self.road_height - self.positions[:, 2]).max()), 0.0)
+
     def rolling_radius(self) -> float:
         """Effective rolling radius, m: material speed over the road per unit speed of rotation.
 

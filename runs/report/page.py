@@ -10,6 +10,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.read import Absent, Results, Section
 from tireroad.runs.report import force_sections, tire_sections
@@ -85,6 +86,9 @@ def read_summary(path: Path, problems: list[str]) -> dict:
         return {}
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
+        if not is_table_as_signed(summary):
+            problems.append("summary.json is not what the run wrote (checksum) and is left out.")
+            return {}
         stages = summary.get("stages", {})
         known = sorted(stages, key=lambda name: (*STAGES, name).index(name))
         summary["stages"] = {name: whole_stage(stages[name]) for name in known}
@@ -118,6 +122,8 @@ def read_scene(path: Path, problems: list[str]) -> tuple[str, dict]:
         return "", {}
     try:
         text = path.read_text(encoding="utf-8")
+        if not is_as_signed(text):
+            problems.append("scene.toml is not what the run wrote (checksum).")
         return text, tomllib.loads(text)
     except ValueError as error:  # UnicodeDecodeError and TOMLDecodeError are both of it
         problems.append(f"scene.toml cannot be read ({error}).")
@@ -137,7 +143,7 @@ def build_sections(
             except Absent as absence:
                 reason = stages.get(name.removesuffix(".h5"), {}).get("reason")
                 left_out.append((name, reason or str(absence)))
-            except OSError as error:
+            except InputError as error:
                 problems.append(f"{name} is damaged and left out: {error}")
                 left_out.append((name, "the file is damaged"))
     return sections, left_out, provenance

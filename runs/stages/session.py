@@ -9,7 +9,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import h5py
 from mpi4py import MPI
 
 from tireroad.fem.timing import Timing
@@ -71,11 +70,11 @@ class Session:
         return self.scene.damping.mass, self.scene.damping.stiffness
 
     @property
-    def rolling(self) -> tuple[float, float, float]:
-        """Speed and damping of the steady-rolling static state; zeros at rest."""
+    def rolling(self) -> tuple[float, float, float, str]:
+        """Speed, damping and inertia of the steady-rolling static state; zeros at rest."""
         if not self.scene.static.steady_rolling or self.speed == 0:
-            return 0.0, 0.0, 0.0
-        return self.speed, *self.damping
+            return 0.0, 0.0, 0.0, "full"
+        return self.speed, *self.damping, self.scene.rotation.inertia
 
     @cached_property
     def section(self):
@@ -164,7 +163,7 @@ class Session:
         """What `pick(file)` returns, on every process. Collective."""
 
         def opened():
-            with h5py.File(path, "r") as file:
+            with store.opened(path) as file:
                 return pick(file)
 
         return on_root(self.comm, opened)

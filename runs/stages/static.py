@@ -122,7 +122,7 @@ def _describe(session: Session, loader) -> None:
             "contact points": (int((state.force > 0).sum()), "-"),
         }
         record.indicators["least contact force"] = (float(state.force.min()), "N")
-        record.indicators["largest penetration"] = (float(-min(state.gap.min(), 0.0)), "m")
+        record.indicators["largest penetration"] = (state.penetration, "m")
     record.headline["rolling radius"] = (state.rolling_radius(), "m")
     record.indicators["Newton steps"] = (loader.newton_steps, "-")
     if session.speed and not session.scene.static.steady_rolling:
