@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
 from tireroad.fem.sections.mesh2d import SectionMesh
+from tireroad.fem.sections.ring import Ring
+
+LEAST = (6, 2)  # elements around and along: below, a tire is none
 
 
 @dataclass(frozen=True)
@@ -64,19 +67,38 @@ class Torus:
 
     def section(self, patches: Sequence[Patch] = (), plies: Sequence[PlyLine] = ()) -> SectionMesh:
         """The section's elements, with edges exactly on those of patches and on plies."""
+        wall, arc = self._lines(patches, plies)
+        return product(
+            order=self.order, wall=wall, arc=arc, place=self._place, patches=patches, plies=plies
+        )
+
+    def _lines(self, patches: Sequence[Patch], plies: Sequence[PlyLine]):
+        """Corners through the wall, as shares of it, and along the arc, rad."""
         arcs = [end for patch in patches for arc in patch.arcs for end in arc]
         arcs += [end for ply in plies for end in ply.arc]
         arcs = [end for end in arcs if abs(end) < self.half_angle * (1 - 1e-9)]
         depths = [end for patch in patches for end in patch.depth]
         depths += [ply.depth for ply in plies]
         wall = corners(self.elements_thickness, np.ones_like, 0.0, 1.0, depths)
-        return product(
-            order=self.order,
-            wall=wall,
-            arc=self.arc_corners(arcs),
-            place=self._place,
-            patches=patches,
-            plies=plies,
+        return wall, self.arc_corners(arcs)
+
+    def ring(self, patches: Sequence[Patch] = (), plies: Sequence[PlyLine] = ()) -> Ring:
+        """The tire's elements, with edges exactly on those of patches and on plies."""
+
+        def coarser() -> Ring | None:
+            around, along = self.segments // 2, self.elements_arc // 2
+            if around < LEAST[0] or along < LEAST[1]:
+                return None
+            half = replace(self, segments=around, elements_arc=along)
+            return half.ring(patches, plies)
+
+        return Ring(
+            section=self.section(patches, plies),
+            ring_corners=self.ring_corners,
+            arc_corners=self._lines(patches, plies)[1],
+            thickness=self.thickness,
+            height=self.minor_radius,
+            coarser=coarser,
         )
 
     def _place(self, depth: np.ndarray, arc: np.ndarray) -> np.ndarray:

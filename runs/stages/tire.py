@@ -7,33 +7,56 @@ from dataclasses import fields
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.runs.scene.tire_tables import Tire
+from tireroad.fem.sections.grid import Patch, PlyLine
+from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.torus import Torus
+from tireroad.runs.scene.tire_tables import Material as MaterialTable
+from tireroad.runs.scene.tire_tables import Region, Tire
 
 
-def make_section(tire: Tire):
+def make_section(tire: Tire) -> Ring:
     """The shape of the tire and its elements."""
-    from tireroad.fem.tire.mesh import Torus
-
     names = {f.name for f in fields(Torus)} - {"half_angle"}
     given = {name: getattr(tire, name) for name in names}
-    return Torus(half_angle=np.radians(tire.half_angle), **given)
+    torus = Torus(half_angle=np.radians(tire.half_angle), **given)
+    patches = [_patch(i, region) for i, region in enumerate(tire.region)]
+    plies = [
+        PlyLine(c.name, tuple(np.radians(c.arc)), 1 - c.depth / tire.thickness) for c in tire.cords
+    ]
+    return torus.ring(patches, plies)
 
 
-def make_lattice(section):
+def _patch(number: int, region: Region) -> Patch:
+    low, high = np.radians(region.arc)
+    sides = {"left": ((-high, -low),), "right": ((low, high),)}
+    arcs = sides.get(region.side, sides["left"] + sides["right"])
+    return Patch(f"tire.region {number}", arcs, region.depth)
+
+
+def make_lattice(section: Ring):
     """The nodes of the displacement field, without a mesh."""
     from tireroad.fem.tire.mesh import field_lattice
 
     return field_lattice(section)
 
 
-def make_body(comm: MPI.Comm, tire: Tire, section):
+def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
     """The finite-element body, undeformed. Collective."""
     from tireroad.fem.tire.body import Body
+    from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
-    from tireroad.fem.tire.wall import Region
 
-    regions = [
-        Region(Material(**vars(r.material)), tuple(np.radians(r.arc)), r.depth, r.side)
-        for r in tire.region
+    def rubber(table: MaterialTable) -> Material:
+        return Material(**vars(table))
+
+    names = [_patch(i, region).name for i, region in enumerate(tire.region)]
+    materials = {name: rubber(r.material) for name, r in zip(names, tire.region, strict=True)}
+    placed = {"depth", "arc", "angle"}
+    cords = [
+        Cords(
+            angle=float(np.radians(c.angle)),
+            **{key: value for key, value in vars(c).items() if key not in placed},
+        )
+        for c in tire.cords
     ]
-    return Body(comm, section, Material(**vars(tire.material)), regions)
+    return Body(comm, section, {"wall": rubber(tire.material)} | materials, cords=cords)
