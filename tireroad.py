@@ -5,6 +5,28 @@ The packages `fem`, `modal`, `greens`, `contact` and `runs` beside this file are
 module that finds them where they lie. So nothing but `tireroad` is a top-level name anywhere.
 """
 
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 __path__ = [str(Path(__file__).resolve().parent)]
+
+# Where each public name lives; imported when it is first asked for, so that `import tireroad` costs
+# nothing and reading results needs no finite elements.
+_HOMES = {
+    "load": "tireroad.runs.files.reader",
+    "RunResults": "tireroad.runs.files.reader",
+    "InputError": "tireroad.fem.errors",
+    "ConvergenceError": "tireroad.fem.errors",
+}
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'tireroad' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOMES])

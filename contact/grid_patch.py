@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.solver.complementarity import ContactSolver
+from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.sparse_columns import LoadedColumns
@@ -57,18 +57,13 @@ def make_grid_patch(
     """
     x0, x1, y0, y1 = nodes.extent
     margin = nodes.half_sizes.max(axis=0)
-    lines = []
-    for low, high, step in (
-        (x0 - margin[0], x1 + margin[0], spacing[0]),
-        (y0 - margin[1], y1 + margin[1], spacing[1]),
-    ):
-        lines.append(step * np.arange(np.ceil(low / step), np.floor(high / step) + 1))
+    ends = (x0 - margin[0], x1 + margin[0]), (y0 - margin[1], y1 + margin[1])
+    _check_count(ends, spacing, reach)
+    lines = [
+        step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
+        for (low, high), step in zip(ends, spacing, strict=True)
+    ]
     shape = len(lines[0]), len(lines[1])
-    if shape[0] * shape[1] > MOST_POINTS:
-        raise InputError(
-            f"contact.points: {shape[0]} x {shape[1]} points are more than {MOST_POINTS}; take a "
-            "coarser grid or a smaller contact.reach"
-        )
     x, y = (a.ravel() for a in np.meshgrid(*lines, indexing="ij"))
     ring, arc, found = surface.locate(x, y)
     height = surface.at(ring, arc)[:, 2]
@@ -92,6 +87,18 @@ def make_grid_patch(
         weights=weights[:, used].tocsr(),
         places=GridPlaces(shape, spacing, place),
     )
+
+
+def _check_count(ends, spacing: tuple[float, float], reach: float) -> None:
+    """InputError for a grid of more than MOST_POINTS, before it is laid out."""
+    sizes = [high - low for low, high in ends]
+    counts = [np.floor(size / step) for size, step in zip(sizes, spacing, strict=True)]
+    if counts[0] * counts[1] > MOST_POINTS:
+        raise InputError(
+            f"contact.points: dx = {spacing[0]:g} m, dy = {spacing[1]:g} m make {counts[0]:.3g} x "
+            f"{counts[1]:.3g} points on the {sizes[0]:.3g} m x {sizes[1]:.3g} m within contact.reach = "
+            f"{reach:.3g} m, more than {MOST_POINTS}: take a coarser grid or a smaller contact.reach"
+        )
 
 
 def settle(

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.solver.complementarity import ContactSolver, checked_compliance, make_solver
+from tireroad.contact.solver.choose import make_solver
+from tireroad.contact.solver.conditions import ContactSolver, checked_compliance
 from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance, SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.tread.compliance import (
@@ -29,6 +30,8 @@ DENSE_POINTS = 1000
 # (15 to 30 ms on a soft tread, more on a stiff one); 160 of them in a tenth of that.
 MOST_TOUCHING = 500
 MOST_DENSE = 6000  # 0.3 GB a matrix
+# Height over half the width of a patch on a torus that has gone up its flanks.
+STEEPEST = 0.25
 
 
 class Spec(Protocol):
@@ -80,7 +83,30 @@ def tread_matrix(spec: Spec, patch: Patch) -> Array:
     if spec.tread == "none":
         return no_tread(len(points))
     check_half_space(points, patch.half_sizes, spec.youngs_modulus, spec.poisson_ratio)
-    return dense_compliance(points, patch.half_sizes, _influence(spec, patch))
+    influence = _influence(spec, patch)
+    try:
+        return dense_compliance(points, patch.half_sizes, influence)
+    except InputError as error:
+        raise _out_of_reach(patch) or error from None
+
+
+def _out_of_reach(patch: Patch) -> InputError | None:
+    """What is wrong where the road is so high that the patch goes up the tire's flanks.
+
+    The tread's laws are those of a plane: points that rise by more than STEEPEST of their distance
+    from the footprint lie above each other as seen by the road.
+    """
+    highest = float(patch.gap.max())
+    x0, x1, y0, y1 = patch.extent
+    if highest <= STEEPEST * 0.5 * min(x1 - x0, y1 - y0):
+        return None
+    return InputError(
+        f"contact: points up to {highest:.3g} m above the static road plane take part, which is up the "
+        "tire's flanks, where a tread law for a plane does not hold. The patch reaches that far because "
+        "of the road's height over that plane ([road] height, amplitude, offset or the file; "
+        "contact.reach is 1.5 times it plus 5 mm unless given): take a lower road, or give contact.reach "
+        "the gap (m) up to which points can really touch"
+    )
 
 
 def _product(spec: Spec, patch: Patch, tire: Array) -> Compliance:

@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.solver.complementarity import ContactSolver
+from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.friction import Friction
 from tireroad.greens.sparse_columns import LoadedColumns
 
@@ -54,7 +54,7 @@ class NonlinearTire(Tire, Protocol):
 
 class Instant(NamedTuple):
     """The state at the end of a step: (c,) arrays in N and m, `horizontal` (c, 2) N, `axle_force`
-    (3,) N; `change` and `moved`, what the tire feels and does beyond the static state, all
+    (3,) N; `penetration` (m) of the deepest point as it was solved; `change` and `moved`, what the tire feels and does beyond the static state, all
     components.
     """
 
@@ -65,6 +65,7 @@ class Instant(NamedTuple):
     displacement: np.ndarray
     axle_force: np.ndarray
     residual: float
+    penetration: float
     active: int
     change: np.ndarray
     moved: np.ndarray
@@ -158,6 +159,7 @@ def roll(
             moved[:count],
             axle,
             solver.residual,
+            solver.penetration,
             int(np.count_nonzero(force)),
             change,
             moved,

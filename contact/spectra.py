@@ -23,8 +23,10 @@ def third_octaves(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarr
 
     Base-ten bands 1000 * 10^(k/10) (IEC 61260-1), those that lie whole between the lines of the
     record's spectrum and half the sampling rate; mean square in a band from the power spectrum,
-    lines on the border shared.
+    lines on the border shared. A record of one value has no band.
     """
+    if len(values) < 2:
+        return np.zeros(0), np.zeros((0, values.shape[1]))
     frequency, power = signal.periodogram(values, 1 / step, "hann", detrend="constant", axis=0)
     spacing = frequency[1]
     k = np.arange(-30, 17)

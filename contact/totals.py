@@ -42,7 +42,7 @@ class Totals:
             # One step after the other: the same bits however the steps are blocked.
             sum=float(np.cumsum([old.sum, *load])[-1]),
             residual=max(old.residual, float(steps["residual"].max())),
-            penetration=max(old.penetration, -float(steps["gap"].min())),
+            penetration=max(old.penetration, float(steps["penetration"].max())),
             least=min(old.least, float(load.min())),
             most=max(old.most, float(load.max())),
             most_active=max(old.most_active, int(steps["active"].max())),

@@ -124,6 +124,12 @@ def form(expression):
     return fem.form(expression, **{_JIT_KEY: JIT})
 
 
+def cell_facets(mesh) -> np.ndarray:
+    """Facets (cells, 6) of the hexahedra of this process, ghosts included, in the reference element's order."""
+    mesh.topology.create_connectivity(3, 2)
+    return mesh.topology.connectivity(3, 2).array.reshape(-1, 6)
+
+
 def meshtags(mesh, dim: int, entities: np.ndarray, values: np.ndarray):
     """Integer tags of mesh entities, entities ascending."""
     return dmesh.meshtags(mesh, dim, entities.astype(np.int32), values.astype(np.int32))

@@ -81,8 +81,11 @@ class Wheel:
         outputs: sparse.csr_matrix,
         loads: sparse.csr_matrix,
         option: str,
+        known: Projection | None = None,
     ) -> Response:
-        """Response with the residual `option`; `modes` (all rows) for "attachment" only. Collective."""
+        """Response with the residual `option`; `modes` (all rows) for "attachment" only, with `known`,
+        the projection on these very vectors where there is one: another solution of the same problem
+        has other signs, and other vectors of repeated frequencies. Collective."""
         if option in ("static", "dirac"):
             flexibility = compliance(self.operators, self.rotating_stiffness, outputs, loads)
             return replace(basis.couple(outputs, loads, flexibility), pulse=option == "dirac")
@@ -90,7 +93,7 @@ class Wheel:
         same = outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
-            whole = self._attached(basis, modes, probes)
+            whole = self._attached(modes, probes, known)
         else:
             shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
@@ -103,11 +106,13 @@ class Wheel:
         full = self.rotating_stiffness, self.rotating_damping
         return static_shapes(self.operators, *full, probes)
 
-    def _attached(self, basis: Basis, modes: Modes, probes: sparse.csr_matrix) -> Response:
+    def _attached(
+        self, modes: Modes, probes: sparse.csr_matrix, known: Projection | None
+    ) -> Response:
         """Response of the modes and the attachment modes of all probes. Collective."""
         if not self._drifts:
             shapes = self._static_shapes(probes)
-            grown = self._grown(modes, shapes.columns, basis.projection)
+            grown = self._grown(modes, shapes.columns, known)
             return grown.couple(probes, probes, shapes.compliance)
         return self._standing_attachments(modes, probes).couple(probes, probes)
 

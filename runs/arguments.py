@@ -74,6 +74,9 @@ def parser() -> argparse.ArgumentParser:
         ("export", "XDMF for ParaView and CSV for spreadsheets from a result folder"),
     ):
         command(name, text).add_argument("directory", type=Path, metavar="DIR")
+    compare = command("compare", "two to twelve runs in one page and one table")
+    compare.add_argument("directories", type=Path, nargs="+", metavar="DIR")
+    compare.add_argument("--out", type=Path, metavar="DIR", default=Path("results/compare"))
     command("info", "what a result file holds: datasets, shapes, units, provenance").add_argument(
         "file", type=Path, metavar="FILE"
     )

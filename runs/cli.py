@@ -32,7 +32,7 @@ def _only_warnings() -> None:
 
 
 def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
-    from tireroad.runs.files.folder import claimed
+    from tireroad.runs.files.folder import check_kept_scene, claimed
     from tireroad.runs.scene.load import load
 
     if args.processes not in (None, comm.size):
@@ -41,6 +41,8 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
             f" use ./tireroad run … -n {args.processes},"
             f" or mpirun -n {args.processes} python3 -m runs run …"
         )
+    if getattr(args, "resumed", False):
+        check_kept_scene(args.out)
     scene = load(args.scene, args.set)
     directory = args.out if args.out is not None else Path("results") / scene.name
     mpi.start_petsc(petsc_options)
@@ -69,6 +71,7 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
 
 def _resumed(args: argparse.Namespace) -> argparse.Namespace:
     """`resume DIR` as the run of the scene that DIR keeps."""
+    args.resumed = True
     args.command, args.scene, args.out = "run", args.directory / "scene.toml", args.directory
     args.set, args.until, args.fresh = [], None, False
     return args
@@ -120,10 +123,17 @@ def _results(directory: Path) -> Path:
     return directory
 
 
+def _compare(args: argparse.Namespace) -> None:
+    from tireroad.runs.report.compare import compare
+
+    print(compare(args.directories, args.out))
+
+
 ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
     "check": _check,
     "report": _report,
     "export": _export,
+    "compare": _compare,
     "info": _info,
     "bench": _bench,
     "validate": _validate,

@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 # Axes off an even spacing by less than this share of a step count as even: files round positions.
 EVEN = 1e-4
 
+# Positions of a measured road, m: what lies beyond is damage.
+FINEST, FARTHEST = 1e-6, 1e8
+
 
 class Axis:
     """Ascending positions (m) and the cell a value falls into."""
@@ -89,6 +92,16 @@ class Grid:
         """((x0, x1), (y0, y1)) in m; a mirrored road has no end."""
         reach = (-np.inf, np.inf) if self._end == "mirror" else (0.0, self._length)
         return reach, self._sides
+
+    @property
+    def extent_of_file(self) -> tuple[float, float]:
+        """Length and width of what was measured, m."""
+        return self._length, self._sides[1] - self._sides[0]
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """The smallest steps along and across, m."""
+        return self._x.step, self._y.step
 
     @property
     def spacing(self) -> float:
@@ -180,6 +193,12 @@ def _check_axes(x: Array, y: Array, shape: tuple[int, ...], source: str) -> None
             raise InputError(f"{source}: {name} must hold at least two positions (m)")
         if not np.all(np.isfinite(axis)) or not np.all(np.diff(axis) > 0.0):
             raise InputError(f"{source}: {name} must be finite and ascend (m)")
+        if np.diff(axis).min() < FINEST or np.abs(axis).max() > FARTHEST:
+            raise InputError(
+                f"{source}: {name} has steps down to {np.diff(axis).min():.3g} m and reaches from "
+                f"{axis[0]:.3g} to {axis[-1]:.3g} m; steps must be at least {FINEST:g} m, positions "
+                f"within {FARTHEST:g} m"
+            )
     if shape != (len(x), len(y)):
         raise InputError(f"{source}: z has shape {shape}, x and y ask for {(len(x), len(y))}")
 

@@ -30,7 +30,7 @@ def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
     joint_width, joint_depth, edge_radius, height_scatter (m), stagger, seed; step and cleat:
     position, height, ramp (m), angle (degrees), cleat: length (m); iso8608: road_class,
     shortest_wave (m), seed; texture: rms, roll_off, cut_off (m), hurst, seed; grid and crg: file,
-    holes, end.
+    holes, end; grid: length_unit, height_unit.
     What is absent or None takes its default; datum and longest_wave are only for files and
     cobblestones and iso8608, datum "mean" by default: the others are about zero by themselves.
     InputError for an unknown kind, a missing key or a file that cannot be used.
@@ -110,6 +110,16 @@ def _from_file(reader: Any) -> Any:
     return make
 
 
+def _grid(spec: Any) -> Grid:
+    return read_grid(
+        Path(_get(spec, "file")),
+        holes=_get(spec, "holes", "refuse"),
+        end=_get(spec, "end", "refuse"),
+        length_unit=getattr(spec, "length_unit", None),
+        height_unit=getattr(spec, "height_unit", None),
+    )
+
+
 _MAKERS = {
     "flat": lambda spec: Flat(),
     "sine": _sine,
@@ -118,7 +128,7 @@ _MAKERS = {
     "cleat": _obstacle,
     "iso8608": _iso8608,
     "texture": _texture,
-    "grid": _from_file(read_grid),
+    "grid": _grid,
     "crg": _from_file(read_opencrg),
 }
 

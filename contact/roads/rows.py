@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 import weakref
 from collections.abc import Iterator
@@ -18,6 +19,19 @@ Array = NDArray[np.float64]
 
 # Numbers read at a time, 32 MB of them: what a road of any length takes.
 PIECE = 4_000_000
+# Lists of points are sorted in memory, and positions along x are held there.
+MAX_POINTS = 10_000_000
+# Heights that may be unpacked into a temporary file: 16 GB.
+MAX_UNPACKED = 2_000_000_000
+
+
+def check_count(file: Path, count: int) -> None:
+    """InputError for more positions than are held in memory."""
+    if count > MAX_POINTS:
+        raise InputError(
+            f"road.file {file}: {count:,} positions to be held in memory, more than the "
+            f"{MAX_POINTS:,} that may be; cut the road first, or write its heights as a matrix by rows"
+        )
 
 
 class Rows(Protocol):
@@ -49,6 +63,18 @@ class Columns:
     def read(self, i0: int, i1: int) -> Array:
         """Rows i0 to i1."""
         return self._rows.read(i0, i1)[:, self._columns]
+
+
+class Scaled:
+    """Rows in another unit: times a factor."""
+
+    def __init__(self, rows: Rows, factor: float) -> None:
+        self._rows, self._factor = rows, factor
+        self.shape = rows.shape
+
+    def read(self, i0: int, i1: int) -> Array:
+        """Rows i0 to i1."""
+        return self._factor * self._rows.read(i0, i1)
 
 
 class Packed(NamedTuple):
@@ -89,10 +115,14 @@ class Spool:
     """Rows that come one block after the other, from text or a compressed file.
 
     More than `PIECE` numbers go to a temporary file without a name, as doubles, and are read from
-    there: it takes room on the disk (TMPDIR) until the program ends, not memory.
+    there: it takes room on the disk (TMPDIR) until the program ends, not memory. InputError, which
+    names `source`, when that would be more than half of the free room, or more than MAX_UNPACKED
+    numbers; at once where their number is `announced`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, source: str = "road", announced: int = 0) -> None:
+        self._source, self._written = source, 0
+        self._check_room(announced)
         self._blocks: list[Array] = []
         self._held = self._rows = self._width = 0
         self._open: int | None = None
@@ -117,11 +147,28 @@ class Spool:
         if self._open is None:
             self._open, name = tempfile.mkstemp()
             os.unlink(name)
+        self._check_room(self._held)
+        self._written += self._held
         for block in self._blocks:
             data = memoryview(np.ascontiguousarray(block, dtype=float)).cast("B")
             while data:
                 data = data[os.write(self._open, data) :]
         self._blocks, self._held = [], 0
+
+    def _check_room(self, numbers: int) -> None:
+        """InputError unless so many numbers more may go to the disk."""
+        if numbers <= PIECE and self._written == 0:
+            return
+        folder = tempfile.gettempdir()
+        free = shutil.disk_usage(folder).free
+        total = self._written + numbers
+        if total > MAX_UNPACKED or 8 * numbers > 0.5 * free:
+            raise InputError(
+                f"{self._source}: unpacked it has {total:.3g} heights, {8e-9 * total:.3g} GB in {folder} "
+                f"({1e-9 * free:.3g} GB free); at most {8e-9 * MAX_UNPACKED:g} GB and half of what is free "
+                "may be taken: cut the road first, set TMPDIR to a larger disk, or write it by "
+                "numpy.savez or to .h5, which need not be unpacked"
+            )
 
 
 def pieces(rows: Rows, overlap: int = 0) -> Iterator[tuple[int, Array]]:

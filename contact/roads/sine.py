@@ -20,7 +20,7 @@ class Sine:
             raise InputError(f"road: amplitude {amplitude:g} m must not be negative")
         self._amplitude, self._phase = amplitude, phase
         self._wavenumber = 2.0 * np.pi / wavelength
-        self.spacing = wavelength
+        self.spacing = wavelength / 2  # two points a wave: the shortest length resolved
 
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m) at x, m; y does not matter."""

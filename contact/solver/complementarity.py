@@ -7,48 +7,26 @@ Complementarity Problem, 3.1.6 and 3.3.7). Serial: every process that calls solv
 problem for itself.
 """
 
-from typing import Protocol
-
 import numpy as np
-from numpy.typing import NDArray
 
+from tireroad.contact.solver.conditions import (
+    Array,
+    Index,
+    Mask,
+    check_residual,
+    checked_compliance,
+    complementarity_residual,
+    penetration,
+)
 from tireroad.contact.solver.factor import ActiveFactor
 from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
-from tireroad.fem.errors import ConvergenceError, InputError
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Index = NDArray[np.intp]
+from tireroad.fem.errors import ConvergenceError
 
 # A sign error below this share of the scale is rounding: without it a point whose force and gap are
 # both 0 flips in and out for ever.
 ROUNDING = 1e-12
-# Share of the scale the complementarity residual may reach in the end.
-TOLERANCE = 1e-9
 # Full exchanges that may fail to reduce the wrong signs before single exchanges take over.
 PATIENCE = 10
-
-
-class ContactSolver(Protocol):
-    """What the time loop needs; `active`, `gap` (m), `residual`, ... are of the last solve."""
-
-    active: Mask
-    gap: Array
-    residual: float
-    iterations: int
-
-    @property
-    def factorisations(self) -> int: ...
-
-    def solve(
-        self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
-    ) -> Array: ...
-
-    def block(self, index: Index) -> Array: ...
-
-    def state(self) -> dict[str, Array]: ...
-
-    def set_state(self, kept: dict[str, Array]) -> None: ...
 
 
 class ActiveSet:
@@ -73,6 +51,7 @@ class ActiveSet:
         n = len(self._diagonal)
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
+        self.penetration = 0.0
         self.residual = 0.0
         self.iterations = 0
         self._factor = ActiveFactor(matrix)
@@ -173,59 +152,8 @@ class ActiveSet:
         np.maximum(force, 0.0, out=force)
         self.residual = complementarity_residual(force, gap, self._diagonal, scale)
         check_residual("active-set", self.residual)
+        self.penetration = penetration(gap)
         gap[active] = 0.0
         self.active, self.gap = active, gap
         self._before, self._signs = self._signs, force * self._diagonal - gap
         return force
-
-
-def make_solver(name: str, matrix: Array | Compliance) -> ContactSolver:
-    """The solver named "active-set" or "snes-vi" (`contact.solver`). InputError for another."""
-    if name == "active-set":
-        return ActiveSet(matrix)
-    if name == "snes-vi":
-        from tireroad.contact.solver.snes_vi import SnesVI  # PETSc only where it is asked for
-
-        return SnesVI(matrix)
-    raise InputError(f'contact.solver = "{name}" is unknown: take "active-set" or "snes-vi"')
-
-
-def checked_compliance(matrix: Array) -> Array:
-    """The matrix (n, n) m/N as a C-ordered copy; InputError if the solution would not be unique."""
-    matrix = np.array(matrix, dtype=float, order="C")
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
-        raise InputError(f"contact: the compliance must be a square matrix, not {matrix.shape}")
-    if not np.all(np.isfinite(matrix)):
-        raise InputError("contact: the compliance has entries that are not finite (m/N)")
-    symmetric = 0.5 * (matrix + matrix.T)
-    try:
-        np.linalg.cholesky(symmetric)
-    except np.linalg.LinAlgError:
-        eigenvalues = np.linalg.eigvalsh(symmetric)
-        raise InputError(
-            "contact: the compliance is not positive definite (eigenvalues of its symmetric part "
-            f"from {eigenvalues[0]:.3g} to {eigenvalues[-1]:.3g} m/N), so the contact forces are "
-            "not unique; add tread compliance ([contact] tread) or a residual flexibility "
-            '([greens] residual = "static")'
-        ) from None
-    return matrix
-
-
-def complementarity_residual(force: Array, gap: Array, diagonal: Array, scale: float) -> float:
-    """max |min(diag(A) f, g)| over `scale` (m); 0 at the solution, also when the scale is 0."""
-    worst = float(np.abs(np.minimum(force * diagonal, gap)).max())
-    return worst / scale if scale > 0.0 else worst
-
-
-def check_residual(name: str, residual: float) -> None:
-    """ConvergenceError when the relative residual is above the tolerance or not a number."""
-    if np.isnan(residual):
-        raise ConvergenceError(
-            f"contact ({name}): the gaps are not finite: the motion has grown without bound; take "
-            'a smaller [time] step or scheme = "constant"'
-        )
-    if residual > TOLERANCE:
-        raise ConvergenceError(
-            f"contact ({name}): complementarity residual {residual:.2g} of the largest gap, above "
-            f"{TOLERANCE:g}; add tread compliance or a residual flexibility, or take another solver"
-        )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from tireroad.contact.solver.complementarity import ContactSolver
+from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.tangential import Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush
 from tireroad.fem.errors import ConvergenceError

@@ -3,7 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.solver.complementarity import check_residual, complementarity_residual
+from tireroad.contact.solver.conditions import (
+    check_residual,
+    complementarity_residual,
+    penetration,
+)
 from tireroad.contact.solver.grid_compliance import Compliance
 from tireroad.fem.errors import ConvergenceError
 
@@ -33,6 +37,7 @@ class ProjectedCG:
         self._before: Array | None = None
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
+        self.penetration = 0.0
         self.residual = 0.0
         self.iterations = 0
         self.factorisations = 0
@@ -115,5 +120,6 @@ class ProjectedCG:
         check_residual("projected-cg", self.residual)
         self.active = force > 0.0
         self._before, self._last = self._last, force
+        self.penetration = penetration(gap)
         self.gap = np.where(self.active, 0.0, gap)
         return force

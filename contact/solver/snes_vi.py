@@ -1,14 +1,17 @@
 """The same contact problem through PETSc's SNES VI: an independent check, slower."""
 
+import weakref
+
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from tireroad.contact.solver.complementarity import (
+from tireroad.contact.solver.conditions import (
     TOLERANCE,
     check_residual,
     checked_compliance,
     complementarity_residual,
+    penetration,
 )
 from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
 from tireroad.contact.solver.snes_product import Preconditioner, Product
@@ -44,6 +47,7 @@ class SnesVI:
         self._unit = float(self._diagonal.max())
         self.active: Mask = np.zeros(n, dtype=bool)
         self.gap: Array = np.zeros(n)
+        self.penetration = 0.0
         self.residual = 0.0
         self.iterations = 0
         self.factorisations = 0
@@ -74,8 +78,10 @@ class SnesVI:
     def _make_snes(self) -> None:
         snes = PETSc.SNES().create(comm=PETSc.COMM_SELF)
         snes.setType(PETSc.SNES.Type.VINEWTONRSLS)
-        snes.setFunction(self._evaluate, self._function)
-        snes.setJacobian(self._fill, self._jacobian)
+        # Not bound methods: the circle they close would outlive PETSc and crash the interpreter's exit.
+        own = weakref.proxy(self)
+        snes.setFunction(lambda *given: own._evaluate(*given), self._function)
+        snes.setJacobian(lambda *given: own._fill(*given), self._jacobian)
         snes.setVariableBounds(*self._bounds)
         snes.setTolerances(rtol=0.0, atol=1e-12, stol=0.0, max_it=MAX_ITERATIONS)
         if self._product is None:
@@ -160,6 +166,7 @@ class SnesVI:
         check_residual("snes-vi", self.residual)
         # The semismooth method leaves forces of rounding size on points that do not touch.
         self.active = diagonal * force > gap
+        self.penetration = length * penetration(gap)
         self.gap = length * np.where(self.active, 0.0, gap)
         return np.where(self.active, force, 0.0) * (length / self._unit)
 

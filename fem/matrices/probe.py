@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from tireroad.fem.sections.reference import line
 from tireroad.fem.tire.mesh import Lattice
 
 _POINTS = 6  # Gauss points a direction for each element a spread force covers
@@ -26,16 +27,28 @@ def spot(
     Angles in rad: around the axle from the lowest point, along the section from the crown; `spread`
     are the half widths. A reading with spread is the mean over the spot.
     """
-    around, ring_weight = _line_rule(lattice.section.ring_corners, ring, spread[0])
-    along, arc_weight = _line_rule(lattice.section.arc_corners, arc, spread[1])
-    # Area per angles of the torus: the outer parts of a spread spot are the longer ones.
-    section = lattice.section
-    reach = section.outer_radius - section.minor_radius + section.minor_radius * np.cos(along)
-    arc_weight = arc_weight * reach / (arc_weight @ reach)
-    shape_ring = ring_weight @ _shape(section.ring_corners, lattice.edge, around % (2 * np.pi))
+    around, ring_weight = _line_rule(lattice.ring_corners, ring, spread[0])
+    along, arc_weight = _line_rule(lattice.arc_corners, arc, spread[1])
+    # Area per angles: the outer parts of a spread spot are the longer ones.
+    area = _area(lattice, along)
+    arc_weight = arc_weight * area / (arc_weight @ area)
+    shape_ring = ring_weight @ _shape(lattice.ring_corners, lattice.edge, around % (2 * np.pi))
     shape_ring[0] += shape_ring[-1]
-    shape_arc = arc_weight @ _shape(section.arc_corners, lattice.edge, along)
+    shape_arc = arc_weight @ _shape(lattice.arc_corners, lattice.edge, along)
     return np.outer(shape_ring[:-1], shape_arc).ravel()
+
+
+_STEP = 1e-5  # of an element, of the difference quotient
+
+
+def _area(lattice: Lattice, arc: np.ndarray) -> np.ndarray:
+    """Area of the undeformed outer face per angle around and section angle, m2/rad2, at angles (k,)."""
+    element, local = _local(lattice.arc_corners, arc)
+    low, high = np.clip(local - _STEP, 0, 1), np.clip(local + _STEP, 0, 1)
+    ends = [lattice.tire.outer_line(element, t) for t in (low, high)]
+    length = np.linalg.norm(ends[1] - ends[0], axis=1) / (high - low)
+    r = lattice.tire.outer_line(element, np.clip(local, 0, 1))[:, 0]
+    return r * length / np.diff(lattice.arc_corners)[element]
 
 
 def directed(weights: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -70,11 +83,11 @@ def line_shape(
     corners: np.ndarray, edge: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """First node (k,) of each point's element on a line, and its shape functions (k, order + 1)."""
-    order = len(edge) - 1
+    element, local = _local(corners, points)
+    return (len(edge) - 1) * element, line(edge, local)
+
+
+def _local(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Element (k,) of each point on a line, and its place in it, 0 to 1."""
     element = np.clip(np.searchsorted(corners, points, side="right") - 1, 0, len(corners) - 2)
-    local = (points - corners[element]) / np.diff(corners)[element]
-    values = np.empty((len(points), order + 1))
-    for a in range(order + 1):
-        others = np.delete(edge, a)
-        values[:, a] = np.prod((local[:, None] - others) / (edge[a] - others), axis=1)
-    return order * element, values
+    return element, (points - corners[element]) / np.diff(corners)[element]

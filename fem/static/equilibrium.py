@@ -205,7 +205,7 @@ class Equilibrium:
         self._assemble_tangent()
         diagonal = self.matrix.getDiagonal()
         typical = diagonal.norm() / np.sqrt(diagonal.size)
-        return self.body.tire.section.thickness * typical, diagonal.array[self._vertical].copy()
+        return self.body.ring.thickness * typical, diagonal.array[self._vertical].copy()
 
     def _assemble_residual(self) -> np.ndarray:
         """Forces out of balance at the owned dofs, N; on the rim 0, where the wheel takes them."""

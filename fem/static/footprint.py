@@ -26,7 +26,7 @@ def nodal_area(lattice: Lattice, positions: np.ndarray) -> np.ndarray:
     pressure puts on the nodes; a node's share of distances is not (a factor 2 between corners and
     middles of quadratic elements).
     """
-    around, _, along = lattice.shape
+    around, along = lattice.face_shape
     order = len(lattice.edge) - 1
     weight, slope = _edge_rule(lattice.edge)
     grid = positions.reshape(around, along, 3)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.probe import line_shape
+from tireroad.fem.sections.locate import interpolation, locate
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.mesh import Lattice, Torus
+from tireroad.fem.tire.mesh import Lattice
 
 RATE = 2.0
-LEAST = (6, 2)  # elements around and along: below, a tire is none
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,10 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
     touch. Collective; the body is left as it is.
     """
     fine, equilibrium = loader.body, loader.equilibrium
-    section = _halved(fine.tire.section)
-    if section is None:
+    ring = fine.ring.coarser()
+    if ring is None:
         return "the mesh is too coarse to be halved"
-    try:
-        body = Body(fine.comm, section, fine.material, fine.regions)
-    except InputError as error:
-        return f"on twice the size, {error}"
+    body = Body(fine.comm, ring, fine.materials)
     coarse = Equilibrium(body, rolling)
     companion = Loader(coarse, lambda progress: None)
     deflection = equilibrium.road_height - loader.touch
@@ -55,36 +52,17 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
     except ConvergenceError as error:
         return f"on twice the size, {error}"
     load, found = loader.load(), companion.load()
-    ratio = np.sqrt(_faces(fine.tire.section) / _faces(section))
+    ratio = np.sqrt(fine.ring.faces / ring.faces)
     relative = abs(load - found) / (ratio**RATE - 1) / load if load else 0.0
     return LoadError(found, float(relative), 3 * body.lattice.size)
 
 
-def _faces(section: Torus) -> int:
-    return section.segments * section.elements_arc
-
-
-def _halved(section: Torus) -> Torus | None:
-    """Half the elements around and along; through the wall one is one."""
-    around, along = section.segments // 2, section.elements_arc // 2
-    if around < LEAST[0] or along < LEAST[1]:
-        return None
-    return replace(section, segments=around, elements_arc=along)
-
-
 def _sampled(lattice: Lattice, values: np.ndarray, other: Lattice) -> np.ndarray:
     """Values (n, 3) of a lattice's nodes at the nodes of another one of the same tire."""
-    section, edge = lattice.section, lattice.edge
-    out = values.reshape(*lattice.shape, 3)
-    lines = (
-        (section.ring_corners, other.ring),
-        (section.wall_corners, other.wall),
-        (section.arc_corners, other.arc),
-    )
-    for axis, (corners, points) in enumerate(lines):
-        first, shape = line_shape(corners, edge, points)
-        index = (first[:, None] + np.arange(len(edge))) % out.shape[axis]
-        taken = np.take(out, index, axis=axis)
-        weights = shape.reshape(*(1,) * axis, *shape.shape, *(1,) * (3 - axis))
-        out = (taken * weights).sum(axis=axis + 1)
-    return out.reshape(-1, 3)
+    section = lattice.tire.section
+    place = locate(section.nodes, section.cells, section.order, other.section)
+    across = interpolation(lattice.cells_2d, lattice.edge, lattice.shape[1], place)
+    first, shape = line_shape(lattice.ring_corners, lattice.edge, other.ring)
+    index = (first[:, None] + np.arange(len(lattice.edge))) % lattice.shape[0]
+    around = np.einsum("ka,kanx->knx", shape, values.reshape(*lattice.shape, 3)[index])
+    return np.stack([across @ ring for ring in around]).reshape(-1, 3)

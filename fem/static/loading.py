@@ -14,7 +14,6 @@ import numpy as np
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.equilibrium import Equilibrium, Step
 from tireroad.fem.static.tread_surface import TreadSurface
-from tireroad.fem.tire.surface import outer_face
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
 _SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
@@ -68,7 +67,7 @@ class Loader:
         """Height of the lowest point of the outer face between its nodes, m. Collective."""
         lattice = self.body.lattice
         moved = self.body.surface(self.body.owned(self.body.u.x.array))
-        return TreadSurface(lattice, lattice.points(outer_face(lattice)) + moved).lowest()
+        return TreadSurface(lattice, lattice.points(lattice.face) + moved).lowest()
 
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
@@ -79,7 +78,7 @@ class Loader:
         if load <= 0:
             raise InputError(f"static.load = {load:g} N: a road carries a positive load")
         known = [_Known(0.0, 0.0, self.body.u.x.array.copy())]
-        trial = 0.1 * self.body.tire.section.thickness
+        trial = 0.1 * self.body.ring.thickness
         for _ in range(60):
             self._try_deflection(trial, known)
             if abs(known[-1].load - load) <= max(LOAD_TOLERANCE * load, self.equilibrium.rounding):
@@ -142,7 +141,7 @@ class Loader:
         if above:
             low, high = below.deflection, min(above)
             return secant if low < secant < high else (low + high) / 2
-        if below.deflection > self.body.tire.section.minor_radius:
+        if below.deflection > self.body.ring.height:
             raise ConvergenceError(
                 f"static: the tire carries {below.load:.4g} N at {below.deflection:.4g} m of "
                 f"deflection, beyond its section; {load:g} N is out of reach. Lower static.load or "
@@ -164,7 +163,7 @@ class Loader:
                 known.append(self._reached(deflection))
             return step
 
-        largest = 0.25 * self.body.tire.section.thickness
+        largest = 0.25 * self.body.ring.thickness
         self._march(attempt, start, end, largest, "deflection", 1.0, "m")
 
     def _march(self, attempt, start, end, first, what, scale, unit) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
 from tireroad.fem.tire.mesh import Lattice
-from tireroad.fem.tire.surface import outer_face
 
 
 @dataclass(frozen=True)
@@ -50,6 +49,13 @@ class StaticState:
         gap = self.positions[:, 2] - self.road_height
         return np.where(self.force > 0, 0.0, gap)
 
+    @property
+    def penetration(self) -> float:
+        """How far the deepest point of the outer face is inside the road as solved, m; 0 without one."""
+        if self.road_height is None:
+            return 0.0
+        return max(float((self.road_height - self.positions[:, 2]).max()), 0.0)
+
     def rolling_radius(self) -> float:
         """Effective rolling radius, m: material speed over the road per unit speed of rotation.
 
@@ -78,7 +84,7 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
     """Collect the converged state on every process. Collective."""
     body, road_height = equilibrium.body, equilibrium.road_height
     displacement = body.displacement()
-    face = outer_face(body.lattice)
+    face = body.lattice.face
     points = body.lattice.points(face)
     moved = displacement[face]
     force = (
@@ -100,7 +106,7 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
 
 def _surface_metric(lattice: Lattice, positions: np.ndarray):
     """Half sizes of each node's rectangle, dx/dtheta, and the shape (around, along) of the face."""
-    shape = (lattice.shape[0], lattice.shape[2])
+    shape = lattice.face_shape
     grid = positions.reshape(*shape, 3)
     ring = np.concatenate([grid[-1:], grid, grid[:1]])
     angle = np.concatenate(

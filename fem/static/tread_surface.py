@@ -23,13 +23,13 @@ class TreadSurface:
 
     def __init__(self, lattice: Lattice, positions: np.ndarray):
         self._lattice, self._positions = lattice, positions
-        self._shape = lattice.shape[0], lattice.shape[2]
+        self._shape = lattice.face_shape
 
     def weights(self, ring: np.ndarray, arc: np.ndarray) -> sparse.csr_matrix:
         """Shape functions (k, s) of the face's nodes at angles around the axle and the section, rad."""
-        section, edge = self._lattice.section, self._lattice.edge
-        around, ring_shape = line_shape(section.ring_corners, edge, ring % (2 * np.pi))
-        along, arc_shape = line_shape(section.arc_corners, edge, arc)
+        lattice, edge = self._lattice, self._lattice.edge
+        around, ring_shape = line_shape(lattice.ring_corners, edge, ring % (2 * np.pi))
+        along, arc_shape = line_shape(lattice.arc_corners, edge, arc)
         nodes = np.arange(len(edge))
         i = (around[:, None] + nodes) % self._shape[0]
         j = along[:, None] + nodes
@@ -49,16 +49,18 @@ class TreadSurface:
         An element dips below its lowest node by less than its nodes' range, so all that could reach
         below every node are looked at; each by a grid that closes in on its lowest point.
         """
-        section, edge = self._lattice.section, self._lattice.edge
+        lattice, edge = self._lattice, self._lattice.edge
         order = len(edge) - 1
-        i = (order * np.arange(section.segments)[:, None] + np.arange(order + 1)) % self._shape[0]
-        j = order * np.arange(section.elements_arc)[:, None] + np.arange(order + 1)
+        i = (
+            order * np.arange(len(lattice.ring_corners) - 1)[:, None] + np.arange(order + 1)
+        ) % self._shape[0]
+        j = order * np.arange(len(lattice.arc_corners) - 1)[:, None] + np.arange(order + 1)
         height = self._positions[:, 2].reshape(self._shape)[i[:, None, :, None], j[None, :, None]]
         low, high = height.min(axis=(2, 3)), height.max(axis=(2, 3))
         around, along = np.nonzero(2 * low - high <= low.min())
         corners = [
             np.stack([line[index], line[index + 1]], axis=1)
-            for line, index in ((section.ring_corners, around), (section.arc_corners, along))
+            for line, index in ((lattice.ring_corners, around), (lattice.arc_corners, along))
         ]
         while max((box[:, 1] - box[:, 0]).max() for box in corners) > _CLOSE_ANGLE:
             corners, found = self._closed_in(*corners)

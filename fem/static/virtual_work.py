@@ -15,12 +15,14 @@ from tireroad.fem.tire.body import Body
 class Rolling:
     """Steady rolling: speed Omega in rad/s, damping gamma1 in 1/s, stiffness_damping gamma2 in s.
 
-    At speed 0 nothing is added.
+    `inertia` "full": of the whole motion, Omega^2 S (X + u), centrifugal forces included; "doppler": of
+    the body rate alone, Omega^2 S_B u, as in the pencil of that name. At speed 0 nothing is added.
     """
 
     speed: float = 0.0
     damping: float = 0.0
     stiffness_damping: float = 0.0
+    inertia: str = "full"
 
 
 AT_REST = Rolling()
@@ -54,7 +56,10 @@ def _rolling_work(body: Body, rolling: Rolling):
     """The virtual work of inertia and of damping by the mass."""
     u, v = body.u, body.test
     w = kinematics.wheel_velocity(body.mesh)
-    rate, test_rate = w + kinematics.convective(u, w), kinematics.convective(v, w)
+    if rolling.inertia == "full":
+        rate, test_rate = w + kinematics.convective(u, w), kinematics.convective(v, w)
+    else:
+        rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
     # Constants and not numbers: another speed compiles nothing.
     inertia = fem.Constant(body.mesh, float(rolling.speed**2))
     drag = fem.Constant(body.mesh, float(rolling.speed * rolling.damping))

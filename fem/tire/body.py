@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import ufl
@@ -11,31 +11,39 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from tireroad.fem import compat
+from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.torus import Torus
 from tireroad.fem.tire.material import Material
-from tireroad.fem.tire.mesh import INNER, RIM, TREAD, Torus, build
-from tireroad.fem.tire.surface import Gather, outer_face
-from tireroad.fem.tire.wall import Region, Wall
+from tireroad.fem.tire.mesh import INNER, RIM, TREAD, build
+from tireroad.fem.tire.surface import Gather
+from tireroad.fem.tire.wall import Region, Wall, compounds
 
 
 class Body:
-    """A section and what it is made of, with its displacement `u` about the undeformed shape.
+    """A ring and what it is made of, with its displacement `u` about the undeformed shape.
 
-    Collective to make. `ids` are the lattice ids of this process's owned nodes; `rim` and `tread`
+    A `Ring` comes with the materials of its section's regions by name; a `Torus` with the one of its
+    wall, and regions that have others. Collective to make. `ids` are the lattice ids of this process's owned nodes; `rim` and `tread`
     its blocked dofs there (ghosts included in `rim`, as boundary conditions want them).
     """
 
     def __init__(
         self,
         comm: MPI.Comm,
-        section: Torus,
-        material: Material,
+        tire: Ring | Torus,
+        material: Material | Mapping[str, Material],
         regions: Sequence[Region] = (),
     ):
-        self.comm, self.material, self.regions = comm, material, tuple(regions)
-        self.tire = build(comm, section)
+        self.comm = comm
+        if isinstance(tire, Torus):
+            tire = tire.ring([region.patch(i) for i, region in enumerate(regions)])
+            material = compounds(material, tuple(regions))
+        self.materials = material
+        self.tire = build(comm, tire)
+        self.ring, order = tire, tire.order
         self.mesh, self.lattice = self.tire.mesh, self.tire.lattice
-        self.space = compat.vector_space(self.mesh, section.order)
-        self.wall = Wall(self.tire, self.space, material, regions)
+        self.space = compat.vector_space(self.mesh, order)
+        self.wall = Wall(self.tire, material)
         self.u = fem.Function(self.space)
         # One of each for all forms: UFL does not always take two of the same space for equal
         # (seen with dolfinx 0.5.2, from one run to the next).
@@ -46,19 +54,19 @@ class Body:
         tread = self._face_dofs(TREAD)
         self.tread = np.setdiff1d(tread[tread < self.nodes], self.rim)
         # 2 x order integrates the quadratic form of an affine element exactly: full integration.
-        measure = {"metadata": {"quadrature_degree": 2 * section.order}}
+        measure = {"metadata": {"quadrature_degree": 2 * order}}
         self.dx = ufl.Measure("dx", domain=self.mesh, **measure)
         # One Gauss point a direction less: what the dilatation is integrated with (static_residual).
-        reduced = {"quadrature_degree": 2 * section.order - 1}
+        reduced = {"quadrature_degree": 2 * order - 1}
         self.reduced_dx = ufl.Measure("dx", domain=self.mesh, metadata=reduced)
         # Two surface tangents and a test function: what exactly makes the pressure's stiffness
         # symmetric. At order 3 with 2 x order, 7e-8 was left, and no mode was as soft as that.
-        exact = {"quadrature_degree": 3 * section.order - 1}
+        exact = {"quadrature_degree": 3 * order - 1}
         self.inner_ds = ufl.Measure(
             "ds", domain=self.mesh, subdomain_data=self.tire.facets, metadata=exact
         )(INNER)
         self.everywhere = Gather(comm, self.ids, np.arange(self.lattice.size))
-        self.surface = Gather(comm, self.ids, outer_face(self.lattice))
+        self.surface = Gather(comm, self.ids, self.lattice.face)
 
     def _face_dofs(self, tag: int) -> np.ndarray:
         facets = self.tire.facets.indices[self.tire.facets.values == tag]
@@ -73,7 +81,7 @@ class Body:
 
         kg; positive, rim included. Collective.
         """
-        lobatto = {"quadrature_rule": "GLL", "quadrature_degree": 2 * self.tire.section.order - 1}
+        lobatto = {"quadrature_rule": "GLL", "quadrature_degree": 2 * self.ring.order - 1}
         dx = ufl.Measure("dx", domain=self.mesh, metadata=lobatto)
         ones = ufl.as_vector((1.0, 1.0, 1.0))
         weight = self.wall.density * ufl.inner(self.test, ones) * dx

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +10,14 @@ from dolfinx import fem
 
 from tireroad.fem import compat
 from tireroad.fem.errors import InputError
+from tireroad.fem.sections.grid import Patch
 from tireroad.fem.tire.material import LAWS, Material
-from tireroad.fem.tire.mesh import TireMesh, Torus
+from tireroad.fem.tire.mesh import TireMesh
 
 
 @dataclass(frozen=True)
 class Region:
-    """A part of the section with a material of its own.
+    """A part of a torus's section with a material of its own; the mesh has element edges on its edges.
 
     `arc` (from, to) in rad from the crown, on the sides named: "both", "left" (y < 0) or "right";
     `depth` (from, to) through the wall, 0 the inner and 1 the outer face.
@@ -27,36 +28,35 @@ class Region:
     depth: tuple[float, float] = (0.0, 1.0)
     side: str = "both"
 
-    def covers(self, arc: np.ndarray, depth: np.ndarray) -> np.ndarray:
-        """Whether points at a section angle (rad) and depth lie in the region."""
-        along = {"both": np.abs(arc), "left": -arc, "right": arc}[self.side]
-        inside = (along >= self.arc[0]) & (along <= self.arc[1])
-        return inside & (depth >= self.depth[0]) & (depth <= self.depth[1])
+    def patch(self, number: int) -> Patch:
+        """The part of the section, named by its number in the scene."""
+        low, high = self.arc
+        right, left = (low, high), (-high, -low)
+        arcs = {"both": (right, left), "left": (left,), "right": (right,)}[self.side]
+        return Patch(f"tire.region {number}", arcs, self.depth)
+
+
+def compounds(material: Material, regions: tuple[Region, ...]) -> dict[str, Material]:
+    """The materials of a torus by name of the region of its section."""
+    return {"wall": material} | {r.patch(i).name: r.material for i, r in enumerate(regions)}
 
 
 class Wall:
     """Density and the coefficients of all laws in use, as fields that are constant in a cell.
 
     They are data of the compiled forms, not part of them: another modulus compiles nothing, and a
-    region costs nothing. A cell belongs to the last region that holds its middle. Collective to make;
-    raises InputError for a region that holds no cell.
+    region costs nothing. `materials` by name of the section's regions. Collective to make; raises
+    InputError for a region without a material.
     """
 
-    def __init__(self, tire: TireMesh, space, material: Material, regions: Sequence[Region] = ()):
+    def __init__(self, tire: TireMesh, materials: Mapping[str, Material]):
         self._space = compat.cell_space(tire.mesh)
-        arc, depth = _middles(tire.section, space)
-        owner = np.zeros(len(arc), dtype=int)
-        for number, region in enumerate(regions):
-            covered = region.covers(arc, depth)
-            if not tire.mesh.comm.allreduce(int(covered.sum())):
-                raise InputError(
-                    f"tire.region {number} (arc {np.degrees(region.arc[0]):g} to "
-                    f"{np.degrees(region.arc[1]):g} deg) holds the middle of no element: make it "
-                    "larger or the mesh finer"
-                )
-            owner[covered] = number + 1
-        self._materials = [material, *(region.material for region in regions)]
-        self._owner = owner
+        section = tire.ring.section
+        missing = [name for name in section.regions if name not in materials]
+        if missing:
+            raise InputError(f"section: no material for region {missing[0]!r}")
+        self._owner = section.region[tire.section_cell]  # of each cell: the number of its region
+        self._materials = [materials[name] for name in section.regions]
         self.density = self._field("density", None)
         self._laws = [
             (law.energy, [self._field(name, model) for name in law.coefficients])
@@ -75,16 +75,3 @@ class Wall:
         """Strain energy density as (distortion, dilatation), J/m3, in UFL."""
         parts = [energy(C, *coefficients) for energy, coefficients in self._laws]
         return sum(part[0] for part in parts), sum(part[1] for part in parts)
-
-
-def _middles(section: Torus, space) -> tuple[np.ndarray, np.ndarray]:
-    """Section angle (rad) and depth (0 inner face, 1 outer) of the middle of each cell, ghosts too.
-
-    From the cell's own nodes: the middle in space of a flat-faced element lies inside the curve.
-    """
-    _, wall, arc = section.coordinates(space.tabulate_dof_coordinates())
-    cells = space.mesh.topology.index_map(3)
-    count = cells.size_local + cells.num_ghosts
-    nodes = np.array([space.dofmap.cell_dofs(cell) for cell in range(count)])
-    depth = 1 - (section.minor_radius - wall) / section.thickness
-    return arc[nodes].mean(axis=1), depth[nodes].mean(axis=1)

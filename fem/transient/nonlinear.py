@@ -52,7 +52,7 @@ class NonlinearTire(FullTire):
             operators, None, 0.0, damping, step, outputs, loads, spectral_radius=spectral_radius
         )
         body = operators.body
-        self._body, self._small = body, _FLOOR * body.tire.section.thickness
+        self._body, self._small = body, _FLOOR * body.ring.thickness
         self._static = body.u.x.array.copy()
         pressure = fem.Constant(body.mesh, float(inflation))
         self._force_form = compat.form(static_residual(body, pressure, AT_REST))

@@ -7,7 +7,6 @@ import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
@@ -16,6 +15,7 @@ from tireroad.contact.grid_patch import settle
 from tireroad.contact.model import step_solver
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
+from tireroad.runs.files.store import opened
 from tireroad.runs.process import observe
 from tireroad.runs.stages.session import Session
 from tireroad.runs.validation.histories import History, distance, follow
@@ -118,7 +118,7 @@ def rolled(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Rolled:
     with observe.quiet():
         run_scene(scene, folder, MPI.COMM_WORLD, until="contact", fresh=False, petsc_options=[])
     stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
-    with h5py.File(folder / "contact.h5") as file:
+    with opened(folder / "contact.h5") as file:
         forces = {name: file[name][:] for name in ("total_force", "axle_force")}
     return Rolled(stages, forces)
 

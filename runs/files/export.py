@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import xdmf
 from tireroad.runs.files.disk import replacing
+from tireroad.runs.files.store import opened
 
 AXES = ("x", "y", "z")
 Columns = dict[str, NDArray]  # heading with unit -> values (n)
@@ -47,13 +48,8 @@ def export(directory: Path) -> list[Path]:
 
 
 def _read(path: Path, reader: Callable[[h5py.File], dict]) -> dict:
-    try:
-        with h5py.File(path, "r") as file:
-            return reader(file)
-    except (OSError, KeyError, RuntimeError, ValueError) as error:
-        raise InputError(
-            f"{path} is damaged or incomplete: {error}; run its scene again with --fresh"
-        ) from error
+    with opened(path) as file:
+        return reader(file)
 
 
 def write_csv(path: Path, columns: Columns) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed, signed_table
 from tireroad.runs.files.disk import explained, write_text
 from tireroad.runs.files.store import plain
 from tireroad.runs.scene.resolved import MARK
@@ -34,7 +35,28 @@ def _earlier(directory: Path) -> dict[str, Any] | None:
         found["program"]["version"], found["scene"], found["stages"].items()
     except (ValueError, TypeError, KeyError, AttributeError):
         raise InputError(f"{path}: is not a summary of {PROGRAM}; {OTHER}") from None
+    if not is_table_as_signed(found):
+        raise InputError(
+            f"{path}: is damaged: it is not what was written (checksum). Remove it to go on, the"
+            " stages' own files are kept; or choose another folder with --out"
+        )
     return found
+
+
+def check_kept_scene(directory: Path) -> None:
+    """Raise InputError where the folder's scene.toml is not as the run left it: no `resume` then."""
+    path = directory / "scene.toml"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{directory}: there is no run to resume: it has no scene.toml") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
+    if not is_as_signed(text):
+        raise InputError(
+            f"{path}: has changed since the run wrote it (damaged or edited): resume goes on with"
+            " what was begun; use run for another scene, or to write it anew from your own file"
+        )
 
 
 def _check_name(directory: Path, found: Any, scene_name: str) -> None:
@@ -148,7 +170,8 @@ class Summary:
             "warnings": warnings or kept.get("warnings", []),
             "cost": cost or kept.get("cost", {}),
         }
-        text = json.dumps(_finite(self.data), indent=1, ensure_ascii=False, default=plain)
+        data = json.loads(json.dumps(_finite(self.data), default=plain))
+        text = json.dumps(signed_table(data), indent=1, ensure_ascii=False)
         write_text(self.path, text + "\n")
 
 

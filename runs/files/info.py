@@ -9,6 +9,8 @@ import h5py
 import numpy as np
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.files import checksum
+from tireroad.runs.files.store import verify
 
 LONG = 96  # characters of an attribute printed on one line
 
@@ -16,26 +18,44 @@ LONG = 96  # characters of an attribute printed on one line
 def describe(file: Path) -> str:
     """Provenance, attributes, datasets (shape, type, unit, size in the file) of an HDF5 result.
 
-    Reads no dataset, so it takes no time for files of any size. Not collective. Raises InputError
-    where the file is absent, is no HDF5 or is damaged.
+    A result file's checksum is verified first, which reads all of it: about a second per GB. Other
+    HDF5 files are described too. Control characters are shown as escapes. Not collective. Raises
+    InputError where the file is absent, is no HDF5 or is damaged.
     """
     if not file.is_file():
         raise InputError(f"{file}: there is no such file")
-    if not h5py.is_hdf5(file):
-        raise InputError(f"{file} is no HDF5 file: give a result file of a run, such as static.h5")
+    try:
+        whole = "right" if checksum.is_whole(file) else "wrong"
+    except checksum.NoChecksum:
+        whole = "none (not written by this version of tireroad)"
+    except OSError as error:
+        raise InputError(f"{file} cannot be read ({error.strerror})") from None
+    if whole == "wrong" and not h5py.is_hdf5(file):
+        raise InputError(
+            f"{file} is no HDF5 file, or a damaged one: give a result file of a run, such as static.h5"
+        )
+    if whole == "wrong":
+        verify(file)
     try:
         with h5py.File(file, "r") as opened:
-            return "\n".join((*_head(file, opened), *_attributes(opened), *_datasets(opened)))
-    except (OSError, RuntimeError, KeyError) as error:
-        raise InputError(
-            f"{file} is damaged or truncated: {error}; run its scene again with --fresh"
-        ) from error
+            lines = (*_head(file, opened, whole), *_attributes(opened), *_datasets(opened))
+            return "\n".join(_printable(line) for line in lines)
+    except Exception as error:  # HDF5 and h5py raise whatever comes of a damaged foreign file
+        raise InputError(f"{file} is damaged: {type(error).__name__}: {error}") from error
 
 
-def _head(path: Path, file: h5py.File) -> Iterator[str]:
+def _printable(line: str) -> str:
+    """A line whose control characters, which a terminal would obey, are written as escapes."""
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape", "backslashreplace").decode()
+        for c in line
+    )
+
+
+def _head(path: Path, file: h5py.File, checksum_is: str) -> Iterator[str]:
     stage = file.attrs.get("stage")
     origin = f": stage {stage}" if isinstance(stage, str) else ""
-    yield f"{path} ({_size(path.stat().st_size)}){origin}"
+    yield f"{path} ({_size(path.stat().st_size)}){origin}; checksum: {checksum_is}"
 
 
 def _attributes(file: h5py.File) -> Iterator[str]:

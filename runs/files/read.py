@@ -8,6 +8,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.fem.errors import InputError
+from tireroad.runs.files import store
 from tireroad.runs.report.quantities import quantity
 
 
@@ -47,11 +49,12 @@ class Results:
             file.close()
 
     def file(self, name: str) -> h5py.File:
-        """The open HDF5 file; Absent where there is none, OSError where it is damaged."""
+        """The open HDF5 file; Absent where there is none, InputError where it is damaged."""
         if name not in self._open:
             path = self.directory / name
             if not path.is_file():
                 raise Absent(f"there is no {name}")
+            store.verify(path)
             self._open[name] = h5py.File(path, "r")
         return self._open[name]
 
@@ -74,7 +77,7 @@ class Results:
         """An optional array of another section's file, whose damage is that section's to report."""
         try:
             return self.optional(name, path)
-        except OSError:
+        except InputError:
             return None
 
     def attribute(self, name: str, key: str) -> float | str | None:

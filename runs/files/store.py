@@ -1,7 +1,8 @@
 """Result files: written to a temporary name and renamed, so that a file that exists is whole.
 
 Only the root process calls what writes; arrays are gathered by the caller. Every HDF5 file carries
-the resolved scene, the hash of what it was computed from, program, library versions, process count.
+the resolved scene, the hash of what it was computed from, program, library versions, process count,
+and a checksum that `opened` verifies before the file is read.
 """
 
 import hashlib
@@ -18,10 +19,16 @@ from typing import Any
 import h5py
 import numpy as np
 
+from tireroad.fem.errors import InputError
+from tireroad.runs.files import checksum
 from tireroad.runs.files.disk import replacing
+from tireroad.runs.files.identity import Identity, identity
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
-LIBRARIES = ("dolfinx", "petsc4py", "slepc4py", "mpi4py", "h5py", "numpy", "scipy")
+LOADED = ("mpi4py", "h5py")
+"""Libraries named in result files beside those that `identity` knows."""
+
+AGAIN = "run its scene again, which computes it anew"
 
 
 @dataclass(frozen=True)
@@ -35,17 +42,19 @@ class Provenance:
     processes: int
 
     def attributes(self) -> dict[str, Any]:
-        """The attributes of the file, library versions of what is loaded included."""
+        """The attributes of the file, library versions included."""
+        computed = identity(self.stage)
         loaded = {
             name: str(getattr(sys.modules[name], "__version__", "unknown"))
-            for name in LIBRARIES
+            for name in LOADED
             if name in sys.modules
         }
         return {
             "program": PROGRAM,
             "version": VERSION,
             "format": RESULT_FORMAT,
-            "libraries": json.dumps(loaded, sort_keys=True),
+            "libraries": json.dumps({**computed.libraries, **loaded}, sort_keys=True),
+            "code": computed.code,
             "processes": self.processes,
             "scene_name": self.scene_name,
             "scene": self.scene_text,
@@ -124,7 +133,8 @@ def writing(path: Path, provenance: Provenance, begin: Path | None = None) -> It
             shutil.copyfile(begin, part)
         disk = _Disk(part.open("r+b" if begin else "w+b", buffering=0))
         try:
-            file = h5py.File(disk, "r+" if begin else "w")
+            block = {} if begin else {"userblock_size": checksum.BLOCK}
+            file = h5py.File(disk, "r+" if begin else "w", **block)
             try:
                 for name, value in provenance.attributes().items():
                     file.attrs[name] = value
@@ -135,6 +145,7 @@ def writing(path: Path, provenance: Provenance, begin: Path | None = None) -> It
             disk.close()
         if disk.error is not None:
             raise disk.error
+        checksum.seal(part)
 
 
 def put(file: h5py.Group, name: str, array: Any, unit: str, **attributes: Any) -> h5py.Dataset:
@@ -158,14 +169,64 @@ def file_hash(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def stored_hash(path: Path) -> str | None:
-    """The input hash of a result file; None when it is absent or no readable result."""
+def wanted_hash(stage: str, inputs: Mapping[str, Any]) -> str:
+    """The hash of a stage: of its name, its inputs, and the code and libraries that compute it."""
+    computed = identity(stage)
+    return stage_hash(
+        {"stage": stage, "code": computed.code, "libraries": computed.libraries, **inputs}
+    )
+
+
+def why_not(path: Path, wanted: str, stage: str) -> str:
+    """Why a stage's file cannot be used in place of computing it; "" when it can.
+
+    `wanted` is the hash of what the stage would be computed from now. A file that is absent is the
+    answer "absent".
+    """
+    if not path.exists():
+        return "absent"
     try:
-        with h5py.File(path, "r") as file:
-            value = file.attrs.get("input_hash")
-    except OSError:
-        return None
-    return value if isinstance(value, str) else None
+        with opened(path) as file:
+            found = dict(file.attrs)
+    except InputError:
+        return "it is damaged"
+    if found.get("input_hash") == wanted:
+        return ""
+    return _changed(found, identity(stage))
+
+
+def _changed(found: Mapping[str, Any], now: Identity) -> str:
+    """What is not as it was when a file with these attributes was written."""
+    if "code" not in found:
+        return "it is of an earlier version"
+    libraries = json.loads(found["libraries"])
+    return now.differs(found["code"], libraries) or "the inputs have changed since"
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[h5py.File]:
+    """A result file for reading, once its checksum is found right. Not collective.
+
+    Raises InputError where it is absent, cannot be read or is damaged.
+    """
+    verify(path)
+    with h5py.File(path, "r") as file:
+        yield file
+
+
+def verify(path: Path) -> None:
+    """Raise InputError where a result file is absent, unreadable or not as it was written."""
+    try:
+        if not checksum.is_whole(path):
+            raise InputError(f"{path} is damaged: it is not what was written (checksum); {AGAIN}")
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror})") from None
+    except checksum.NoChecksum:
+        raise InputError(
+            f"{path} has no checksum: an earlier version wrote it, or another program; {AGAIN}"
+        ) from None
 
 
 def plain(value: Any) -> Any:

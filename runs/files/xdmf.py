@@ -6,6 +6,8 @@ from xml.sax.saxutils import quoteattr
 import h5py
 import numpy as np
 
+from tireroad.runs.files.store import opened
+
 SHAPES = 20  # modes offered: ParaView lists every one in its menus
 INSTANTS = 400  # contact states offered: every one costs 1 kB of page and a line in the time slider
 
@@ -51,7 +53,7 @@ def _surface(file: h5py.File) -> tuple[str, str]:
     beside = Path(file.filename).with_name("static.h5")
     quads = None
     if beside.is_file():
-        with h5py.File(beside, "r") as other:
+        with opened(beside) as other:
             if "surface/quads" in other and other["surface/points"].shape == points.shape:
                 found = other["surface/quads"]
                 quads = f'<Topology TopologyType="Quadrilateral" NumberOfElements="{len(found)}">'

@@ -107,14 +107,14 @@ def forces(time: NDArray, contact: NDArray, axle: NDArray | None, active: NDArra
 
 
 @styled
-def spectrum(frequency: NDArray, axle: NDArray) -> str:
-    """Amplitude spectrum (nf, 3) N of the axle force over frequency (nf) Hz."""
+def spectrum(frequency: NDArray, axle: NDArray, of: str = "axle force") -> str:
+    """Amplitude spectrum (nf, 3) N of a force, named `of`, over frequency (nf) Hz."""
     figure, axes = canvas(9.5, 3.4)
     here, kept = axes[0, 0], frequency > 0
     levels = decibels(axle[kept])
     for column, name in enumerate(COMPONENTS):
         here.plot(*peak_hold(frequency[kept], levels[:, column]), color=COLOURS[column], label=name)
-    here.set(xscale="log", xlabel="frequency in Hz", ylabel="axle force in dB re 1 N")
+    here.set(xscale="log", xlabel="frequency in Hz", ylabel=f"{of} in dB re 1 N")
     _over_frequency(here, frequency[kept])
     _top_decibels(here, levels)
     here.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))

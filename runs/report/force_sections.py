@@ -74,15 +74,19 @@ def pressure_maps(results: Results, section: Section, time: NDArray, vertical: N
 
 
 def spectra(results: Results) -> Section:
-    """Spectra of the variation of the axle force (spectra.h5)."""
+    """Spectra of the variation of the axle force, or, where that is not kept, of the contact force."""
     name = "spectra.h5"
-    section = Section("Spectra of the axle force", "Of its variation about the mean, by component.")
-    frequency, force = results.array(name, "frequency"), results.array(name, "axle_force")
-    if len(frequency) > 1:
-        spacing = quantity(float(frequency[1] - frequency[0]), "Hz")
-        section.facts.append(("spacing of lines", spacing))
+    frequency, force = results.array(name, "frequency"), results.optional(name, "axle_force")
+    of = "contact force" if force is None else "axle force"
+    force = results.array(name, "contact_force") if force is None else force
+    section = Section(f"Spectra of the {of}", "Of its variation about the mean, by component.")
+    if len(frequency) < 2:
+        section.notes.append("A run of one step has no spectrum.")
+        return section
+    spacing = quantity(float(frequency[1] - frequency[0]), "Hz")
+    section.facts.append(("spacing of lines", spacing))
     section.facts.append(("up to", quantity(float(frequency.max()), "Hz")))
-    section.figures.append((figures.spectrum(frequency, force), "Amplitude spectrum."))
+    section.figures.append((figures.spectrum(frequency, force, of), "Amplitude spectrum."))
     centre = results.optional(name, "third_octave/centre")
     level = results.optional(name, "third_octave/level")
     if centre is None or level is None or not len(centre):

@@ -10,10 +10,12 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.read import Absent, Results, Section
 from tireroad.runs.report import force_sections, tire_sections
 from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.verdicts import verdicts
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.schema import key_of, table_of
 from tireroad.runs.scene.tables import Scene
@@ -54,6 +56,7 @@ def render(directory: Path) -> str:
     summary = read_summary(directory / "summary.json", problems)
     text, scene = read_scene(directory / "scene.toml", problems)
     stages = summary.get("stages", {})
+    judged = verdicts(summary.get("told", {}))
     sections, left_out, provenance = build_sections(directory, scene, stages, problems)
     told = [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
     told += [(section.title, warning) for section in sections for warning in section.warnings]
@@ -67,6 +70,7 @@ def render(directory: Path) -> str:
         computed=computed(directory),
         warnings=[("report", problem) for problem in problems] + told,
         stages=stages,
+        judged=judged,
         costs=costs(stages),
         parameters=parameters(scene),
         provenance=provenance,
@@ -85,7 +89,11 @@ def read_summary(path: Path, problems: list[str]) -> dict:
         return {}
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
+        if not is_table_as_signed(summary):
+            problems.append("summary.json is not what the run wrote (checksum) and is left out.")
+            return {}
         stages = summary.get("stages", {})
+        summary["told"] = stages
         known = sorted(stages, key=lambda name: (*STAGES, name).index(name))
         summary["stages"] = {name: whole_stage(stages[name]) for name in known}
     except (ValueError, AttributeError, TypeError, KeyError) as error:
@@ -100,7 +108,6 @@ def whole_stage(stage: Mapping) -> dict:
         "reason": str(stage.get("reason") or ""),
         "seconds": float(stage.get("seconds") or 0.0),
         "headline": quantities(stage.get("headline") or {}),
-        "indicators": quantities(stage.get("indicators") or {}),
         "warnings": [str(warning) for warning in stage.get("warnings") or []],
         "cost": {key: float(value) for key, value in (stage.get("cost") or {}).items()},
     }
@@ -118,6 +125,8 @@ def read_scene(path: Path, problems: list[str]) -> tuple[str, dict]:
         return "", {}
     try:
         text = path.read_text(encoding="utf-8")
+        if not is_as_signed(text):
+            problems.append("scene.toml is not what the run wrote (checksum).")
         return text, tomllib.loads(text)
     except ValueError as error:  # UnicodeDecodeError and TOMLDecodeError are both of it
         problems.append(f"scene.toml cannot be read ({error}).")
@@ -137,7 +146,7 @@ def build_sections(
             except Absent as absence:
                 reason = stages.get(name.removesuffix(".h5"), {}).get("reason")
                 left_out.append((name, reason or str(absence)))
-            except OSError as error:
+            except InputError as error:
                 problems.append(f"{name} is damaged and left out: {error}")
                 left_out.append((name, "the file is damaged"))
     return sections, left_out, provenance

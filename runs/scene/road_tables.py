@@ -10,6 +10,8 @@ UNEVEN = ("kind", ("cobblestones", "iso8608", "grid", "crg"))
 OBSTACLE = ("kind", ("step", "cleat"))
 TEXTURE = ("kind", ("texture",))
 RANDOM = ("kind", ("cobblestones", "iso8608", "texture"))
+GRID = ("kind", ("grid",))
+UNITS = ("m", "cm", "mm", "um", "in")
 MEASURED = ("kind", ("grid", "crg"))
 
 
@@ -52,10 +54,24 @@ class Road:
     phase: float = number(
         0.0, "deg", "of the waves at the start", least=-360, most=360, only_for=SINE
     )
-    block_length: float = number(0.14, "m", "pitch along x", above=0, most=10, only_for=STONES)
-    block_width: float = number(0.12, "m", "pitch along y", above=0, most=10, only_for=STONES)
+    block_length: float = number(
+        0.14,
+        "m",
+        "length of a block along x; the pitch is joint_width more",
+        above=0,
+        most=10,
+        only_for=STONES,
+    )
+    block_width: float = number(
+        0.12,
+        "m",
+        "width of a block along y; the pitch is joint_width more",
+        above=0,
+        most=10,
+        only_for=STONES,
+    )
     joint_width: float = number(0.012, "m", "between two blocks", above=0, most=10, only_for=STONES)
-    joint_depth: float = number(0.006, "m", "below the blocks", least=0, most=1, only_for=STONES)
+    joint_depth: float = number(0.006, "m", "below the blocks", above=0, most=1, only_for=STONES)
     edge_radius: float = number(
         0.006, "m", "of the rounded edges", least=0, most=1, only_for=STONES
     )
@@ -83,7 +99,21 @@ class Road:
     hurst: float = number(0.8, "-", "exponent", least=0, most=1, only_for=TEXTURE)
     roll_off: float = number(0.05, "m", "longest wave", above=0, most=100, only_for=TEXTURE)
     cut_off: float = number(0.004, "m", "shortest wave", above=0, most=100, only_for=TEXTURE)
-    file: str | None = text(None, "of the measured road; relative: to the scene", only_for=MEASURED)
+    file: str | None = text(
+        None,
+        "of the measured road, relative to the scene; grid: .npz or .h5 with x, y, z, or .csv: a line of a "
+        "corner and all y, then lines of x and heights; or x,y,z and lines of points; crg: OpenCRG",
+        only_for=MEASURED,
+    )
+    length_unit: str | None = choice(
+        None,
+        UNITS,
+        "of x and y in the file; absent: m, and the sizes must be plausible",
+        only_for=GRID,
+    )
+    height_unit: str | None = choice(
+        None, UNITS, "of the heights in the file; absent: as length_unit", only_for=GRID
+    )
     holes: str = choice("refuse", ("refuse", "fill"), "in the measured road", only_for=MEASURED)
     end: str = choice(
         "refuse", ("refuse", "mirror"), "when the run is longer than the road", only_for=MEASURED

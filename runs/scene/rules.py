@@ -218,7 +218,7 @@ def _road(scene: Scene, error: Where) -> None:
             raise error(
                 ("road", "joint_width"),
                 f"= {road.joint_width:g} m must be less than"
-                f" {side} = {getattr(road, side):g} m, the pitch of the blocks",
+                f" {side} = {getattr(road, side):g} m, the size of a block",
             )
 
 

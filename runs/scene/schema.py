@@ -138,8 +138,8 @@ def flag(default: bool, doc: str, *, only_for=None) -> Any:
     return _make(Key(read, "-", doc, "true, false", False, only_for), default)
 
 
-def choice(default: str, choices: tuple[str, ...], doc: str, *, only_for=None) -> Any:
-    """One of a few words."""
+def choice(default: str | None, choices: tuple[str, ...], doc: str, *, only_for=None) -> Any:
+    """One of a few words; a default of None makes the key optional."""
     words = ", ".join(choices)
 
     def read(value: Any) -> str:
@@ -147,7 +147,7 @@ def choice(default: str, choices: tuple[str, ...], doc: str, *, only_for=None) -
             raise ValueError(f"must be one of {words}, not {described(value)}")
         return value
 
-    return _make(Key(read, "-", doc, words, False, only_for), default)
+    return _make(Key(read, "-", doc, words, default is None, only_for), default)
 
 
 def text(default: str | None, doc: str, *, only_for=None) -> Any:

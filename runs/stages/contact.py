@@ -17,9 +17,6 @@ from tireroad.contact.rolling import Drive, Loop, roll
 from tireroad.contact.solver.friction import Friction
 from tireroad.contact.totals import Figures, Totals
 from tireroad.contact.tread.brush import Brush, BrushLaw
-from tireroad.greens.convolution import Convolution
-from tireroad.greens.recursion import Recursion
-from tireroad.greens.response import Response
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import Deferred, Stopped
@@ -27,10 +24,8 @@ from tireroad.runs.stages.contact_balance import balance
 from tireroad.runs.stages.contact_file import ContactFile
 from tireroad.runs.stages.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.session import Session
+from tireroad.runs.stages.stepping import integration, passing_period
 
-# Radians a kept mode may turn in one automatic step: 0.3 leaves less than a percent in its phase.
-_TURN = 0.3
-_LEAST_STEPS = 200
 _TOGETHER = 8  # steps between two agreements of several processes on whether to stop
 
 
@@ -43,6 +38,7 @@ def inputs(session: Session) -> dict:
         "road": asdict(scene.road),
         "file": store.file_hash(scene.road.file) if scene.road.file else None,
         "speed": session.road_speed,
+        "axle_force": scene.output.axle_force,
         "forces": [asdict(force) for force in scene.force],
         "time": {k: v for k, v in asdict(scene.time).items() if k != "checkpoint"},
     }
@@ -51,7 +47,11 @@ def inputs(session: Session) -> dict:
 def compute(session: Session, path: Path) -> None:
     """The time loop, written block by block, from the last checkpoint where there is one. Collective."""
     record = session.record
-    shortest = _shortest_period(session)
+    road, forces = session.road, session.scene.force
+    shortest = min(
+        passing_period(session.scene.road, road.spacing, session.road_speed),
+        shortest_period(forces),
+    )
     tire, step, steps, scheme = integration(session, session.contact_response, shortest)
     with record.timing("tread and solver"):
         _settled(session)
@@ -71,7 +71,7 @@ def compute(session: Session, path: Path) -> None:
         busy = (time.thread_time() - began) / max(steps - done, 1)
         record.indicators["processor time a step"] = (1e6 * busy, "us")
         file.finish()
-    _describe(session, totals.figures, loop.solver, step, steps, scheme)
+    _describe(session, totals.figures, loop.solver, step, steps - done, scheme)
     if scheme != "convolution":
         balance(session, loop, totals.work.total, driven.work if driven else 0.0, step)
 
@@ -134,43 +134,6 @@ class _Watch:
         return asked, due
 
 
-def integration(session: Session, response: Response, shortest: float):
-    """(tire, step, steps, scheme) for the scene's time table; what was chosen is shown. Collective.
-
-    `shortest` (s): the shortest period in the excitation.
-    """
-    wanted = session.scene.time
-    fastest = np.abs(response.eigenvalue).max(initial=0.0)
-    step = wanted.step
-    if step == "auto":
-        limits = [wanted.duration / _LEAST_STEPS, shortest / 16]
-        if fastest > 0:
-            limits.append(_TURN / fastest)
-        step = min(limits)
-    steps = max(int(np.ceil(wanted.duration / step * (1 - 1e-9))), 1)
-    if wanted.step == "auto":
-        step = wanted.duration / steps
-    scheme = "linear" if wanted.scheme == "auto" else wanted.scheme
-    kept = response.resolved(step)
-    moved = len(response.eigenvalue) - len(kept.eigenvalue)
-    observe.say(
-        f"  step {step:.4g} s, {steps} steps, scheme {scheme}; fastest mode {fastest:.4g} 1/s, "
-        f"{moved} states too fast for the step follow statically"
-    )
-    session.record.indicators["states moved to the residual"] = (moved, "-")
-    if scheme == "convolution":
-        return Convolution(kept, step, steps), step, steps, scheme
-    return Recursion(kept, step, scheme, session.comm), step, steps, scheme
-
-
-def _shortest_period(session: Session) -> float:
-    """Time in which the road's finest detail, its motion, or a force's period passes, s."""
-    motion, road = session.scene.road.motion, session.road
-    passing = 2 * road.spacing / session.road_speed if session.road_speed else np.inf
-    moving = 1 / motion.frequency if motion.kind == "sine" else np.inf
-    return min(passing, moving, shortest_period(session.scene.force))
-
-
 def _settled(session: Session) -> None:
     """A grid of points takes up the static load that the finite elements gave to nodes."""
     patch = session.patch
@@ -199,9 +162,20 @@ def _on_points(session: Session, tire, step: float):
         friction = _friction(session, tire, step)
         limit = friction.largest_unique(patch.force > 0, solver)
         session.record.indicators["friction up to which a step has one answer"] = (limit, "-")
+        session.record.warnings += beyond_unique(spec.friction, limit)
     if patch.weights is not None:
         tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
     return tire, solver, friction
+
+
+def beyond_unique(friction: float | None, limit: float) -> list[str]:
+    """A warning where points that slip may leave a step with more than one answer."""
+    if friction is None or friction <= limit:
+        return []
+    return [
+        f"contact.friction = {friction:g} is more than {limit:.3g}, up to which a step is sure to have "
+        "one answer: where points slip there may be another; lower it, or take a softer tread"
+    ]
 
 
 def _friction(session: Session, tire, step: float) -> Friction:
@@ -213,7 +187,8 @@ def _friction(session: Session, tire, step: float) -> Friction:
     return Friction(brush, tire.same_step, patch.weights)
 
 
-def _describe(session: Session, totals: Figures, solver, step, steps, scheme) -> None:
+def _describe(session: Session, totals: Figures, solver, step, taken, scheme) -> None:
+    """`taken`: the steps of this run, without those before its checkpoint."""
     record = session.record
     record.headline |= {
         "mean load": (float(totals.sum / totals.steps), "N"),
@@ -222,7 +197,7 @@ def _describe(session: Session, totals: Figures, solver, step, steps, scheme) ->
         "points touching at most": (totals.most_active, "-"),
         "step": (step, "s"),
         "scheme": (scheme, "-"),
-        "time a step": (record.cost["time loop"] / steps * 1e6, "us"),
+        "time a step": (record.cost["time loop"] / max(taken, 1) * 1e6, "us"),
     }
     record.indicators |= {
         "worst complementarity residual": (float(totals.residual), "-"),

@@ -12,7 +12,9 @@ import numpy as np
 
 from tireroad.contact.rolling import Instant
 from tireroad.runs.files import packed, store
+from tireroad.runs.files.checksum import seal
 from tireroad.runs.files.disk import part_of, replacing
+from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.session import Session
 
@@ -48,6 +50,9 @@ class ContactFile:
         self._stack: list = []
         self._readings: list[np.ndarray] = []
         self._rubs = session.scene.contact.brush_stiffness is not None
+        self._layout = dict(_LAYOUT)
+        if not session.scene.output.axle_force:
+            del self._layout["axle_force"]
         self._done = 0
 
     def open(self, stack: ExitStack, path: Path) -> dict[str, np.ndarray] | None:
@@ -61,8 +66,7 @@ class ContactFile:
         self._path, self._packer = path, packed.Packer()
         stack.callback(self._packer.close)
         provenance = self._session.provenance("contact")
-        usable = store.stored_hash(self._checkpoint) == provenance.input_hash
-        going_on = usable and not self._session.fresh
+        going_on = not self._session.fresh and self._usable(provenance.input_hash)
         begin = self._checkpoint if going_on else None
         self._file = stack.enter_context(store.writing(path, provenance, begin))
         if not going_on:
@@ -71,6 +75,13 @@ class ContactFile:
         state = {name: value[()] for name, value in self._file[STATE].items()}
         del self._file[STATE]
         return len(self._file["time"]), state
+
+    def _usable(self, wanted: str) -> bool:
+        """Whether there is a checkpoint to go on from; one that cannot serve is named."""
+        reason = store.why_not(self._checkpoint, wanted, "contact")
+        if reason and reason != "absent":
+            observe.say(f"  {CHECKPOINT} is there, but {reason}: the loop begins at t = 0")
+        return not reason
 
     def _lay_out(self) -> None:
         patch = self._session.patch
@@ -81,7 +92,7 @@ class ContactFile:
         driven = {DRIVEN: ((forces, 3), "m")} if forces else {}
         # A chunk of many points would be many megabytes: 4 MB at most is read at once.
         rows = 2 ** int(np.log2(np.clip(500_000 // max(c, 1), 1, BLOCK)))
-        for name, (shape, unit) in (_LAYOUT | driven).items():
+        for name, (shape, unit) in (self._layout | driven).items():
             width = tuple(c if n is None else n for n in shape)
             if width[:1] == (c,):
                 dataset = packed.create(self._file, name, rows, width)
@@ -113,7 +124,7 @@ class ContactFile:
     def _write(self, steps: dict[str, np.ndarray]) -> None:
         self._packer.wait()
         driven = {DRIVEN: np.stack(self._readings)} if self._readings else {}
-        for name in _LAYOUT | driven:
+        for name in self._layout | driven:
             dataset, values = self._file[name], (steps | driven)[name]
             if name == "horizontal_force" and not self._rubs:
                 dataset.resize(self._done + len(values), axis=0)  # what is not written is zero
@@ -135,6 +146,7 @@ class ContactFile:
             with h5py.File(part, "r+") as copy:
                 for name, value in state.items():
                     copy.create_dataset(f"{STATE}/{name}", data=value)
+            seal(part)
 
     def finish(self) -> None:
         """All steps are flushed: the checkpoint has had its day. Collective."""

@@ -17,6 +17,7 @@ from tireroad.modal.rotating import standing
 from tireroad.runs.files.store import put
 from tireroad.runs.stages.responses import chosen, fill_response, judge, make, read_responses
 from tireroad.runs.stages.session import Session
+from tireroad.runs.stages.stepping import run_time
 
 # What the tire may give way beyond the road's own height, m: the smallest reach of the patch.
 _MARGIN = 5e-3
@@ -59,6 +60,7 @@ def _prepare_contact(session: Session) -> None:
     session.road_speed = session.speed * (given or state.rolling_radius())
     motion = scene.road.motion
     session.motion = make_motion(motion.kind, motion.amplitude, motion.frequency, motion.duration)
+    session.travel = session.road_speed * run_time(scene.time)
     road = make_road(scene.road)
     session.reach = scene.contact.reach or _reach(session, road)
     session.patch = _points(session)
@@ -86,8 +88,7 @@ def _points(session: Session) -> Patch:
 def _under(session: Session, road, patch: Patch):
     """The strip of road that the patch drives over in this run."""
     x0, x1, y0, y1 = patch.extent
-    way = session.road_speed * session.scene.time.duration
-    return road.prepare(x1, x1 + way, y0, y1)
+    return road.prepare(x1, x1 + session.travel, y0, y1)
 
 
 def _reach(session: Session, road) -> float:
@@ -102,8 +103,7 @@ def _reach(session: Session, road) -> float:
         patch = _patch(session, reach)
         strip = _under(session, road, patch)
         x0, x1, y0, y1 = patch.extent
-        way = session.road_speed * session.scene.time.duration
-        highest = max(strip.highest(x0, x1 + way, y0, y1), 0.0)
+        highest = max(strip.highest(x0, x1 + session.travel, y0, y1), 0.0)
         reach = 1.5 * (highest + lift) + _MARGIN
     return reach
 

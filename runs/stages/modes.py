@@ -107,8 +107,7 @@ def _labels(session: Session, vectors: np.ndarray):
     if session.static.road_height is not None:
         return None
     body = session.body
-    _, wall, along = np.unravel_index(body.ids, body.lattice.shape)
-    circles = wall * body.lattice.shape[2] + along
+    circles = body.lattice.circles(body.ids)
     nodal = session.operators.spread(vectors).reshape(-1, vectors.shape[1])
     points = body.lattice.points(body.ids)
     return label(session.comm, points, circles, body.nodal_mass(), nodal)

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from tireroad.contact.roads.road import make_road
 from tireroad.runs.files import store
+from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.folder import Summary
 from tireroad.runs.process import observe
@@ -43,7 +44,7 @@ def run_scene(
     """Run the stages a scene needs into the directory; what they left in memory. Collective."""
     session = Session(scene, directory, comm, fresh)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
-    on_root(comm, lambda: write_text(directory / "scene.toml", dumps(scene)))
+    on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
     if scene.road is not None:
         # A road file that cannot be used should be told before hours of solving, not after.
         on_root(comm, lambda: make_road(scene.road) and None)
@@ -68,15 +69,17 @@ def _run_stage(session: Session, stage: str, summary: Summary, fresh: bool) -> N
     """Reuse the stage's file or compute it, and enter it in the summary. Collective."""
     module, comm = _MODULES[stage], session.comm
     began = time.perf_counter()
-    wanted = store.stage_hash({"stage": stage, **module.inputs(session)})
+    wanted = store.wanted_hash(stage, module.inputs(session))
     session.hashes[stage] = wanted
     path = session.directory / f"{stage}.h5"
-    same = comm.bcast(store.stored_hash(path) == wanted if comm.rank == 0 else None)
-    if same and not fresh:
+    reason = on_root(comm, lambda: "absent" if fresh else store.why_not(path, wanted, stage))
+    if not reason:
         module.reuse(session, path)
         observe.say(f"{stage:9s} reused: computed from the same inputs before")
         on_root(comm, lambda: summary.record(stage, "reused", reason="same inputs"))
         return
+    if reason != "absent":
+        observe.say(f"{stage:9s} computed anew: {path.name} is there, but {reason}")
     with session.recording(stage) as record:
         module.compute(session, path)
         record.indicators["largest memory of a process so far"] = (_peak(comm), "GB")

@@ -11,10 +11,10 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.stages.contact import integration
 from tireroad.runs.stages.contact_file import DRIVEN
 from tireroad.runs.stages.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.session import Session
+from tireroad.runs.stages.stepping import integration
 
 
 def inputs(session: Session) -> dict:
@@ -26,6 +26,7 @@ def inputs(session: Session) -> dict:
         "time": asdict(scene.time) if scene.time else None,
         "receptance": asdict(scene.output.receptance) if scene.output.receptance else None,
         "contact": session.hashes.get("contact"),
+        "axle_force": scene.output.axle_force,
         "also": [scene.output.velocity, scene.output.acceleration, scene.output.impulse],
     }
 
@@ -53,7 +54,8 @@ def _in_contact(session: Session) -> dict:
     """What the contact loop found at the driven points, contact included. Collective."""
 
     def pick(file):
-        return file["time"][:], file[DRIVEN][:], file["axle_force"][:]
+        axle = {"axle_force": (file["axle_force"][:], "N")} if "axle_force" in file else {}
+        return file["time"][:], file[DRIVEN][:], axle
 
     time, displacement, axle = session.read(session.directory / "contact.h5", pick)
     largest = float(np.abs(displacement).max())
@@ -62,8 +64,7 @@ def _in_contact(session: Session) -> dict:
         "time": (time, "s"),
         "force": (histories(session.scene.force, time), "N"),
         "displacement": (displacement, "m"),
-        "axle_force": (axle, "N"),
-    }
+    } | axle
 
 
 def _in_time(session: Session) -> dict:
@@ -98,7 +99,9 @@ def _in_time(session: Session) -> dict:
         "force": (force, "N"),
         "displacement": (displacement.reshape(steps + 1, -1, 3), "m"),
     }
-    if not _drifts(session):  # with a free rim nothing holds the axle
+    if session.scene.output.axle_force and not _drifts(
+        session
+    ):  # nothing holds the axle of a free rim
         out["axle_force"] = axle, "N"
     return out | _rates(session, time, step, "linear" if scheme == "convolution" else scheme)
 

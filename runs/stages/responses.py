@@ -39,9 +39,13 @@ def make(session: Session, outputs, loads) -> Response:
     basis = session.basis
     if option == "none":
         return basis.couple(outputs, loads)
-    modes = session.modes if option == "attachment" else None
+    modes = known = None
+    if option == "attachment":
+        # Vectors that are solved once more are not those of the stored projection.
+        known = session.modal.projection if "modes" in vars(session) else None
+        modes = session.modes
     with session.record.timing("residual flexibility"):
-        response = session.wheel.respond(basis, modes, outputs, loads, option)
+        response = session.wheel.respond(basis, modes, outputs, loads, option, known)
     if option in ("static", "dirac"):
         return response
     cutoff = _cutoff(session)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import h5py
-import numpy as np
 from mpi4py import MPI
 
 from tireroad.fem.timing import Timing
@@ -18,6 +16,7 @@ from tireroad.runs.files import store
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables import Scene
+from tireroad.runs.stages.tire import make_body, make_lattice, make_section
 
 
 @dataclass
@@ -71,42 +70,26 @@ class Session:
         return self.scene.damping.mass, self.scene.damping.stiffness
 
     @property
-    def rolling(self) -> tuple[float, float, float]:
-        """Speed and damping of the steady-rolling static state; zeros at rest."""
+    def rolling(self) -> tuple[float, float, float, str]:
+        """Speed, damping and inertia of the steady-rolling static state; zeros at rest."""
         if not self.scene.static.steady_rolling or self.speed == 0:
-            return 0.0, 0.0, 0.0
-        return self.speed, *self.damping
+            return 0.0, 0.0, 0.0, "full"
+        return self.speed, *self.damping, self.scene.rotation.inertia
 
     @cached_property
     def section(self):
-        """The torus of the scene."""
-        from tireroad.fem.tire.mesh import Torus
-
-        tire = self.scene.tire
-        names = {f.name for f in fields(Torus)} - {"half_angle"}
-        given = {name: getattr(tire, name) for name in names}
-        return Torus(half_angle=np.radians(tire.half_angle), **given)
+        """The shape of the scene's tire and its elements."""
+        return make_section(self.scene.tire)
 
     @cached_property
     def lattice(self):
         """The nodes of the displacement field, without a mesh."""
-        from tireroad.fem.tire.mesh import field_lattice
-
-        return field_lattice(self.section)
+        return make_lattice(self.section)
 
     @cached_property
     def body(self):
         """The finite-element body, at the static state once that is known. Collective."""
-        from tireroad.fem.tire.body import Body
-        from tireroad.fem.tire.material import Material
-        from tireroad.fem.tire.wall import Region
-
-        tire = self.scene.tire
-        regions = [
-            Region(Material(**vars(r.material)), tuple(np.radians(r.arc)), r.depth, r.side)
-            for r in tire.region
-        ]
-        body = Body(self.comm, self.section, Material(**vars(tire.material)), regions)
+        body = make_body(self.comm, self.scene.tire, self.section)
         if hasattr(self, "static"):
             body.set_displacement(self.static.displacement)
         return body
@@ -180,7 +163,7 @@ class Session:
         """What `pick(file)` returns, on every process. Collective."""
 
         def opened():
-            with h5py.File(path, "r") as file:
+            with store.opened(path) as file:
                 return pick(file)
 
         return on_root(self.comm, opened)

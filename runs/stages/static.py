@@ -122,7 +122,7 @@ def _describe(session: Session, loader) -> None:
             "contact points": (int((state.force > 0).sum()), "-"),
         }
         record.indicators["least contact force"] = (float(state.force.min()), "N")
-        record.indicators["largest penetration"] = (float(-min(state.gap.min(), 0.0)), "m")
+        record.indicators["largest penetration"] = (state.penetration, "m")
     record.headline["rolling radius"] = (state.rolling_radius(), "m")
     record.indicators["Newton steps"] = (loader.newton_steps, "-")
     if session.speed and not session.scene.static.steady_rolling:
@@ -150,7 +150,7 @@ def _fill(file, session: Session, equilibrium) -> None:
     file.attrs["rolling_radius"] = state.rolling_radius()
     if state.road_height is None:
         return
-    near = np.flatnonzero(state.gap < session.scene.tire.thickness)
+    near = np.flatnonzero(state.gap < session.section.thickness)
     force = np.zeros((len(near), 3))
     force[:, 2] = state.force[near]
     put(file, "contact/index", near, "-")
@@ -171,8 +171,6 @@ def reuse(session: Session, path: Path) -> None:
 
     def pick(file):
         surface = file["surface"]
-        section = session.scene.tire
-        along = section.elements_arc * section.order + 1
         return StaticState(
             file["displacement"][:],
             surface["points"][:],
@@ -181,7 +179,7 @@ def reuse(session: Session, path: Path) -> None:
             surface["area"][:],
             surface["half_sizes"][:],
             surface["ring_rate"][:],
-            shape=(len(surface["points"]) // along, along),
+            shape=session.lattice.face_shape,
             touch_height=float(file.attrs["touch_height"]),
             road_height=float(file.attrs["road_height"]) if "road_height" in file.attrs else None,
         )

@@ -5,7 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from tireroad.contact.solver.complementarity import ActiveSet, make_solver
+from tireroad.contact.solver.choose import make_solver
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.grid_compliance import MatrixCompliance
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.snes_vi import SnesVI
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError, InputError
 
@@ -96,6 +100,19 @@ def test_bad_guess_and_strong_skew_part(share: float) -> None:
     gap = matrix @ force + q
     assert force.min() >= 0.0 and gap.min() > -1e-11 and abs(force @ gap) < 1e-11 * force.sum()
     assert contact.iterations < 60
+
+
+@pytest.mark.parametrize("make", [ActiveSet, SnesVI, lambda a: ProjectedCG(MatrixCompliance(a))])
+def test_the_penetration_is_that_of_the_answer_as_solved(make) -> None:
+    """The gaps at touching points are set to 0 afterwards: what they were before is told apart."""
+    rng = np.random.default_rng(5)
+    matrix, q = random_compliance(rng, 60, 0.0), rng.standard_normal(60)
+    contact = make(matrix)
+    force = contact.solve(q)
+    assert contact.gap[force > 0.0].max() == 0.0
+    deepest = -(matrix @ force + q).min()
+    assert 0.0 < contact.penetration < 1e-7 * np.abs(q).max()
+    assert contact.penetration == pytest.approx(deepest, rel=0.5, abs=1e-14 * np.abs(q).max())
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

@@ -13,7 +13,7 @@ from tireroad.contact.roads.window import fill_holes
 from tireroad.fem.errors import InputError
 
 X, Y = 5.0 + 0.1 * np.arange(31), np.linspace(-0.5, 0.5, 11)
-Z = np.random.default_rng(2).standard_normal((31, 11))
+Z = 0.1 * np.random.default_rng(2).standard_normal((31, 11))
 
 
 @pytest.mark.parametrize("y", [Y, np.sort(np.r_[Y, 0.333, -0.111])], ids=["even", "uneven"])

@@ -21,9 +21,8 @@ SECTION = Torus(0.32, 0.10, 0.012, np.radians(120), 60, 16, 1, 2, "bead", 0.3)
 def tread():
     """A torus flattened a little towards the road plane at z = -0.318 m: lattice, positions."""
     lattice = field_lattice(SECTION)
-    from tireroad.fem.tire.surface import outer_face
 
-    points = lattice.points(outer_face(lattice))
+    points = lattice.points(lattice.face)
     road = -0.318
     depth = np.maximum(road - points[:, 2], 0.0)
     points = points + np.stack([0.1 * depth, -0.2 * depth, depth], axis=-1)
@@ -36,7 +35,7 @@ def patches(tread, reach: float, pitch: float):
     force = np.where(gap == 0, 1.0, 0.0)
     force *= 500 / force.sum()
     halves = np.full((len(points), 2), 0.01)
-    shape = lattice.shape[0], lattice.shape[2]
+    shape = lattice.face_shape
     nodes = make_patch(points, halves, force, gap, shape, reach)
     surface = TreadSurface(lattice, points)
     return force, surface, make_grid_patch(surface, road, nodes, (pitch, pitch), reach)

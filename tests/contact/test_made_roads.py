@@ -69,9 +69,9 @@ def test_ten_kilometres_take_no_more_memory_than_ten_metres() -> None:
     assert peak < 60e6
 
 
-def test_texture_spectrum_and_tiling() -> None:
+def test_texture_spectrum() -> None:
     road = Texture(2e-4, 0.8, 0.02, 0.002, seed=1)
-    tile = road._z
+    tile = road._tile(3)
     assert tile.std() == pytest.approx(2e-4)
     assert abs(tile.mean()) < 1e-12
     power = np.abs(np.fft.fft2(tile)) ** 2
@@ -86,9 +86,33 @@ def test_texture_spectrum_and_tiling() -> None:
     slope = np.log(power[outer].mean() / power[inner].mean()) / np.log(350 / 70)
     assert slope == pytest.approx(-3.6, abs=0.15)
     assert power[(q > 510) | ((q < 49) & (q > 0))].max() < 1e-20 * power.max()
-    x, y = np.random.default_rng(0).random((2, 50))
-    length, width = (n * pitch for n in tile.shape)
-    assert np.allclose(road.height(x + length, y - 2 * width), road.height(x, y), atol=1e-15)
-    assert np.allclose(road.height(np.array([3 * pitch]), np.array([5 * pitch])), tile[3, 5])
     with pytest.raises(InputError, match="cut_off"):
         Texture(1e-4, 0.8, 1.0, 1e-5)
+
+
+def test_texture_is_continuous_repeatable_and_bounded() -> None:
+    road, again = Texture(2e-4, 0.8, 0.02, 0.002, 1), Texture(2e-4, 0.8, 0.02, 0.002, 1)
+    half = 0.16
+    for seam in (-half, 0.0, 3 * half):
+        x = seam + np.array([-1e-9, 1e-9])
+        assert np.ptp(road.height(x, 0.013 + 0 * x)) < 1e-9
+    x, y = np.random.default_rng(0).uniform(-3, 3, (2, 5000))
+    z = road.height(x, y)
+    assert np.array_equal(z[::-1], again.height(x[::-1], y[::-1]))
+    assert road.lowest(-3, 3, -3, 3) <= z.min() and z.max() <= road.highest(-3, 3, -3, 3)
+
+
+def test_texture_never_repeats_and_keeps_its_variance_along() -> None:
+    """The mean over many places of z(x) z(x + lag) is near 0 at every lag, that of z z near rms²."""
+    road = Texture(2e-4, 0.8, 0.02, 0.002, seed=1)
+    pitch = 0.0005
+    x = pitch * np.arange(round(8.0 / pitch))
+    rows = np.array([road.height(x, np.full(len(x), 0.029 * k)) for k in range(20)]) / 2e-4
+    assert rows.var() == pytest.approx(1.0, abs=0.03)
+    # Where two tiles weigh the same, and where one weighs all.
+    for place in (0.0, 0.08):
+        here = np.abs(np.mod(x - place + 0.08, 0.16) - 0.08) < 0.01
+        assert rows[:, here].var() == pytest.approx(1.0, abs=0.12)
+    spectrum = np.abs(np.fft.rfft(rows, 2 * len(x), axis=1)) ** 2
+    correlation = np.fft.irfft(spectrum.mean(axis=0))[: len(x) // 2] / len(x)
+    assert np.abs(correlation[round(0.1 / pitch) :]).max() < 0.15

@@ -126,7 +126,7 @@ def test_points_beyond_the_strip_are_an_error() -> None:
 def test_factory_takes_a_scenes_object_and_ignores_what_is_none() -> None:
     spec = SimpleNamespace(kind="sine", amplitude=1e-3, wavelength=0.2, phase=None, datum=None)
     road = make_road(spec).prepare(*STRIP)
-    assert road.spacing == 0.2
+    assert road.spacing == 0.1  # two points a wave: the shortest length it resolves
     assert road.height(np.array([2.05]), np.zeros(1))[0] == pytest.approx(
         1e-3 * np.sin(41 / 2 * np.pi)
     )

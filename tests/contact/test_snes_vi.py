@@ -1,12 +1,17 @@
 """PETSc's two solvers for bounds, on a matrix and on a product, against the active set."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from petsc4py import PETSc
 from scipy import sparse
+from started import environment
 
 from tireroad.contact.model import DENSE_POINTS
-from tireroad.contact.solver.complementarity import ActiveSet, make_solver
+from tireroad.contact.solver.choose import make_solver
+from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.grid_compliance import SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.snes_vi import PREFIX, SnesVI
@@ -57,3 +62,11 @@ def test_thousands_of_points_without_a_matrix() -> None:
     force = found.solve(bowl - 3e-4)
     assert np.abs(force - wanted).max() < 1e-6 * wanted.max()
     assert found.factorisations == 0 and found.residual < 1e-9
+
+
+def test_solvers_left_at_exit_do_not_crash_the_interpreter() -> None:
+    # pytest keeps what a test made until the interpreter ends, after PETSc has ended.
+    other = f"{__file__}::test_thousands_of_points_without_a_matrix"
+    command = [sys.executable, "-P", "-m", "pytest", "-q", "-p", "no:xdist", other]
+    done = subprocess.run(command, env=environment(), capture_output=True, timeout=600)
+    assert done.returncode == 0

@@ -21,7 +21,7 @@ def test_gmres_solves_what_is_far_from_symmetric(skew: float) -> None:
 
     found = gmres(apply, right, 1e-10)
     assert np.linalg.norm(matrix @ found - right) < 1e-9 * np.linalg.norm(right)
-    assert len(calls) <= 60
+    assert len(calls) <= 61  # a step each, and one product that checks the residual
     rough = gmres(apply, right, 1e-2)
     assert np.linalg.norm(matrix @ rough - right) <= 1.01e-2 * np.linalg.norm(right)
     assert not gmres(apply, 0 * right, 1e-2).any()

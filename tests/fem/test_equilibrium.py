@@ -19,6 +19,7 @@ TERMS = {
     "pressure": (2e6, Rolling()),
     "inertia": (0.0, Rolling(150.0)),
     "damping": (0.0, Rolling(150.0, 500.0)),
+    "doppler": (0.0, Rolling(150.0, 0.0, 0.0, "doppler")),
 }
 MODELS = {
     "linear": {"youngs_modulus": 5e6, "poisson_ratio": 0.49},

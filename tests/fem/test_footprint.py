@@ -43,7 +43,7 @@ def test_extent_of_an_ellipse_converges(plane, order):
         q = (points[:, 0] / A) ** 2 + (points[:, 1] / B) ** 2
         pressure, gap = np.sqrt(np.maximum(1 - q, 0)), 1e-3 * np.maximum(q - 1, 0) ** 1.5
         area = nodal_area(lattice, points)
-        shape = (lattice.shape[0], lattice.shape[2])
+        shape = lattice.face_shape
         found = footprint(shape, points, pressure, gap, area)
         assert (area * pressure).sum() == pytest.approx(2 / 3 * np.pi * A * B, rel=0.1)
         errors.append(
@@ -60,13 +60,13 @@ def test_extent_of_an_ellipse_converges(plane, order):
 def test_no_pressure_no_footprint(plane):
     lattice, points = plane(2, 16, 4)
     nothing = np.zeros(len(points))
-    shape = (lattice.shape[0], lattice.shape[2])
+    shape = lattice.face_shape
     assert footprint(shape, points, nothing, nothing + 1, nothing) == Footprint(0, 0, 0)
 
 
 def test_extent_grows_with_the_load_without_jumps(plane):
     lattice, points = plane(2, 40, 10)
-    shape, area = (lattice.shape[0], lattice.shape[2]), nodal_area(lattice, points)
+    shape, area = lattice.face_shape, nodal_area(lattice, points)
     lengths = []
     for half in np.linspace(0.02, 0.03, 41):
         q = (points[:, 0] / half) ** 2 + (points[:, 1] / B) ** 2

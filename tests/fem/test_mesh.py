@@ -47,8 +47,8 @@ def test_faces_have_the_areas_of_the_torus(make_body, order):
 
 def test_graded_corners_keep_the_mirror_planes_to_the_last_bit(make_body):
     body = make_body(footprint_size=0.25)
-    arc, ring = body.tire.section.arc_corners, body.tire.section.ring_corners - np.pi
+    arc, ring = body.ring.arc_corners, body.ring.ring_corners - np.pi
     np.testing.assert_array_equal(arc, -arc[::-1])
     np.testing.assert_allclose(ring, -ring[::-1], atol=1e-15)
-    sizes = np.diff(body.tire.section.ring_corners)
+    sizes = np.diff(body.ring.ring_corners)
     assert sizes[0] < 0.5 * sizes.max()

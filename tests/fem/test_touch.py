@@ -6,7 +6,12 @@ import pytest
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.tread_surface import TreadSurface
-from tireroad.fem.tire.mesh import Lattice, Torus
+from tireroad.fem.tire.mesh import Lattice, Torus, position
+
+
+def torus(ring, arc):
+    """Places on the outer face of the torus."""
+    return position(ring, np.stack([0.22 + 0.1 * np.cos(arc), 0.1 * np.sin(arc)], axis=-1))
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -19,9 +24,7 @@ def test_the_lowest_point_of_a_turned_wheel(order, turn):
         edge = {1: [0, 1], 2: [0, 0.5, 1], 3: [0, 0.27639320225, 0.72360679775, 1]}[order]
         lattice = Lattice(section, np.array(edge))
         ring, arc = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
-        face = section.position(
-            ring.ravel() + turn * 2 * np.pi / segments, np.full(ring.size, 0.1), arc.ravel()
-        )
+        face = torus(ring.ravel() + turn * 2 * np.pi / segments, arc.ravel())
         errors.append(abs(TreadSurface(lattice, face).lowest() + 0.32))
     assert errors[0] < {1: 1e-2, 2: 3e-4, 3: 5e-5}[order]
     assert errors[1] < 1e-12 or errors[1] < errors[0] / 2**order
@@ -32,7 +35,7 @@ def test_no_place_on_the_face_is_lower():
     section = Torus(0.32, 0.1, 0.012, np.radians(120), 12, 6, 1, 3)
     lattice = Lattice(section, np.array([0, 0.27639320225, 0.72360679775, 1]))
     ring, arc = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
-    face = section.position(ring.ravel(), np.full(ring.size, 0.1), arc.ravel())
+    face = torus(ring.ravel(), arc.ravel())
     surface = TreadSurface(lattice, face + 5e-4 * rng.standard_normal(face.shape))
     anywhere = surface.at(rng.uniform(-0.6, 0.6, 200_000), rng.uniform(-0.6, 0.6, 200_000))[:, 2]
     assert anywhere.min() - 1e-5 < surface.lowest() <= anywhere.min()

@@ -1,11 +1,15 @@
 """A result folder as a finished run leaves it, from closed forms: no solver, no mesh."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+
+from tireroad.runs.files.checksum import BLOCK, seal
 
 CROWN, SECTION, HALF_ARC, ROAD = 0.32, 0.10, np.radians(120.0), -0.309
 SCENE = """name = "synthetic-torus"
@@ -32,6 +36,15 @@ kind = "cobblestones"
 duration = 0.25
 step = 2.5e-5
 """
+
+
+@contextmanager
+def sealed(path: Path, mode: str = "w") -> Iterator[h5py.File]:
+    """A file, new or changed (mode "a"), with the checksum that a run gives it."""
+    block = {"userblock_size": BLOCK} if mode == "w" else {}
+    with h5py.File(path, mode, **block) as file:
+        yield file
+    seal(path)
 
 
 def put(file: h5py.File, name: str, values: NDArray, unit: str, **storage: object) -> None:
@@ -69,7 +82,7 @@ def write_static(path: Path, around: int, across: int) -> NDArray:
     force = np.zeros((near.size, 3))
     force[:, 2] = 500.0 * below[near] / below[near].sum()
     touching = (points + displacement)[near]
-    with h5py.File(path, "w") as file:
+    with sealed(path) as file:
         provenance(file, "static")
         file.attrs.update(load=500.0, deflection=0.015, inflation=2.0e5, touch_height=-0.324)
         file.attrs.update(
@@ -97,7 +110,7 @@ def write_modes(path: Path, around: int, across: int, count: int) -> None:
         [np.cos(n * theta + 1.6 * (q % 2))[:, None] * radial for q, n in enumerate(waves)]
     )
     frequency = 60.0 + 9.0 * np.arange(count) ** 1.1
-    with h5py.File(path, "w") as file:
+    with sealed(path) as file:
         provenance(file, "modes")
         file.attrs.update(inertia_count=count, rigid_modes=0)
         put(file, "frequency", frequency, "Hz")
@@ -111,7 +124,7 @@ def write_rotating(path: Path, count: int, unstable: bool = False) -> None:
     decay = np.full(frequency.size, -250.0)
     decay[0] = 12.0 if unstable else -240.0
     eigenvalue = np.concatenate((decay + 2j * np.pi * frequency, decay - 2j * np.pi * frequency))
-    with h5py.File(path, "w") as file:
+    with sealed(path) as file:
         provenance(file, "rotating")
         file.attrs.update(speed=50.0, basis_condition=42.0, first_unstable=2 * int(unstable))
         put(file, "eigenvalue", eigenvalue, "1/s")
@@ -130,7 +143,7 @@ def write_contact(path: Path, points: NDArray, steps: int) -> None:
     total = np.stack((excitation[0], excitation[1], force.sum(axis=1)), -1)
     axle = total + np.stack((excitation[1], excitation[0], excitation[2]), -1)
     storage = {"chunks": (min(64, steps), points.shape[0]), "compression": "gzip"}
-    with h5py.File(path, "w") as file:
+    with sealed(path) as file:
         provenance(file, "contact")
         file.attrs.update(road="cobblestones", step=2.5e-5, scheme="linear", speed=50.0)
         put(file, "time", time, "s")
@@ -154,7 +167,7 @@ def write_spectra(path: Path, lines: int) -> None:
         -18.0,
         9.0,
     ]
-    with h5py.File(path, "w") as file:
+    with sealed(path) as file:
         provenance(file, "spectra")
         put(file, "frequency", frequency, "Hz")
         put(file, "axle_force", force, "N")
@@ -170,7 +183,7 @@ def write_response(path: Path, steps: int) -> None:
     moved = 1e-6 * force[:, :, None] * np.array((0.1, 0.02, 1.0))
     plain = 1e-6 / (1 - (frequency / 91.0) ** 2 + 0.08j * frequency / 91.0)
     receptance = plain[:, None, None] * np.array(((1.0, 0.3), (0.3, 0.8)))
-    with h5py.File(path, "w") as file:
+    with sealed(path) as file:
         provenance(file, "response")
         put(file, "time", time, "s")
         put(file, "force", force, "N")

@@ -10,10 +10,9 @@ from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
-from synthetic_results import write_results, write_rotating
+from synthetic_results import sealed, write_results, write_rotating
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.report import figures, surface_figures
@@ -150,7 +149,7 @@ def test_a_summary_of_strange_content_is_a_warning(results: Path) -> None:
 
 @pytest.mark.usefixtures("blank")
 def test_a_missing_dataset_is_named(results: Path) -> None:
-    with h5py.File(results / "contact.h5", "a") as file:
+    with sealed(results / "contact.h5", "a") as file:
         del file["total_force"]
     assert "contact.h5 holds no dataset total_force" in page(results)
 
@@ -164,7 +163,7 @@ def test_an_unstable_tire_is_a_warning_at_the_top(results: Path) -> None:
 
 
 def test_a_tire_without_a_road(results: Path) -> None:
-    with h5py.File(results / "static.h5", "a") as file:
+    with sealed(results / "static.h5", "a") as file:
         del file["contact"]
         del file.attrs["road_height"]
     assert "there is no footprint" in page(results)
@@ -176,9 +175,9 @@ def test_short_runs(tmp_path: Path, steps: int) -> None:
 
 
 def test_not_a_number_in_a_result_does_not_stop_the_report(results: Path) -> None:
-    with h5py.File(results / "contact.h5", "a") as file:
+    with sealed(results / "contact.h5", "a") as file:
         file["normal_force"][5] = np.nan
-    with h5py.File(results / "spectra.h5", "a") as file:
+    with sealed(results / "spectra.h5", "a") as file:
         file["axle_force"][7] = np.nan
         file["third_octave/level"][3] = -np.inf
     shown = titles(page(results))

@@ -1,8 +1,12 @@
 """Result files are whole or not there; what they were computed from is in them."""
 
+import ast
 import json
 import resource
+import shutil
 import signal
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -10,8 +14,17 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.files import checksum, identity
 from tireroad.runs.files.disk import write_text
-from tireroad.runs.files.store import Provenance, put, stage_hash, stored_hash, writing
+from tireroad.runs.files.store import (
+    Provenance,
+    opened,
+    put,
+    stage_hash,
+    wanted_hash,
+    why_not,
+    writing,
+)
 from tireroad.runs.version import VERSION
 
 ORIGIN = Provenance("scene", 'name = "scene"\n', "static", "abc", 2)
@@ -32,7 +45,7 @@ def test_file_carries_data_units_and_origin(tmp_path: Path) -> None:
         assert file.attrs["version"] == VERSION and file.attrs["processes"] == 2
         assert file.attrs["scene"] == 'name = "scene"\n' and file.attrs["stage"] == "static"
         assert "numpy" in json.loads(file.attrs["libraries"])
-    assert stored_hash(path) == "abc"
+    assert why_not(path, "abc", "static") == ""
     assert leftovers(tmp_path) == ["static.h5"]
 
 
@@ -81,11 +94,123 @@ def test_hash_depends_on_values_only() -> None:
     assert one == same and one != other
 
 
-def test_no_hash_where_there_is_no_result(tmp_path: Path) -> None:
-    assert stored_hash(tmp_path / "none.h5") is None
+def test_a_file_is_used_only_when_it_is_what_would_be_computed(tmp_path: Path) -> None:
+    path = tmp_path / "static.h5"
+    assert why_not(path, "abc", "static") == "absent"
+    with writing(path, ORIGIN):
+        pass
+    assert why_not(path, "abc", "static") == ""
+    assert why_not(path, "abd", "static") == "the inputs have changed since"
+
+
+def test_code_and_libraries_are_part_of_what_a_stage_is_computed_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half the shear stiffness in the sources, or another SciPy, and nothing is reused."""
+    path, inputs = tmp_path / "static.h5", {"load": 1.0}
+    written = wanted_hash("static", inputs)
+    with writing(path, replace(ORIGIN, input_hash=written)):
+        pass
+    assert why_not(path, wanted_hash("static", inputs), "static") == ""
+    libraries = identity._libraries()
+    monkeypatch.setattr(identity, "_libraries", lambda: libraries | {"scipy": "0.1"})
+    now = wanted_hash("static", inputs)
+    assert now != written
+    assert "scipy" in why_not(path, now, "static") and "-> 0.1" in why_not(path, now, "static")
+    monkeypatch.undo()
+    copy = tmp_path / "program"
+    for folder in ("fem", "runs/stages"):
+        shutil.copytree(identity.ROOT / folder, copy / folder)
+    source = next((copy / "fem").rglob("equilibrium.py"))
+    source.write_text(source.read_text() + "FACTOR = 0.5\n")
+    monkeypatch.setattr(identity, "ROOT", copy)
+    identity._code.cache_clear()
+    now = wanted_hash("static", inputs)
+    assert now != written
+    assert why_not(path, now, "static") == "the program's code has changed since"
+    identity._code.cache_clear()
+
+
+def test_identity_is_cheap() -> None:
+    """In processor time: the machine may be busy."""
+    identity.identity("contact")
+    identity._code.cache_clear()
+    identity._libraries.cache_clear()
+    began = time.process_time()
+    identity.identity("contact")
+    assert time.process_time() - began < 0.1
+
+
+@pytest.mark.parametrize("stage", [*identity.PACKAGES, "contact"])
+def test_a_stage_imports_only_what_its_hash_covers(stage: str) -> None:
+    """By the import statements of its module and of all that these lead to, functions' own included."""
+    covered = identity.PACKAGES.get(stage, identity._ALL)
+    passive = ("runs/files", "runs/process", "runs/scene", "runs/report", "runs/version.py")
+    seen, left = set(), [identity.ROOT / "runs" / "stages" / f"{stage}.py"]
+    while left:
+        path = left.pop()
+        name = path.relative_to(identity.ROOT).as_posix()
+        if path in seen or name.startswith(passive) or name.startswith("runs/stages/session"):
+            continue
+        seen.add(path)
+        assert name.startswith(covered), f"{stage} depends on {name}"
+        left += _imported(path)
+    assert len(seen) > 3
+
+
+def _imported(path: Path) -> list[Path]:
+    found = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("tireroad."):
+            continue
+        base = identity.ROOT / Path(*node.module.split(".")[1:])
+        places = [base, *(base / alias.name for alias in node.names)]
+        found += [file for p in places if (file := p.with_suffix(".py")).is_file()]
+    return found
+
+
+def _sealed(path: Path) -> bytes:
+    with writing(path, ORIGIN) as file:
+        put(file, "a", np.arange(300.0), "m")
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_any_damage_is_found(tmp_path: Path, seed: int) -> None:
+    """One bit, a block of zeros, or a part that is missing: never opened by HDF5."""
+    path = tmp_path / "static.h5"
+    whole = bytearray(_sealed(path))
+    rng = np.random.default_rng(seed)
+    place = int(rng.integers(len(whole)))
+    if seed % 3 == 0:
+        whole[place] ^= 1 << int(rng.integers(8))
+    elif seed % 3 == 1:
+        whole[place // 512 * 512 : place // 512 * 512 + 512] = b"\1" * 512
+    else:
+        del whole[place:]
+    path.write_bytes(bytes(whole))
+    assert why_not(path, "abc", "static") == "it is damaged"
+    with pytest.raises(InputError, match=r"static\.h5"), opened(path):
+        pass
+
+
+def test_what_is_no_result_is_not_used(tmp_path: Path) -> None:
     damaged = tmp_path / "damaged.h5"
     damaged.write_bytes(b"\x89HDF\r\n\x1a\n" + b"\0" * 100)
-    assert stored_hash(damaged) is None
+    assert why_not(damaged, "abc", "static") == "it is damaged"
     with h5py.File(tmp_path / "foreign.h5", "w"):
         pass
-    assert stored_hash(tmp_path / "foreign.h5") is None
+    assert why_not(tmp_path / "foreign.h5", "abc", "static") == "it is damaged"
+    with pytest.raises(InputError, match="no checksum"), opened(tmp_path / "foreign.h5"):
+        pass
+
+
+def test_signed_texts_tell_a_change() -> None:
+    text = checksum.signed("load = 300.0\n# [road] absent\n")
+    assert checksum.is_as_signed(text) and checksum.is_as_signed("load = 300.0\n")
+    assert not checksum.is_as_signed(text.replace("300", "700"))
+    table = checksum.signed_table({"stages": {"static": {"seconds": 1.5}}})
+    read = json.loads(json.dumps(table))
+    assert checksum.is_table_as_signed(read)
+    read["stages"]["static"]["seconds"] = 1.25
+    assert not checksum.is_table_as_signed(read)

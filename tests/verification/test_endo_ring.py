@@ -71,8 +71,7 @@ def lowest(operators: Operators, count: int) -> Modes:
 def in_plane(operators: Operators, count: int = 28) -> tuple[Modes, np.ndarray]:
     """Bending modes in the plane with n = 2, 3, 4, and their n."""
     modes, body = lowest(operators, count), operators.body
-    _, wall, along = np.unravel_index(body.ids, body.lattice.shape)
-    circles = wall * body.lattice.shape[2] + along
+    circles = body.lattice.circles(body.ids)
     points = body.lattice.points(body.ids)
     wave = label(body.comm, points, circles, operators.mass, modes.vectors).wave
     axial = (operators.mass[:, None] * modes.vectors**2)[1::3].sum(axis=0)

@@ -1,0 +1,114 @@
+"""Road heights in NumPy's archives (.npz), read as data; sizes are checked before memory is taken."""
+
+import struct
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.roads.rows import PIECE, ArrayRows, FileRows, Packed, Rows, Spool, check_count
+from tireroad.fem.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+class _Header(NamedTuple):
+    """What stands before the numbers of an array in an archive."""
+
+    shape: tuple[int, ...]
+    by_columns: bool
+    kind: np.dtype
+    start: int
+
+
+def read_npz(file: Path) -> tuple[Array, Array, Rows]:
+    """The arrays x (nx,), y (ny,) and z (nx, ny) of an archive; z stays in the file where it can.
+
+    InputError for missing arrays, arrays without numbers, and headers that announce other sizes than
+    the archive holds.
+    """
+    with zipfile.ZipFile(file) as archive:
+        members = {member.filename for member in archive.infolist()}
+        missing = [name for name in "xyz" if f"{name}.npy" not in members]
+        if missing:
+            names = ", ".join(missing)
+            raise InputError(f"road.file {file}: no array {names}; x, y and z are needed")
+        try:
+            x, y = (_axis(file, archive, name) for name in "xy")
+            return x, y, _rows(file, archive)
+        except (ValueError, TypeError) as error:
+            raise InputError(f"road.file {file}: x, y and z must hold numbers ({error})") from error
+
+
+def _header(stream: BinaryIO, info: zipfile.ZipInfo, name: str) -> _Header:
+    """ValueError where the header is none of numbers, or does not fit the size of the member."""
+    version = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0
+    if version != (1, 0):
+        read = np.lib.format.read_array_header_2_0
+    shape, by_columns, kind = read(stream)
+    if kind.kind not in "iuf" or 0 in shape:
+        raise ValueError(f"{name} is {kind} of shape {shape}")
+    start, size = stream.tell(), kind.itemsize
+    for length in shape:
+        size *= length
+    if size != info.file_size - start:
+        raise ValueError(
+            f"the header of {name} announces {size:,} bytes, the archive {info.file_size - start:,}"
+        )
+    return _Header(shape, by_columns, kind, start)
+
+
+def _axis(file: Path, archive: zipfile.ZipFile, name: str) -> Array:
+    info = archive.getinfo(f"{name}.npy")
+    check_count(file, info.file_size // 8)
+    with archive.open(info) as stream:
+        header = _header(stream, info, name)
+        check_count(file, int(np.prod(header.shape, dtype=float)))
+        data = stream.read()
+    return np.frombuffer(data, header.kind).reshape(header.shape).astype(float)
+
+
+def _rows(file: Path, archive: zipfile.ZipFile) -> Rows:
+    """z, left in the archive where it is not compressed; all of it passes by once, as a check."""
+    info = archive.getinfo("z.npy")
+    with archive.open(info) as stream:
+        header = _header(stream, info, "z")
+        if len(header.shape) != 2:
+            raise ValueError(f"z has the shape {header.shape}")
+        if header.by_columns:
+            check_count(file, header.shape[0] * header.shape[1])
+            numbers = np.frombuffer(stream.read(), header.kind)
+            return ArrayRows(numbers.reshape(header.shape, order="F").astype(float))
+        packed = Packed(header.start, header.kind, header.shape)
+        stored = info.compress_type == zipfile.ZIP_STORED
+        spool = Spool(f"road.file {file}", 0 if stored else header.shape[0] * header.shape[1])
+        for block in _blocks(stream, packed):
+            if not stored:
+                spool.add(block)
+    return _stored(file, info, packed) if stored else spool.rows()
+
+
+def _blocks(stream: BinaryIO, packed: Packed) -> Iterator[Array]:
+    """Blocks of rows in their order; beyond the last, the archive checks its sum."""
+    (count, width), size = packed.shape, packed.kind.itemsize
+    most = max(PIECE // width, 1)
+    for first in range(0, count, most):
+        wanted = min(most, count - first) * width * size
+        data = stream.read(wanted)
+        if len(data) < wanted:
+            raise EOFError("z ends too early")
+        yield np.frombuffer(data, packed.kind).reshape(-1, width).astype(float)
+    stream.read(1)
+
+
+def _stored(file: Path, info: zipfile.ZipInfo, packed: Packed) -> FileRows:
+    """Rows of an archive's member that is not compressed: its own header has two lengths at byte 26."""
+    with file.open("rb") as stream:
+        stream.seek(info.header_offset + 26)
+        name, extra = struct.unpack("<HH", stream.read(4))
+    start = info.header_offset + 30 + name + extra + packed.start
+    return FileRows(file, packed._replace(start=start))

@@ -1,0 +1,88 @@
+"""What every solver of the contact problem has in common: its interface, and the checks of A and of f."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.fem.errors import ConvergenceError, InputError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
+
+# Share of the scale the complementarity residual may reach in the end.
+TOLERANCE = 1e-9
+
+
+class ContactSolver(Protocol):
+    """What the time loop needs; `active`, `gap` (m), `residual`, ... are of the last solve.
+
+    `gap` is 0 at the points that touch; `penetration` (m) is how far the answer as it was solved has
+    any point inside the road.
+    """
+
+    active: Mask
+    gap: Array
+    penetration: float
+    residual: float
+    iterations: int
+
+    @property
+    def factorisations(self) -> int: ...
+
+    def solve(
+        self, q: Array, guess_active: Mask | None = None, reference: Array | None = None
+    ) -> Array: ...
+
+    def block(self, index: Index) -> Array: ...
+
+    def state(self) -> dict[str, Array]: ...
+
+    def set_state(self, kept: dict[str, Array]) -> None: ...
+
+
+def penetration(gap: Array) -> float:
+    """How far (m) the deepest of the gaps (n,) m is below 0."""
+    return max(-float(gap.min(initial=0.0)), 0.0)
+
+
+def checked_compliance(matrix: Array) -> Array:
+    """The matrix (n, n) m/N as a C-ordered copy; InputError if the solution would not be unique."""
+    matrix = np.array(matrix, dtype=float, order="C")
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
+        raise InputError(f"contact: the compliance must be a square matrix, not {matrix.shape}")
+    if not np.all(np.isfinite(matrix)):
+        raise InputError("contact: the compliance has entries that are not finite (m/N)")
+    symmetric = 0.5 * (matrix + matrix.T)
+    try:
+        np.linalg.cholesky(symmetric)
+    except np.linalg.LinAlgError:
+        eigenvalues = np.linalg.eigvalsh(symmetric)
+        raise InputError(
+            "contact: the compliance is not positive definite (eigenvalues of its symmetric part "
+            f"from {eigenvalues[0]:.3g} to {eigenvalues[-1]:.3g} m/N), so the contact forces are "
+            "not unique; add tread compliance ([contact] tread) or a residual flexibility "
+            '([greens] residual = "static")'
+        ) from None
+    return matrix
+
+
+def complementarity_residual(force: Array, gap: Array, diagonal: Array, scale: float) -> float:
+    """max |min(diag(A) f, g)| over `scale` (m); 0 at the solution, also when the scale is 0."""
+    worst = float(np.abs(np.minimum(force * diagonal, gap)).max())
+    return worst / scale if scale > 0.0 else worst
+
+
+def check_residual(name: str, residual: float) -> None:
+    """ConvergenceError when the relative residual is above the tolerance or not a number."""
+    if np.isnan(residual):
+        raise ConvergenceError(
+            f"contact ({name}): the gaps are not finite: the motion has grown without bound; take "
+            'a smaller [time] step or scheme = "constant"'
+        )
+    if residual > TOLERANCE:
+        raise ConvergenceError(
+            f"contact ({name}): complementarity residual {residual:.2g} of the largest gap, above "
+            f"{TOLERANCE:g}; add tread compliance or a residual flexibility, or take another solver"
+        )

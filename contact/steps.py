@@ -1,0 +1,42 @@
+"""How many steps a run takes, and so how long it is and how far the tire rolls."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tireroad.fem.errors import InputError
+
+_ROUNDING = 1e-9  # of the number of steps: a duration that is a multiple of the step stays one
+
+
+@dataclass(frozen=True)
+class Steps:
+    """`count` equal steps of `size` s. The state at t = 0 is known; the last one is at `duration`."""
+
+    size: float
+    count: int
+
+    @property
+    def duration(self) -> float:
+        """Time of the last step, s: not less than the duration that was asked for."""
+        return self.size * self.count
+
+
+def steps_of(duration: float, size: float) -> Steps:
+    """The least number of steps of `size` (s) that cover `duration` (s); at least one."""
+    _check(duration, size)
+    return Steps(size, max(math.ceil(duration / size * (1.0 - _ROUNDING)), 1))
+
+
+def equal_steps(duration: float, largest: float) -> Steps:
+    """Equal steps no longer than `largest` (s) that end at `duration` (s) exactly."""
+    _check(duration, largest)
+    count = steps_of(duration, largest).count
+    return Steps(duration / count, count)
+
+
+def _check(duration: float, size: float) -> None:
+    for name, value in (("duration", duration), ("step", size)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(f"time.{name} = {value:g} s must be positive and finite")

@@ -1,0 +1,134 @@
+"""The cross-section of a tire as curved quadrilaterals in the meridian half plane."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tireroad.fem.sections import reference
+
+Position = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SectionMesh:
+    """A section, undeformed, in (r, y) m: r > 0 from the axle, y along it, 0 the centre plane.
+
+    Whatever a section comes from (torus, built-in tire, section file, deck) ends in this, and the ring
+    of hexahedra is made from nothing else. With p = `order` of the elements, 1 to 3:
+
+    nodes (n, 2): r, y of all nodes, each used, no two at one place.
+    cells (c, (p + 1)^2): nodes of each cell in tensor order, local (i, j) at i * (p + 1) + j, where
+        xi = i / p and eta = j / p: equispaced on the reference square. d(r, y)/d(xi, eta) has a
+        positive determinant; cells share whole edges or nothing.
+    region (c,): index into `regions`, names of the compounds.
+    Sets of edges, (k, 2) of (cell, side), side 0: xi = 0, 1: xi = 1, 2: eta = 0, 3: eta = 1:
+      outer: the face away from the air, an ordered chain from the rim at the lower y to the rim at
+          the higher y, each edge starting where the last one ended;
+      tread: the part of `outer` that can touch the road (order does not matter);
+      inner: the face under inflation pressure, one unbroken chain between the two rims (any order);
+      rim: what the wheel holds (any order). Part of outer, inner or any other boundary edges.
+    plies: name -> ordered chain of cell edges, inside or on the boundary, on which cords lie; each
+        edge is named once, by one of the cells that have it. Chains run towards higher y at their
+        middle; cord angles are positive from +x (forward at the lowest point) towards the chain's end.
+    position: (cells, xi, eta), (k,) each, to the exact (r, y) (k, 2), where there is an exact shape;
+        None: the Lagrange interpolation of the nodes is the shape.
+
+    A mesh that breaks one of these rules is an InputError that names the rule, cell and place.
+    """
+
+    order: int
+    nodes: np.ndarray
+    cells: np.ndarray
+    region: np.ndarray
+    regions: tuple[str, ...]
+    outer: np.ndarray
+    tread: np.ndarray
+    inner: np.ndarray
+    rim: np.ndarray
+    plies: Mapping[str, np.ndarray] = field(default_factory=dict)
+    position: Position | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self):
+        from tireroad.fem.sections.checks import check
+
+        check(self)
+
+    def at(self, cells: np.ndarray, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
+        """Places (k, 2) m at reference coordinates of cells, (k,) each."""
+        if self.position is not None:
+            return self.position(cells, xi, eta)
+        edge = reference.equispaced(self.order)
+        shape = reference.tensor(reference.line(edge, xi), reference.line(edge, eta))
+        return np.einsum("ka,kax->kx", shape, self.nodes[self.cells[cells]])
+
+    def on_nodes(self, order: int, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes (m, 2) and cells (c, (order + 1)^2) of the same section with `edge` (order + 1,), the
+        nodes on one edge of the reference element, in place of equispaced ones.
+
+        The numbers of nodes do not depend on `edge`. With the mesh's own order they are its own.
+        """
+        cells = self.cells if order == self.order else self._numbered(order)
+        count = cells.max() + 1
+        owner, local = _first_use(cells, count)
+        xi, eta = (part[local] for part in reference.grid_points(edge))
+        return self.at(owner, xi, eta), cells
+
+    def of_order(self, order: int) -> SectionMesh:
+        """The same section of elements of another order; equal shape where the order is raised."""
+        if order == self.order:
+            return self
+        nodes, cells = self.on_nodes(order, reference.equispaced(order))
+        return replace(self, order=order, nodes=nodes, cells=cells)
+
+    def side(self, edges: np.ndarray) -> np.ndarray:
+        """Nodes (k, order + 1) of edges (k, 2), in ascending xi or eta."""
+        cell, side = edges.T
+        return self.cells[cell[:, None], reference.side_nodes(self.order)[side]]
+
+    def chain(self, edges: np.ndarray) -> np.ndarray:
+        """Nodes (k * order + 1,) along an ordered chain of edges (k, 2)."""
+        return _joined(self.side(edges))
+
+    def _numbered(self, order: int) -> np.ndarray:
+        """Cells (c, (order + 1)^2) of another order: corners, then inner nodes of edges, then of cells."""
+        corners = self.cells[:, [0, self.order, -1 - self.order, -1]]
+        used, corner = np.unique(corners, return_inverse=True)
+        corner = corner.reshape(corners.shape)
+        cells = np.empty((len(self.cells), (order + 1) ** 2), int)
+        cells[:, [0, order, -1 - order, -1]] = corner
+        ends = corner[:, [[0, 1], [2, 3], [0, 2], [1, 3]]]  # of the four sides
+        edges, number = np.unique(np.sort(ends, axis=2).reshape(-1, 2), axis=0, return_inverse=True)
+        number = number.reshape(-1, 4)
+        inner = np.arange(order - 1)
+        for side, local in enumerate(reference.side_nodes(order)):
+            turned = (ends[:, side, 0] > ends[:, side, 1])[:, None]
+            step = np.where(turned, inner[::-1], inner)
+            cells[:, local[1:-1]] = len(used) + number[:, side, None] * (order - 1) + step
+        grid = np.arange((order + 1) ** 2).reshape(order + 1, order + 1)[1:-1, 1:-1].ravel()
+        first = len(used) + len(edges) * (order - 1)
+        cells[:, grid] = first + np.arange(len(cells) * len(grid)).reshape(len(cells), -1)
+        return cells
+
+
+def _first_use(cells: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """For each node a cell that has it, and its local number there."""
+    nodes, first = np.unique(cells, return_index=True)
+    if len(nodes) != count:
+        raise ValueError("a number of a node is not used")
+    return np.divmod(first, cells.shape[1])
+
+
+def _joined(sides: np.ndarray) -> np.ndarray:
+    """Nodes along a chain of edges (k, n) that are each turned to start where the last one ended."""
+    sides = sides.copy()
+    if len(sides) > 1 and sides[0, -1] not in sides[1, [0, -1]]:
+        sides[0] = sides[0, ::-1]
+    for before, edge in zip(sides[:-1], sides[1:], strict=True):
+        if edge[0] != before[-1]:
+            edge[:] = edge[::-1]
+        if edge[0] != before[-1]:
+            return np.zeros(0, int)
+    return np.append(sides[:, :-1].ravel(), sides[-1, -1])

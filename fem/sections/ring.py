@@ -1,0 +1,95 @@
+"""A section with what its revolution into a ring of elements needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tireroad.fem.sections.mesh2d import SectionMesh
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ring:
+    """The section revolved about the axle (y) in `segments` elements around, all of the section's order.
+
+    `ring_corners` (segments + 1,) rad: the angles of the element corners, ascending from 0, the lowest
+    point, towards +x, to 2 pi. `arc_corners` (k + 1,) rad: the section angle, ascending, where the k
+    edges of the outer face start and end; 0 is the crown, y > 0 positive. `thickness` m of a typical
+    wall and `height` m of the section: the scale of motions. `coarser`: the same tire of elements about
+    twice the size, None where there is none.
+    """
+
+    section: SectionMesh
+    ring_corners: np.ndarray
+    arc_corners: np.ndarray
+    thickness: float
+    height: float
+    coarser: Callable[[], Ring | None] = lambda: None
+
+    @property
+    def segments(self) -> int:
+        """Elements around."""
+        return len(self.ring_corners) - 1
+
+    @property
+    def order(self) -> int:
+        """Of the elements."""
+        return self.section.order
+
+    @property
+    def elements(self) -> int:
+        """Number of hexahedra."""
+        return self.segments * len(self.section.cells)
+
+    @cached_property
+    def faces(self) -> int:
+        """Number of element faces on the outer face."""
+        return self.segments * len(self.section.outer)
+
+    def outer_line(self, element: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """(r, y) (k, 2) m on the outer face: place t (k,), 0 to 1 bead to bead, on edges (k,) of the chain."""
+        cell, side = self.section.outer[element].T
+        t = np.where(self._turned[element], 1 - t, t)
+        fixed = np.where(side % 2 == 1, 1.0, 0.0)
+        xi, eta = np.where(side < 2, fixed, t), np.where(side < 2, t, fixed)
+        return self.section.at(cell, xi, eta)
+
+    @cached_property
+    def _turned(self) -> np.ndarray:
+        """Whether each edge of the outer chain runs against its cell's coordinate."""
+        start = self.section.chain(self.section.outer)[:: self.order][:-1]
+        return self.section.side(self.section.outer)[:, 0] != start
+
+
+def section_angles(section: SectionMesh) -> np.ndarray:
+    """Section angle (rad) of the corners of the outer face, ascending, 0 at the crown.
+
+    The angle about the middle of the section: the point of the centre plane half way between the
+    crown and the beads. Where the face does not go round that point steadily, the same range is
+    shared out by length along the face.
+    """
+    line = section.nodes[section.chain(section.outer)]
+    corners = line[:: section.order]
+    centre = (line[:, 0].max() + line[[0, -1], 0].mean()) / 2
+    angle = np.unwrap(np.arctan2(line[:, 1], line[:, 0] - centre))
+    if (np.diff(angle) > 0).all():
+        return angle[:: section.order]
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1)))
+    crown = np.interp(0.0, corners[:, 1], length) if (np.diff(corners[:, 1]) > 0).all() else None
+    middle = length[-1] / 2 if crown is None else crown
+    return (length - middle) / length[-1] * (angle[-1] - angle[0])
+
+
+def wall_thickness(section: SectionMesh) -> float:
+    """Area over mean length of inner and outer face, m."""
+    corners = section.nodes[section.cells[:, [0, section.order, -1, -1 - section.order]]]
+    x, y = corners[..., 0], corners[..., 1]
+    area = 0.5 * abs((x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1)).sum()
+    lengths = [
+        np.linalg.norm(np.diff(section.nodes[section.side(face)], axis=1), axis=2).sum()
+        for face in (section.inner, section.outer)
+    ]
+    return float(2 * area / sum(lengths))

@@ -1,0 +1,91 @@
+"""What computed a result besides its inputs: the program's own sources and the libraries under them.
+
+Part of every stage's hash, so that a result is not reused after the code or a library has changed.
+"""
+
+import functools
+import hashlib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# Imports go one way, so a stage is computed by its own package and those below it. A later stage
+# has all packages of an earlier one: whatever changes an earlier result changes its hash too.
+_TIRE = ("fem", "runs/stages")
+_MODAL = (*_TIRE, "modal")
+_ALL = (*_MODAL, "greens", "contact")
+PACKAGES: Mapping[str, tuple[str, ...]] = {"static": _TIRE, "modes": _MODAL}
+"""Folders of sources a stage depends on; all five packages where it is not named here."""
+
+LIBRARIES = {
+    "dolfinx": "fenics-dolfinx",
+    "basix": "fenics-basix",
+    "ffcx": "fenics-ffcx",
+    "ufl": "fenics-ufl",
+    "PETSc": "petsc4py",
+    "SLEPc": "slepc4py",
+    "numpy": "numpy",
+    "scipy": "scipy",
+}
+"""Libraries whose version can change a result, with the name their installation goes by."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """`code`: SHA-256 of the sources; `libraries`: versions by name."""
+
+    code: str
+    libraries: Mapping[str, str]
+
+    def differs(self, code: str, libraries: Mapping[str, str]) -> str:
+        """What has changed since a result was computed by `code` on `libraries`; "" if nothing."""
+        if code != self.code:
+            return "the program's code has changed since"
+        changed = [
+            f"{name} {libraries.get(name, 'unknown')} -> {version}"
+            for name, version in self.libraries.items()
+            if libraries.get(name) != version
+        ]
+        return f"libraries have changed since: {', '.join(changed)}" if changed else ""
+
+
+def identity(stage: str) -> Identity:
+    """Of what computes a stage in this process. Reads the sources once a process, some 10 ms."""
+    return Identity(_code(PACKAGES.get(stage, _ALL)), _libraries())
+
+
+@functools.cache
+def _code(folders: tuple[str, ...]) -> str:
+    digest = hashlib.sha256()
+    for folder in folders:
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            digest.update(f"{path.relative_to(ROOT)}\0".encode())
+            digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+@functools.cache
+def _libraries() -> dict[str, str]:
+    versions = {name: _version(package) for name, package in LIBRARIES.items()}
+    return {**versions, "MUMPS": _mumps()}
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def _mumps() -> str:
+    """From the name of the loaded library, which no interface tells; known once PETSc is loaded."""
+    try:
+        maps = Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return "unknown"
+    found = re.search(r"/libdmumps[^/\n]*?(\d+(?:\.\d+)+)", maps)
+    return found.group(1) if found else "unknown"

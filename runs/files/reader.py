@@ -1,0 +1,104 @@
+"""A result folder as a mapping of numpy arrays with units, for scripts and notebooks."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.fem.errors import InputError
+
+
+class RunResults(Mapping[str, NDArray[Any]]):
+    """The datasets of all result files in a folder: `run["contact/total_force"]` is the dataset
+    `total_force` of `contact.h5`, read when asked for.
+
+    `unit(name)` is its unit, `attributes(file)` what the file says of itself (for example
+    `run.attributes("static")["load"]`, N), `scene` the resolved scene and `summary` the stages as in
+    `summary.json`. Nothing is kept open. Raises InputError for a folder that holds no results and for
+    a file that cannot be read; KeyError, with the names there are, for a dataset that is not there.
+    """
+
+    def __init__(self, directory: str | Path) -> None:
+        self.directory = Path(directory)
+        if not (self.directory / "summary.json").is_file():
+            raise InputError(f"{self.directory}: no result folder: it has no summary.json")
+        self._units: dict[str, str] | None = None
+
+    @property
+    def scene(self) -> dict[str, Any]:
+        """The resolved scene, every default written back."""
+        return tomllib.loads((self.directory / "scene.toml").read_text(encoding="utf-8"))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Each stage: seconds, headline figures and indicators with units, warnings."""
+        text = (self.directory / "summary.json").read_text(encoding="utf-8")
+        return json.loads(text)["stages"]
+
+    def unit(self, name: str) -> str:
+        """The unit of a dataset; "-" for a pure number."""
+        self._known(name)
+        return self._listed()[name]
+
+    def attributes(self, file: str) -> dict[str, Any]:
+        """The attributes of a file, "static" for `static.h5`: figures, provenance."""
+        with self._opened(file) as opened:
+            found = dict(opened.attrs)
+        return {key: v.item() if isinstance(v, np.generic) else v for key, v in found.items()}
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        self._known(name)
+        file, _, path = name.partition("/")
+        with self._opened(file) as opened:
+            return np.asarray(opened[path][()])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._listed())
+
+    def __len__(self) -> int:
+        return len(self._listed())
+
+    def __repr__(self) -> str:
+        return f"RunResults({str(self.directory)!r}: {len(self)} datasets)"
+
+    def _known(self, name: str) -> None:
+        if name not in self._listed():
+            file = name.partition("/")[0]
+            near = [known for known in self._listed() if known.startswith(f"{file}/")]
+            raise KeyError(f"{name}; there are {', '.join(near or self._listed())}")
+
+    def _listed(self) -> dict[str, str]:
+        """Every dataset's unit by its name."""
+        if self._units is None:
+            self._units = {}
+            for path in sorted(self.directory.glob("*.h5")):
+                with self._opened(path.stem) as opened:
+                    opened.visititems(
+                        lambda name, item, stem=path.stem: self._note(stem, name, item)
+                    )
+        return self._units
+
+    def _note(self, stem: str, name: str, item: h5py.Group | h5py.Dataset) -> None:
+        if isinstance(item, h5py.Dataset):
+            self._units[f"{stem}/{name}"] = str(item.attrs.get("unit", "-"))
+
+    def _opened(self, stem: str) -> h5py.File:
+        path = self.directory / f"{stem}.h5"
+        if not path.is_file():
+            raise KeyError(f"{stem}.h5 is not in {self.directory}")
+        try:
+            return h5py.File(path, "r")
+        except OSError as error:
+            raise InputError(f"{path} is damaged or no HDF5 file: {error}") from error
+
+
+def load(directory: str | Path) -> RunResults:
+    """The results in a folder, for reading."""
+    return RunResults(directory)

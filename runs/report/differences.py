@@ -1,0 +1,134 @@
+"""What differs between runs: scenes, figures, levels, modes, cost, as rows of one table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tireroad.runs.files.reader import RunResults
+from tireroad.runs.report.figures import nominal
+
+Array = NDArray[np.float64]
+AXES = ("x", "y", "z")
+MATCHED = 24  # lowest modes of the first run that are sought in the others
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity in every run; None where a run does not have it."""
+
+    group: str
+    name: str
+    unit: str
+    values: tuple[Any, ...]
+
+
+def scene_rows(scenes: Sequence[Mapping[str, Any]]) -> list[Row]:
+    """The scene keys whose values are not the same in all runs; a key that is absent is None."""
+    flat = [dict(_flattened(scene)) for scene in scenes]
+    keys = sorted({key for one in flat for key in one} - {"name"})
+    rows = [Row("scene", key, "", tuple(one.get(key) for one in flat)) for key in keys]
+    return [row for row in rows if any(value != row.values[0] for value in row.values)]
+
+
+def _flattened(table: Mapping[str, Any], path: str = "") -> list[tuple[str, Any]]:
+    found: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        where = f"{path}.{key}" if path else key
+        if isinstance(value, Mapping):
+            found += _flattened(value, where)
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            for number, one in enumerate(value):
+                found += _flattened(one, f"{where}.{number}")
+        else:
+            found.append((where, value))
+    return found
+
+
+def figure_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
+    """Headline figures of all stages, in the order of the first run that has them."""
+    rows: dict[tuple[str, str], Row] = {}
+    for summary in summaries:
+        for stage, told in summary.items():
+            for name, entry in (told.get("headline") or {}).items():
+                values = tuple(
+                    ((other.get(stage, {}).get("headline") or {}).get(name) or {}).get("value")
+                    for other in summaries
+                )
+                rows.setdefault((stage, name), Row(stage, name, entry.get("unit", ""), values))
+    return list(rows.values())
+
+
+def cost_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
+    """Seconds of each stage; None where it was reused or skipped."""
+    stages = list(dict.fromkeys(stage for summary in summaries for stage in summary))
+    computed = [
+        {stage: told.get("seconds") for stage, told in summary.items()} for summary in summaries
+    ]
+    return [
+        Row("cost", stage, "s", tuple(one.get(stage) or None for one in computed))
+        for stage in stages
+        if any(one.get(stage) for one in computed)
+    ]
+
+
+def level_rows(runs: Sequence[RunResults]) -> list[Row]:
+    """Third-octave levels of the axle force by band and component, dB re 1 N."""
+    levels: list[dict[tuple[int, float], float]] = []
+    for run in runs:
+        own: dict[tuple[int, float], float] = {}
+        if {"spectra/third_octave/centre", "spectra/third_octave/level"} <= set(run):
+            bands, level = run["spectra/third_octave/centre"], run["spectra/third_octave/level"]
+            for centre, parts in zip(nominal(bands), level, strict=True):
+                own |= {(axis, float(centre)): float(v) for axis, v in enumerate(parts)}
+        levels.append(own)
+    keys = sorted({key for own in levels for key in own})
+    return [
+        Row(
+            f"axle force {AXES[axis]}",
+            f"{centre:g} Hz",
+            "dB re 1 N",
+            tuple(o.get(key) for o in levels),
+        )
+        for key in keys
+        for axis, centre in [key]
+    ]
+
+
+def mode_rows(runs: Sequence[RunResults]) -> list[Row]:
+    """Frequencies of the first run's lowest modes, and of the most similar mode in each other run.
+
+    Similarity is the modal assurance criterion of the motion of the outer face, on the nodes of the
+    first run that lie next to one of the other's. In a name: the least MAC of that row.
+    """
+    if not all("modes/surface/shape" in run for run in runs):
+        return []
+    reference = runs[0]
+    frequency = reference["modes/frequency"][:MATCHED]
+    shape = reference["modes/surface/shape"][:MATCHED]
+    points = reference["modes/surface/points"]
+    found = [list(frequency)]
+    least = np.ones(len(frequency))
+    for run in runs[1:]:
+        other = run["modes/surface/shape"]
+        _, near = cKDTree(run["modes/surface/points"]).query(points)
+        mac = assurance(shape, other[:, near])
+        best = mac.argmax(axis=1)
+        found.append(list(run["modes/frequency"][best]))
+        least = np.minimum(least, mac.max(axis=1))
+    return [
+        Row("modes", f"mode {k + 1}, MAC {least[k]:.2f}", "Hz", tuple(float(f[k]) for f in found))
+        for k in range(len(frequency))
+    ]
+
+
+def assurance(first: Array, second: Array) -> Array:
+    """|a . b|^2 / (a . a)(b . b) of shapes (m, s, 3) and (n, s, 3): (m, n), 1 where they are alike."""
+    a, b = first.reshape(len(first), -1), second.reshape(len(second), -1)
+    square = np.einsum("ij,ij->i", a, a)[:, None] * np.einsum("ij,ij->i", b, b)[None, :]
+    return (a @ b.T) ** 2 / np.maximum(square, 1e-300)

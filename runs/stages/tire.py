@@ -1,0 +1,49 @@
+"""How the tire of a scene becomes a section, a lattice of nodes and a finite-element body."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+from mpi4py import MPI
+
+from tireroad.fem.sections.grid import Patch
+from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.torus import Torus
+from tireroad.runs.scene.tire_tables import Material as MaterialTable
+from tireroad.runs.scene.tire_tables import Region, Tire
+
+
+def make_section(tire: Tire) -> Ring:
+    """The shape of the tire and its elements."""
+    names = {f.name for f in fields(Torus)} - {"half_angle"}
+    given = {name: getattr(tire, name) for name in names}
+    torus = Torus(half_angle=np.radians(tire.half_angle), **given)
+    return torus.ring([_patch(i, region) for i, region in enumerate(tire.region)])
+
+
+def _patch(number: int, region: Region) -> Patch:
+    low, high = np.radians(region.arc)
+    sides = {"left": ((-high, -low),), "right": ((low, high),)}
+    arcs = sides.get(region.side, sides["left"] + sides["right"])
+    return Patch(f"tire.region {number}", arcs, region.depth)
+
+
+def make_lattice(section: Ring):
+    """The nodes of the displacement field, without a mesh."""
+    from tireroad.fem.tire.mesh import field_lattice
+
+    return field_lattice(section)
+
+
+def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
+    """The finite-element body, undeformed. Collective."""
+    from tireroad.fem.tire.body import Body
+    from tireroad.fem.tire.material import Material
+
+    def rubber(table: MaterialTable) -> Material:
+        return Material(**vars(table))
+
+    names = [_patch(i, region).name for i, region in enumerate(tire.region)]
+    materials = {name: rubber(r.material) for name, r in zip(names, tire.region, strict=True)}
+    return Body(comm, section, {"wall": rubber(tire.material)} | materials)

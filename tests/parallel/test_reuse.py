@@ -1,0 +1,73 @@
+"""Stages of one number of processes, reused on another: the answer is that of a fresh run."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+SCENE = """
+name = "reuse"
+[tire]
+segments = 20
+elements_arc = 6
+footprint_size = 0.4
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 400.0
+error_estimate = false
+[modal]
+count = 20
+[rotation]
+speed = 40.0
+[greens]
+residual = "attachment"
+[contact]
+[road]
+[time]
+duration = 0.002
+step = 1e-4
+"""
+FREQUENCY = np.linspace(20.0, 190.0, 18)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, launch):
+    """Run the scene on some processes in the folder of a name: its summary's stages, its receptances."""
+    base = tmp_path_factory.mktemp("reuse")
+    scene = base / "scene.toml"
+    scene.write_text(SCENE)
+
+    def started(name: str, processes: int, *options: str):
+        arguments = ("-m", "runs", "run", scene, "--out", base / name, *options)
+        done = launch(*arguments, processes=processes)
+        assert done.returncode == 0, done.stderr + done.stdout
+        stages = json.loads((base / name / "summary.json").read_text())["stages"]
+        return stages, receptance(base / name) if (base / name / "greens.h5").exists() else None
+
+    return started
+
+
+def receptance(folder) -> np.ndarray:
+    """H (f, c, c) m/N between the contact points, of the stored states."""
+    from tireroad.runs.stages.responses import read_responses
+
+    with h5py.File(folder / "greens.h5") as file:
+        return read_responses(file, False)["contact"].receptance(FREQUENCY)
+
+
+def test_modes_of_other_processes_with_attachments(run) -> None:
+    """1 -> 2 -> 3 -> 1: eigenvectors have other signs there, and the rotating matrices between modes
+    and attachments have them too."""
+    _, fresh = run("fresh", 1, "--until", "greens")
+    size = np.linalg.norm(fresh, axis=(1, 2))
+    run("moved", 1, "--until", "rotating")
+    for processes in (2, 3, 1):
+        # Another band of interest, which changes no response: the Green's functions are made anew.
+        option = "--set", f"greens.band={200 + processes}"
+        stages, found = run("moved", processes, "--until", "greens", *option)
+        assert stages["rotating"]["status"] == "reused"
+        assert stages["greens"]["status"] == "computed"
+        off = np.linalg.norm(found - fresh, axis=(1, 2)) / size
+        assert off.max() < 1e-6, processes

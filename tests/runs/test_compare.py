@@ -1,0 +1,82 @@
+"""Two to twelve runs in one page and one table."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.report.compare import compare
+from tireroad.runs.report.differences import assurance, scene_rows
+
+
+def write(folder: Path, load: float, level: float, frequencies: list[float], turn: bool) -> Path:
+    folder.mkdir()
+    (folder / "scene.toml").write_text(f'name = "{folder.name}"\n[static]\nload = {load}\n')
+    headline = {"load": {"value": load, "unit": "N"}}
+    stages = {"static": {"seconds": 1.0, "headline": headline}}
+    (folder / "summary.json").write_text(json.dumps({"stages": stages}))
+    shape = np.random.default_rng(1).standard_normal((3, 20, 3))
+    points = np.random.default_rng(2).random((20, 3))
+    order = [2, 1, 0] if turn else [0, 1, 2]
+    with h5py.File(folder / "modes.h5", "w") as file:
+        file["frequency"] = np.array(frequencies)
+        file["surface/shape"] = -shape[order] if turn else shape
+        file["surface/points"] = points
+    with h5py.File(folder / "spectra.h5", "w") as file:
+        file["third_octave/centre"] = np.array([100.0, 125.892541])
+        file["third_octave/level"] = np.array([[1.0, 2.0, level], [1.0, 2.0, level + 3]])
+    return folder
+
+
+@pytest.fixture
+def pair(tmp_path: Path) -> list[Path]:
+    first = write(tmp_path / "a", 500.0, 10.0, [50.0, 60.0, 70.0], turn=False)
+    second = write(tmp_path / "b", 550.0, 16.0, [71.0, 61.0, 51.0], turn=True)
+    return [first, second]
+
+
+def test_table_has_what_differs(pair: list[Path], tmp_path: Path) -> None:
+    page = compare(pair, tmp_path / "out").read_text()
+    with (tmp_path / "out" / "compare.csv").open() as file:
+        rows = {(r["group"], r["quantity"]): r for r in csv.DictReader(file)}
+    assert rows["scene", "static.load"]["b"] == "550.0"
+    assert float(rows["axle force z", "125 Hz"]["b"]) == 19.0
+    assert "+6.0 dB" in page and "+10 %" in page
+    # Modes are matched by shape, whatever their order and sign.
+    assert float(rows["modes", "mode 1, MAC 1.00"]["b"]) == 51.0
+    assert float(rows["modes", "mode 3, MAC 1.00"]["b"]) == 71.0
+
+
+def test_what_is_missing_is_said(pair: list[Path], tmp_path: Path) -> None:
+    (pair[1] / "spectra.h5").unlink()
+    assert "b has no spectra.h5" in compare(pair, tmp_path / "out").read_text()
+
+
+def test_folders_without_results_are_refused(pair: list[Path], tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="2 to 12"):
+        compare(pair[:1], tmp_path / "out")
+    with pytest.raises(InputError, match=r"summary\.json"):
+        compare([pair[0], tmp_path], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_same_scenes_differ_in_nothing() -> None:
+    one = {"name": "a", "force": [{"angle": 1.0}], "tire": {"order": 2}}
+    assert scene_rows([one, one | {"name": "b"}]) == []
+    assert [r.name for r in scene_rows([one, {"tire": {"order": 3}}])] == [
+        "force.0.angle",
+        "tire.order",
+    ]
+
+
+def test_assurance_criterion() -> None:
+    shapes = np.random.default_rng(3).standard_normal((4, 7, 3))
+    assert np.allclose(np.diag(assurance(shapes, -3.0 * shapes)), 1.0)
+    apart = assurance(np.eye(3).reshape(3, 1, 3), np.eye(3).reshape(3, 1, 3))
+    assert np.allclose(apart, np.eye(3))

@@ -1,0 +1,47 @@
+"""Result folders read from a script."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import tireroad
+from tireroad.fem.errors import InputError
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    with h5py.File(tmp_path / "contact.h5", "w") as file:
+        file["total_force"] = np.arange(6.0).reshape(2, 3)
+        file["total_force"].attrs["unit"] = "N"
+        file["contact/points"] = np.zeros((4, 3))
+        file["contact/points"].attrs["unit"] = "m"
+    with h5py.File(tmp_path / "static.h5", "w") as file:
+        file.attrs["load"] = 500.0
+    (tmp_path / "summary.json").write_text(json.dumps({"stages": {"static": {"seconds": 1.5}}}))
+    (tmp_path / "scene.toml").write_text('name = "a"\n')
+    return tmp_path
+
+
+def test_arrays_units_and_attributes(folder: Path) -> None:
+    run = tireroad.load(folder)
+    assert sorted(run) == ["contact/contact/points", "contact/total_force"]
+    assert np.array_equal(run["contact/total_force"], np.arange(6.0).reshape(2, 3))
+    assert run.unit("contact/total_force") == "N"
+    assert run.attributes("static")["load"] == 500.0
+    assert run.scene == {"name": "a"} and run.summary["static"]["seconds"] == 1.5
+
+
+def test_what_is_not_there_is_named(folder: Path) -> None:
+    run = tireroad.load(folder)
+    with pytest.raises(KeyError, match="contact/total_force"):
+        run["contact/axle_force"]
+    with pytest.raises(InputError, match=r"summary\.json"):
+        tireroad.load(folder / "nothing")
+    (folder / "modes.h5").write_bytes(b"no HDF5")
+    with pytest.raises(InputError, match="damaged"):
+        len(tireroad.load(folder))
