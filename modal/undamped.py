@@ -125,7 +125,7 @@ def _splits(matrix: sparse.csr_matrix, sites: Sites | None, waves: bool) -> Iter
 
 @dataclass(frozen=True)
 class _Problem:
-    """A distributed and `whole` on every process, own rows of `mass` kg and of their `rank` by position."""
+    """A distributed and `whole` on each process; own rows' `mass` kg and `rank` by position."""
 
     scaled: PETSc.Mat
     whole: sparse.csr_matrix
@@ -134,7 +134,6 @@ class _Problem:
 
     @property
     def comm(self) -> MPI.Comm:
-        """The processes that share it."""
         return self.scaled.comm.tompi4py()
 
     def solve(self, split: _Split, count: int, limit: float) -> Modes:
@@ -182,7 +181,6 @@ class _Problem:
         )
 
     def _same(self, values: np.ndarray) -> float:
-        """Relative distance of eigenvalues that rounding of A cannot tell apart."""
         return max(_SAME, self._rounding(values))
 
     def _rounding(self, values: np.ndarray, defect: float = 0.0) -> float:
@@ -194,9 +192,7 @@ class _Problem:
         return min(max(stiff, defect) / flexible.min(), MOST) if len(flexible) else 0.0
 
     def _allowed(self, modes: Modes, defect: float) -> float:
-        """Largest residual: the tolerance, or what rounding is of the softest mode. Near incompressibility
-        that alone is 1e-8.
-        """
+        """Largest residual. Near incompressibility rounding alone is 1e-8 of the softest mode."""
         return max(RESIDUAL_TOLERANCE, self._rounding(modes.squares, defect))
 
     def accurate(self, modes: Modes, defect: float) -> bool:
