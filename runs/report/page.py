@@ -137,7 +137,9 @@ def build_sections(
     directory: Path, scene: Mapping, stages: Mapping, problems: list[str]
 ) -> tuple[list[Section], list[tuple[str, str]], list[tuple[str, str]]]:
     """Sections of the files there are; what is left out and why; provenance of the first file."""
-    sections, left_out, provenance = [], [], []
+    sections: list[Section] = []
+    left_out: list[tuple[str, str]] = []
+    provenance: list[tuple[str, str]] = []
     with Results(directory, scene) as results:
         for name, build in SECTIONS.items():
             try:
