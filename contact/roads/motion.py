@@ -19,10 +19,17 @@ class Motion(Parameters):
 
     owner = "road.motion"
 
-    kind: str = choice("none", ("none", "ramp", "sine"), "vertical motion of the whole road over time")
+    kind: str = choice(
+        "none", ("none", "ramp", "sine"), "vertical motion of the whole road over time"
+    )
     amplitude: float = number(1.0e-3, "m", "amplitude of the motion, positive up", least=-1, most=1)
     frequency: float = number(
-        50.0, "Hz", "frequency of the sine", least=1e-3, most=1e5, only_for=("kind", ("none", "sine"))
+        50.0,
+        "Hz",
+        "frequency of the sine",
+        least=1e-3,
+        most=1e5,
+        only_for=("kind", ("none", "sine")),
     )
     duration: float = number(
         0.01, "s", "duration of the ramp", least=1e-5, most=1e5, only_for=("kind", ("none", "ramp"))

@@ -45,10 +45,18 @@ class Placement(Parameters):
     owner = "road"
 
     run_in: float = number(
-        0.1, "m", "length over which the heights grow from flat: the run starts at rest", least=0, most=1e4
+        0.1,
+        "m",
+        "length over which the heights grow from flat: the run starts at rest",
+        least=0,
+        most=1e4,
     )
     lateral: float = number(
-        0.0, "m", "y of the road under the tire's middle, positive to the left", least=-1e4, most=1e4
+        0.0,
+        "m",
+        "y of the road under the tire's middle, positive to the left",
+        least=-1e4,
+        most=1e4,
     )
     start: float = number(0.0, "m", "x of the road under the axle at t = 0", least=-1e6, most=1e6)
     offset: float = number(0.0, "m", "added to all heights, positive up", least=-10, most=10)

@@ -3,7 +3,6 @@
 import json
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import fields
 from datetime import UTC, datetime
 from pathlib import Path
 

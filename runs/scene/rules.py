@@ -196,7 +196,8 @@ def _force(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     for key in ("velocity", "acceleration"):
         if scene.contact is not None and getattr(scene.output, key):
             raise error(
-                ("output", key), "is not available in scenes with [contact]: leave it out, or take out [contact]"
+                ("output", key),
+                "is not available in scenes with [contact]: leave it out, or take out [contact]",
             )
     if scene.force and scene.time is None and receptance is None:
         raise error(("force",), "has nothing to drive: add [time] or output.receptance")

@@ -87,7 +87,9 @@ def later(doc: str) -> Any:
 
     def read(value: Any) -> bool:
         if value is not False:
-            raise ValueError(f"must be false, the only value supported in this version, not {described(value)}")
+            raise ValueError(
+                f"must be false, the only value supported in this version, not {described(value)}"
+            )
         return value
 
     return parameter(Key(read=read, doc=f"{doc}: not in this version", values="false"), False)

@@ -191,7 +191,11 @@ class Contact(Variants):
         "bristles that pass through the patch with the tire, or springs fixed at the points",
     )
     friction: float | None = number(
-        None, "-", "coefficient of Coulomb friction; absent: the bristles never slip", least=0, most=10
+        None,
+        "-",
+        "coefficient of Coulomb friction; absent: the bristles never slip",
+        least=0,
+        most=10,
     )
     slip: tuple[float, float] = vector(
         (0.0, 0.0), "-", "slip of the tire: longitudinal (> 0 drives), lateral", least=-1, most=1

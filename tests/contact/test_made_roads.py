@@ -8,8 +8,8 @@ from scipy import signal
 
 from tireroad.contact.roads.kinds.iso8608 import CHUNK, CLASSES, Iso8608
 from tireroad.contact.roads.kinds.obstacle import Cleat
-from tireroad.contact.roads.road import make_road
 from tireroad.contact.roads.kinds.texture import Texture
+from tireroad.contact.roads.road import make_road
 from tireroad.fem.errors import InputError
 
 
@@ -91,9 +91,7 @@ def test_texture_spectrum() -> None:
 
 
 def test_texture_is_continuous_repeatable_and_bounded() -> None:
-    road, again = (
-        Texture(roll_off=0.02, cut_off=0.002, seed=1).make() for _ in range(2)
-    )
+    road, again = (Texture(roll_off=0.02, cut_off=0.002, seed=1).make() for _ in range(2))
     half = 0.16
     for seam in (-half, 0.0, 3 * half):
         x = seam + np.array([-1e-9, 1e-9])

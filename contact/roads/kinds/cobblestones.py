@@ -1,6 +1,7 @@
 """A generated cobblestone road: rows of rounded blocks with joints, endless and repeatable."""
 
 import math
+
 import numpy as np
 from numpy.typing import NDArray
 

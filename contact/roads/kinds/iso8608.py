@@ -22,7 +22,9 @@ class Iso8608(Levelled):
     """Class, shortest wave and seed of a profile."""
 
     road_class: str = choice("C", tuple(CLASSES), "road class of ISO 8608, A smooth to H rough")
-    shortest_wave: float = number(0.1, "m", "shortest wavelength of the profile", least=1e-3, most=50)
+    shortest_wave: float = number(
+        0.1, "m", "shortest wavelength of the profile", least=1e-3, most=50
+    )
     seed: int = integer(0, "seed of the random generator", least=0, most=2**31 - 1)
 
     def make(self) -> "Profile":
@@ -99,9 +101,9 @@ class Profile:
     def _extreme(self, x0: float, x1: float, pick) -> float:
         first, last = (int(np.floor(v / self._pitch / CHUNK)) for v in (x0, x1))
         worst = -np.inf
-        for number in range(first, last + 1):
-            place = np.clip(np.array([x0, x1]) / self._pitch - number * CHUNK, 0, CHUNK)
-            part = self._chunk(number)[int(place[0]) : int(place[1]) + 4]
+        for index in range(first, last + 1):
+            place = np.clip(np.array([x0, x1]) / self._pitch - index * CHUNK, 0, CHUNK)
+            part = self._chunk(index)[int(place[0]) : int(place[1]) + 4]
             worst = max(worst, float(pick(part)))
         # z'' p^2/8 of all waves at once bounds what a place between two can add.
         return worst + float(self._amplitude @ self._wavenumber**2) * self._pitch**2 / 8.0

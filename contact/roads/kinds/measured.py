@@ -22,7 +22,9 @@ class Measured(Levelled):
     what = "the road"
 
     holes: str = choice(
-        "refuse", ("refuse", "fill"), "heights missing in the strip driven over: an error, or filled"
+        "refuse",
+        ("refuse", "fill"),
+        "heights missing in the strip driven over: an error, or filled",
     )
     end: str = choice(
         "refuse", ("refuse", "mirror"), "a run longer than the road: an error, or the road mirrored"

@@ -21,9 +21,7 @@ class Edges(RoadKind):
     position: float = number(
         0.3, "m", "x of the foot of the first edge on the road's middle line", least=-1e6, most=1e6
     )
-    height: float = number(
-        0.01, "m", "height of the step or cleat, positive up", least=-1, most=1
-    )
+    height: float = number(0.01, "m", "height of the step or cleat, positive up", least=-1, most=1)
     ramp: float = number(
         0.005, "m", "length over which an edge rises; 0: a jump", least=0, most=1e4
     )

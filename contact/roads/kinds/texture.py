@@ -150,8 +150,8 @@ class Tiles:
 
     def _strip(self, x0: float, x1: float):
         length = self._shape[0] // 2 * self._pitch
-        for number in range(int(np.floor(x0 / length)), int(np.floor(x1 / length)) + 1):
-            yield self._half(number)
+        for index in range(int(np.floor(x0 / length)), int(np.floor(x1 / length)) + 1):
+            yield self._half(index)
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Tiles":
         """Nothing to prepare."""
