@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
+from tireroad.fem.cavity.column import Column
 from tireroad.fem.matrices.compliance import (
     StaticShapes,
     compliance,
@@ -23,6 +24,7 @@ from tireroad.greens.attachment import with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, modal_moments, second_order
+from tireroad.modal.air import Air
 from tireroad.modal.basis import Projection, project
 from tireroad.modal.damping import Damping, tail_loss
 from tireroad.modal.rotating import StateModes, matrices, rotating, standing
@@ -42,12 +44,14 @@ class Basis:
 
     def couple(self, outputs, loads, flexibility: np.ndarray | None = None) -> Response:
         """Response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s), or 3 s + 6 wide."""
-        momentum = self.projection.momentum
-        return couple(self.states, self.seen(outputs), self.seen(loads), momentum, flexibility)
+        carried = self.projection.carried
+        return couple(self.states, self.seen(outputs), self.seen(loads), carried, flexibility)
 
     def seen(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """The modes (k, m) as the probes read them."""
-        return probes @ self.shape[: probes.shape[1]]
+        """The coordinates (k, m + a) as the probes read them: the air's are not seen."""
+        seen = probes @ self.shape[: probes.shape[1]]
+        air = self.projection.air
+        return seen if air is None else np.pad(seen, ((0, 0), (0, air.count)))
 
 
 def regained(
@@ -58,13 +62,14 @@ def regained(
     The moments of full matrices with it are those of matrices that damp the modes truly, and the rest
     uniformly. `true`, `uniform`: D~ and K~ of both.
     """
-    flexible = basis.projection.squares > 0
+    own = basis.projection.squares > 0
+    flexible = np.pad(own, (0, len(true[0]) - len(own)), constant_values=True)  # the air's are
     seen = basis.seen(outputs)[:, flexible], basis.seen(loads)[:, flexible]
-    momentum = basis.projection.momentum[:, flexible]
+    carried = basis.projection.carried[:, flexible]
     parts = [
         [matrix[np.ix_(flexible, flexible)] for matrix in pencil] for pencil in (true, uniform)
     ]
-    one, other = (modal_moments(*pencil, *seen, momentum) for pencil in parts)
+    one, other = (modal_moments(*pencil, *seen, carried) for pencil in parts)
     return one.minus(other)
 
 
@@ -80,6 +85,7 @@ class Wheel:
     speed: float
     damping: Damping
     inertia: str
+    air: Column | None = None
     beyond: tuple[float, float] | None = None
 
     @cached_property
@@ -126,7 +132,9 @@ class Wheel:
         the projection on these very vectors where there is one: another solution of the same problem
         has other signs, and other vectors of repeated frequencies. Collective."""
         if option in ("static", "dirac"):
-            flexibility = compliance(self.operators, self.rotating_stiffness, outputs, loads)
+            flexibility = compliance(
+                self.operators, self.rotating_stiffness, outputs, loads, self.air
+            )
             if self.beyond is not None:
                 pencils = self._pencils(basis.projection)
                 flexibility += regained(basis, *pencils, outputs, loads).compliance
@@ -140,7 +148,7 @@ class Wheel:
             shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
             poles = basis.couple(probes, probes)
-            carried, loss = basis.projection.momentum, None
+            carried, loss = basis.projection.carried, None
             if self.beyond is not None:
                 pencils = self._pencils(basis.projection)
                 moments = moments.plus(regained(basis, *pencils, probes, probes))
@@ -150,7 +158,7 @@ class Wheel:
 
     def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
         full = self.rotating_stiffness, self.rotating_damping
-        return static_shapes(self.operators, *full, probes)
+        return static_shapes(self.operators, *full, probes, self.air)
 
     def _attached(
         self, modes: Modes, probes: sparse.csr_matrix, known: Projection | None
@@ -186,8 +194,10 @@ class Wheel:
         apart = sparse.hstack([loads, sparse.csr_matrix((loads.shape[0], 6))])
         probes = sparse.vstack([rim, apart], format="csr")
         grown = self._standing_attachments(modes, probes)
-        seen, momentum = grown.seen(probes), grown.projection.momentum
-        response = couple(grown.states, np.vstack([seen[:6], momentum]), seen, momentum)
+        seen, carried = grown.seen(probes), grown.projection.carried
+        # What damps by the mass is the tire, not the air.
+        moment = np.where(np.arange(carried.shape[1]) < grown.projection.own, carried, 0.0)
+        response = couple(grown.states, np.vstack([seen[:6], moment]), seen, carried)
         # By strain energy a rigid motion is not damped, so nothing acts against the wheel.
         turning = self.speed, self.damping[0] if self.beyond is None else 0.0
         return axle_transfer(response.receptance(frequency), frequency, *turning)
@@ -197,13 +207,22 @@ class Wheel:
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
         loss = None if self.beyond is None else self._loss
-        projection = project(grown, self.rotation, operators.carried, comm, known, loss)
+        projection = self.with_air(
+            project(grown, self.rotation, operators.carried, comm, known, loss), grown
+        )
         shape = operators.trace(grown.vectors)
         return Basis(shape, projection, self.decouple(projection, comm))
 
+    def with_air(self, projection: Projection, modes: Modes) -> Projection:
+        """The projection on the modes (all rows), joined by the air where there is any. Collective."""
+        if self.air is None:
+            return projection
+        air = Air(self.air.duct, self.air.coupling(modes.vectors))
+        return replace(projection, air=air)
+
     def decouple(self, projection: Projection, comm) -> StateModes:
-        """The second eigenproblem, or the closed formula when the wheel stands. Collective."""
-        if self.speed == 0:
+        """The second eigenproblem, or the closed formula of a tire without air that stands. Collective."""
+        if self.speed == 0 and projection.air is None:
             return standing(projection, self.damping)
         pencil = matrices(projection, self.speed, self.damping, self.inertia)
         # One process solves: LAPACK on another could order repeated eigenvalues differently.
@@ -214,4 +233,4 @@ class Wheel:
     ) -> np.ndarray:
         """H (f, r, k) m/N without any modes, at the frequencies in Hz. Collective."""
         full = self.rotating_stiffness, self.rotating_damping
-        return receptance(self.operators, *full, outputs, loads, frequency)
+        return receptance(self.operators, *full, outputs, loads, frequency, air=self.air)

@@ -1,6 +1,7 @@
 """What the cords and the compounds of a scene must keep to."""
 
 from collections.abc import Callable
+from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables import Scene
@@ -36,7 +37,7 @@ def check_cords(tire: Tire, error: Where) -> None:
             )
 
 
-def check_damping(scene: Scene, error: Where) -> None:
+def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """What is solved on the full matrices needs a damping that they have."""
     if scene.damping is not None:
         return

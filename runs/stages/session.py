@@ -135,7 +135,7 @@ class Session:
         tail = None
         if isinstance(self.damping, StrainEnergy):
             tail = beyond(self.damping, self.modal.projection)
-        return Wheel(self.operators, rotation, self.speed, self.damping, inertia, tail)
+        return Wheel(self.operators, rotation, self.speed, self.damping, inertia, beyond=tail)
 
     @cached_property
     def modes(self):

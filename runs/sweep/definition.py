@@ -170,8 +170,12 @@ def _hypercube(
 
 def _range(path: Path, axis: Mapping[str, Any]) -> tuple[float, float]:
     given = axis.get("range")
-    numbers = isinstance(given, list) and all(isinstance(v, int | float) for v in given)
-    if not numbers or len(given) != 2 or not given[0] < given[1]:
+    if (
+        not isinstance(given, list)
+        or len(given) != 2
+        or not all(isinstance(v, int | float) for v in given)
+        or not given[0] < given[1]
+    ):
         raise InputError(f"{path}: axis {axis['key']}: give values, or range = [low, high]")
     return float(given[0]), float(given[1])
 

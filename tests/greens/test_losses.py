@@ -79,7 +79,7 @@ def pencil(t, speed):
 def made(t, speed) -> tuple[Wheel, Basis]:
     tail = beyond(StrainEnergy(), t.projection)
     rotation = t.rotation if speed else None
-    wheel = Wheel(t.operators, rotation, speed, StrainEnergy(), "full", tail)
+    wheel = Wheel(t.operators, rotation, speed, StrainEnergy(), "full", beyond=tail)
     states = wheel.decouple(t.projection, MPI.COMM_SELF)
     return wheel, Basis(t.operators.trace(t.modes.vectors), t.projection, states)
 
