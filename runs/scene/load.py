@@ -9,7 +9,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import Field, fields
+from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any
 
