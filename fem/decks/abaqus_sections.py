@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from tireroad.fem.decks.abaqus_sets import data_lines
-from tireroad.fem.decks.deck import Compound, Embedded, Layer, Solid
+from tireroad.fem.decks.deck import Compound, Embedded, Layer, Orientation, Solid
 from tireroad.fem.decks.lines import Card, Data
 from tireroad.fem.decks.numbers import number
 
@@ -28,6 +28,7 @@ class SectionReader:
         self.layers: list[Layer] = []
         self.embedded: list[Embedded] = []
         self.held: list = []
+        self.orientations: dict[str, Orientation] = {}
         self.unused: list[str] = []
         self._membranes: str | None = None
         self._material: str | None = None
@@ -38,6 +39,7 @@ class SectionReader:
             "MEMBRANE SECTION": self._membrane,
             "REBAR LAYER": self._layer,
             "EMBEDDED ELEMENT": self._embed,
+            "ORIENTATION": self._orientation,
             "RIGID BODY": self._rigid,
             "MATERIAL": self._begin_material,
             **{name: self._suboption for name in SUBOPTIONS},
@@ -86,6 +88,7 @@ class SectionReader:
                     geometry=geometry,
                     extension=numbers.get(7, 0.0),
                     radius=numbers.get(8, 0.0),
+                    orientation=card.options.get("ORIENTATION", "").upper(),
                     place=place,
                 )
             )
@@ -94,6 +97,18 @@ class SectionReader:
         host = card.options.get("HOST ELSET", card.options.get("HOST"))
         names = tuple(p.upper() for _, parts in data_lines(lines) for p in parts if p)
         self.embedded.append(Embedded(names, host.upper() if host else None, card.place))
+
+    def _orientation(self, card: Card, lines: list[Data], _: int) -> None:
+        table = [[number(part, place) for part in parts] for place, parts in data_lines(lines)]
+        points, turn = (*table, [], [])[:2]
+        turn = (turn + [1.0, 0.0])[:2] if not turn else (turn + [0.0])[:2]
+        self.orientations[card.options.get("NAME", "").upper()] = Orientation(
+            card.options.get("SYSTEM", "RECTANGULAR").upper(),
+            tuple((points + [0.0] * 6)[:6]),
+            int(turn[0]),
+            turn[1],
+            card.place,
+        )
 
     def _rigid(self, card: Card, lines: list[Data], _: int) -> None:
         for key in ("TIE NSET", "PIN NSET"):

@@ -106,6 +106,20 @@ class Layer:
     geometry: str = "CONSTANT"
     extension: float = 0.0
     radius: float = 0.0
+    orientation: str = ""
+    place: Place
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """An *ORIENTATION: its system in capitals, the six numbers of two points, the normal's axis (1 to 3) and
+    the further turn about it in degrees.
+    """
+
+    system: str
+    points: tuple[float, ...]
+    axis: int
+    turn: float
     place: Place
 
 
@@ -133,7 +147,7 @@ class Deck:
 
     labels (n,) ascending and points (n, 3) of the nodes; surfaces: name -> (k, 2) of (element label,
     face), a face counted from 0, ALL_FACES or BOTH_SIDES; `held`: node sets fixed to the rim;
-    `pressed`: surfaces under pressure in a step. `used` and `unused` are lines for the user.
+    `pressed`: surfaces under pressure in a step; `lines`: surfaces that may be lines of cords inside. `used` and `unused` are lines for the user.
     """
 
     file: str
@@ -149,6 +163,8 @@ class Deck:
     held: tuple[tuple[str, Place], ...] = ()
     pressed: tuple[str, ...] = ()
     materials: Mapping[str, Compound] = field(default_factory=dict)
+    orientations: Mapping[str, Orientation] = field(default_factory=dict)
+    lines: tuple[str, ...] = ()
     used: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
 

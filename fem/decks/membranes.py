@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tireroad.fem.decks.cut import Origins, cut, oriented
+from tireroad.fem.decks.places import inverse, locate, rates
 from tireroad.fem.decks.quad_split import Quads, shape
 
 SNAP = 0.01  # of a cell: nearer to a node or side than this is on it
@@ -71,72 +72,26 @@ def lay(quads: Quads, line: Line, origins: Origins) -> tuple[Quads, list[int]]:
     return quads, numbers
 
 
-def locate(quads: Quads, point: np.ndarray) -> tuple[int, np.ndarray, float]:
-    """The cell nearest to holding a point, (xi, eta) there, and how far outside, in cells."""
-    nine = quads.points[quads.cells]
-    low, high = nine.min(axis=1), nine.max(axis=1)
-    margin = 0.2 * (high - low).max(axis=1, keepdims=True)
-    near = np.flatnonzero(((point >= low - margin) & (point <= high + margin)).all(axis=1))
-    if not len(near):
-        return -1, np.zeros(2), np.inf
-    where = np.full((len(near), 2), 0.5)
-    for _ in range(12):
-        where = np.clip(where - _newton_step(nine[near], where, point), -1, 2)
-    miss = np.linalg.norm(_each(nine[near], where) - point, axis=1)
-    size = np.linalg.norm(high - low, axis=1)[near]
-    beyond = np.maximum(np.maximum(-where, where - 1).max(axis=1), 0) + miss / size
-    best = int(np.argmin(beyond))
-    return int(near[best]), where[best], float(beyond[best])
-
-
-def _each(nine: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """Points (k, 2) of cells (k, 9, 2) at one place (k, 2) each."""
-    both = shape(where[:, 0])[:, :, None] * shape(where[:, 1])[:, None, :]
-    return np.einsum("kab,kabx->kx", both, nine.reshape(-1, 3, 3, 2))
-
-
-def _newton_step(nine: np.ndarray, where: np.ndarray, point: np.ndarray) -> np.ndarray:
-    step = 1e-6
-    off = _each(nine, where) - point
-    rates = [
-        (_each(nine, where + move) - _each(nine, where - move)) / (2 * step)
-        for move in (np.array([step, 0]), np.array([0, step]))
-    ]
-    matrix = np.stack(rates, axis=-1)
-    area = np.abs(np.linalg.det(matrix)) > 1e-14 * (nine.max(axis=1) - nine.min(axis=1)).prod(
-        axis=1
-    )
-    matrix[~area] = np.eye(2) * 1e300
-    return np.linalg.solve(matrix, off[..., None])[..., 0]
-
-
 def _inside(quads: Quads, line: Line) -> None:
     """That the line's ends and middles lie in the body, and in the hosts."""
-    for number, three in enumerate(line.points):
-        for point in three:
-            cell, where, beyond = locate(quads, point)
-            at = f"at r = {point[0]:.5g}, z = {point[1]:.5g}"
-            if beyond > SNAP:
-                raise line.fail(f"element {number + 1} of it lies outside the wall, {at}")
-            clear = where.min() > 0.1 and where.max() < 0.9
-            if line.hosts is not None and clear and quads.element[cell] not in line.hosts:
-                raise line.fail(
-                    f"element {number + 1} of it lies outside its hosts, in another region, {at}"
-                )
+    points = line.points.reshape(-1, 2)
+    cells, where, beyond = locate(quads, points)
+    clear = ((where > 0.1) & (where < 0.9)).all(axis=1)
+    astray = np.zeros(len(points), bool)
+    if line.hosts is not None:
+        astray = clear & ~np.isin(quads.element[cells], list(line.hosts))
+    for k in np.flatnonzero((beyond > SNAP) | astray)[:1]:
+        what = "outside the wall" if beyond[k] > SNAP else "outside its hosts, in another region"
+        r, z = points[k]
+        raise line.fail(f"element {k // 3 + 1} of it lies {what}, at r = {r:.5g}, z = {z:.5g}")
 
 
 def _cut_at_end(quads: Quads, line: Line, end: float) -> Quads:
     """The cell in which a line ends cut across it, unless it ends on a side or node."""
-    point = line.at(np.array([end]))[0]
-    cell, where, _ = locate(quads, point)
-    nine = quads.points[quads.cells[[cell]]]
-    step = 1e-6
-    rates = [
-        (_each(nine, where[None] + move) - _each(nine, where[None] - move))[0] / (2 * step)
-        for move in (np.array([step, 0]), np.array([0, step]))
-    ]
-    along = int(np.argmax(np.abs(np.linalg.solve(np.stack(rates, axis=1), line.slope(end)))))
-    t = float(where[along])
+    (cell,), where, _ = locate(quads, line.at(np.array([end])))
+    matrix = rates(quads.points[quads.cells[[cell]]], where)[0]
+    along = int(np.argmax(np.abs(np.linalg.solve(matrix, line.slope(end)))))
+    t = float(where[0, along])
     if not SNAP < t < 1 - SNAP:
         return quads
     sides = quads.sides()[cell, [2, 3] if along == 0 else [0, 1]]
@@ -222,8 +177,8 @@ def _follow(quads: Quads, line: Line, stations: list[_Station]):
         else:
             cell = _opposite(quads, shared, names, a, b, line)
             marks |= {one.side: one.t for one in (a, b)}
-            path[cell] = _half_way(quads, cell, line, (a, b))
-    return marks, path, whole
+            path[cell] = (a, b)
+    return marks, _half_way(quads, path, line), whole
 
 
 def _slant(line: Line, a: _Station, b: _Station) -> str:
@@ -237,7 +192,7 @@ def _slant(line: Line, a: _Station, b: _Station) -> str:
 def _between(quads: Quads, cells, first: int, last: int, line, a, b) -> int:
     """The middle node of the side between two nodes."""
     for cell in cells:
-        for side in quads.sides()[cell]:
+        for side in quads.sides_of(cell):
             if {int(side[0]), int(side[2])} == {first, last}:
                 return int(side[1])
     raise line.fail(_slant(line, a, b))
@@ -247,27 +202,25 @@ def _opposite(quads: Quads, cells, names: list[int], a, b, line) -> int:
     """The cell in which two sides are opposite each other."""
     if a.node < 0 and b.node < 0:
         for cell in cells:
-            middles = quads.sides()[cell, :, 1].tolist()
+            middles = quads.sides_of(cell)[:, 1].tolist()
             if middles.index(names[0]) ^ 1 == middles.index(names[1]):
                 return cell
     raise line.fail(_slant(line, a, b))
 
 
-def _half_way(quads: Quads, cell: int, line: Line, stations) -> float:
-    """Where the line is, across the cell, half way along: by the parabola through three of its points."""
-    sides = quads.sides()[cell]
-    middles = sides[:, 1].tolist()
-    k = [middles.index(one.side) for one in stations]
-    ends = [oriented(sides[i], one.t) for i, one in zip(k, stations, strict=True)]
-    if k[0] > k[1]:
-        ends.reverse()
-    point = line.at(np.array([(stations[0].s + stations[1].s) / 2]))[0]
-    where = np.array([0.5, 0.5])
-    nine = quads.points[quads.cells[[cell]]]
-    for _ in range(12):
-        where = where - _newton_step(nine, where[None], point)[0]
-    along, across = where if k[0] < 2 else where[::-1]
-    if not 0.2 < along < 0.8:
-        return sum(ends) / 2
-    straight = ends[0] + (ends[1] - ends[0]) * along
-    return sum(ends) / 2 + (across - straight) / (4 * along * (1 - along))
+def _half_way(quads: Quads, path: dict, line: Line) -> dict[int, float]:
+    """Where the line is, across each cell, half way along: by the parabola through three of its points."""
+    cells = np.array(list(path), np.int64)
+    middle = line.at(np.array([(a.s + b.s) / 2 for a, b in path.values()]))
+    places, _ = inverse(quads.points[quads.cells[cells]], middle) if len(cells) else ([], None)
+    found = {}
+    for cell, (a, b), where in zip(path, path.values(), places, strict=True):
+        sides = quads.sides_of(cell)
+        at = {sides[:, 1].tolist().index(one.side): one for one in (a, b)}
+        first, last = (oriented(sides[k], at[k].t) for k in sorted(at))
+        along, across = where if min(at) == 0 else where[::-1]
+        bulge = 0.0
+        if 0.2 < along < 0.8:
+            bulge = (across - first - (last - first) * along) / (4 * along * (1 - along))
+        found[cell] = (first + last) / 2 + bulge
+    return found

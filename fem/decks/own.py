@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.fem.decks import abaqus, faces, gmsh, revolved
-from tireroad.fem.decks.chains import with_origin
+from tireroad.fem.decks.chains import ends, forward, strings, with_origin
 from tireroad.fem.decks.compounds import Rubber, cord, rubber
 from tireroad.fem.decks.cut import Origins
 from tireroad.fem.decks.deck import SCOPE, Deck
@@ -91,6 +91,7 @@ def _section(deck: Deck, ring_angles, wishes: Wishes) -> OwnSection:
         quads, *(_sides(quads, named[key], key) for key in ("rim", "inner", "tread"))
     )
     layers = _cords(deck, quads, laid, units)
+    lines = {ply.name: ply.sides for ply in layers} | _lines(deck, quads, edges, origins, wishes)
     compounds = _rubbers(deck, found, units, wishes)
     centred, shift = _centred(quads.points * units.length)
     mesh = SectionMesh(
@@ -103,7 +104,7 @@ def _section(deck: Deck, ring_angles, wishes: Wishes) -> OwnSection:
         tread=shape.tread,
         inner=shape.inner,
         rim=shape.rim,
-        plies={ply.name: ply.sides for ply in layers},
+        plies=lines,
     )
     notes = [*shape.notes, *_said(deck, split, shift, wishes, found, units)]
     notes += [note for one in compounds if one for note in one.notes]
@@ -185,6 +186,20 @@ def _cords(deck: Deck, quads: Quads, laid: dict[str, Laid], units) -> list[Ply]:
         replace(ply, name=f"{ply.name} [{n + 1}]") if names.count(ply.name) > 1 else ply
         for n, ply in enumerate(made)
     ]
+
+
+def _lines(deck: Deck, quads: Quads, edges, origins: Origins, wishes: Wishes) -> dict:
+    """Named lines of a Gmsh mesh that lie inside the body, ready for cords of the scene."""
+    faces_named = {name.upper() for names in _names(deck, wishes).values() for name in names}
+    found = {}
+    for name in deck.lines:
+        numbers = origins.with_parts(named_edges(deck, edges, name, "cords"))
+        sides = with_origin(quads, numbers)
+        if name.upper() in faces_named or len(faces.on_outline(quads, sides)) == len(sides):
+            continue
+        for n, line in enumerate(strings(ends(quads, sides))[0]):
+            found[name if n == 0 else f"{name} ({n + 1})"] = forward(quads, sides[line])
+    return found
 
 
 def _rubbers(deck: Deck, found: Regions, units, wishes: Wishes) -> list[Rubber | None]:

@@ -37,6 +37,10 @@ class Quads:
         """(c, 4, 3) nodes of all sides, in ascending xi or eta."""
         return self.cells[:, SIDE_NODES]
 
+    def sides_of(self, cell: int) -> np.ndarray:
+        """(4, 3) nodes of the sides of one cell."""
+        return self.cells[cell][SIDE_NODES]
+
     def boundary(self) -> np.ndarray:
         """(k, 2) of (cell, side): the sides of one cell only."""
         middle = self.sides()[:, :, 1]
