@@ -8,7 +8,7 @@ import numpy as np
 
 from tireroad.fem.decks.deck import ALL_FACES, BOTH_SIDES, SCOPE, Members, Sets
 from tireroad.fem.decks.lines import Card, Data, Place
-from tireroad.fem.decks.numbers import fields, label, rows, shown
+from tireroad.fem.decks.numbers import fields, label, labels, rows, shown
 
 _FACE = re.compile(r"S([1-6])")
 _NAME = re.compile(r"[^\d\s+.-]")  # a field that is the name of a set and no number
@@ -71,7 +71,10 @@ class SetReader:
         if "GENERATE" in card.options:
             self._ranges(members, card, lines, offset)
             return
-        for place, parts in data_lines(lines):
+        plain = [labels(part) for part in lines]
+        members.labels += [found + offset for found in plain if found is not None]
+        rest = [part for part, found in zip(lines, plain, strict=True) if found is None]
+        for place, parts in data_lines(rest):
             numbers = [part for part in parts if part and not _NAME.search(part)]
             members.names += [(p.upper().strip("\"'"), place) for p in parts if _NAME.search(p)]
             found = np.array([label(part, place) for part in numbers], np.int64)

@@ -119,6 +119,8 @@ def _nodes_4(numbers):
         dimension, _, parametric = numbers.ints(3)
         count = numbers.fits(numbers.sizes(1)[0], 8)
         labels.append(numbers.sizes(count))
+        if not 0 <= dimension <= 3:
+            raise numbers.error(f"nodes of an entity of dimension {dimension}")
         width = 3 + (int(dimension) if parametric else 0)
         points.append(numbers.reals(width * count).reshape(count, width)[:, :3])
     return np.concatenate(labels), np.concatenate(points)

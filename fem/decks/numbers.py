@@ -11,7 +11,7 @@ from tireroad.fem.decks.lines import Data, Place
 
 # Fortran writes 1.0D-3; commas and tabs only separate.
 _CLEAN = bytes.maketrans(b",\tDd", b"  ee")
-_EMPTY_FIELD = re.compile(rb",[ \t]*,|^[ \t]*,", re.MULTILINE)
+_EMPTY_FIELD = re.compile(rb",[ \t]*(?=,)|,[ \t]*$", re.MULTILINE)
 LABEL = 10**9  # the largest label of a node or element
 
 
@@ -26,22 +26,17 @@ def rows(data: list[Data], width: int, least: int = 1) -> np.ndarray:
 
 
 def _rows_of(part: Data, width: int, least: int) -> np.ndarray:
-    flat = _fast(part.text)
-    if flat is not None:
-        lines = sum(1 for line in part.text.splitlines() if line.strip())
-        fields, odd = divmod(len(flat), lines)
-        if not odd and least <= fields <= width and _regular(part.text, fields, lines):
-            table = np.zeros((lines, width))
-            table[:, :fields] = flat.reshape(lines, fields)
-            if np.isfinite(table).all():
-                return table
-    return np.array(list(_slow(part, width, least))).reshape(-1, width)
+    lines = part.text.splitlines()
+    table = _regular(part.text, lines, width, least)
+    if table is None:
+        table = _ragged(lines, width, least)
+    if table is None or not np.isfinite(table).all():
+        table = np.array(list(_slow(part, width, least))).reshape(-1, width)
+    return table
 
 
-def _fast(text: bytes) -> np.ndarray | None:
-    """All numbers of a text in their order, or None where it holds anything else or a blank field."""
-    if _EMPTY_FIELD.search(text):
-        return None
+def fast(text: bytes) -> np.ndarray | None:
+    """All numbers of a text in their order, or None where it holds anything else."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -50,10 +45,37 @@ def _fast(text: bytes) -> np.ndarray | None:
             return None
 
 
-def _regular(text: bytes, fields: int, lines: int) -> bool:
-    """Whether every line has as many fields: by its commas, one after the last field allowed."""
-    counts = {line.count(b",") for line in text.splitlines() if line.strip()}
-    return len(counts) == 1 and counts <= {fields - 1, fields}
+def _regular(text: bytes, lines: list[bytes], width: int, least: int) -> np.ndarray | None:
+    """The table of lines that all have as many commas; None for others, and for text."""
+    counts = {line.count(b",") for line in lines if line.strip()}
+    if len(counts) != 1:
+        return None
+    fields = counts.pop() + 1
+    flat = fast(_EMPTY_FIELD.sub(b",0", text))
+    rows = sum(1 for line in lines if line.strip())
+    # A comma at the end of the lines begins a field that is blank, and no field where there are too many.
+    if flat is None or len(flat) != fields * rows or not least <= fields <= width + 1:
+        return None
+    table = np.zeros((rows, max(width, fields)))
+    table[:, :fields] = flat.reshape(rows, fields)
+    return table[:, :width] if not table[:, width:].any() else None
+
+
+def _ragged(lines: list[bytes], width: int, least: int) -> np.ndarray | None:
+    """The table of lines of different lengths; None where one is not plain numbers or blanks."""
+    found = []
+    for line in lines:
+        if not line.strip():
+            continue
+        parts = [part if part.strip() else b"0" for part in line.split(b",")]
+        if b"_" in line or not least <= len(parts) <= width + (not parts[-1].strip(b" 0")):
+            return None
+        try:
+            values = [float(part) for part in parts[:width]]
+        except ValueError:
+            return None
+        found.append(values + [0.0] * (width - len(values)))
+    return np.array(found).reshape(-1, width)
 
 
 def _slow(part: Data, width: int, least: int):
@@ -112,7 +134,7 @@ def records(data: list[Data], width: int) -> np.ndarray:
 
 def _joined_records(data: list[Data], width: int):
     text = b"".join(part.text if part.text.endswith(b"\n") else part.text + b"\n" for part in data)
-    flat = _fast(text) if data else np.empty(0)
+    flat = fast(text) if data else np.empty(0)
     if flat is not None and len(flat) % width == 0 and _whole(flat):
         lines = sum(1 for line in text.splitlines() if line.strip())
         if flat.size and lines % (len(flat) // width) == 0:
@@ -146,6 +168,13 @@ def _slow_records(data: list[Data], width: int):
             f"{len(begun)} numbers, {width} belong to an element of this type: is the deck cut short?"
         )
     yield np.array(found, np.int64).reshape(-1, width)
+
+
+def labels(part: Data) -> np.ndarray | None:
+    """All labels in the lines of a set, or None where they hold anything but labels."""
+    flat = fast(part.text)
+    good = flat is not None and _whole(flat) and (flat >= 0).all()
+    return flat.astype(np.int64) if good else None
 
 
 def label(text: str, place: Place) -> int:

@@ -26,7 +26,7 @@ class Regions:
 
 def regions(deck: Deck) -> Regions:
     """The solid sections of a deck, or, where it has none, the element sets of its blocks."""
-    blocks = [b for b in deck.blocks if b.kind.role == "solid"]
+    blocks = [b for b in deck.blocks if b.kind.role == "solid" and len(b.labels)]
     if not blocks:
         raise InputError(
             f"{deck.file}: no solid element in it: CGAX, CAX (sections) and C3D types are read, and "

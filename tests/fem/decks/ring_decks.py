@@ -20,7 +20,9 @@ def solids(torus: Torus, angles, axis="y", sector=False) -> str:
     """Hexahedra or wedges (by the torus's cells), C3D8, C3D20 or C3D6, around the axis."""
     half = 2 * len(angles)
     step = 1 if torus.quadratic else 2
-    theta = np.interp(np.arange(half + 1) / 2, np.arange(len(angles) + 1), [*angles, angles[0] + 2 * np.pi])
+    theta = np.interp(
+        np.arange(half + 1) / 2, np.arange(len(angles) + 1), [*angles, angles[0] + 2 * np.pi]
+    )
     text = "*NODE\n"
     for k in range(0, half, step):
         for i, depth in enumerate(torus.depth):
@@ -40,8 +42,17 @@ def solids(torus: Torus, angles, axis="y", sector=False) -> str:
             if len(ids) > 12:
                 text = text[:-1] + ",\n" + ",".join(map(str, ids[12:])) + "\n"
     around = range(0, half, step)
-    for name, labels in (("RIMNODES", torus.ends()), ("INSIDE", torus.face(0)), ("OUTSIDE", torus.face(-1))):
-        ids = [one + 100_000 * k for k in around for one in labels if not (k % 2 and _middle(torus, one))]
+    for name, labels in (
+        ("RIMNODES", torus.ends()),
+        ("INSIDE", torus.face(0)),
+        ("OUTSIDE", torus.face(-1)),
+    ):
+        ids = [
+            one + 100_000 * k
+            for k in around
+            for one in labels
+            if not (k % 2 and _middle(torus, one))
+        ]
         text += f"*NSET, NSET={name}\n" + listed(ids)
     return text + "*SOLID SECTION, ELSET=WALL, MATERIAL=RUBBER\n" + RUBBER
 

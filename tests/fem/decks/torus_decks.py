@@ -61,7 +61,10 @@ class Torus:
         a, b, c, d = corners
         if not self.quadratic:
             return [[a, b, c], [a, c, d]]
-        return [[a, b, c, middles[0], middles[1], centre], [a, c, d, centre, middles[2], middles[3]]]
+        return [
+            [a, b, c, middles[0], middles[1], centre],
+            [a, c, d, centre, middles[2], middles[3]],
+        ]
 
     def elements(self) -> str:
         return "\n".join(", ".join(map(str, (n, *nodes))) for n, nodes in self.cells()) + "\n"
