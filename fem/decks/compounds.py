@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from tireroad.fem.decks.deck import Compound
+from tireroad.fem.decks.prony import prony
 from tireroad.fem.decks.units import Units
 
 INCOMPRESSIBLE = 0.49  # Poisson's ratio in place of 1/2: changes modes by under 0.3 %
-PRONY_FREQUENCY = 100.0  # Hz at which a Prony series is read as dynamic modulus and loss factor
 _MODULUS = (1e4, 1e12)  # Pa, of anything in a tire
 _DENSITY = (100.0, 2e4)  # kg/m3
 
@@ -21,7 +19,7 @@ class Rubber:
     """A compound: law of the long-term state and its coefficients by the keys of a scene, SI.
 
     `density` is None where the deck has none; `dynamic` and `loss_factor` are of a Prony series at
-    PRONY_FREQUENCY. `notes` say what was taken otherwise than written.
+    100 Hz. `notes` say what was taken otherwise than written.
     """
 
     name: str
@@ -57,7 +55,7 @@ def rubber(compound: Compound, units: Units) -> Rubber:
         raise compound.place.error(
             f"material {compound.name} has no *HYPERELASTIC and no *ELASTIC that is read"
         )
-    share, dynamic, loss = _prony(parts, options, notes)
+    share, dynamic, loss = prony(parts, options, notes)
     poisson = _incompressible(model, values, notes, compound.name)
     modular = {k: v * share * units.stress for k, v in values.items() if k != "poisson_ratio"}
     values = modular | ({"poisson_ratio": poisson} if model == "neo-hookean" else {})
@@ -202,30 +200,6 @@ def _incompressible(model: str, values: dict, notes: list[str], name: str) -> fl
         values["bulk_modulus"] = shear * 2 * (1 + INCOMPRESSIBLE) / (3 * (1 - 2 * INCOMPRESSIBLE))
         notes.append(said)
     return INCOMPRESSIBLE
-
-
-def _prony(parts: dict, options, notes: list[str]) -> tuple[float, float, float]:
-    """(long-term share of the given moduli, dynamic over long-term modulus, loss factor)."""
-    if "VISCOELASTIC" not in parts:
-        return 1.0, 1.0, 0.0
-    given, table, place = parts["VISCOELASTIC"]
-    if given.get("TIME", "").upper() != "PRONY":
-        notes.append(f"*VISCOELASTIC other than TIME=PRONY: not used ({place})")
-        return 1.0, 1.0, 0.0
-    terms = np.array([(*row, 0.0, 0.0, 0.0)[:3] for row in table]).reshape(-1, 3)
-    share, times = terms[:, 0], terms[:, 2]
-    if (share < 0).any() or share.sum() >= 1 or (times <= 0).any():
-        raise place.error("a Prony series needs g ≥ 0 with a sum below 1, and times > 0")
-    long_term = 1 - share.sum()
-    turn = 2 * np.pi * PRONY_FREQUENCY * times
-    storage = long_term + (share * turn**2 / (1 + turn**2)).sum()
-    loss = (share * turn / (1 + turn**2)).sum()
-    notes.append(
-        f"Prony series read at {PRONY_FREQUENCY:g} Hz: dynamic modulus {storage / long_term:.3g} times the "
-        f"long-term one, loss factor {loss / storage:.3g} ({place})"
-    )
-    instant = options.get("MODULI", "LONG TERM").upper() == "INSTANTANEOUS"
-    return (long_term if instant else 1.0), storage / long_term, loss / storage
 
 
 def _youngs(values: Mapping[str, float]) -> float:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tireroad.fem.decks.elements import Block
-from tireroad.fem.decks.lines import Place
+from tireroad.fem.decks.files.elements import Block
+from tireroad.fem.decks.files.lines import Place
 from tireroad.fem.errors import InputError
 
 ALL_FACES = -1  # of an element in a surface: those on the boundary

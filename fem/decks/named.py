@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tireroad.fem.decks.deck import ALL_FACES, BOTH_SIDES, Deck, missing
-from tireroad.fem.decks.quads import DeckEdges
+from tireroad.fem.decks.shape.quads import DeckEdges
 from tireroad.fem.errors import InputError
 
 

@@ -7,18 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.fem.decks import abaqus, faces, gmsh, revolved
-from tireroad.fem.decks.chains import ends, forward, strings, with_origin
 from tireroad.fem.decks.compounds import Rubber, cord, rubber
-from tireroad.fem.decks.cut import Origins
 from tireroad.fem.decks.deck import SCOPE, Deck
-from tireroad.fem.decks.embedding import lay_all
-from tireroad.fem.decks.mirror import is_half, mirrored
+from tireroad.fem.decks.files import abaqus, gmsh
 from tireroad.fem.decks.named import named_edges
-from tireroad.fem.decks.plies import Laid, Ply, plies
-from tireroad.fem.decks.quad_split import Quads
-from tireroad.fem.decks.quads import build
 from tireroad.fem.decks.regions import Regions, regions
+from tireroad.fem.decks.shape import faces
+from tireroad.fem.decks.shape.chains import ends, forward, strings, with_origin
+from tireroad.fem.decks.shape.cut import Origins
+from tireroad.fem.decks.shape.embedding import lay_all
+from tireroad.fem.decks.shape.mirror import is_half, mirrored
+from tireroad.fem.decks.shape.plies import Laid, Ply, plies
+from tireroad.fem.decks.shape.quad_split import Quads
+from tireroad.fem.decks.shape.quads import build
+from tireroad.fem.decks.solids import revolved
 from tireroad.fem.decks.units import SYSTEMS, check_size
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import SectionMesh

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.fem.decks.deck import SCOPE, Deck
-from tireroad.fem.decks.lines import Place
+from tireroad.fem.decks.files.lines import Place
 from tireroad.fem.errors import InputError
 
 

@@ -8,7 +8,7 @@ from ring_decks import solids
 from test_forms import MESHES
 from torus_decks import BELT, CORDS, Torus, membranes, plain
 
-from tireroad.fem.decks import lines
+from tireroad.fem.decks.files import lines
 from tireroad.fem.decks.own import Wishes, read
 from tireroad.fem.errors import InputError
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.fem.decks.deck import SCOPE, Deck
-from tireroad.fem.decks.elements import Block
-from tireroad.fem.decks.quad_split import SIDE_OF_FACE, TENSOR, Quads, Raw, nine_points, split
+from tireroad.fem.decks.files.elements import Block
+from tireroad.fem.decks.shape.quad_split import SIDE_OF_FACE, TENSOR, Quads, Raw, nine_points, split
 
 _MOST = 50_000  # elements of a section
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from tireroad.fem.decks.chains import strings
-from tireroad.fem.decks.cut import Origins
 from tireroad.fem.decks.deck import SCOPE, Deck, Layer
-from tireroad.fem.decks.membranes import Line, lay
-from tireroad.fem.decks.plies import Laid
-from tireroad.fem.decks.quad_split import Quads
-from tireroad.fem.decks.quads import DeckEdges
+from tireroad.fem.decks.shape.chains import strings
+from tireroad.fem.decks.shape.cut import Origins
+from tireroad.fem.decks.shape.membranes import Line, lay
+from tireroad.fem.decks.shape.plies import Laid
+from tireroad.fem.decks.shape.quad_split import Quads
+from tireroad.fem.decks.shape.quads import DeckEdges
 
 
 def lay_all(

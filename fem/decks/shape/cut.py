@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tireroad.fem.decks.quad_split import SIDE_NODES, Quads, place, shape
+from tireroad.fem.decks.shape.quad_split import SIDE_NODES, Quads, place, shape
 
 Marks = dict[
     int, float

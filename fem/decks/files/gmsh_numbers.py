@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.fem.decks.lines import Place
+from tireroad.fem.decks.files.lines import Place
 from tireroad.fem.errors import InputError
 
 LARGEST = 1 << 29  # bytes

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tireroad.fem.decks.chains import along, ends, forward, strings, with_origin
 from tireroad.fem.decks.compounds import CordMaterial
 from tireroad.fem.decks.deck import Layer
-from tireroad.fem.decks.quad_split import Quads
+from tireroad.fem.decks.shape.chains import along, ends, forward, strings, with_origin
+from tireroad.fem.decks.shape.quad_split import Quads
 from tireroad.fem.errors import InputError
 
 

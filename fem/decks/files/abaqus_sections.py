@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 
-from tireroad.fem.decks.abaqus_sets import data_lines
 from tireroad.fem.decks.deck import Compound, Embedded, Layer, Orientation, Solid
-from tireroad.fem.decks.lines import Card, Data
-from tireroad.fem.decks.numbers import number
+from tireroad.fem.decks.files.abaqus_sets import data_lines
+from tireroad.fem.decks.files.lines import Card, Data
+from tireroad.fem.decks.files.numbers import number
 
 # Suboptions of *MATERIAL that are read; others of a material are listed as not used by the reader.
 SUBOPTIONS = (

@@ -6,7 +6,7 @@ from collections import defaultdict
 
 import numpy as np
 
-from tireroad.fem.decks.quad_split import Quads
+from tireroad.fem.decks.shape.quad_split import Quads
 
 
 def once(quads: Quads, edges: np.ndarray) -> np.ndarray:

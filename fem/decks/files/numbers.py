@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 
-from tireroad.fem.decks.lines import Data, Place
+from tireroad.fem.decks.files.lines import Data, Place
 
 # Fortran writes 1.0D-3; commas and tabs only separate.
 _CLEAN = bytes.maketrans(b",\tDd", b"  ee")

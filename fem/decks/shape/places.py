@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tireroad.fem.decks.quad_split import Quads, shape
+from tireroad.fem.decks.shape.quad_split import Quads, shape
 
 _NEWTON = 12
 

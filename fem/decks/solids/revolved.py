@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tireroad.fem.decks.deck import SCOPE, Deck, Members, Sets
-from tireroad.fem.decks.elements import Block, kind
-from tireroad.fem.decks.revolved_cords import meridian_layers
-from tireroad.fem.decks.rings import Rings, find_rings
+from tireroad.fem.decks.files.elements import Block, kind
+from tireroad.fem.decks.solids.revolved_cords import meridian_layers
+from tireroad.fem.decks.solids.rings import Rings, find_rings
 from tireroad.fem.errors import InputError
 
 _NODES = 2_000_000

@@ -7,8 +7,8 @@ import re
 import numpy as np
 
 from tireroad.fem.decks.deck import ALL_FACES, BOTH_SIDES, SCOPE, Members, Sets
-from tireroad.fem.decks.lines import Card, Data, Place
-from tireroad.fem.decks.numbers import fields, label, labels, rows, shown
+from tireroad.fem.decks.files.lines import Card, Data, Place
+from tireroad.fem.decks.files.numbers import fields, label, labels, rows, shown
 
 _FACE = re.compile(r"S([1-6])")
 _NAME = re.compile(r"[^\d\s+.-]")  # a field that is the name of a set and no number

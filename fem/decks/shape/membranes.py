@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tireroad.fem.decks.cut import Origins, cut, oriented
-from tireroad.fem.decks.places import inverse, locate, rates
-from tireroad.fem.decks.quad_split import Quads, shape
+from tireroad.fem.decks.shape.cut import Origins, cut, oriented
+from tireroad.fem.decks.shape.places import inverse, locate, rates
+from tireroad.fem.decks.shape.quad_split import Quads, shape
 
 SNAP = 0.01  # of a cell: nearer to a node or side than this is on it
 _LEAST_ANGLE = 0.1  # sine between a line and the sides it crosses; below it runs along them

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.fem.decks.abaqus_sections import SectionReader
-from tireroad.fem.decks.abaqus_sets import SetReader
 from tireroad.fem.decks.deck import SCOPE, Deck, Sets
-from tireroad.fem.decks.elements import Block, kind
-from tireroad.fem.decks.lines import Card, Data, Place, cards
-from tireroad.fem.decks.numbers import LABEL, records, rows
+from tireroad.fem.decks.files.abaqus_sections import SectionReader
+from tireroad.fem.decks.files.abaqus_sets import SetReader
+from tireroad.fem.decks.files.elements import Block, kind
+from tireroad.fem.decks.files.lines import Card, Data, Place, cards
+from tireroad.fem.decks.files.numbers import LABEL, records, rows
 from tireroad.fem.errors import InputError
 
 # Keywords that describe an analysis and not the tire; anything else unknown is called so.

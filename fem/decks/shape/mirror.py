@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tireroad.fem.decks.quad_split import Quads
+from tireroad.fem.decks.shape.quad_split import Quads
 from tireroad.fem.errors import InputError
 
 _CLOSE = 1e-4  # of the section's size: a node is on the centre plane

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.fem.decks.chains import along, ends, once, strings
-from tireroad.fem.decks.quad_split import Quads
+from tireroad.fem.decks.shape.chains import along, ends, once, strings
+from tireroad.fem.decks.shape.quad_split import Quads
 from tireroad.fem.errors import InputError
 
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.fem.decks.deck import ALL_FACES, Deck, Members, Sets
-from tireroad.fem.decks.elements import Block, kind
-from tireroad.fem.decks.gmsh_numbers import LARGEST, BinaryNumbers, Part, TextNumbers, parts
-from tireroad.fem.decks.numbers import LABEL
+from tireroad.fem.decks.files.elements import Block, kind
+from tireroad.fem.decks.files.gmsh_numbers import LARGEST, BinaryNumbers, Part, TextNumbers, parts
+from tireroad.fem.decks.files.numbers import LABEL
 from tireroad.fem.errors import InputError
 
 # Number of the type: dimension, nodes, Abaqus name, which of its nodes in Abaqus's order.
@@ -69,9 +69,9 @@ def read(path: Path) -> Deck:
 
 
 def _format(found: dict[str, Part], path: Path) -> tuple[str, bool]:
-    if "MeshFormat" not in found:
+    part = found.get("MeshFormat")
+    if part is None:
         raise InputError(f"{path}: no $MeshFormat: this is no Gmsh mesh")
-    part = found["MeshFormat"]
     words = part.text.split(None, 3)[:3]
     if len(words) < 3 or words[0] not in (b"2.2", b"4.1") or words[1] not in (b"0", b"1"):
         raise part.place.error("the mesh must be of format 2.2 or 4.1 (gmsh -format msh41)")
