@@ -7,7 +7,7 @@ carcass when a unit force presses on point j. None of them is collective.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tireroad.fem.errors import InputError
 
@@ -85,7 +85,7 @@ def no_tread(n: int) -> Array:
     return np.zeros((n, n))
 
 
-def rectangle_potential(x: Array, y: Array, a: Array, b: Array) -> Array:
+def rectangle_potential(x: ArrayLike, y: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
     """I(x, y) = integral of 1/r over the rectangle 2a x 2b around the origin, in its own plane, m.
 
     x, y, a, b broadcast against each other, all in m. Relative error below 1e-11 at any distance.
@@ -135,6 +135,15 @@ def _far_potential(x: Array, y: Array, a: Array, b: Array) -> Array:
 
 def check_half_space(points: Array, half_sizes: Array, youngs_modulus: float, nu: float) -> None:
     """InputError for points (n, 2) m, half sizes (n, 2) m, a modulus or ratio out of range."""
+    check_points(points, half_sizes)
+    if not (np.isfinite(youngs_modulus) and youngs_modulus > 0.0):
+        raise InputError(f"tread: Young's modulus {youngs_modulus:g} Pa must be positive")
+    if not -1.0 < nu <= 0.5:
+        raise InputError(f"tread: Poisson ratio {nu:g} must lie in (-1, 0.5]")
+
+
+def check_points(points: Array, half_sizes: Array) -> None:
+    """InputError for points (n, 2) m or half sizes (n, 2) m that are not finite or do not fit."""
     points, half_sizes = np.asarray(points, dtype=float), np.asarray(half_sizes, dtype=float)
     if points.ndim != 2 or points.shape[1] != 2 or half_sizes.shape != points.shape:
         raise InputError(
@@ -144,10 +153,6 @@ def check_half_space(points: Array, half_sizes: Array, youngs_modulus: float, nu
         raise InputError("tread: a point or half size is not finite (m)")
     if not np.all(half_sizes > 0.0):
         raise InputError("tread: every half size must be positive (m)")
-    if not (np.isfinite(youngs_modulus) and youngs_modulus > 0.0):
-        raise InputError(f"tread: Young's modulus {youngs_modulus:g} Pa must be positive")
-    if not -1.0 < nu <= 0.5:
-        raise InputError(f"tread: Poisson ratio {nu:g} must lie in (-1, 0.5]")
 
 
 def _check_positive_definite(compliance: Array) -> None:

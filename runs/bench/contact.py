@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
@@ -11,7 +12,7 @@ from scipy import sparse
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.roads.flat import Flat
+from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.rolling import Drive, roll
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.friction import Friction
@@ -187,7 +188,9 @@ def _on_a_grid(shape: tuple[int, int], modes: int, finer: int, brush: float | No
     )
     weights = sparse.csr_matrix(np.kron(along, across))
     places = GridPlaces(tuple(counts), spacing, np.arange(len(points.points)))
-    kernel = KernelTread(places, lambda *where: half_space_influence(*where, *ELASTIC))
+    kernel = KernelTread(
+        places, partial(half_space_influence, youngs_modulus=ELASTIC[0], poisson_ratio=ELASTIC[1])
+    )
     normal = tire.same_step[:count, :count]
     solver = ActiveSet(SpreadCompliance(normal, weights, kernel))
     drive = Drive(_wavy, lambda t: 0.0, 20.0)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import importlib.util
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy import sparse
 
-from tireroad.contact.roads.texture import Texture
+from tireroad.contact.roads.kinds.texture import Texture
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.grid_compliance import SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
@@ -31,7 +32,9 @@ def _grid_case(n: int):
     pitch = 0.1 / n
     x, y = (a.ravel() for a in np.meshgrid(*2 * [(np.arange(n) - (n - 1) / 2) * pitch]))
     places = GridPlaces((n, n), (pitch, pitch), np.arange(n * n))
-    kernel = KernelTread(places, lambda *where: half_space_influence(*where, *ELASTIC))
+    kernel = KernelTread(
+        places, partial(half_space_influence, youngs_modulus=ELASTIC[0], poisson_ratio=ELASTIC[1])
+    )
     return x, y, kernel
 
 
@@ -49,7 +52,7 @@ def large() -> Table:
         nodes = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
         away = ((nodes[:, None] - nodes) ** 2).sum(axis=-1)
         tire = 1e-6 * (np.exp(-away / 0.0018) + 0.01 * np.eye(len(nodes)))
-        road = Texture(2e-4, 0.8, 0.05, 0.004, seed=1)
+        road = Texture(seed=1).make()
         for solver in (
             ActiveSet(SpreadCompliance(tire, weights, kernel)),
             ProjectedCG(SpreadCompliance(tire, weights, kernel)),
@@ -73,7 +76,7 @@ def rough() -> Table:
     """128 x 128 points from nothing; tamaas, where it is installed, in the last row."""
     n = 128
     x, y, kernel = _grid_case(n)
-    road = Texture(2e-4, 0.8, 0.05, 0.004, seed=2)
+    road = Texture(seed=2).make()
     q = -2e-4 - road.height(x, y)
     weights, tire = _none(n * n)
     compliance = SpreadCompliance(tire, weights, kernel)
