@@ -14,6 +14,7 @@ from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene import locate, rules
+from tireroad.runs.scene.cavity_table import filled
 from tireroad.runs.scene.schema import Key, Table, described, key_of, names, table_of
 from tireroad.runs.scene.tables import Scene
 
@@ -62,7 +63,7 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         raise source.error(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-    scene = _with_road_file(scene, source)
+    scene = filled(_with_road_file(scene, source))
     rules.check(scene, raw, source.error)
     return scene
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.scene.cavity_table import check_cavity
 from tireroad.runs.scene.cord_rules import check_cords
 from tireroad.runs.scene.schema import described
 from tireroad.runs.scene.tables import Scene
@@ -51,6 +52,7 @@ def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         _contact(scene, error)
     _force(scene, error)
     _greens(scene, error)
+    check_cavity(scene, error)
     if scene.road is not None:
         _road(scene, error)
     _time(scene, error)

@@ -128,7 +128,14 @@ class Session:
 
         rotation = self.rotation_matrices if self.speed else None
         inertia = self.scene.rotation.inertia if self.speed else "full"
-        return Wheel(self.operators, rotation, self.speed, self.damping, inertia)
+        return Wheel(self.operators, rotation, self.speed, self.damping, inertia, self.air)
+
+    @cached_property
+    def air(self):
+        """The air at the wall of the static state, once the modes are known; None without it. Collective."""
+        from tireroad.runs.stages.cavity import make
+
+        return make(self)
 
     @cached_property
     def modes(self):
