@@ -16,6 +16,7 @@ from tireroad.runs.stages.session import Session
 
 LIMIT = 1000.0  # Hz: beyond it the section is half a wavelength wide, and the duct no line
 _SHOWN = 4
+_MOSTLY = 0.3  # of a state's energy: then it is one of the air's
 _UNITS = {
     "circular": "rad/s",
     "pressure": "m^1/2/kg^1/2 s",
@@ -131,6 +132,7 @@ def describe(session: Session) -> None:
     """Tell the states that are the air's more than any others: the cavity's resonances."""
     modes, part = session.state_modes, share(session)
     first = np.argsort(-part * (modes.eigenvalue.imag > 0))[:_SHOWN]
+    first = first[part[first] >= min(_MOSTLY, part[first[0]])]
     first = first[np.argsort(modes.eigenvalue.imag[first])]
     session.record.headline |= {
         "states mostly of air": (_listed(modes.eigenvalue.imag[first] / (2 * np.pi)), "Hz"),
