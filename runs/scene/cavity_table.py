@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.schema import choice, number
@@ -44,7 +44,7 @@ def has_air(scene: Scene) -> bool:
     return scene.tire.cavity is not None and scene.tire.cavity.gas != "none"
 
 
-def check_cavity(scene: Scene, error: Where) -> None:
+def check_cavity(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Raise InputError for what is not computed with air."""
     if not has_air(scene):
         return
