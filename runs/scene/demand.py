@@ -59,5 +59,9 @@ def duration(seconds: float) -> str:
     """A rough time in words: it is within a factor of three."""
     for unit, size in (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 1.5 * size:
-            return f"{seconds / size:.1g} {unit}" if seconds < 9.5 * size else f"{seconds / size:.0f} {unit}"
+            return (
+                f"{seconds / size:.1g} {unit}"
+                if seconds < 9.5 * size
+                else f"{seconds / size:.0f} {unit}"
+            )
     return f"{max(seconds, 1.0):.0f} seconds"

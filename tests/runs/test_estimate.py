@@ -36,7 +36,9 @@ def test_modes_below_a_frequency_count(quickstart: Path) -> None:
     soft += ["tire.material.poisson_ratio=", "modal.count=", "modal.up_to=500"]
     scene = load(quickstart, [*soft, "tire.outer_radius=0.316", "tire.minor_radius=0.105"])
     assert sizes(scene).modes == pytest.approx(523, rel=0.3)
-    taken = [sum(memory(load(quickstart, [f"modal.up_to={f}"])).values()) for f in (500, 1000, 2000)]
+    taken = [
+        sum(memory(load(quickstart, [f"modal.up_to={f}"])).values()) for f in (500, 1000, 2000)
+    ]
     assert taken[0] < taken[1] - 1e8 < taken[2] - 3e8
 
 
