@@ -165,3 +165,18 @@ def test_leftovers_of_the_dead_are_removed(tmp_path: Path) -> None:
         path.write_text("")
     remove_leftovers(tmp_path)
     assert sorted(tmp_path.iterdir()) == sorted([alive, elsewhere])
+
+
+@pytest.mark.parametrize("package", ["numpy", "mpi4py", "dolfinx"])
+def test_a_missing_package_is_one_line(scene: Path, package: str) -> None:
+    code = f"""
+import sys
+sys.modules[{package!r}] = None
+sys.argv = ["tireroad", "run", {str(scene)!r}, "--out", {str(scene.parent / "out")!r}]
+from tireroad.runs.start import program
+program()
+"""
+    command = [sys.executable, "-P", "-c", code]
+    done = subprocess.run(command, capture_output=True, env=environment(), timeout=LONG, text=True)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert f"the Python package {package} is missing" in done.stderr
