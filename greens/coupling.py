@@ -19,7 +19,7 @@ from tireroad.fem.matrices.compliance import (
 from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
-from tireroad.greens.attachment import with_attachments
+from tireroad.greens.attachment import dynamic, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, second_order
@@ -93,7 +93,7 @@ class Wheel:
         same = outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
-            whole = self._attached(modes, probes, known)
+            whole = self._attached(basis, modes, probes, known)
         else:
             shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
@@ -107,13 +107,18 @@ class Wheel:
         return static_shapes(self.operators, *full, probes)
 
     def _attached(
-        self, modes: Modes, probes: sparse.csr_matrix, known: Projection | None
+        self, basis: Basis, modes: Modes, probes: sparse.csr_matrix, known: Projection | None
     ) -> Response:
         """Response of the modes and the attachment modes of all probes. Collective."""
         if not self._drifts:
-            shapes = self._static_shapes(probes)
-            grown = self._grown(modes, shapes.columns, known)
-            return grown.couple(probes, probes, shapes.compliance)
+            loads = on_own_rows(self.operators, probes)
+            shapes = statics(self.operators, self.rotating_stiffness, loads)
+            flexibility = self.operators.body.comm.allreduce(loads.T @ shapes)
+            own = np.abs(np.diag(flexibility))
+            missing = flexibility - basis.couple(probes, probes).static()
+            columns = shapes @ foremost(missing, own)
+            grown = self._grown(modes, columns, known, every=False)
+            return grown.couple(probes, probes, flexibility)
         return self._standing_attachments(modes, probes).couple(probes, probes)
 
     @property
@@ -141,12 +146,19 @@ class Wheel:
         turning = self.speed, self.damping[0]
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
-    def _grown(self, modes: Modes, columns: np.ndarray, known: Projection | None = None) -> Basis:
-        """The basis with attachment modes; `known` is the projection on the modes. Collective."""
+    def _grown(
+        self, modes: Modes, columns: np.ndarray, known: Projection | None = None, every: bool = True
+    ) -> Basis:
+        """The basis with attachment modes, or those that are more than static; `known` is the projection on
+        the modes. Collective.
+        """
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
         projection = project(grown, self.rotation, operators.carried, comm, known)
         shape = operators.trace(grown.vectors)
+        if not every:
+            stays = dynamic(projection, self.speed, len(modes.squares))
+            projection, shape = projection.among(stays), shape[:, stays]
         return Basis(shape, projection, self.decouple(projection, comm))
 
     def decouple(self, projection: Projection, comm) -> StateModes:

@@ -26,6 +26,15 @@ class Projection:
     body: np.ndarray | None = None
     body_convective: np.ndarray | None = None
 
+    def among(self, wanted: np.ndarray) -> Projection:
+        """On the coordinates where `wanted` (m,) is true."""
+        small = {
+            name: value if value is None else value[np.ix_(wanted, wanted)]
+            for name, value in vars(self).items()
+            if name not in ("squares", "momentum")
+        }
+        return Projection(self.squares[wanted], self.momentum[:, wanted], **small)
+
 
 def project(
     modes: Modes, rotation, carried: np.ndarray, comm, known: Projection | None = None
