@@ -8,9 +8,11 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
+from tireroad.fem.cavity.column import Column
 from tireroad.fem.matrices.compliance import (
     StaticShapes,
     compliance,
+    loaded_shapes,
     on_own_rows,
     rotating_damping,
     rotating_stiffness,
@@ -22,8 +24,10 @@ from tireroad.fem.matrices.receptance import receptance
 from tireroad.greens.attachment import dynamic, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
-from tireroad.greens.second_order import Moments, second_order
+from tireroad.greens.second_order import Moments, modal_moments, second_order
+from tireroad.modal.air import Air
 from tireroad.modal.basis import Projection, project
+from tireroad.modal.damping import Damping, tail_loss
 from tireroad.modal.rotating import StateModes, matrices, rotating, standing
 from tireroad.modal.undamped import Modes
 from tireroad.runs.process.mpi import on_root
@@ -41,24 +45,49 @@ class Basis:
 
     def couple(self, outputs, loads, flexibility: np.ndarray | None = None) -> Response:
         """Response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s), or 3 s + 6 wide."""
-        momentum = self.projection.momentum
-        return couple(self.states, self.seen(outputs), self.seen(loads), momentum, flexibility)
+        carried = self.projection.carried
+        return couple(self.states, self.seen(outputs), self.seen(loads), carried, flexibility)
 
     def seen(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """The modes (k, m) as the probes read them."""
-        return probes @ self.shape[: probes.shape[1]]
+        """The coordinates (k, m + a) as the probes read them: the air's are not seen."""
+        seen = probes @ self.shape[: probes.shape[1]]
+        air = self.projection.air
+        return seen if air is None else np.pad(seen, ((0, 0), (0, air.count)))
+
+
+def regained(
+    basis: Basis, true: tuple, uniform: tuple, outputs: sparse.csr_matrix, loads: sparse.csr_matrix
+) -> Moments:
+    """What the modes answer under their true damping beyond what they do under that of the full matrices.
+
+    The moments of full matrices with it are those of matrices that damp the modes truly, and the rest
+    uniformly. `true`, `uniform`: D~ and K~ of both.
+    """
+    own = basis.projection.squares > 0
+    flexible = np.pad(own, (0, len(true[0]) - len(own)), constant_values=True)  # the air's are
+    seen = basis.seen(outputs)[:, flexible], basis.seen(loads)[:, flexible]
+    carried = basis.projection.carried[:, flexible]
+    parts = [
+        [matrix[np.ix_(flexible, flexible)] for matrix in pencil] for pencil in (true, uniform)
+    ]
+    one, other = (modal_moments(*pencil, *seen, carried) for pencil in parts)
+    return one.minus(other)
 
 
 @dataclass(frozen=True)
 class Wheel:
-    """The full matrices of a tire that turns: `damping` is (gamma1 1/s, gamma2 s), `rotation` None
-    when it stands. Its properties are collective at their first use."""
+    """The full matrices of a tire that turns: `damping` as in modal.damping, `rotation` None when it
+    stands. `beyond` (gamma1 1/s, gamma2 s) damps what no mode has, and the full matrices: given where
+    `damping` is by strain energy, of which there are no full matrices. Its properties are collective
+    at their first use."""
 
     operators: Operators
     rotation: Rotation | None
     speed: float
-    damping: tuple[float, float]
+    damping: Damping
     inertia: str
+    air: Column | None = None
+    beyond: tuple[float, float] | None = None
 
     @cached_property
     def rotating_stiffness(self):
@@ -72,7 +101,24 @@ class Wheel:
 
     @property
     def _given(self) -> tuple:
-        return self.operators, self.rotation, self.speed, self.damping, self.inertia
+        return self.operators, self.rotation, self.speed, self._uniform, self.inertia
+
+    @property
+    def _uniform(self) -> tuple[float, float]:
+        """What the full matrices are damped by."""
+        return self.damping if self.beyond is None else self.beyond
+
+    @cached_property
+    def _loss(self):
+        """sum_r eta_r K_r, or None."""
+        return self.operators.loss_stiffness()
+
+    def _pencils(self, projection: Projection) -> tuple:
+        """The projected pencil as the modes are damped, and as the full matrices are."""
+        return tuple(
+            matrices(projection, self.speed, damping, self.inertia)
+            for damping in (self.damping, self._uniform)
+        )
 
     def respond(
         self,
@@ -87,7 +133,12 @@ class Wheel:
         the projection on these very vectors where there is one: another solution of the same problem
         has other signs, and other vectors of repeated frequencies. Collective."""
         if option in ("static", "dirac"):
-            flexibility = compliance(self.operators, self.rotating_stiffness, outputs, loads)
+            flexibility = compliance(
+                self.operators, self.rotating_stiffness, outputs, loads, self.air
+            )
+            if self.beyond is not None:
+                pencils = self._pencils(basis.projection)
+                flexibility += regained(basis, *pencils, outputs, loads).compliance
             return replace(basis.couple(outputs, loads, flexibility), pulse=option == "dirac")
         r, k = outputs.shape[0], loads.shape[0]
         same = outputs is loads
@@ -98,26 +149,31 @@ class Wheel:
             shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
             poles = basis.couple(probes, probes)
-            carried = basis.projection.momentum
-            whole = second_order(poles, basis.states, basis.seen(probes), carried, moments)
+            carried, loss = basis.projection.carried, None
+            if self.beyond is not None:
+                pencils = self._pencils(basis.projection)
+                moments = moments.plus(regained(basis, *pencils, probes, probes))
+                loss = self.beyond[0], tail_loss(basis.projection)
+            whole = second_order(poles, basis.states, basis.seen(probes), carried, moments, loss)
         return whole if same else whole.between(slice(r), slice(r, r + k))
 
     def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
         full = self.rotating_stiffness, self.rotating_damping
-        return static_shapes(self.operators, *full, probes)
+        return static_shapes(self.operators, *full, probes, self.air)
 
     def _attached(
         self, basis: Basis, modes: Modes, probes: sparse.csr_matrix, known: Projection | None
     ) -> Response:
         """Response of the modes and the attachment modes of all probes. Collective."""
         if not self._drifts:
-            loads = on_own_rows(self.operators, probes)
-            shapes = statics(self.operators, self.rotating_stiffness, loads)
-            flexibility = self.operators.body.comm.allreduce(loads.T @ shapes)
-            own = np.abs(np.diag(flexibility))
+            full = self.operators, self.rotating_stiffness
+            shapes, flexibility = loaded_shapes(*full, probes, self.air)
             missing = flexibility - basis.couple(probes, probes).static()
-            columns = shapes @ foremost(missing, own)
+            columns = shapes @ foremost(missing, np.abs(np.diag(flexibility)))
             grown = self._grown(modes, columns, known, every=False)
+            if self.beyond is not None:
+                pencils = self._pencils(grown.projection)
+                flexibility = flexibility + regained(grown, *pencils, probes, probes).compliance
             return grown.couple(probes, probes, flexibility)
         return self._standing_attachments(modes, probes).couple(probes, probes)
 
@@ -141,9 +197,12 @@ class Wheel:
         apart = sparse.hstack([loads, sparse.csr_matrix((loads.shape[0], 6))])
         probes = sparse.vstack([rim, apart], format="csr")
         grown = self._standing_attachments(modes, probes)
-        seen, momentum = grown.seen(probes), grown.projection.momentum
-        response = couple(grown.states, np.vstack([seen[:6], momentum]), seen, momentum)
-        turning = self.speed, self.damping[0]
+        seen, carried = grown.seen(probes), grown.projection.carried
+        # What damps by the mass is the tire, not the air.
+        moment = np.where(np.arange(carried.shape[1]) < grown.projection.own, carried, 0.0)
+        response = couple(grown.states, np.vstack([seen[:6], moment]), seen, carried)
+        # By strain energy a rigid motion is not damped, so nothing acts against the wheel.
+        turning = self.speed, self.damping[0] if self.beyond is None else 0.0
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
     def _grown(
@@ -154,16 +213,25 @@ class Wheel:
         """
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
-        projection = project(grown, self.rotation, operators.carried, comm, known)
-        shape = operators.trace(grown.vectors)
+        loss = None if self.beyond is None else self._loss
+        projection = project(grown, self.rotation, operators.carried, comm, known, loss)
         if not every:
             stays = dynamic(projection, self.speed, len(modes.squares))
-            projection, shape = projection.among(stays), shape[:, stays]
+            projection, grown = projection.among(stays), grown.among(stays)
+        projection = self.with_air(projection, grown)
+        shape = operators.trace(grown.vectors)
         return Basis(shape, projection, self.decouple(projection, comm))
 
+    def with_air(self, projection: Projection, modes: Modes) -> Projection:
+        """The projection on the modes (all rows), joined by the air where there is any. Collective."""
+        if self.air is None:
+            return projection
+        air = Air(self.air.duct, self.air.coupling(modes.vectors))
+        return replace(projection, air=air)
+
     def decouple(self, projection: Projection, comm) -> StateModes:
-        """The second eigenproblem, or the closed formula when the wheel stands. Collective."""
-        if self.speed == 0:
+        """The second eigenproblem, or the closed formula of a tire without air that stands. Collective."""
+        if self.speed == 0 and projection.air is None:
             return standing(projection, self.damping)
         pencil = matrices(projection, self.speed, self.damping, self.inertia)
         # One process solves: LAPACK on another could order repeated eigenvalues differently.
@@ -174,4 +242,4 @@ class Wheel:
     ) -> np.ndarray:
         """H (f, r, k) m/N without any modes, at the frequencies in Hz. Collective."""
         full = self.rotating_stiffness, self.rotating_damping
-        return receptance(self.operators, *full, outputs, loads, frequency)
+        return receptance(self.operators, *full, outputs, loads, frequency, air=self.air)

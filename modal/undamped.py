@@ -10,7 +10,7 @@ are then measured on A itself.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -57,6 +57,10 @@ class Modes:
     def frequency(self) -> np.ndarray:
         """Natural frequencies (m,), Hz; 0 for rigid modes."""
         return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * np.pi)
+
+    def among(self, wanted: np.ndarray) -> Modes:
+        """With the squares and vectors where `wanted` (m,) is true."""
+        return replace(self, squares=self.squares[wanted], vectors=self.vectors[:, wanted])
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ def inputs(session: Session) -> dict:
     prepare(session)
     return {
         "modes": session.hashes.get("rotating", session.hashes["modes"]),
-        "damping": session.damping,
+        "damping": repr(session.damping),
         "greens": asdict(scene.greens),
         "forces": [asdict(force) for force in scene.force],
         "points": session.patch.index.tolist() if scene.contact else [],

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.symmetry import Sites
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
@@ -44,7 +45,10 @@ def compute(session: Session, path: Path) -> None:
         modes = solve(session)
     rotation = session.rotation_matrices if session.speed else None
     with record.timing("projection"):
-        projection = project(modes, rotation, operators.carried, session.comm)
+        loss = operators.loss_stiffness()
+        projection = project(modes, rotation, operators.carried, session.comm, loss=loss)
+        if loss is not None:
+            loss.destroy()
         shape = operators.trace(modes.vectors)
         labels = _labels(session, modes.vectors)
     session.modes = modes
@@ -54,6 +58,7 @@ def compute(session: Session, path: Path) -> None:
         "lowest": (float(modes.frequency[0]), "Hz"),
         "highest": (float(modes.frequency[-1]), "Hz"),
     }
+    record.headline["damping"] = (_damping(session, projection), "-")
     if modes.segments > 1:
         record.headline["equal segments, solved by wave number"] = (modes.segments, "-")
     else:
@@ -70,6 +75,16 @@ def compute(session: Session, path: Path) -> None:
     if labels is not None:
         _say_names(modes.frequency, labels)
     session.write(path, "modes", lambda file: _fill(file, session, modes, labels))
+
+
+def _damping(session: Session, projection) -> str:
+    """Which damping acts, in words."""
+    given = session.damping
+    if not isinstance(given, StrainEnergy):
+        unused = "" if projection.loss_factor is None else "; the loss factors do not act"
+        return f"γ1 = {given.mass:g} 1/s, γ2 = {given.stiffness:g} s{unused}"
+    low, high = projection.loss_factor.min(), projection.loss_factor.max()
+    return f"modal strain energy, loss factors {low:.3g} to {high:.3g}"
 
 
 def _say_names(frequency: np.ndarray, labels) -> None:
@@ -118,6 +133,8 @@ def _fill(file, session: Session, modes, labels) -> None:
     m = len(basis.frequency)
     put(file, "frequency", basis.frequency, "Hz")
     put(file, "residual", modes.residual, "-")
+    if basis.projection.loss_factor is not None:
+        put(file, "loss_factor", basis.projection.loss_factor, "-")
     put(file, "surface/points", session.static.points, "m")
     face = 3 * len(session.static.points)
     put(file, "surface/shape", basis.shape[:face].T.reshape(m, -1, 3), "kg^-1/2")
@@ -142,6 +159,7 @@ _UNITS = {
     "body": "1/rad",
     "body_convective": "1/rad2",
     "momentum": "kg^1/2",
+    "loss_factor": "-",
 }
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from tireroad.contact.roads.road import make_road
 from tireroad.runs.files import store
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
@@ -17,6 +16,7 @@ from tireroad.runs.process.memory import peak_memory
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.road_check import check_road
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.stages import contact, greens, modes, response, rotating, spectra, static
 from tireroad.runs.stages.session import Session
@@ -47,7 +47,7 @@ def run_scene(
     on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
     if scene.road is not None:
         # A road file that cannot be used should be told before hours of solving, not after.
-        on_root(comm, lambda: make_road(scene.road) and None)
+        on_root(comm, lambda: check_road(scene))
     reasons = skipped(scene, until)
     if petsc_options:
         observe.say(f"PETSc options: {' '.join(petsc_options)}")

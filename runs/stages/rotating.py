@@ -31,7 +31,7 @@ def inputs(session: Session) -> dict:
     wanted = session.scene.rotation
     return {
         "modes": session.hashes["modes"],
-        "damping": session.damping,
+        "damping": repr(session.damping),
         "speed": session.speed,
         "inertia": wanted.inertia,
         "campbell": asdict(wanted.campbell) if wanted.campbell else None,
