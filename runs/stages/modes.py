@@ -11,6 +11,7 @@ from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.symmetry import Sites
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
+from tireroad.runs.stages import cavity
 from tireroad.runs.stages.session import Session
 
 _NAMED = 8  # modes of a round tire shown by name
@@ -33,6 +34,7 @@ def inputs(session: Session) -> dict:
         "static": session.hashes["static"],
         "modal": asdict(session.scene.modal),
         "rotating": session.speed != 0,
+        "cavity": cavity.inputs(session),
     }
 
 
@@ -53,6 +55,7 @@ def compute(session: Session, path: Path) -> None:
         labels = _labels(session, modes.vectors)
     session.modes = modes
     session.modal = ModalBasis(modes.frequency, shape, projection)
+    cavity.join(session, modes)
     record.headline |= {
         "modes": (len(modes.squares), "-"),
         "lowest": (float(modes.frequency[0]), "Hz"),
@@ -148,6 +151,7 @@ def _fill(file, session: Session, modes, labels) -> None:
     for name, unit in _UNITS.items():
         if getattr(basis.projection, name) is not None:
             put(file, f"projected/{name}", getattr(basis.projection, name), unit)
+    cavity.fill(file, basis.projection.air)
     file.attrs["inertia_count"] = modes.inertia_count
     file.attrs["rigid_modes"] = modes.rigid
 
@@ -173,6 +177,7 @@ def reuse(session: Session, path: Path) -> None:
             parts += [file["rim/translation"][:], file["rim/rotation"][:]]
         shape = np.hstack([part.reshape(len(part), -1) for part in parts]).T.copy()
         matrices = {name: values[:] for name, values in file["projected"].items()}
-        return ModalBasis(file["frequency"][:], shape, Projection(**matrices))
+        projection = Projection(**matrices, air=cavity.read(file))
+        return ModalBasis(file["frequency"][:], shape, projection)
 
     session.modal = session.read(path, pick)

@@ -135,7 +135,14 @@ class Session:
         tail = None
         if isinstance(self.damping, StrainEnergy):
             tail = beyond(self.damping, self.modal.projection)
-        return Wheel(self.operators, rotation, self.speed, self.damping, inertia, beyond=tail)
+        return Wheel(self.operators, rotation, self.speed, self.damping, inertia, self.air, tail)
+
+    @cached_property
+    def air(self):
+        """The air at the wall of the static state, once the modes are known; None without it. Collective."""
+        from tireroad.runs.stages.cavity import make
+
+        return make(self)
 
     @cached_property
     def modes(self):
