@@ -36,7 +36,9 @@ def test_the_fast_part_of_a_block_follows_statically():
         kept = whole.resolved(2e-3)
         assert len(kept.block) == (4 if rigid else 2)
         assert kept.rigid == whole.rigid
-        np.testing.assert_allclose(np.sort(np.abs(kept.every)), [40, 40, np.hypot(3, 60)], rtol=1e-4)
+        np.testing.assert_allclose(
+            np.sort(np.abs(kept.every)), [40, 40, np.hypot(3, 60)], rtol=1e-4
+        )
         both = kept.residual + kept.static(), whole.residual + whole.static()
         np.testing.assert_allclose(*both, rtol=1e-7)
         frequency = np.array([0.01, 5.0])
