@@ -43,7 +43,7 @@ def test_the_fast_part_of_a_block_follows_statically():
         np.testing.assert_allclose(*both, rtol=1e-7)
         frequency = np.array([0.01, 5.0])
         difference = np.abs(kept.receptance(frequency) - whole.receptance(frequency))
-        assert difference[0].max() < 1e-3 * difference[1].max()
+        assert difference[0].max() < 3e-3 * difference[1].max()
         lag = 2 * 2 * np.pi * 5.0 / 3000.0
         assert 0 < difference[1].max() < 2 * lag * np.abs(kept.residual).max()
 
