@@ -32,6 +32,7 @@ def test_make_road_writes_what_is_shipped(tmp_path: Path) -> None:
 def test_own_road_and_tread(capsys: pytest.CaptureFixture[str]) -> None:
     """Registered classes serve in a scene as ours do; pinned when it was written."""
     import own_road
+
     from tireroad.contact.roads.kind import ROADS
     from tireroad.contact.tread.law import TREADS
 
