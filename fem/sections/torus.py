@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tireroad.fem.sections import bead
+from tireroad.fem.sections.footprint import ARC_NEAR, near_road, ring_corners
 from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.ring import Ring
@@ -44,26 +46,19 @@ class Torus:
 
         With corners at the angles `between` and at their mirror images.
         """
-        plain = self.half_angle * graded(self.elements_arc, self._size)
-        if not len(between):
-            return plain
-        # The same sizes as without: density by the plain corners, each element one.
-        size = np.diff(plain)
-        middle = (plain[1:] + plain[:-1]) / 2
         both = np.concatenate([between, -np.asarray(between)])
-        return corners(
-            self.elements_arc,
-            lambda x: 1 / np.interp(x, middle, size),
-            -self.half_angle,
-            self.half_angle,
-            both,
-        )
+        half, size = self.half_angle, self._size
+        return corners(self.elements_arc, lambda x: 1 / size(x), -half, half, both)
 
-    def _size(self, t: np.ndarray) -> np.ndarray:
-        # The clamped edge is singular: at the bead an element is _BEAD times the uniform one.
-        bead = _BEAD + (1 - _BEAD) * np.pi / 2 * np.cos(np.pi / 2 * t)
-        near = near_road(np.abs(t), self.footprint_size)
-        return near * (bead if self.grading == "bead" else 1.0)
+    def _size(self, arc: np.ndarray) -> np.ndarray:
+        """Relative size of the elements at a section angle."""
+        near = near_road(np.abs(arc), self.footprint_size, ARC_NEAR)
+        if self.grading != "bead":
+            return near
+        edge = self.half_angle - np.abs(arc)
+        length = 2 * self.half_angle
+        floor = bead.LEAST * self.thickness / self.minor_radius / self.elements_arc
+        return near * bead.size(edge, length, self.elements_arc, floor)
 
     def section(self, patches: Sequence[Patch] = (), plies: Sequence[PlyLine] = ()) -> SectionMesh:
         """The section's elements, with edges exactly on those of patches and on plies."""
@@ -106,35 +101,3 @@ class Torus:
         wall = np.where(depth == 1.0, self.minor_radius, inner + depth * self.thickness)
         reach = self.outer_radius - self.minor_radius + wall * np.cos(arc)
         return np.stack([reach, wall * np.sin(arc)], axis=-1)
-
-
-# First frequency of the unloaded torus, 16 segments, 8, 12 and 16 elements along the arc, above that of
-# 36: 7.3, 2.1 and 0.8 % at 0.3; 7.9, 2.1, 0.8 % at 0.2; 6.9, 2.1, 1.0 % at 0.5; 9.7, 3.2, 1.7 % ungraded.
-_BEAD = 0.3
-_NEAR = 0.4  # of the elements on either side of the footprint: enough, and a soft change
-
-
-def near_road(distance: np.ndarray, footprint_size: float) -> np.ndarray:
-    """Relative element size at a distance from the footprint, by element count, 0 to 1."""
-    return 1 - (1 - footprint_size) * np.exp(-((distance / _NEAR) ** 2))
-
-
-def ring_corners(segments: int, footprint_size: float) -> np.ndarray:
-    """Angles of the element corners around the axle, rad, from the lowest point towards +x."""
-    sizes = graded(segments, lambda t: near_road(1 - np.abs(t), footprint_size))
-    return np.pi + np.pi * sizes
-
-
-def graded(count: int, size: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Corners of `count` elements over [-1, 1] whose lengths follow size(t), t in [-1, 1] by count.
-
-    The size must be even in t; so are the corners then, to the last bit, and a symmetric tire
-    keeps its mirror planes.
-    """
-    t, weight = np.polynomial.legendre.leggauss(8)
-    middle = (2 * np.arange(count) + 1) / count - 1
-    lengths = size(middle[:, None] + t / count) @ weight
-    lengths = lengths + lengths[::-1]
-    corners = np.concatenate([[0.0], np.cumsum(lengths)])
-    corners = 2 * corners / corners[-1] - 1
-    return (corners - corners[::-1]) / 2
