@@ -12,6 +12,7 @@ import logging
 import platform
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 
 import basix
 import dolfinx.fem.petsc  # noqa: F401  (newer releases do not import it by themselves)
@@ -20,6 +21,8 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+
+from tireroad.fem import form_cache
 
 
 def _cpu() -> str:
@@ -62,11 +65,16 @@ else:
 # of a hyperelastic tangent on 27-node hexahedra either way.
 JIT = {
     "cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno", f"-DCPU_{_cpu()}"],
-    "timeout": 600,  # s that a second run waits for the first to compile; 10 s are too few
 }
 _JIT_KEY = (
     "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
 )
+
+
+def _options(folder: Path, **more) -> dict:
+    """Keyword of what dolfinx compiles: in this folder (form_cache). On another node of a cluster
+    the folder's new files may be seen some seconds later."""
+    return {_JIT_KEY: {**more, "cache_dir": str(folder), "timeout": 120}}
 
 
 def geometry_nodes(degree: int) -> np.ndarray:
@@ -107,7 +115,7 @@ def vector_space(mesh, degree: int):
     """Continuous Lagrange space of displacement vectors."""
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
-    return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+    return _space(mesh, ufl.VectorElement("Lagrange", mesh.ufl_cell(), degree))
 
 
 @_quietly
@@ -115,13 +123,21 @@ def cell_space(mesh):
     """Scalars that are constant in each cell."""
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, ("DG", 0))
-    return fem.FunctionSpace(mesh, ("DG", 0))
+    return _space(mesh, ufl.FiniteElement("DG", mesh.ufl_cell(), 0))
+
+
+def _space(mesh, element):
+    """dolfinx 0.5 compiles elements too; newer releases take theirs from Basix."""
+    return form_cache.compiled(
+        mesh.comm, lambda folder: fem.FunctionSpace(mesh, element, **_options(folder))
+    )
 
 
 @_quietly
 def form(expression):
     """Compile a UFL form with the program's compiler flags. Collective."""
-    return fem.form(expression, **{_JIT_KEY: JIT})
+    comm = expression.ufl_domain().ufl_cargo().comm
+    return form_cache.compiled(comm, lambda folder: fem.form(expression, **_options(folder, **JIT)))
 
 
 def cell_facets(mesh) -> np.ndarray:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from pathlib import Path
 
+from tireroad.fem import form_cache
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.arguments import parser
 from tireroad.runs.process import mpi, observe
@@ -46,6 +47,7 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
     scene = load(args.scene, args.set)
     directory = args.out if args.out is not None else Path("results") / scene.name
     mpi.start_petsc(petsc_options)
+    form_cache.announce = observe.say
     with ExitStack() as stack:
 
         def claim() -> None:

@@ -55,7 +55,8 @@ class ActiveSet:
         self.residual = 0.0
         self.iterations = 0
         self._factor = ActiveFactor(matrix)
-        self._lifted, self._reference = (b"", b""), None
+        self._lifted = b"", b""
+        self._reference: Array | None = None
         self._signs = self._before = np.zeros(n)
 
     def solve(
@@ -96,12 +97,12 @@ class ActiveSet:
             'flexibility, or take solver = "snes-vi"'
         )
 
-    def state(self) -> dict[str, Array]:
+    def state(self) -> dict[str, Array | Mask]:
         """What the next solve starts from."""
         signs = {"signs": self._signs, "signs_before": self._before}
         return {"active": self.active, "factorised": self._factor.base} | signs
 
-    def set_state(self, kept: dict[str, Array]) -> None:
+    def set_state(self, kept: dict[str, Array | Mask]) -> None:
         """Go on from `state`."""
         self.active = np.asarray(kept["active"], dtype=bool)
         self._signs, self._before = kept["signs"], kept["signs_before"]

@@ -1,6 +1,6 @@
 """What every solver of the contact problem has in common: its interface, and the checks of A and of f."""
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,9 +37,9 @@ class ContactSolver(Protocol):
 
     def block(self, index: Index) -> Array: ...
 
-    def state(self) -> dict[str, Array]: ...
+    def state(self) -> dict[str, NDArray[Any]]: ...
 
-    def set_state(self, kept: dict[str, Array]) -> None: ...
+    def set_state(self, kept: dict[str, NDArray[Any]]) -> None: ...
 
 
 def penetration(gap: Array) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from tireroad.contact.solver.conditions import ContactSolver
+from tireroad.contact.solver.conditions import ContactSolver, Mask
 from tireroad.contact.solver.tangential import Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush
 from tireroad.fem.errors import ConvergenceError
@@ -64,7 +64,7 @@ class Friction:
         self._brush.set_state(kept)
 
     def solve(
-        self, normal: ContactSolver, q: Array, guess: Array | None, static: Array, free: Array
+        self, normal: ContactSolver, q: Array, guess: Mask | None, static: Array, free: Array
     ) -> tuple[Array, Array]:
         """Normal (c,) and horizontal (c, 2) forces, N; `free` (2c,) m, x then y.
 

@@ -103,7 +103,8 @@ class ProjectedCG:
             return base.copy()
         if self._before is None:
             return self._last.copy()
-        return np.maximum(2.0 * self._last - self._before, 0.0) * (self._last > 0.0)
+        ahead: Array = np.maximum(2.0 * self._last - self._before, 0.0)
+        return np.where(self._last > 0.0, ahead, 0.0)
 
     def _gap(self, force: Array, base: Array, q: Array) -> Array:
         return q + self._compliance.apply(force - base)

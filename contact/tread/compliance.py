@@ -7,7 +7,7 @@ carcass when a unit force presses on point j. None of them is collective.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tireroad.fem.errors import InputError
 
@@ -85,7 +85,7 @@ def no_tread(n: int) -> Array:
     return np.zeros((n, n))
 
 
-def rectangle_potential(x: Array, y: Array, a: Array, b: Array) -> Array:
+def rectangle_potential(x: ArrayLike, y: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
     """I(x, y) = integral of 1/r over the rectangle 2a x 2b around the origin, in its own plane, m.
 
     x, y, a, b broadcast against each other, all in m. Relative error below 1e-11 at any distance.

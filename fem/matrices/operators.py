@@ -86,20 +86,20 @@ class Operators:
         body = self.body
         u, v = body.trial, body.test
         w = kinematics.wheel_velocity(body.mesh)
-        density, convect = body.wall.density, kinematics.convective
+        convect = kinematics.convective
         rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
         forms = (
             convection_form(body),
-            -density * ufl.inner(convect(v, w), convect(u, w)) * body.dx,
+            body.inertia(-ufl.inner(convect(v, w), convect(u, w))),
             body_rate_form(body),
-            -density * ufl.inner(test_rate, rate) * body.dx,
+            body.inertia(-ufl.inner(test_rate, rate)),
         )
         return Rotation(*(self._assemble(form) for form in forms))
 
     def consistent_mass(self) -> PETSc.Mat:
         """int rho phi_i . phi_j by full integration, kg: what the diagonal `mass` is compared to. Collective."""
         body = self.body
-        return self._assemble(body.wall.density * ufl.inner(body.trial, body.test) * body.dx)
+        return self._assemble(body.inertia(ufl.inner(body.trial, body.test)))
 
     def _assemble(self, form) -> PETSc.Mat:
         matrix = fem.petsc.assemble_matrix(compat.form(form))

@@ -38,7 +38,7 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
     ring = fine.ring.coarser()
     if ring is None:
         return "the mesh is too coarse to be halved"
-    body = Body(fine.comm, ring, fine.materials)
+    body = Body(fine.comm, ring, fine.materials, cords=fine.plies.cords)
     coarse = Equilibrium(body, rolling)
     companion = Loader(coarse, lambda progress: None)
     deflection = equilibrium.road_height - loader.touch

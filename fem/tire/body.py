@@ -13,8 +13,10 @@ from petsc4py import PETSc
 from tireroad.fem import compat
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
+from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import INNER, RIM, TREAD, build
+from tireroad.fem.tire.plies import Plies, laid_on
 from tireroad.fem.tire.surface import Gather
 from tireroad.fem.tire.wall import Region, Wall, compounds
 
@@ -23,7 +25,7 @@ class Body:
     """A ring and what it is made of, with its displacement `u` about the undeformed shape.
 
     A `Ring` comes with the materials of its section's regions by name; a `Torus` with the one of its
-    wall, and regions that have others. Collective to make. `ids` are the lattice ids of this process's owned nodes; `rim` and `tread`
+    wall, and regions that have others; `cords` lie on its section's plies, by name. Collective to make. `ids` are the lattice ids of this process's owned nodes; `rim` and `tread`
     its blocked dofs there (ghosts included in `rim`, as boundary conditions want them).
     """
 
@@ -33,6 +35,7 @@ class Body:
         tire: Ring | Torus,
         material: Material | Mapping[str, Material],
         regions: Sequence[Region] = (),
+        cords: Sequence[Cords] = (),
     ):
         self.comm = comm
         if isinstance(tire, Torus):
@@ -44,6 +47,7 @@ class Body:
         self.mesh, self.lattice = self.tire.mesh, self.tire.lattice
         self.space = compat.vector_space(self.mesh, order)
         self.wall = Wall(self.tire, material)
+        self.plies = Plies(self.mesh, order, cords, laid_on(self.tire, cords))
         self.u = fem.Function(self.space)
         # One of each for all forms: UFL does not always take two of the same space for equal
         # (seen with dolfinx 0.5.2, from one run to the next).
@@ -77,7 +81,7 @@ class Body:
         return fem.dirichletbc(np.zeros(3), self.rim, self.space)
 
     def nodal_mass(self) -> np.ndarray:
-        """Owned entries (3 nodes,) of int rho phi_i . (1, 1, 1) by the rule whose points are the nodes.
+        """Owned entries (3 nodes,) of int rho phi_i . (1, 1, 1) by the rule whose points are the nodes, cords too.
 
         kg; positive, rim included. Collective.
         """
@@ -85,9 +89,14 @@ class Body:
         dx = ufl.Measure("dx", domain=self.mesh, metadata=lobatto)
         ones = ufl.as_vector((1.0, 1.0, 1.0))
         weight = self.wall.density * ufl.inner(self.test, ones) * dx
+        weight += self.plies.inertia(ufl.inner(self.test, ones), "nodes")
         vector = fem.petsc.assemble_vector(compat.form(weight))
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         return vector.array_r.copy()
+
+    def inertia(self, integrand):
+        """int rho0 integrand over wall and cords by full integration, a UFL form."""
+        return self.wall.density * integrand * self.dx + self.plies.inertia(integrand)
 
     def owned(self, vector: np.ndarray) -> np.ndarray:
         """The owned part of a dof array as (nodes, 3)."""

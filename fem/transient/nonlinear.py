@@ -146,9 +146,10 @@ class NonlinearTire(FullTire):
 
 
 def _potential(body, pressure):
-    """Strain energy and p V, J, in UFL; V(u) the volume behind the inner face, whose edges stand still."""
+    """Strain energy of wall and cords and p V, J, in UFL; V(u) the volume behind the inner face, whose edges stand still."""
     F = kinematics.deformation_gradient(body.u)
     distortion, dilatation = body.wall.energy(F.T * F)
     place = ufl.SpatialCoordinate(body.mesh) + body.u
     swept = kinematics.pressure_virtual_work(body.u, place, ufl.FacetNormal(body.mesh)) / 3
-    return distortion * body.dx + dilatation * body.reduced_dx + pressure * swept * body.inner_ds
+    wall = distortion * body.dx + dilatation * body.reduced_dx
+    return wall + body.plies.energy(body.u) + pressure * swept * body.inner_ds

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
@@ -187,7 +188,9 @@ def _on_a_grid(shape: tuple[int, int], modes: int, finer: int, brush: float | No
     )
     weights = sparse.csr_matrix(np.kron(along, across))
     places = GridPlaces(tuple(counts), spacing, np.arange(len(points.points)))
-    kernel = KernelTread(places, lambda *where: half_space_influence(*where, *ELASTIC))
+    kernel = KernelTread(
+        places, partial(half_space_influence, youngs_modulus=ELASTIC[0], poisson_ratio=ELASTIC[1])
+    )
     normal = tire.same_step[:count, :count]
     solver = ActiveSet(SpreadCompliance(normal, weights, kernel))
     drive = Drive(_wavy, lambda t: 0.0, 20.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy import sparse
@@ -31,7 +32,9 @@ def _grid_case(n: int):
     pitch = 0.1 / n
     x, y = (a.ravel() for a in np.meshgrid(*2 * [(np.arange(n) - (n - 1) / 2) * pitch]))
     places = GridPlaces((n, n), (pitch, pitch), np.arange(n * n))
-    kernel = KernelTread(places, lambda *where: half_space_influence(*where, *ELASTIC))
+    kernel = KernelTread(
+        places, partial(half_space_influence, youngs_modulus=ELASTIC[0], poisson_ratio=ELASTIC[1])
+    )
     return x, y, kernel
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from tireroad.contact.roads.flat import Flat
-from tireroad.contact.rolling import Drive, roll
+from tireroad.contact.rolling import Drive, Tire, roll
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.convolution import Convolution
@@ -60,7 +60,8 @@ def convolution() -> Table:
     """
     patch = oval_patch((10, 6), (0.015, 0.02), 500.0)
     response = Strip(speed=20.0).response(patch.points, 12, 5)
-    rows, before = [], []
+    rows: list[list] = []
+    before: list[float] = []
     for steps in (200, 400, 800, 1600):
         times, off, size = _both(response, patch.force, 0.02, steps, 200)
         # Romberg's table: both err by even powers of the step, for the force begins smoothly.
@@ -91,7 +92,10 @@ def _both(response, shape: np.ndarray, duration: float, steps: int, shown: int):
     """Seconds of recursion and convolution, the difference of their displacements at `shown` common
     times (shown, r) m, and the largest displacement, m."""
     h = duration / steps
-    tires = Recursion(response, h, "linear", MPI.COMM_SELF), Convolution(response, h, steps)
+    tires: tuple[Tire, ...] = (
+        Recursion(response, h, "linear", MPI.COMM_SELF),
+        Convolution(response, h, steps),
+    )
     times, off, size = [0.0, 0.0], [], 0.0
     for k in range(1, steps + 1):
         force, moved = shape * np.sin(300 * k * h) ** 2, []

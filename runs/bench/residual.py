@@ -45,7 +45,9 @@ def run() -> list[Table]:
     operators = _tire(comm, 20, 7)
     modes = undamped.solve(operators.stiffness, operators.mass, max(COUNTS))
     lattice = operators.body.lattice
-    spots = [probe.directed(probe.spot(lattice, *spot), (0, 0, 1.0)) for spot in PATCH]
+    spots = [
+        probe.directed(probe.spot(lattice, *spot), np.array([0.0, 0.0, 1.0])) for spot in PATCH
+    ]
     probes = sparse.csr_matrix(np.stack(spots))
     rotation = operators.rotation()
     standing_wheel = Wheel(operators, None, 0.0, DAMPING, "full")
@@ -62,8 +64,8 @@ def run() -> list[Table]:
 def _tire(comm: MPI.Comm, segments: int, elements_arc: int) -> Operators:
     """An inflated torus of 48 MPa. Collective."""
     section = Torus(0.32, 0.10, 0.012, np.radians(120), segments, elements_arc, 1, 2)
-    material = {"model": "neo-hookean", "youngs_modulus": 48e6}
-    body = Body(comm, section, Material(**material, poisson_ratio=0.45, density=1200.0))
+    rubber = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
+    body = Body(comm, section, rubber)
     Loader(Equilibrium(body), lambda progress: None).inflate(INFLATION)
     return Operators(body, INFLATION)
 

@@ -77,17 +77,12 @@ class RunResults(Mapping[str, NDArray[Any]]):
     def _listed(self) -> dict[str, str]:
         """Every dataset's unit by its name."""
         if self._units is None:
-            self._units = {}
+            found: dict[str, str] = {}
             for path in sorted(self.directory.glob("*.h5")):
                 with self._opened(path.stem) as opened:
-                    opened.visititems(
-                        lambda name, item, stem=path.stem: self._note(stem, name, item)
-                    )
+                    found |= {f"{path.stem}/{name}": unit for name, unit in _units(opened)}
+            self._units = found
         return self._units
-
-    def _note(self, stem: str, name: str, item: h5py.Group | h5py.Dataset) -> None:
-        if isinstance(item, h5py.Dataset):
-            self._units[f"{stem}/{name}"] = str(item.attrs.get("unit", "-"))
 
     def _opened(self, stem: str) -> h5py.File:
         path = self.directory / f"{stem}.h5"
@@ -97,6 +92,18 @@ class RunResults(Mapping[str, NDArray[Any]]):
             return h5py.File(path, "r")
         except OSError as error:
             raise InputError(f"{path} is damaged or no HDF5 file: {error}") from error
+
+
+def _units(file: h5py.File) -> list[tuple[str, str]]:
+    """Name and unit of every dataset."""
+    found: list[tuple[str, str]] = []
+
+    def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
+        if isinstance(item, h5py.Dataset):
+            found.append((name, str(item.attrs.get("unit", "-"))))
+
+    file.visititems(visit)
+    return found
 
 
 def load(directory: str | Path) -> RunResults:

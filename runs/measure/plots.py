@@ -86,7 +86,7 @@ def _lines(table: Any) -> str:
 
 def _shared_label(names: list[str], columns: _Columns) -> str:
     """What several curves on one axis have in common: the words they begin with, and their unit."""
-    words = commonprefix([name.split() for name in names])
+    words = list(commonprefix([name.split() for name in names]))
     while words and words[-1] in ("of", "a", "the"):
         words.pop()
     units = {columns.label(name).removeprefix(name) for name in names}

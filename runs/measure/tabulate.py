@@ -36,7 +36,8 @@ def modules(package: str) -> dict[str, ModuleType]:
 
     Some have run_large() too: the same on a mesh that takes longer than one would wait for.
     """
-    path = Path(importlib.import_module(package).__file__).parent
+    (folder,) = importlib.import_module(package).__path__
+    path = Path(folder)
     names = sorted(found.name for found in pkgutil.iter_modules([str(path)]))
     loaded = {name: importlib.import_module(f"{package}.{name}") for name in names}
     return {name: module for name, module in loaded.items() if hasattr(module, "run")}

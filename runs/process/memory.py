@@ -1,6 +1,8 @@
-"""How much memory this process has taken."""
+"""How much memory this process has taken, and how much there is."""
 
+import math
 import resource
+from contextlib import suppress
 from pathlib import Path
 
 
@@ -16,3 +18,18 @@ def peak_memory() -> float:
         return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     (own,) = (line.split()[1] for line in lines if line.startswith("VmHWM:"))
     return 1024.0 * float(own)
+
+
+def available_memory() -> float:
+    """Memory that this machine can still give, bytes: what the kernel reckons, within the limit of
+    the control group; infinite where neither can be read.
+    """
+    free = math.inf
+    with suppress(OSError, ValueError):
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        free = next(1024.0 * float(line.split()[1]) for line in lines if "MemAvailable" in line)
+    with suppress(OSError, ValueError):
+        limit = float(Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii"))
+        used = float(Path("/sys/fs/cgroup/memory.current").read_text(encoding="ascii"))
+        free = min(free, limit - used)
+    return free

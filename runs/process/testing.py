@@ -180,7 +180,8 @@ def run_tests(arguments: list[str]) -> int:
         print(f"{collected} collected")
         return 0 if collected and not totals["failed"] else 1
     print(", ".join(f"{number} {outcome}" for outcome, number in totals.items()))
-    return 0 if totals["failed"] == 0 and sum(totals.values()) else 1
+    ran = sum(int(number) for number in totals.values())
+    return 0 if totals["failed"] == 0 and ran else 1
 
 
 if __name__ == "__main__":

@@ -19,7 +19,8 @@ CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 DASHES = ("-", "--")
 
 
-def _pen(number: int) -> dict[str, str]:
+def pen(number: int) -> dict[str, str]:
+    """Colour and dashes of the curve of run number `number`."""
     return {"color": CYCLE[number % len(CYCLE)], "ls": DASHES[number // len(CYCLE) % 2]}
 
 
@@ -30,10 +31,10 @@ def levels(rows: Sequence[Row], names: Sequence[str]) -> str:
     figure, axes = canvas(9.5, 5.0, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
     place = np.arange(len(rows))
     for number, name in enumerate(names):
-        axes[0, 0].plot(place, values[:, number], marker="o", ms=3, label=name, **_pen(number))
+        axes[0, 0].plot(place, values[:, number], marker="o", ms=3, label=name, **pen(number))
         if number:
             change = values[:, number] - values[:, 0]
-            axes[1, 0].plot(place, change, marker="o", ms=3, **_pen(number))
+            axes[1, 0].plot(place, change, marker="o", ms=3, **pen(number))
     axes[0, 0].set_ylabel("dB re 1 N, rms")
     axes[0, 0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8)
     axes[1, 0].axhline(0.0, color="#7b8794", lw=0.8)
@@ -47,7 +48,7 @@ def histories(runs: Mapping[str, tuple[Array, Array]]) -> str:
     """Forces (nt,) N over time (nt,) s."""
     figure, axes = canvas(9.5, 3.0)
     for number, (name, (time, force)) in enumerate(runs.items()):
-        axes[0, 0].plot(*envelope(time, force), lw=0.9, label=name, **_pen(number))
+        axes[0, 0].plot(*envelope(time, force), lw=0.9, label=name, **pen(number))
     axes[0, 0].set(xlabel="time in s", ylabel="vertical contact force in N")
     axes[0, 0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8)
     return encode(figure)

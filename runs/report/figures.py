@@ -79,7 +79,8 @@ def peak_hold(frequency: NDArray, level: NDArray, bins: int = DRAWN) -> tuple[ND
     """The highest line of each of `bins` bands equal on a logarithmic axis; frequency (n) > 0."""
     if len(frequency) <= bins:
         return frequency, level
-    edges = np.linspace(*np.log(frequency[[0, -1]]), bins)
+    low, high = np.log(frequency[[0, -1]])
+    edges = np.linspace(low, high, bins)
     first = np.unique(np.searchsorted(np.log(frequency), edges[:-1]))
     highest = np.maximum.reduceat(level, first)
     return frequency[first], highest

@@ -15,6 +15,7 @@ from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.read import Absent, Results, Section
 from tireroad.runs.report import force_sections, tire_sections
 from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.verdicts import verdicts
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.schema import key_of, table_of
 from tireroad.runs.scene.tables import Scene
@@ -55,6 +56,7 @@ def render(directory: Path) -> str:
     summary = read_summary(directory / "summary.json", problems)
     text, scene = read_scene(directory / "scene.toml", problems)
     stages = summary.get("stages", {})
+    judged = verdicts(summary.get("told", {}))
     sections, left_out, provenance = build_sections(directory, scene, stages, problems)
     told = [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
     told += [(section.title, warning) for section in sections for warning in section.warnings]
@@ -68,6 +70,7 @@ def render(directory: Path) -> str:
         computed=computed(directory),
         warnings=[("report", problem) for problem in problems] + told,
         stages=stages,
+        judged=judged,
         costs=costs(stages),
         parameters=parameters(scene),
         provenance=provenance,
@@ -90,6 +93,7 @@ def read_summary(path: Path, problems: list[str]) -> dict:
             problems.append("summary.json is not what the run wrote (checksum) and is left out.")
             return {}
         stages = summary.get("stages", {})
+        summary["told"] = stages
         known = sorted(stages, key=lambda name: (*STAGES, name).index(name))
         summary["stages"] = {name: whole_stage(stages[name]) for name in known}
     except (ValueError, AttributeError, TypeError, KeyError) as error:
@@ -104,7 +108,6 @@ def whole_stage(stage: Mapping) -> dict:
         "reason": str(stage.get("reason") or ""),
         "seconds": float(stage.get("seconds") or 0.0),
         "headline": quantities(stage.get("headline") or {}),
-        "indicators": quantities(stage.get("indicators") or {}),
         "warnings": [str(warning) for warning in stage.get("warnings") or []],
         "cost": {key: float(value) for key, value in (stage.get("cost") or {}).items()},
     }
@@ -134,7 +137,9 @@ def build_sections(
     directory: Path, scene: Mapping, stages: Mapping, problems: list[str]
 ) -> tuple[list[Section], list[tuple[str, str]], list[tuple[str, str]]]:
     """Sections of the files there are; what is left out and why; provenance of the first file."""
-    sections, left_out, provenance = [], [], []
+    sections: list[Section] = []
+    left_out: list[tuple[str, str]] = []
+    provenance: list[tuple[str, str]] = []
     with Results(directory, scene) as results:
         for name, build in SECTIONS.items():
             try:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.scene.cord_rules import check_cords
 from tireroad.runs.scene.schema import described
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_tables import Tire
@@ -85,6 +86,7 @@ def _geometry(scene: Scene, error: Where) -> None:
                 raise error(
                     ("tire", "region", str(number), key), f"= [{low:g}, {high:g}] must ascend"
                 )
+    check_cords(tire, error)
     free = free_unknowns(tire)
     if scene.modal.up_to is None and scene.modal.count >= free:
         raise error(

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tireroad.runs.scene.schema import choice, integer, number, table, tables, vector
+from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
 
 LINEAR = ("model", ("linear", "neo-hookean"))
 
@@ -73,6 +73,27 @@ class Region:
     material: Material = table(Material, "what the region is made of")
 
 
+@dataclass(frozen=True)
+class Cords:
+    name: str = text("ply", "of this line of cords, in results and messages")
+    depth: float = number(
+        0.006, "m", "under the outer face of the undeformed wall", least=0, most=5
+    )
+    arc: tuple[float, float] = vector(
+        (-45.0, 45.0), "deg", "from, to, measured from the crown; y < 0 first", least=-180, most=180
+    )
+    angle: float = number(
+        20.0, "deg", "from the circumference, at the lowest point +x to +y", least=-90, most=90
+    )
+    youngs_modulus: float = number(172.2e9, "Pa", "of a cord in tension", above=0, most=1e13)
+    area: float = number(2.118e-7, "m²", "cross-section of one cord", above=0, most=1)
+    spacing: float = number(1.16e-3, "m", "between cords, across them", above=0, most=1)
+    density: float = number(0.0, "kg/m³", "of the cords", least=0, most=1e5)
+    compression: float = number(
+        1.0, "-", "modulus in compression over that in tension", least=0, most=1
+    )
+
+
 # The mesh's defaults are from `bench discretisation`, soft torus, 5 mm on the road, errors of the first
 # and the 20th frequency and of the load. 100 x 16 of order 2, graded at the beads: 0.4, 0.15 and 0.4 %.
 # 50 x 16 with footprint_size 0.25 has half the unknowns: 0.65, 0.2 and 1.4 %. Without grading at the
@@ -97,3 +118,4 @@ class Tire:
     region: tuple[Region, ...] = tables(
         Region, "a part of the section of another material; elements whose middle it holds"
     )
+    cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")

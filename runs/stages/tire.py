@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.fem.sections.grid import Patch
+from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
 from tireroad.runs.scene.tire_tables import Material as MaterialTable
@@ -19,7 +19,11 @@ def make_section(tire: Tire) -> Ring:
     names = {f.name for f in fields(Torus)} - {"half_angle"}
     given = {name: getattr(tire, name) for name in names}
     torus = Torus(half_angle=np.radians(tire.half_angle), **given)
-    return torus.ring([_patch(i, region) for i, region in enumerate(tire.region)])
+    patches = [_patch(i, region) for i, region in enumerate(tire.region)]
+    plies = [
+        PlyLine(c.name, tuple(np.radians(c.arc)), 1 - c.depth / tire.thickness) for c in tire.cords
+    ]
+    return torus.ring(patches, plies)
 
 
 def _patch(number: int, region: Region) -> Patch:
@@ -39,6 +43,7 @@ def make_lattice(section: Ring):
 def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
     """The finite-element body, undeformed. Collective."""
     from tireroad.fem.tire.body import Body
+    from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
 
     def rubber(table: MaterialTable) -> Material:
@@ -46,4 +51,12 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
 
     names = [_patch(i, region).name for i, region in enumerate(tire.region)]
     materials = {name: rubber(r.material) for name, r in zip(names, tire.region, strict=True)}
-    return Body(comm, section, {"wall": rubber(tire.material)} | materials)
+    placed = {"depth", "arc", "angle"}
+    cords = [
+        Cords(
+            angle=float(np.radians(c.angle)),
+            **{key: value for key, value in vars(c).items() if key not in placed},
+        )
+        for c in tire.cords
+    ]
+    return Body(comm, section, {"wall": rubber(tire.material)} | materials, cords=cords)

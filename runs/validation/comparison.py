@@ -75,7 +75,7 @@ class Comparison:
 
     def _row(self, run: Run) -> list:
         history, choice = run.history, run.choice
-        head = ["all", "full FE"] if choice is None else [choice.modes, choice.residual]
+        head: list = ["all", "full FE"] if choice is None else [choice.modes, choice.residual]
         errors = [percent(part) for far in run.errors.values() for part in (far.mean, far.worst)]
         gain = self.full_within(run.error).history.seconds / history.seconds
         same = [

@@ -10,6 +10,7 @@ from scipy import sparse
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
+from tireroad.fem.tire.wall import compounds
 
 RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
 
@@ -20,8 +21,10 @@ def make_body() -> Callable[..., Body]:
 
     def make(order=2, segments=12, arc=6, layers=1, comm=MPI.COMM_SELF, free=False, **more):
         material, regions = more.pop("material", RUBBER), more.pop("regions", ())
+        cords, plies = more.pop("cords", ()), more.pop("plies", ())
         section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, layers, order, **more)
-        body = Body(comm, section, material, regions)
+        ring = section.ring([region.patch(i) for i, region in enumerate(regions)], plies)
+        body = Body(comm, ring, compounds(material, tuple(regions)), cords=cords)
         if free:
             body.rim = np.array([], dtype=np.int32)
         return body

@@ -276,3 +276,24 @@ def test_measured_road_scene_takes_a_road(root: Path, roads: Path) -> None:
     road = roads / "belgian_block.crg"
     scene = load(root / "runs" / "scenes" / "measured_road.toml", [f"road.file={road}"])
     assert scene.road.file == str(road.resolve()) and scene.contact is not None
+
+
+CORDS = """
+[[tire.cords]]
+name = "ply"
+depth = 0.0
+arc = [-120.0, 120.0]
+angle = 90.0
+[[tire.cords]]
+name = "belt"
+"""
+
+
+def test_cords_are_read_and_kept_inside_the_wall(scene_file):
+    belt = load(scene_file(CORDS)).tire.cords[1]
+    assert (belt.depth, belt.arc, belt.angle) == (0.006, (-45.0, 45.0), 20.0)
+    assert "at most tire.thickness = 0.012 m" in refused(scene_file(CORDS + "depth = 0.013"))
+    assert "beyond the beads" in refused(scene_file(CORDS + "arc = [-121.0, 10.0]"))
+    assert "must ascend" in refused(scene_file(CORDS + "arc = [10.0, -10.0]"))
+    assert "is taken" in refused(scene_file(CORDS.replace('"belt"', '"ply"')))
+    assert 'must hold no "/"' in refused(scene_file(CORDS.replace('"belt"', '"a/b"')))

@@ -1,0 +1,201 @@
+"""Where compiled forms are kept, so that a stop in the middle of a compilation leaves nothing behind.
+
+FFCx marks a form as being compiled by a file of its name and waits for whoever made it; a process that
+is killed leaves that file, and everybody who needs the form waits ten minutes in vain. So each
+process compiles in a folder of its own, which begins with links to all forms that are kept, and what
+it has compiled is kept, whole, afterwards. A folder whose process has died is removed by the next.
+"""
+
+from __future__ import annotations
+
+import atexit
+import fcntl
+import logging
+import os
+import shutil
+import signal
+import socket
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+from typing import Any
+
+from tireroad.fem.errors import InputError
+
+DONE = ".c.cached"  # FFCx's mark of a module that is compiled
+_LOCK = "in-use"
+_PATIENCE = 2.0  # s of compilation before it is announced
+_LIBRARY = tuple(EXTENSION_SUFFIXES)
+
+announce: Callable[[str], None] = logging.getLogger(__name__).warning
+"""How a user is told that forms are being compiled; the command line puts its own here."""
+
+
+def kept_in() -> Path:
+    """The folder of compiled forms of this Python, in `$XDG_CACHE_HOME` or `~/.cache`."""
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(base) / "tireroad" / f"forms-{sys.implementation.cache_tag}"
+
+
+def compiled(comm: Any, make: Callable[[Path], Any]) -> Any:
+    """`make(folder)`, which compiles with `folder` as FFCx's cache; what it returns. Collective.
+
+    Raises InputError where forms cannot be compiled or loaded: that is no fault of the scene's, but
+    of a compiler or a folder that the user can name.
+    """
+    folder = Path(comm.bcast(str(_workshop()) if comm.rank == 0 else None))
+    try:
+        with _announced(folder):
+            made = make(folder)
+    except (OSError, ImportError, RuntimeError, _cffi_error()) as error:
+        raise InputError(
+            f"{folder.parent}: finite-element forms cannot be compiled or loaded there ({error});"
+            " this needs a C compiler and some room: name another folder by XDG_CACHE_HOME, or"
+            " remove this one if it is damaged"
+        ) from error
+    except BaseException:  # a stop: the compiler would go on by itself
+        end_compilers(folder)
+        raise
+    if comm.rank == 0:
+        _keep(folder)
+    return made
+
+
+@cache
+def _cffi_error() -> type[Exception]:
+    import cffi
+
+    return cffi.VerificationError
+
+
+@cache
+def _workshop() -> Path:
+    """This process's own folder, with all forms that are kept."""
+    kept = kept_in()
+    try:
+        kept.mkdir(parents=True, exist_ok=True)
+        _sweep(kept)
+        folder = _new_folder(kept)
+        for names in _forms(kept).values():
+            _borrow(kept, folder, names)
+    except OSError as error:
+        announce(
+            f"compiled forms cannot be kept in {kept} ({error.strerror}) and are compiled anew in"
+            " every run: name another folder by XDG_CACHE_HOME"
+        )
+        folder = Path(tempfile.mkdtemp(prefix="tireroad-forms-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+_held: list[int] = []  # locks of this process's folders, given up when it ends in whatever way
+
+
+def _new_folder(kept: Path) -> Path:
+    folder = Path(tempfile.mkdtemp(prefix=folder_prefix(os.getpid()), dir=kept))
+    _held.append(os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
+    with suppress(OSError):  # a file system without locks
+        fcntl.flock(_held[-1], fcntl.LOCK_EX)
+    return folder
+
+
+def folder_prefix(process: int) -> str:
+    """How the folder of a process of this machine begins."""
+    return f"run-{socket.gethostname()}-{process}-"
+
+
+def _sweep(kept: Path) -> None:
+    """Remove the folders of processes that have ended without doing so."""
+    for folder in kept.glob("run-*"):
+        with suppress(OSError):
+            handle = os.open(folder / _LOCK, os.O_RDWR | os.O_CLOEXEC)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                end_compilers(folder)
+                shutil.rmtree(folder, ignore_errors=True)
+            finally:
+                os.close(handle)
+
+
+def _forms(folder: Path) -> dict[str, list[str]]:
+    """The complete forms in a folder: their files, the mark last."""
+    files: dict[str, list[str]] = {}
+    for name in os.listdir(folder):
+        files.setdefault(name.partition(".")[0], []).append(name)
+    forms = {}
+    for form, names in files.items():
+        library = [name for name in names if name.endswith(_LIBRARY)]
+        if len(library) == 1 and {f"{form}.c", f"{form}{DONE}"} <= set(names):
+            forms[form] = [library[0], f"{form}.c", f"{form}{DONE}"]
+    return forms
+
+
+def _borrow(kept: Path, folder: Path, names: list[str]) -> None:
+    """Link a kept form into the folder."""
+    for name in names:
+        try:
+            os.link(kept / name, folder / name)
+        except FileNotFoundError:
+            return  # somebody has just removed it: it will be compiled
+        except OSError:
+            os.symlink(kept / name, folder / name)
+
+
+def _keep(folder: Path) -> None:
+    """Keep what was compiled in the folder and is not kept yet."""
+    kept = folder.parent
+    if kept != kept_in():
+        return  # a temporary folder: nothing can be kept
+    for form, names in _forms(folder).items():
+        if not (kept / f"{form}{DONE}").exists():
+            with suppress(OSError):  # no room: this process has its own
+                for name in names:
+                    _put(folder / name, kept / name)
+
+
+def _put(source: Path, target: Path) -> None:
+    """A copy of the file under its name, whole at once and on the disk."""
+    part = target.with_name(f".{target.name}.{source.parent.name}.part")
+    try:
+        shutil.copyfile(source, part)
+        with part.open("rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+@contextmanager
+def _announced(folder: Path) -> Iterator[None]:
+    """Say once that forms are being compiled, where that takes over two seconds."""
+    timer = threading.Timer(_PATIENCE, _announce, (folder,))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _announce(folder: Path) -> None:
+    if any(not file.with_suffix(DONE).exists() for file in folder.glob("*.c")):
+        _say_once(folder.parent)
+
+
+@cache
+def _say_once(kept: Path) -> None:
+    announce(f"compiling finite-element forms, once for this kind of tire (kept in {kept}) ...")
+
+
+def end_compilers(folder: Path) -> None:
+    """Kill the compilers at work in a folder: they outlive the process that started them."""
+    named = os.fsencode(folder)
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError, ValueError):
+            if int(entry.name) != os.getpid() and named in (entry / "cmdline").read_bytes():
+                os.kill(int(entry.name), signal.SIGKILL)

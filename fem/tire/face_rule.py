@@ -1,0 +1,76 @@
+"""Integrals over one face of each cell, written as cell integrals: the rule's points lie on that face.
+
+    int_face f dA = int_cell-rule f |J^-T n| |det J|,   n the reference normal (Nanson's formula)
+
+No facet integral is needed for a surface inside the body: that would couple the two cells on its sides in
+the sparsity pattern, count each facet's sides in an order of its own on each process, and need cells of other
+processes. Here each cell, and so each process, has the faces that are its own.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import ufl
+
+from tireroad.fem import compat
+
+AXES = 3
+
+
+def edge_rule(order: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Points and weights on [0, 1]: "reduced" `order` Gauss points, "full" one more, "nodes" Lobatto's."""
+    if kind == "nodes":
+        nodes = compat.field_nodes(order)
+        points = np.sort(nodes[(nodes[:, 1] == 0) & (nodes[:, 2] == 0), 0])
+        powers = np.arange(order + 1)
+        return points, np.linalg.solve(points ** powers[:, None], 1 / (powers + 1))
+    points, weights = np.polynomial.legendre.leggauss(order + (kind == "full"))
+    return (points + 1) / 2, weights / 2
+
+
+def face_points(axis: int, side: int, line: np.ndarray) -> np.ndarray:
+    """The tensor points (n^2, 3) of a line on a face; the earlier of the other two axes varies slowest."""
+    points = np.full((len(line) ** 2, AXES), float(side))
+    first, second = (other for other in range(AXES) if other != axis)
+    grid = np.array(list(itertools.product(line, line)))
+    points[:, first], points[:, second] = grid[:, 0], grid[:, 1]
+    return points
+
+
+class Face:
+    """The face of all cells of a mesh where reference coordinate `axis` is `side` (0 or 1)."""
+
+    def __init__(self, mesh, axis: int, side: int, order: int):
+        self.mesh, self.axis, self.side, self._order = mesh, axis, side, order
+        reference = np.zeros(AXES)
+        reference[axis] = 2 * side - 1
+        scaled = ufl.inv(ufl.Jacobian(mesh)).T * ufl.as_vector([float(v) for v in reference])
+        self.area = ufl.sqrt(ufl.dot(scaled, scaled))
+        self.normal = scaled / self.area
+
+    def integral(self, integrand, kind: str):
+        """The UFL form of an integral by area with the rule `kind` of `edge_rule`."""
+        line, weights = edge_rule(self._order, kind)
+        metadata = {
+            "quadrature_rule": "custom",
+            "quadrature_degree": 2 * self._order,  # of no effect, but UFL asks for one
+            # Tuples: UFL writes them into the form's signature in full, arrays to eight digits.
+            "quadrature_points": _nested(face_points(self.axis, self.side, line)),
+            "quadrature_weights": _nested(np.outer(weights, weights).ravel()),
+        }
+        return self.area * integrand * ufl.Measure("dx", domain=self.mesh, metadata=metadata)
+
+    def tangents(self):
+        """(e_circ, e_across) in UFL: around the axle, and e_circ x normal, both in the face's surface."""
+        X = ufl.SpatialCoordinate(self.mesh)
+        along = ufl.as_vector((-X[2], 0.0, X[0]))
+        # The polynomial face is not exactly a surface of revolution.
+        along = along - ufl.dot(along, self.normal) * self.normal
+        around = along / ufl.sqrt(ufl.dot(along, along))
+        return around, ufl.cross(around, self.normal)
+
+
+def _nested(values: np.ndarray) -> tuple:
+    return tuple(_nested(part) if part.ndim else float(part) for part in values)

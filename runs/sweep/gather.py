@@ -1,0 +1,113 @@
+"""One table of all members of a sweep: what was set, what came out. Reads result folders only."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.files.disk import replacing
+from tireroad.runs.files.reader import RunResults
+from tireroad.runs.report.figures import nominal
+from tireroad.runs.sweep.definition import Sweep
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A quantity of every member: numbers, NaN where a member has none."""
+
+    name: str
+    unit: str
+    values: Array
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """The table: `settings` of each axis by member, `columns` of results, members without results."""
+
+    names: tuple[str, ...]
+    settings: Mapping[str, tuple[Any, ...]]
+    columns: tuple[Column, ...]
+    missing: tuple[str, ...]
+
+
+def gather(sweep: Sweep, folder: Path) -> Gathered:
+    """What the members left in folder/members."""
+    rows: list[dict[tuple[str, str], float]] = []
+    missing = []
+    for member in sweep.members:
+        try:
+            rows.append(_figures(RunResults(folder / "members" / member.name)))
+        except (InputError, KeyError, ValueError):
+            rows.append({})
+        if not rows[-1]:
+            missing.append(member.name)
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    return Gathered(
+        names=tuple(member.name for member in sweep.members),
+        settings={key: tuple(m.settings.get(key) for m in sweep.members) for key in sweep.axes},
+        columns=tuple(
+            Column(name, unit, np.array([row.get((name, unit), np.nan) for row in rows]))
+            for name, unit in keys
+        ),
+        missing=tuple(missing),
+    )
+
+
+def _figures(run: RunResults) -> dict[tuple[str, str], float]:
+    """Headline numbers of all stages and third-octave levels, by (name, unit)."""
+    found: dict[tuple[str, str], float] = {}
+    for stage, told in run.summary.items():
+        for name, entry in (told.get("headline") or {}).items():
+            value = entry.get("value")
+            if isinstance(value, int | float) and not isinstance(value, bool):
+                found[f"{stage}: {name}", entry.get("unit", "-")] = float(value)
+    if "spectra/third_octave/level" in run:
+        centres = nominal(run["spectra/third_octave/centre"])
+        level = run["spectra/third_octave/level"]
+        for centre, parts in zip(centres, level, strict=True):
+            for axis, value in zip("xyz", parts, strict=True):
+                found[f"axle force {axis}, {centre:g} Hz", "dB re 1 N"] = float(value)
+    return found
+
+
+def write(table: Gathered, folder: Path) -> None:
+    """folder/sweep.csv and folder/sweep.h5."""
+    with (
+        replacing(folder / "sweep.csv") as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(
+            ["member", *table.settings, *(f"{c.name} ({c.unit})" for c in table.columns)]
+        )
+        for k, name in enumerate(table.names):
+            given = [values[k] for values in table.settings.values()]
+            shown = ["" if np.isnan(c.values[k]) else c.values[k] for c in table.columns]
+            writer.writerow([name, *given, *shown])
+    with replacing(folder / "sweep.h5") as part, h5py.File(part, "w") as file:
+        file["member"] = list(table.names)
+        for key, values in table.settings.items():
+            numbers = all(isinstance(v, int | float) for v in values)
+            file[f"axis/{key}"] = np.array(values, float) if numbers else [str(v) for v in values]
+        for number, column in enumerate(table.columns):
+            data = file.create_dataset(f"result/{number:03d}", data=column.values)
+            data.attrs["name"], data.attrs["unit"] = column.name, column.unit
+
+
+def numeric(settings: Mapping[str, Sequence[Any]]) -> dict[str, Array]:
+    """The axes whose values are numbers."""
+    return {
+        key: np.array(values, float)
+        for key, values in settings.items()
+        if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+    }

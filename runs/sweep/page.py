@@ -1,0 +1,114 @@
+"""sweep.html: the members of a sweep side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from numpy.typing import NDArray
+
+from tireroad.runs.files.disk import write_text
+from tireroad.runs.report.comparison_figures import pen
+from tireroad.runs.report.figures import canvas, encode, styled
+from tireroad.runs.report.quantities import quantity
+from tireroad.runs.sweep.gather import Column, Gathered, numeric
+from tireroad.runs.version import PROGRAM, VERSION
+
+Array = NDArray[np.float64]
+SHOWN = (
+    "static: deflection",
+    "static: load",
+    "contact: mean load",
+    "rotating: lowest",
+    "modes: lowest",
+)
+CURVES = 12  # third-octave spectra that can be told apart in one picture
+
+
+def write_page(table: Gathered, folder: Path, title: str, failed: Sequence[str]) -> Path:
+    """Write folder/sweep.html; its path."""
+    loader = FileSystemLoader(Path(__file__).parent)
+    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    pages.filters["quantity"] = quantity
+    path = folder / "sweep.html"
+    text = pages.get_template("sweep.html.j2").render(
+        title=title,
+        program=f"{PROGRAM} {VERSION}",
+        table=table,
+        columns=[column for column in table.columns if "Hz" not in column.name],
+        figures=_figures(table),
+        failed=failed,
+    )
+    write_text(path, text)
+    return path
+
+
+def _figures(table: Gathered) -> list[tuple[str, str]]:
+    axes = numeric(table.settings)
+    found = []
+    bands = [c for c in table.columns if c.name.startswith("axle force z")]
+    if bands:
+        text = "Third octaves of the vertical axle force."
+        if len(table.names) > CURVES:
+            text += f" The first {CURVES} of {len(table.names)} members."
+        found.append((_spectra(bands, table.names), text))
+    chosen = [c for c in _with_level(table, bands) if np.isfinite(c.values).sum() > 1]
+    for key, values in axes.items():
+        if len(set(values.tolist())) > 1:
+            found.append((_against(key, values, chosen), f"Results over {key}."))
+    if len(axes) == 2:
+        for column in chosen[:2]:
+            (first, a), (second, b) = axes.items()
+            found.append((_map(first, a, second, b, column), f"{column.name} over both axes."))
+    return found
+
+
+def _with_level(table: Gathered, bands: Sequence[Column]) -> list[Column]:
+    """The columns that are drawn; first the overall level of the vertical axle force."""
+    columns = [
+        c for c in table.columns if c.name in SHOWN and np.ptp(c.values[np.isfinite(c.values)])
+    ]
+    if not bands:
+        return columns
+    power = np.nansum([10 ** (c.values / 10) for c in bands], axis=0)
+    level = 10 * np.log10(np.where(power > 0, power, np.nan))
+    return [Column("axle force z, all bands", "dB re 1 N", level), *columns]
+
+
+@styled
+def _spectra(bands: Sequence[Column], names: Sequence[str]) -> str:
+    figure, axes = canvas(9.5, 3.6)
+    place = np.arange(len(bands))
+    for number, name in enumerate(names[:CURVES]):
+        levels = [column.values[number] for column in bands]
+        axes[0, 0].plot(place, levels, marker="o", ms=3, label=name, **pen(number))
+    axes[0, 0].set(ylabel="dB re 1 N, rms", xlabel="third-octave band")
+    axes[0, 0].set_xticks(place, [c.name.partition(", ")[2] for c in bands], rotation=45)
+    axes[0, 0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=7)
+    return encode(figure)
+
+
+@styled
+def _against(key: str, values: Array, columns: Sequence[Column]) -> str:
+    """Every chosen result over one axis, a panel each."""
+    count = max(min(len(columns), 4), 1)
+    figure, axes = canvas(9.5, 2.0 * count + 0.4, count, sharex=True)
+    order = np.argsort(values, kind="stable")
+    for here, column in zip(axes[:, 0], columns, strict=False):
+        here.plot(values[order], column.values[order], "o-", ms=4, lw=0.8, color="#0072b2")
+        here.set(title=column.name, ylabel=column.unit)
+    axes[-1, 0].set_xlabel(key)
+    return encode(figure)
+
+
+@styled
+def _map(first: str, a: Array, second: str, b: Array, column: Column) -> str:
+    """A result over two axes: coloured where the grid has it."""
+    figure, axes = canvas(6.5, 4.2)
+    drawn = axes[0, 0].scatter(a, b, c=column.values, s=320, marker="s", cmap="cividis")
+    axes[0, 0].set(xlabel=first, ylabel=second)
+    axes[0, 0].margins(0.15)
+    figure.colorbar(drawn, ax=axes, label=f"{column.name}, {column.unit}")
+    return encode(figure)

@@ -1,0 +1,97 @@
+"""Families of runs: what a sweep file says, and what is gathered of its members."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.sweep.definition import read
+
+SCENE = """
+name = "base"
+[tire]
+segments = 12
+elements_arc = 4
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 300.0
+error_estimate = false
+[modal]
+count = 8
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "base.toml").write_text(SCENE)
+    return tmp_path
+
+
+def sweep_of(folder: Path, text: str):
+    path = folder / "family.toml"
+    path.write_text('scene = "base.toml"\n' + text)
+    return read(path)
+
+
+def test_a_grid_is_every_combination(folder: Path) -> None:
+    text = '[[axis]]\nkey = "static.load"\nvalues = [100.0, 200.0]\n'
+    text += '[[axis]]\nkey = "modal.count"\nvalues = [4, 5, 6]\n'
+    sweep = sweep_of(folder, text)
+    assert sweep.axes == ("static.load", "modal.count")
+    found = {tuple(member.settings.values()) for member in sweep.members}
+    assert found == {(load, count) for load in (100.0, 200.0) for count in (4, 5, 6)}
+    names = [member.name for member in sweep.members]
+    assert names[0] == "1_load-100_count-4" and len(set(names)) == 6
+    scene = sweep.load(sweep.members[-1])
+    assert (scene.static.load, scene.modal.count, scene.name) == (200.0, 6, names[-1])
+
+
+def test_a_range_with_a_count(folder: Path) -> None:
+    sweep = sweep_of(folder, '[[axis]]\nkey = "static.load"\nrange = [100.0, 300.0]\ncount = 3\n')
+    assert [member.settings["static.load"] for member in sweep.members] == [100.0, 200.0, 300.0]
+
+
+def test_a_latin_hypercube_has_one_sample_in_every_layer(folder: Path) -> None:
+    text = 'plan = "latin-hypercube"\nsamples = 8\nseed = 3\n'
+    text += '[[axis]]\nkey = "static.load"\nrange = [100.0, 300.0]\n'
+    text += '[[axis]]\nkey = "static.inflation"\nrange = [1e5, 3e5]\n'
+    sweep = sweep_of(folder, text)
+    loads = np.sort([member.settings["static.load"] for member in sweep.members])
+    assert np.array_equal(np.floor((loads - 100) / 25), np.arange(8))
+    assert [m.settings for m in sweep.members] == [
+        m.settings for m in sweep_of(folder, text).members
+    ]
+
+
+def test_a_list_names_its_members(folder: Path) -> None:
+    text = '[[member]]\nname = "soft"\nset = { "tire.material.youngs_modulus" = 30e6 }\n'
+    text += '[[member]]\nname = "heavy"\nset = { "static.load" = 400.0 }\n'
+    sweep = sweep_of(folder, text)
+    assert [member.name for member in sweep.members] == ["soft", "heavy"]
+    assert sweep.axes == ("tire.material.youngs_modulus", "static.load")
+    assert sweep.load(sweep.members[0]).tire.material.youngs_modulus == 30e6
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ('[[axis]]\nkey = "static.lod"\nvalues = [1.0]\n', "static.load"),
+        ('[[axis]]\nkey = "static.load"\nvalues = [-1.0]\n', "1_load--1"),
+        ('[[axis]]\nkey = "static.load"\nvalues = []\n', "must be a list"),
+        ('[[axis]]\nkey = "static.load"\nrange = [3.0, 1.0]\ncount = 2\n', "range"),
+        ('plan = "random"\n', "plan must be one of"),
+        ('plan = "list"\n', "[[member]]"),
+        ("", "[[axis]]"),
+        ("axes = 1\n", "unknown key axes"),
+        ('[[member]]\nname = "a/b"\n', "member name"),
+        ('[[member]]\nname = "a"\n[[member]]\nname = "a"\n', "unique"),
+    ],
+)
+def test_mistakes_are_named(folder: Path, text: str, wanted: str) -> None:
+    with pytest.raises(InputError) as caught:
+        sweep_of(folder, text)
+    assert wanted in str(caught.value)
