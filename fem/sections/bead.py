@@ -8,7 +8,6 @@ depends on how many there are: with few, the middle of the wall needs them more.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
 
 # Largest error of nine frequencies (n = 0, 1, 3; three each) of the clamped torus of order 3, ring exact, in %,
 # 8, 10, 12, 14 and 16 elements along the arc: 0.82, 0.38, 0.22, 0.16, 0.14 so; 1.0, 0.56, 0.37, 0.28, 0.22
@@ -30,6 +29,9 @@ def size(distance: np.ndarray, length: float, count: int, floor: float) -> np.nd
         graded = 2 * (largest - first) / GROWTH
         return 2 * logarithm / GROWTH + max(length - graded, 0.0) / largest
 
-    most = np.log(largest / floor) if largest > floor else 0.0
-    deep = most if elements(most) <= count else brentq(lambda x: elements(x) - count, 0.0, most)
+    low, deep = 0.0, np.log(largest / floor) if largest > floor else 0.0
+    if elements(deep) > count:  # what a smaller first element costs grows with its depth: bisect
+        for _ in range(60):
+            middle = (low + deep) / 2
+            low, deep = (middle, deep) if elements(middle) < count else (low, middle)
     return np.minimum(largest * np.exp(-deep) + GROWTH * distance, largest)

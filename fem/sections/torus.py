@@ -62,12 +62,12 @@ class Torus:
 
     def section(self, patches: Sequence[Patch] = (), plies: Sequence[PlyLine] = ()) -> SectionMesh:
         """The section's elements, with edges exactly on those of patches and on plies."""
-        wall, arc = self._lines(patches, plies)
+        wall, arc = self.lines(patches, plies)
         return product(
             order=self.order, wall=wall, arc=arc, place=self._place, patches=patches, plies=plies
         )
 
-    def _lines(self, patches: Sequence[Patch], plies: Sequence[PlyLine]):
+    def lines(self, patches: Sequence[Patch], plies: Sequence[PlyLine]):
         """Corners through the wall, as shares of it, and along the arc, rad."""
         arcs = [end for patch in patches for arc in patch.arcs for end in arc]
         arcs += [end for ply in plies for end in ply.arc]
@@ -90,7 +90,7 @@ class Torus:
         return Ring(
             section=self.section(patches, plies),
             ring_corners=self.ring_corners,
-            arc_corners=self._lines(patches, plies)[1],
+            arc_corners=self.lines(patches, plies)[1],
             thickness=self.thickness,
             height=self.minor_radius,
             coarser=coarser,

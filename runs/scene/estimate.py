@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from tireroad.runs.scene.rules import free_unknowns
 from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tire_section import free_unknowns
 
 PROGRAM = 2.1e8
 """Bytes of one process with all libraries loaded and the mesh made (measured)."""

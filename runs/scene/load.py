@@ -16,6 +16,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.scene import locate, rules
 from tireroad.runs.scene.schema import Key, Table, described, key_of, names, table_of
 from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tire_section import with_elements
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 LARGEST = 1_000_000
@@ -62,7 +63,7 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         raise source.error(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-    scene = _with_road_file(scene, source)
+    scene = with_elements(_with_road_file(scene, source))
     rules.check(scene, raw, source.error)
     return scene
 

@@ -8,7 +8,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.scene.cord_rules import check_cords
 from tireroad.runs.scene.schema import described
 from tireroad.runs.scene.tables import Scene
-from tireroad.runs.scene.tire_tables import Tire
+from tireroad.runs.scene.tire_section import free_unknowns
 
 Where = Callable[[tuple[str, ...], str], InputError]
 
@@ -31,14 +31,6 @@ def refuse_later(raw: dict[str, Any], error: Where) -> None:
             here = here.get(part) if isinstance(here, dict) else None
         if here is not None and here not in supported:
             raise error(path, f"= {described(here)}: {message}")
-
-
-def free_unknowns(tire: Tire) -> int:
-    """Displacement unknowns of the torus without the clamped bead faces."""
-    around = tire.segments * tire.order
-    inner_arc = tire.elements_arc * tire.order - 1
-    through = tire.elements_thickness * tire.order + 1
-    return 3 * around * inner_arc * through
 
 
 def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:

@@ -106,16 +106,24 @@ class Tire:
     minor_radius: float = number(0.10, "m", "of the section, to its outer face", above=0, most=10)
     thickness: float = number(0.012, "m", "of the wall", above=0, most=5)
     half_angle: float = number(120.0, "deg", "arc from the crown to each bead", least=10, most=175)
-    segments: int = integer(100, "elements around", least=8, most=4000)
-    elements_arc: int = integer(16, "elements from bead to bead", least=2, most=1000)
+    segments: int | None = integer(
+        None, "elements around; absent: 30 of order 3", least=8, most=4000
+    )
+    elements_arc: int | None = integer(
+        None, "elements from bead to bead; absent: 14 of order 3", least=2, most=1000
+    )
     elements_thickness: int = integer(1, "elements through the wall", least=1, most=20)
-    order: int = integer(2, "of the elements", least=1, most=3)
+    order: int | None = integer(
+        None, "of the elements; absent: 3, or 2 where their number is given", least=1, most=3
+    )
     grading: str = choice("bead", ("bead", "uniform"), "of the elements along the arc")
-    footprint_size: float = number(
-        1.0, "-", "length of elements at the footprint, relative to ungraded", least=0.05, most=1
+    footprint_size: float | None = number(
+        None,
+        "-",
+        "length of elements at the footprint over that elsewhere; absent: 0.3 with a road, else 1",
+        least=0.05,
+        most=1,
     )
     material: Material = table(Material, "what the wall is made of")
-    region: tuple[Region, ...] = tables(
-        Region, "a part of the section of another material; elements whose middle it holds"
-    )
+    region: tuple[Region, ...] = tables(Region, "a part of the section of another material")
     cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")
