@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
+from tireroad.fem.cavity.column import Column
 from tireroad.fem.matrices.compliance import (
     StaticShapes,
     compliance,
@@ -23,6 +24,7 @@ from tireroad.greens.attachment import with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, second_order
+from tireroad.modal.air import Air
 from tireroad.modal.basis import Projection, project
 from tireroad.modal.rotating import StateModes, matrices, rotating, standing
 from tireroad.modal.undamped import Modes
@@ -41,12 +43,14 @@ class Basis:
 
     def couple(self, outputs, loads, flexibility: np.ndarray | None = None) -> Response:
         """Response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s), or 3 s + 6 wide."""
-        momentum = self.projection.momentum
-        return couple(self.states, self.seen(outputs), self.seen(loads), momentum, flexibility)
+        carried = self.projection.carried
+        return couple(self.states, self.seen(outputs), self.seen(loads), carried, flexibility)
 
     def seen(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """The modes (k, m) as the probes read them."""
-        return probes @ self.shape[: probes.shape[1]]
+        """The coordinates (k, m + a) as the probes read them: the air's are not seen."""
+        seen = probes @ self.shape[: probes.shape[1]]
+        air = self.projection.air
+        return seen if air is None else np.pad(seen, ((0, 0), (0, air.count)))
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,7 @@ class Wheel:
     speed: float
     damping: tuple[float, float]
     inertia: str
+    air: Column | None = None
 
     @cached_property
     def rotating_stiffness(self):
@@ -87,7 +92,9 @@ class Wheel:
         the projection on these very vectors where there is one: another solution of the same problem
         has other signs, and other vectors of repeated frequencies. Collective."""
         if option in ("static", "dirac"):
-            flexibility = compliance(self.operators, self.rotating_stiffness, outputs, loads)
+            flexibility = compliance(
+                self.operators, self.rotating_stiffness, outputs, loads, self.air
+            )
             return replace(basis.couple(outputs, loads, flexibility), pulse=option == "dirac")
         r, k = outputs.shape[0], loads.shape[0]
         same = outputs is loads
@@ -98,13 +105,13 @@ class Wheel:
             shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
             poles = basis.couple(probes, probes)
-            carried = basis.projection.momentum
+            carried = basis.projection.carried
             whole = second_order(poles, basis.states, basis.seen(probes), carried, moments)
         return whole if same else whole.between(slice(r), slice(r, r + k))
 
     def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
         full = self.rotating_stiffness, self.rotating_damping
-        return static_shapes(self.operators, *full, probes)
+        return static_shapes(self.operators, *full, probes, self.air)
 
     def _attached(
         self, modes: Modes, probes: sparse.csr_matrix, known: Projection | None
@@ -136,8 +143,10 @@ class Wheel:
         apart = sparse.hstack([loads, sparse.csr_matrix((loads.shape[0], 6))])
         probes = sparse.vstack([rim, apart], format="csr")
         grown = self._standing_attachments(modes, probes)
-        seen, momentum = grown.seen(probes), grown.projection.momentum
-        response = couple(grown.states, np.vstack([seen[:6], momentum]), seen, momentum)
+        seen, carried = grown.seen(probes), grown.projection.carried
+        # What damps by the mass is the tire, not the air.
+        moment = np.where(np.arange(carried.shape[1]) < grown.projection.own, carried, 0.0)
+        response = couple(grown.states, np.vstack([seen[:6], moment]), seen, carried)
         turning = self.speed, self.damping[0]
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
@@ -145,13 +154,22 @@ class Wheel:
         """The basis with attachment modes; `known` is the projection on the modes. Collective."""
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
-        projection = project(grown, self.rotation, operators.carried, comm, known)
+        projection = self.with_air(
+            project(grown, self.rotation, operators.carried, comm, known), grown
+        )
         shape = operators.trace(grown.vectors)
         return Basis(shape, projection, self.decouple(projection, comm))
 
+    def with_air(self, projection: Projection, modes: Modes) -> Projection:
+        """The projection on the modes (all rows), joined by the air where there is any. Collective."""
+        if self.air is None:
+            return projection
+        air = Air(self.air.duct, self.air.coupling(modes.vectors))
+        return replace(projection, air=air)
+
     def decouple(self, projection: Projection, comm) -> StateModes:
-        """The second eigenproblem, or the closed formula when the wheel stands. Collective."""
-        if self.speed == 0:
+        """The second eigenproblem, or the closed formula of a tire without air that stands. Collective."""
+        if self.speed == 0 and projection.air is None:
             return standing(projection, self.damping)
         pencil = matrices(projection, self.speed, self.damping, self.inertia)
         # One process solves: LAPACK on another could order repeated eigenvalues differently.
@@ -162,4 +180,4 @@ class Wheel:
     ) -> np.ndarray:
         """H (f, r, k) m/N without any modes, at the frequencies in Hz. Collective."""
         full = self.rotating_stiffness, self.rotating_damping
-        return receptance(self.operators, *full, outputs, loads, frequency)
+        return receptance(self.operators, *full, outputs, loads, frequency, air=self.air)

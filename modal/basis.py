@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tireroad.modal.air import Air
 from tireroad.modal.fields import gram, multiply
 from tireroad.modal.undamped import Modes
 
@@ -16,7 +17,7 @@ class Projection:
 
     `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad skew; `convective`, `body_convective`
     (m, m) 1/rad2 symmetric, all four None for a wheel that stands; `momentum` (3, m) kg^1/2:
-    int rho phi_k, the mass each mode moves.
+    int rho phi_k, the mass each mode moves. `air`: what else takes part, a coordinates after the m.
     """
 
     squares: np.ndarray
@@ -25,6 +26,19 @@ class Projection:
     convective: np.ndarray | None = None
     body: np.ndarray | None = None
     body_convective: np.ndarray | None = None
+    air: Air | None = None
+
+    @property
+    def carried(self) -> np.ndarray:
+        """Momentum (3, m + a) kg^1/2 per rate of all coordinates, the air's last."""
+        if self.air is None:
+            return self.momentum
+        return np.hstack([self.momentum, self.air.duct.momentum])
+
+    @property
+    def own(self) -> int:
+        """Coordinates of the tire itself, m."""
+        return len(self.squares)
 
 
 def project(

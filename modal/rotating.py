@@ -60,6 +60,15 @@ def matrices(
     projection: Projection, speed: float, damping: tuple[float, float], inertia: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """D~ (1/s) and K~ (1/s2) of the projected problem; damping is (gamma1 in 1/s, gamma2 in s)."""
+    pencil = _tire_matrices(projection, speed, damping, inertia)
+    air = projection.air
+    return pencil if air is None else air.joined(*pencil, speed)
+
+
+def _tire_matrices(
+    projection: Projection, speed: float, damping: tuple[float, float], inertia: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same of the tire without the air in it."""
     rate = damping[0] + damping[1] * projection.squares
     stiffness, drag = np.diag(projection.squares), np.diag(rate)
     if speed == 0:

@@ -1,32 +1,51 @@
 """The lowest eigenvalues of independent symmetric matrices, sliced by inertia over the processes.
 
-Every process holds the matrices whole and solves slices by itself: no communication inside a solve,
+Every process holds all the matrices and solves slices by itself: no communication inside a solve,
 results that do not depend on the number of processes, and cost proportional to the slices' number.
+Memory of one process: the matrices (together as many entries as the whole one), one factor and the
+Krylov basis of one slice at a time, and the vectors of the slices it solved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.modal.lanczos import Interval, eigenpairs
 from tireroad.modal.shifted import Shifted
+from tireroad.modal.slices import Interval, eigenpairs
 
 ZERO = 1e-12  # of the matrix norm: eigenvalues nearer to zero are rigid modes, rounding is 1e-16
 _SLICE = 64  # eigenvalues a slice and matrix: the basis stays small, factorisations few
 _PROBES = 8
 _FINEST = 1e-9  # relative width below which a crowded interval counts as one cluster
+_CROWDED = 1.6  # times the wanted number in a step: then a boundary below costs less
+
+
+class Part(Protocol):
+    """An independent part of a symmetric problem: its own sparse `matrix` (d, d), each of whose eigenvalues
+    stands for `copies` equal ones of the whole.
+    """
+
+    matrix: sparse.csr_matrix
+    copies: int
+
+    def fields(self, vectors: np.ndarray) -> np.ndarray:
+        """Orthonormal fields (n, k copies) of the whole, from vectors (d, k) of the part."""
+        ...
 
 
 @dataclass(frozen=True)
 class Slice:
-    """One interval of one matrix, and its answer: `values` (k,), `vectors` (n, k) on `owner` only."""
+    """One interval of one part, and its answer: `values` (k,), each as often as the part has copies,
+    and the part's `vectors` (d, k / copies), on `owner` only.
+    """
 
-    matrix: int
+    part: int
     interval: Interval
     owner: int
     values: np.ndarray
@@ -35,7 +54,7 @@ class Slice:
 
 @dataclass(frozen=True)
 class Bottom:
-    """Below -`zero` lie `negative` eigenvalues of all matrices; `near` (k,) estimates next to zero."""
+    """Below -`zero` lie `negative` eigenvalues of all parts; `near` (k,) estimates next to zero, ascending."""
 
     zero: float
     negative: int
@@ -43,56 +62,57 @@ class Bottom:
 
 
 class Spectrum:
-    """Independent symmetric matrices, the same on all processes of `comm`."""
+    """Independent parts of a symmetric problem, the same on all processes of `comm`."""
 
-    def __init__(self, comm: MPI.Comm, matrices: list[sparse.csr_matrix]):
-        self.comm, self.matrices = comm, matrices
-        self.size = sum(matrix.shape[0] for matrix in matrices)
-        self.bound = 1.001 * max(float(abs(matrix).sum(axis=1).max()) for matrix in matrices)
+    def __init__(self, comm: MPI.Comm, parts: list[Part]):
+        self.comm, self.parts = comm, parts
+        norms = [float(abs(part.matrix).sum(axis=1).max()) for part in parts]
+        self.bound = 1.001 * max(norms)
 
-    def shared(self, tasks: int, work: Callable[[int], np.ndarray]) -> list[np.ndarray]:
-        """The results of all tasks on every process, each computed by one of them. Collective."""
-        mine = {task: work(task) for task in range(self.comm.rank, tasks, self.comm.size)}
+    def _shared(self, work: Callable[[Part], np.ndarray]) -> list[np.ndarray]:
+        """What is computed of each part, on every process, each by one of them. Collective."""
+        size = self.comm.size
+        mine = {k: work(self.parts[k]) for k in range(self.comm.rank, len(self.parts), size)}
         everyone = self.comm.allgather(mine)
-        return [everyone[task % self.comm.size][task] for task in range(tasks)]
+        return [everyone[k % size][k] for k in range(len(self.parts))]
 
     def bottom(self) -> Bottom:
         """Negative eigenvalues by inertia, and rough values of the lowest. Collective."""
         zero = ZERO * self.bound
 
-        def work(task: int) -> np.ndarray:
-            shifted = Shifted(self.matrices[task], -zero)
-            estimates = _near(shifted) - zero
-            negative = shifted.negative
+        def work(part: Part) -> np.ndarray:
+            shifted = Shifted(part.matrix, -zero)
+            estimates = np.repeat(_near(shifted) - zero, part.copies)
+            negative = part.copies * shifted.negative
             shifted.destroy()
             return np.append(estimates, negative)
 
-        found = self.shared(len(self.matrices), work)
+        found = self._shared(work)
         negative = int(sum(one[-1] for one in found))
         return Bottom(zero, negative, np.sort(np.concatenate([one[:-1] for one in found])))
 
     def below(self, shift: float) -> np.ndarray:
-        """Eigenvalues below the shift, (matrices,), by inertia. Collective."""
+        """Eigenvalues below the shift, (parts,), copies counted, by inertia. Collective."""
 
-        def work(task: int) -> int:
-            shifted = Shifted(self.matrices[task], shift)
+        def work(part: Part) -> int:
+            shifted = Shifted(part.matrix, shift)
             negative = shifted.negative
             shifted.destroy()
-            return negative
+            return part.copies * negative
 
-        return np.array(self.shared(len(self.matrices), work))
+        return np.array(self._shared(work))
 
     def boundaries(
         self, bottom: Bottom, count: int, limit: float
     ) -> list[tuple[float, np.ndarray]]:
-        """(value, eigenvalues below it in each matrix), ascending, in steps of about one slice.
+        """(value, eigenvalues below it in each part), ascending, in steps of about one slice.
 
         From zero up to the first value with `count` eigenvalues below, or to `limit`, if that is less.
         Collective.
         """
         limit = min(limit, self.bound)
-        done = [(-bottom.zero, np.zeros(len(self.matrices), int))]
-        largest = _SLICE * len(self.matrices)
+        done = [(-bottom.zero, np.zeros(len(self.parts), int))]
+        largest = _SLICE * len(self.parts)
         # The density of modes in frequency changes slowly: the last slice tells the next one's width.
         density = len(bottom.near) / np.sqrt(np.abs(bottom.near).max())
         ceiling = None  # a value with too many below: the next boundary lies under it
@@ -103,12 +123,16 @@ class Spectrum:
                 return done
             # Two per cent and two more: a little too far costs less than one step more.
             goal = min(1.02 * remaining + 2, largest)
-            trial = min(_next(max(low, 0.0), goal / density), limit)
+            trial = _next(max(low, 0.0), goal / density)
+            if len(done) == 1 and 2 * goal < len(bottom.near):
+                # Estimates by Ritz values lie above: at least so many eigenvalues lie below.
+                trial = max(bottom.near[int(goal)], 2 * bottom.zero)
+            trial = min(trial, limit)
             if ceiling and trial >= ceiling[0]:
                 trial = _between(low, known.sum(), *ceiling, goal)
             below = self.below(trial)
             new = below.sum() - known.sum()
-            if new > 1.6 * largest and trial - low > _FINEST * trial:
+            if new > _CROWDED * goal + _PROBES and trial - low > _FINEST * trial:
                 ceiling = (trial, below.sum())
                 continue
             rise = np.sqrt(trial) - np.sqrt(max(low, 0.0))
@@ -120,17 +144,17 @@ class Spectrum:
     def slices(self, boundaries: list[tuple[float, np.ndarray]]) -> list[Slice]:
         """All eigenpairs between the boundaries. Collective."""
         tasks = [
-            (matrix, Interval(low, high, int(upper[matrix] - lower[matrix])))
+            (k, Interval(low, high, int(upper[k] - lower[k]) // part.copies))
             for (low, lower), (high, upper) in zip(boundaries, boundaries[1:], strict=False)
-            for matrix in range(len(self.matrices))
+            for k, part in enumerate(self.parts)
         ]
         tasks = [task for task in tasks if task[1].count]
         owners = _owners([interval.count for _, interval in tasks], self.comm.size)
         answers, error = {}, None
-        for task, (matrix, interval) in enumerate(tasks):
+        for task, (k, interval) in enumerate(tasks):
             if owners[task] == self.comm.rank and error is None:
                 try:
-                    answers[task] = eigenpairs(self.matrices[matrix], interval)
+                    answers[task] = eigenpairs(self.parts[k].matrix, interval)
                 except Exception as raised:
                     error = raised
         first = next((e for e in self.comm.allgather(error) if e is not None), None)
@@ -140,8 +164,14 @@ class Spectrum:
         for part in self.comm.allgather({task: pair[0] for task, pair in answers.items()}):
             values |= part
         return [
-            Slice(*tasks[task], owners[task], values[task], answers.get(task, (None, None))[1])
-            for task in range(len(tasks))
+            Slice(
+                k,
+                interval,
+                owners[task],
+                np.repeat(values[task], self.parts[k].copies),
+                answers.get(task, (None, None))[1],
+            )
+            for task, (k, interval) in enumerate(tasks)
         ]
 
 

@@ -1,7 +1,13 @@
-"""Mirror planes of a tire: found from its nodes, verified on its matrix, and used to split the problem.
+"""Symmetries of a tire: found from its nodes, verified on its matrix, and used to split the problem.
 
-A mirror R (reflect the nodes, change the sign of one component) with R A R = A leaves the symmetric
-and the antisymmetric fields to themselves: two problems of half the size. Two mirrors make four.
+An isometry R of order two (move the nodes, change the signs of components) with R A R = A leaves the
+symmetric and the antisymmetric fields to themselves: two problems of half the size. Two mirrors make
+four. Belts at +-alpha at different depths take away both mirrors of a loaded tire at rest and leave
+their product, the half turn about the vertical.
+
+The parts are Q^T A Q. What couples them is rounding of A, whose entries are symmetric to some 1e-13 of the
+largest. An eigenvalue is off by |R A R - A| / 2 at most; the residual on A itself, twice the relative error
+of a frequency at most, is measured.
 """
 
 from __future__ import annotations
@@ -16,7 +22,26 @@ from scipy.spatial import cKDTree
 # Largest entry of R A R - A relative to that of A: a symmetric state converges to about 1e-13; a road
 # load, a slope of the footprint or another mesh on one side gives 1e-6 and more.
 TOLERANCE = 1e-11
-_NEAR = 1e-6  # of the body's size: nodes are mirror images
+_NEAR = 1e-6  # of the body's size: nodes are each other's images
+
+
+@dataclass(frozen=True)
+class Isometry:
+    """(x, y, z) -> flip (x, y, z), its own inverse."""
+
+    name: str
+    flip: tuple[float, float, float]
+
+    def sign(self, component: int) -> float:
+        """Of the image of a motion (0, 1, 2) or of a rotation (3, 4, 5), which a mirror turns round."""
+        if component < 3:
+            return self.flip[component]
+        return self.flip[component - 3] * float(np.prod(self.flip))
+
+
+MIRROR_Y = Isometry("mirror plane y = 0", (1.0, -1.0, 1.0))
+MIRROR_X = Isometry("mirror plane x = 0", (-1.0, 1.0, 1.0))
+HALF_TURN = Isometry("half turn about z", (-1.0, -1.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -37,61 +62,105 @@ class Sites:
         """Those of all processes, one after the other. Collective."""
         return Sites(*(np.concatenate(comm.allgather(part)) for part in vars(self).values()))
 
+    def rank(self) -> np.ndarray:
+        """(n,) the place of each unknown in an order by position, lowest points first, then component:
+        the same for the same tire on any number of processes.
+        """
+        x, y, z = self.place.T
+        order = np.lexsort((self.component, x, y, z))
+        rank = np.empty(len(order), int)
+        rank[order] = np.arange(len(order))
+        return rank
 
-def sectors(
-    matrix: sparse.csr_matrix, sites: Sites, axes: tuple[int, ...] = (1, 0)
-) -> list[sparse.csr_matrix]:
-    """Isometries Q (n, k) onto the invariant spaces of the mirrors that the matrix has; [1] without any.
 
-    `matrix` (n, n) symmetric, `sites` of all its unknowns; `axes` the normals of the mirror planes
-    through the origin that are tried (y, then x). Not collective.
+@dataclass(frozen=True)
+class Sector:
+    """The fields `basis` (n, d), an isometry, that a group of symmetries leaves to themselves, and A on them."""
+
+    basis: sparse.csr_matrix
+    matrix: sparse.csr_matrix
+    copies: int = 1
+
+    def fields(self, vectors: np.ndarray) -> np.ndarray:
+        """(n, k) from vectors (d, k)."""
+        return self.basis @ vectors
+
+
+def whole(matrix: sparse.csr_matrix) -> Sector:
+    """The problem as one part."""
+    return Sector(sparse.identity(matrix.shape[0], format="csr"), matrix)
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """An isometry that a matrix A has: its signed permutation `image` R (n, n), and `defect`, the norm of
+    R A R - A: what rounding, or a slight asymmetry, has left in A, in the units of its eigenvalues.
     """
+
+    isometry: Isometry
+    image: sparse.csr_matrix
+    defect: float
+
+
+def symmetries(matrix: sparse.csr_matrix, sites: Sites) -> list[Symmetry]:
+    """Independent symmetries of the matrix (n, n). Not collective.
+
+    The two mirrors first; the half turn is their product, so it is tried where there is neither.
+    """
+    found = [_found(matrix, sites, isometry) for isometry in (MIRROR_Y, MIRROR_X)]
+    if not any(found):
+        found = [_found(matrix, sites, HALF_TURN)]
+    return [symmetry for symmetry in found if symmetry]
+
+
+def _found(matrix: sparse.csr_matrix, sites: Sites, isometry: Isometry) -> Symmetry | None:
+    image = _permutation(sites, isometry)
+    if image is None:
+        return None
+    difference = abs(image @ matrix @ image.T - matrix)
+    if difference.max() > TOLERANCE * abs(matrix).max():
+        return None
+    return Symmetry(isometry, image, float(difference.sum(axis=1).max()))
+
+
+def sectors(matrix: sparse.csr_matrix, images: list[sparse.csr_matrix]) -> list[Sector]:
+    """The parts of a symmetric matrix that commuting signed permutations of order two leave; itself without any."""
     bases = [sparse.identity(matrix.shape[0], format="csr")]
-    for axis in axes:
-        mirror = _mirror(sites, axis)
-        if mirror is not None and _invariant(matrix, mirror):
-            bases = [half for basis in bases for half in _halves(basis, mirror)]
-    return bases
+    for image in images:
+        bases = [half for basis in bases for half in _halves(basis, image)]
+    return [Sector(basis, (basis.T @ matrix @ basis).tocsr()) for basis in bases]
 
 
-def _mirror(sites: Sites, axis: int) -> sparse.csr_matrix | None:
-    """The signed permutation that reflects a field, or None when an unknown has no mirror image."""
-    flip = np.ones(3)
-    flip[axis] = -1.0
+def _permutation(sites: Sites, isometry: Isometry) -> sparse.csr_matrix | None:
+    """The signed permutation that moves a field, or None when an unknown has no image."""
     size = len(sites.component)
     image, sign = np.empty(size, int), np.empty(size)
     near = _NEAR * np.abs(sites.place).max(initial=0.0)
     for component in np.unique(sites.component):
         same = np.flatnonzero(sites.component == component)
         points = sites.place[same]
-        distance, partner = cKDTree(points).query(points * flip)
+        distance, partner = cKDTree(points).query(points * isometry.flip)
         if distance.max(initial=0.0) > near or len(np.unique(partner)) != len(partner):
             return None
         image[same] = same[partner]
-        # A rotation is mirrored the other way round than a motion.
-        sign[same] = flip[component] if component < 3 else -flip[component - 3]
+        sign[same] = isometry.sign(component)
     return sparse.csr_matrix((sign, (image, np.arange(size))), (size, size))
 
 
-def _invariant(matrix: sparse.csr_matrix, mirror: sparse.csr_matrix) -> bool:
-    largest = abs(matrix).max()
-    return abs(mirror @ matrix @ mirror.T - matrix).max() <= TOLERANCE * largest
-
-
-def _halves(basis: sparse.csr_matrix, mirror: sparse.csr_matrix) -> list[sparse.csr_matrix]:
-    """The symmetric and the antisymmetric part of a space that the mirror maps onto itself."""
+def _halves(basis: sparse.csr_matrix, image: sparse.csr_matrix) -> list[sparse.csr_matrix]:
+    """The symmetric and the antisymmetric part of a space that the isometry maps onto itself."""
     size = basis.shape[1]
-    inner = (basis.T @ mirror @ basis).tocoo()  # again a signed permutation, beside rounded zeros
+    inner = (basis.T @ image @ basis).tocoo()  # again a signed permutation, beside rounded zeros
     real = np.abs(inner.data) > 0.5
-    image, sign = np.empty(size, int), np.empty(size)
-    image[inner.col[real]], sign[inner.col[real]] = inner.row[real], np.sign(inner.data[real])
+    partner, sign = np.empty(size, int), np.empty(size)
+    partner[inner.col[real]], sign[inner.col[real]] = inner.row[real], np.sign(inner.data[real])
     own = np.arange(size)
-    pairs = own[own < image]
+    pairs = own[own < partner]
     halves = []
     for parity in (1.0, -1.0):
-        fixed = own[(own == image) & (sign == parity)]
+        fixed = own[(own == partner) & (sign == parity)]
         count = len(pairs) + len(fixed)
-        rows = np.concatenate([pairs, fixed, image[pairs]])
+        rows = np.concatenate([pairs, fixed, partner[pairs]])
         columns = np.concatenate([np.arange(count), np.arange(len(pairs))])
         root = np.full(len(pairs), np.sqrt(0.5))
         values = np.concatenate([root, np.ones(len(fixed)), parity * sign[pairs] * root])

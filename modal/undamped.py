@@ -1,7 +1,15 @@
-"""The first eigenproblem: K Phi = M Phi Lambda, Phi^T M Phi = I, with none of the lowest missing."""
+"""The first eigenproblem: K Phi = M Phi Lambda, Phi^T M Phi = I, with none of the lowest missing.
+
+The diagonal mass makes it the standard problem of A = M^-1/2 K M^-1/2, which symmetries split: equal
+segments by wave number (modal.circulant), or else mirror planes or a half turn (modal.symmetry). The
+inertia of each part, L D L^T by MUMPS, says how many eigenvalues lie below a value and so where to slice
+(modal.spectrum); SLEPc extracts the eigenpairs of each slice (modal.slices). Residuals and orthonormality
+are then measured on A itself.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,27 +18,27 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.modal.circulant import Ring, Wave, repeated
-from tireroad.modal.fields import CHUNK, collect, everywhere, gram, multiply, scaled_by
-from tireroad.modal.lanczos import Interval
-from tireroad.modal.spectrum import ZERO, Bottom, Slice, Spectrum
-from tireroad.modal.symmetry import Sites, sectors
+from tireroad.modal.canonical import ordered, turn_to_rule
+from tireroad.modal.circulant import repeated
+from tireroad.modal.fields import CHUNK, collect, everywhere, multiply, orthonormalise, scaled_by
+from tireroad.modal.spectrum import Bottom, Part, Slice, Spectrum
+from tireroad.modal.symmetry import Sites, sectors, symmetries, whole
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
 MOST = 1e-6  # where rounding alone is more than the tolerance
 ORTHONORMALITY_TOLERANCE = 1e-10
-# Vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product.
-_REPAIR = 1e-12
+_SAME = 1e-10  # relative distance of equal eigenvalues, where rounding is not more
 
 
 @dataclass(frozen=True)
 class Modes:
     """The lowest m modes. `squares` omega^2 (m,) 1/s2 ascending; `vectors` this process's rows (n, m)
-    of the mass-normalised shapes, kg^-1/2; `residual` (m,) ||K phi - lambda M phi|| / ||lambda M phi||;
-    `inertia_count` eigenvalues below `counted_below` (1/s2) by Sylvester's law, equal to the number
-    found there; `rigid` modes without stiffness, whose square is 0, among them; `sectors` sizes of the
-    independent problems that mirror planes or wave numbers split it into, `slices` intervals solved;
-    `segments` equal ones around the axle, 1 where there are none that hold the matrix.
+    of the mass-normalised shapes, kg^-1/2, signs and bases of repeated frequencies by rule
+    (modal.canonical); `residual` (m,) ||K phi - lambda M phi|| / ||lambda M phi||, twice the relative error
+    of the frequency at most; `inertia_count` eigenvalues below `counted_below` (1/s2) by Sylvester's law,
+    equal to the number found there; `rigid` modes without stiffness, whose square is 0, among them;
+    `sectors` sizes of the independent problems that the `symmetries` (names) or wave numbers split it
+    into, `slices` intervals solved; `segments` equal ones around the axle, 1 where none are used.
     """
 
     squares: np.ndarray
@@ -43,11 +51,31 @@ class Modes:
     sectors: tuple[int, ...]
     slices: int
     segments: int = 1
+    symmetries: tuple[str, ...] = ()
 
     @property
     def frequency(self) -> np.ndarray:
         """Natural frequencies (m,), Hz; 0 for rigid modes."""
         return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * np.pi)
+
+
+@dataclass(frozen=True)
+class _Split:
+    """Independent `parts` of the problem, what made them, and what A lacks to be so split, 1/s2."""
+
+    parts: list[Part]
+    defect: float = 0.0
+    segments: int = 1
+    symmetries: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Proof:
+    """What inertia says: next to zero, and how many eigenvalues lie below `top`."""
+
+    bottom: Bottom
+    top: float
+    inertia: int
 
 
 def solve(
@@ -62,147 +90,152 @@ def solve(
     """The `count` lowest modes, or all below `up_to` (Hz), of a stiffness (n, n) in N/m and a diagonal
     mass (own rows) in kg; at least one of the two is given.
 
-    The diagonal mass turns the pencil into the standard problem of A = M^-1/2 K M^-1/2. With the
-    `sites` of its own unknowns, equal segments split it by wave number into small dense problems
-    (modal.circulant), or else mirror planes (modal.symmetry) into parts that are sliced by inertia
-    (modal.spectrum) and solved by block Lanczos (modal.lanczos); `waves` False: these always. Every
-    process holds a copy of A.
+    Symmetries are looked for with the `sites` of own unknowns, equal segments unless `waves` is False. A
+    split whose modes are no modes of A is given up for the next. Every process holds a copy of A.
     Raises ConvergenceError when a mode is missing, inaccurate or unstable. Collective.
     """
     comm = stiffness.comm.tompi4py()
     size = stiffness.getSize()[0]
     scaled = scaled_by(stiffness, mass)
-    whole = everywhere(scaled)
-    wanted = min(count or size, size), (2 * np.pi * up_to) ** 2
-    bases, modes = [sparse.identity(size, format="csr")], None
-    if sites is not None:
-        all_sites = sites.everywhere(comm)
-        ring = repeated(whole, all_sites) if waves else None
-        if ring is not None:
-            modes = _by_waves(scaled, whole, ring, mass, *wanted)
-        if modes is not None and modes.residual.max(initial=0.0) <= RESIDUAL_TOLERANCE:
-            scaled.destroy()
-            return _checked(modes, whole)
-        bases = sectors(whole, all_sites)
-    modes = _solve(scaled, whole, bases, mass, *wanted)
-    if len(bases) > 1 and modes.residual.max(initial=0.0) > RESIDUAL_TOLERANCE:
-        # Mirror symmetric to the tolerance, and yet too coarsely for the lowest modes: do not split.
-        whole_basis = [sparse.identity(size, format="csr")]
-        modes = _solve(scaled, whole, whole_basis, mass, len(modes.squares), np.inf)
+    all_sites = None if sites is None else sites.everywhere(comm)
+    rank = np.arange(size) if all_sites is None else all_sites.rank()
+    problem = _Problem(scaled, everywhere(scaled), mass, rank[slice(*scaled.getOwnershipRange())])
+    count, limit = min(count or size, size), (2 * np.pi * up_to) ** 2
+    for split in _splits(problem.whole, all_sites, waves):
+        modes = problem.solve(split, count, limit)
+        if problem.accurate(modes, split.defect):
+            break
     scaled.destroy()
-    return _checked(modes, whole)
+    return problem.checked(modes, split.defect)
 
 
-def _solve(scaled, whole, bases, mass, count: int, limit: float) -> Modes:
-    """By slices of the independent problems that the isometries `bases` leave. Collective."""
-    comm = scaled.comm.tompi4py()
-    spectrum = Spectrum(comm, [(basis.T @ whole @ basis).tocsr() for basis in bases])
-    bottom = spectrum.bottom()
-    _check_stable(bottom)
-    boundaries = spectrum.boundaries(bottom, count, limit)
-    proof = _Proof(bottom, boundaries[-1][0], int(boundaries[-1][1].sum()))
-    found = spectrum.slices(boundaries)
-    return _together(scaled, bases, mass, count, found, proof)
+def _splits(matrix: sparse.csr_matrix, sites: Sites | None, waves: bool) -> Iterator[_Split]:
+    """Ways to split the problem, the finest first, the last one not at all."""
+    if sites is not None:
+        ring = repeated(matrix, sites) if waves else None
+        if ring is not None:
+            yield _Split([ring.wave(n) for n in ring.waves], ring.defect, ring.segments)
+        found = symmetries(matrix, sites)
+        if found:
+            parts = sectors(matrix, [one.image for one in found])
+            names = tuple(one.isometry.name for one in found)
+            yield _Split(parts, sum(one.defect for one in found), symmetries=names)
+    yield _Split([whole(matrix)])
 
 
 @dataclass(frozen=True)
-class _Proof:
-    """What inertia says: next to zero, and how many eigenvalues lie below `top`."""
+class _Problem:
+    """A distributed and `whole` on each process; own rows' `mass` kg and `rank` by position."""
 
-    bottom: Bottom
-    top: float
-    inertia: int
+    scaled: PETSc.Mat
+    whole: sparse.csr_matrix
+    mass: np.ndarray
+    rank: np.ndarray
 
+    @property
+    def comm(self) -> MPI.Comm:
+        return self.scaled.comm.tompi4py()
 
-def _by_waves(scaled, whole, ring: Ring, mass, count: int, limit: float) -> Modes | None:
-    """By the wave numbers of equal segments; None when inertia does not bear them out. Collective."""
-    comm = scaled.comm.tompi4py()
-    spectrum = Spectrum(comm, [whole])
-    values = spectrum.shared(len(ring.waves), ring.values)
-    twice = [np.repeat(own, 1 if ring.single(n) else 2) for n, own in enumerate(values)]
-    every = np.sort(np.concatenate(twice))
-    zero = ZERO * spectrum.bound
-    bottom = Bottom(zero, int((every < -zero).sum()), every[: 8 + int((every < -zero).sum())])
-    _check_stable(bottom)
-    inside = min(count, int(np.searchsorted(every, limit)))
-    top = min(_just_above(every, inside, spectrum.bound), limit) if inside else limit
-    proof = _Proof(bottom, top, int(spectrum.below(top).sum()))
-    if proof.inertia != np.searchsorted(every, top):
-        return None
-    found = []
-    for n, own in enumerate(twice):
-        wanted = int(np.searchsorted(own, top))
-        owner = n % comm.size
-        vectors = None
-        if wanted and owner == comm.rank:
-            vectors = ring.vectors(n, wanted if ring.single(n) else wanted // 2)
-        found.append(Slice(n, Interval(-zero, top, wanted), owner, own[:wanted], vectors))
-    found = [one for one in found if one.interval.count]
-    bases = [Wave(ring, n) for n in ring.waves]
-    return _together(scaled, bases, mass, count, found, proof, ring.segments)
+    def solve(self, split: _Split, count: int, limit: float) -> Modes:
+        """By slices of the parts. Collective."""
+        spectrum = Spectrum(self.comm, split.parts)
+        bottom = spectrum.bottom()
+        _check_stable(bottom)
+        boundaries = spectrum.boundaries(bottom, count, limit)
+        proof = _Proof(bottom, boundaries[-1][0], int(boundaries[-1][1].sum()))
+        if proof.inertia == 0:
+            raise ConvergenceError(
+                f"modes: the tire has no mode below {np.sqrt(proof.top) / (2 * np.pi):.4g} Hz. Raise "
+                "modal.up_to."
+            )
+        return self._together(split, spectrum.slices(boundaries), min(count, proof.inertia), proof)
 
-
-def _just_above(every: np.ndarray, count: int, bound: float) -> float:
-    """A value in the gap after the lowest `count`, pairs not parted."""
-    beyond = every[count:][every[count:] > every[count - 1] * (1 + 1e-6)]
-    return (every[count - 1] + beyond[0]) / 2 if len(beyond) else bound
-
-
-def _together(
-    scaled, bases, mass, count: int, found: list[Slice], proof: _Proof, segments: int = 1
-) -> Modes:
-    """The lowest `count` modes of all slices, orthonormal, with their residuals. Collective."""
-    comm, bottom = scaled.comm.tompi4py(), proof.bottom
-    if proof.inertia == 0:
-        raise ConvergenceError(
-            f"modes: the tire has no mode below {np.sqrt(proof.top) / (2 * np.pi):.4g} Hz. Raise "
-            "modal.up_to."
+    def _together(self, split: _Split, found: list[Slice], count: int, proof: _Proof) -> Modes:
+        """The lowest `count` modes of all slices, orthonormal and by rule, with residuals. Collective."""
+        parts, bottom = split.parts, proof.bottom
+        values = np.concatenate([one.values for one in found])
+        rigid = values <= bottom.zero
+        values[rigid] = 0.0
+        order, group = ordered(values, _families(parts, found), self._same(values))
+        # A group is turned as a whole, also where the last mode cuts it.
+        end = int(np.searchsorted(group, group[count - 1], side="right"))
+        order, group = order[:end], group[:end]
+        vectors = collect(self.scaled, parts, found, order)
+        part = np.concatenate([np.full(len(one.values), one.part) for one in found])[order]
+        defect = orthonormalise(self.comm, vectors, part)
+        vectors /= np.sqrt(self.mass)[:, None]
+        turn_to_rule(self.comm, vectors, self.rank, group)
+        squares, vectors = values[order][:count], vectors[:, :count]
+        return Modes(
+            squares=squares,
+            vectors=vectors,
+            residual=self._residuals(squares, vectors, bottom.zero),
+            orthonormality=defect,
+            inertia_count=proof.inertia,
+            counted_below=proof.top,
+            rigid=int(rigid.sum()),
+            sectors=tuple(part.matrix.shape[0] * part.copies for part in parts),
+            slices=len(found),
+            segments=split.segments,
+            symmetries=split.symmetries,
         )
-    values = np.concatenate([one.values for one in found])
-    order = np.argsort(values, kind="stable")[:count]
-    vectors = collect(scaled, bases, found, order)
-    matrix = np.concatenate([np.full(len(one.values), one.matrix) for one in found])[order]
-    defect = _orthonormalise(comm, vectors, matrix)
-    squares = values[order]
-    rigid = int((squares <= bottom.zero).sum())
-    squares[:rigid] = 0.0
-    # A rigid mode is measured by the first flexible one.
-    scale = squares[min(rigid, len(squares) - 1)]
-    residual = _residuals(scaled, squares, vectors, max(scale, bottom.zero))
-    vectors /= np.sqrt(mass)[:, None]
-    parts = tuple(basis.shape[1] for basis in bases)
-    return Modes(
-        squares,
-        vectors,
-        residual,
-        defect,
-        proof.inertia,
-        proof.top,
-        rigid,
-        parts,
-        len(found),
-        segments,
-    )
+
+    def _same(self, values: np.ndarray) -> float:
+        return max(_SAME, self._rounding(values))
+
+    def _rounding(self, values: np.ndarray, defect: float = 0.0) -> float:
+        """Of A phi, relative to the lowest eigenvalue (measured: 0.05 to 1 times eps |A|), or of A itself where
+        a symmetry shows it; at most `MOST`.
+        """
+        flexible = values[values > 0]
+        stiff = np.finfo(float).eps * float(abs(self.whole).sum(axis=1).max())
+        return min(max(stiff, defect) / flexible.min(), MOST) if len(flexible) else 0.0
+
+    def _allowed(self, modes: Modes, defect: float) -> float:
+        """Largest residual. Near incompressibility rounding alone is 1e-8 of the softest mode."""
+        return max(RESIDUAL_TOLERANCE, self._rounding(modes.squares, defect))
+
+    def accurate(self, modes: Modes, defect: float) -> bool:
+        """Whether all are modes of the whole matrix."""
+        return bool(modes.residual.max(initial=0.0) <= self._allowed(modes, defect))
+
+    def checked(self, modes: Modes, defect: float) -> Modes:
+        """The modes, or a ConvergenceError where they are not accurate."""
+        if not self.accurate(modes, defect):
+            raise ConvergenceError(
+                f"modes: worst relative residual {modes.residual.max():.1e}, allowed "
+                f"{self._allowed(modes, defect):.0e}: the lowest mode is too soft against the stiffest "
+                "element for the number of digits. Use elements of more equal size."
+            )
+        if not modes.orthonormality <= ORTHONORMALITY_TOLERANCE:
+            raise ConvergenceError(
+                f"modes: orthonormality is lost ({modes.orthonormality:.1e}, allowed "
+                f"{ORTHONORMALITY_TOLERANCE:.0e}). Use elements of more equal size."
+            )
+        return modes
+
+    def _residuals(self, squares: np.ndarray, vectors: np.ndarray, zero: float) -> np.ndarray:
+        """(m,) relative; a rigid mode is measured by the first flexible one. Collective."""
+        defects = np.empty(len(squares))
+        root = np.sqrt(self.mass)[:, None]
+        for start in range(0, len(squares), CHUNK):
+            some = slice(start, start + CHUNK)
+            shapes = root * vectors[:, some]
+            defects[some] = ((multiply(self.scaled, shapes) - shapes * squares[some]) ** 2).sum(
+                axis=0
+            )
+        flexible = squares[squares > 0]
+        least = max(flexible[0] if len(flexible) else 0.0, zero)
+        return np.sqrt(self.comm.allreduce(defects)) / np.maximum(squares, least)
 
 
-def _checked(modes: Modes, matrix: sparse.csr_matrix) -> Modes:
-    worst = float(modes.residual.max())
-    # Rounding of A phi (measured: 0.05 to 1 times this): near incompressibility it alone is 1e-8 of the lowest eigenvalue.
-    soft = modes.squares[min(modes.rigid, len(modes.squares) - 1)]
-    stiff = abs(matrix).sum(axis=1).max()
-    allowed = max(RESIDUAL_TOLERANCE, min(np.finfo(float).eps * stiff / soft, MOST) if soft else 0)
-    if not worst <= allowed:
-        raise ConvergenceError(
-            f"modes: worst relative residual {worst:.1e}, allowed {allowed:.0e}: the lowest "
-            "mode is too soft against the stiffest element for the number of digits. Use elements of "
-            "more equal size."
-        )
-    if not modes.orthonormality <= ORTHONORMALITY_TOLERANCE:
-        raise ConvergenceError(
-            f"modes: orthonormality is lost ({modes.orthonormality:.1e}, allowed "
-            f"{ORTHONORMALITY_TOLERANCE:.0e}). Use elements of more equal size."
-        )
-    return modes
+def _families(parts: list[Part], found: list[Slice]) -> np.ndarray:
+    """(k,) a number for each eigenpair: of its part, and of a part's copies first or second."""
+    most = max(part.copies for part in parts)
+    numbers = [
+        most * one.part + np.arange(len(one.values)) % parts[one.part].copies for one in found
+    ]
+    return np.concatenate(numbers)
 
 
 def _check_stable(bottom: Bottom) -> None:
@@ -214,35 +247,3 @@ def _check_stable(bottom: Bottom) -> None:
             "forces: the tire buckles, or topples if its rim is free. Lower the load, raise the "
             "inflation or stiffen the wall; let a free rim stand on no road."
         )
-
-
-def _orthonormalise(comm: MPI.Comm, vectors: np.ndarray, matrix: np.ndarray) -> float:
-    """Worst entry of V^T V - 1 after a correction where slices meet, in place. Collective.
-
-    One Newton-Schulz step V (3 - V^T V) / 2 squares the defect and turns no vector further than it.
-    Vectors of different sectors are orthogonal by their making.
-    """
-    worst = 0.0
-    for one in np.unique(matrix):
-        columns = np.flatnonzero(matrix == one)
-        part = vectors[:, columns]
-        defect = gram(comm, part, part) - np.eye(len(columns))
-        if np.abs(defect).max() > _REPAIR:
-            # What is rounding already stays: mixed in, it would carry stiff modes into soft ones.
-            part -= part @ (np.where(np.abs(defect) > _REPAIR / 10, defect, 0.0) / 2)
-            vectors[:, columns] = part
-            defect = gram(comm, part, part) - np.eye(len(columns))
-        worst = max(worst, float(np.abs(defect).max()))
-    return worst
-
-
-def _residuals(
-    scaled: PETSc.Mat, values: np.ndarray, vectors: np.ndarray, least: float
-) -> np.ndarray:
-    squares = np.empty(len(values))
-    for start in range(0, len(values), CHUNK):
-        some = slice(start, start + CHUNK)
-        defect = multiply(scaled, vectors[:, some]) - vectors[:, some] * values[some]
-        squares[some] = (defect**2).sum(axis=0)
-    squares = scaled.comm.tompi4py().allreduce(squares)
-    return np.sqrt(squares) / np.maximum(values, least)

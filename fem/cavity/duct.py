@@ -107,6 +107,37 @@ class Duct:
         """
         return self.density * self.pressure @ flux
 
+    def pencil(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
+        """The air's own damping (1/s) and stiffness (1/s2) matrices (a, a), mass 1, at `speed` rad/s."""
+        drag = np.diag(self.loss) + 2 * speed * self.gyroscopic
+        turning = speed * self.loss[:, None] * self.gyroscopic
+        return drag, np.diag(self.circular**2) + speed**2 * self.convective + turning
+
+    def joined(
+        self, drag: np.ndarray, stiffness: np.ndarray, speed: float, coupling: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Damping and stiffness (m + a, m + a) of a tire with unit mass and its air, from those of the
+        tire (m, m) and e = `coupling` (1 + a, m):
+
+            [K + e^T e   -e'^T w ]      [D          0        ]
+            [ -w e'         K_a  ],     [0   D_a + 2 Omega G_a],    e' the rows of e without the first.
+        """
+        own_drag, own_stiffness = self.pencil(speed)
+        across = -self.circular[:, None] * coupling[1:]
+        whole = np.block([[stiffness + coupling.T @ coupling, across.T], [across, own_stiffness]])
+        return linalg.block_diag(drag, own_drag), whole
+
+    def dynamic_stiffness(self, s: complex, speed: float) -> np.ndarray:
+        """W(s) (1 + a, 1 + a): the air adds e^T W e to what resists a motion of the tire with e^(st).
+
+        At rest and s = 0 the trapped air alone is left, 1 in the first place; when the wheel turns the
+        square of the flow's Mach number besides.
+        """
+        drag, stiffness = self.pencil(speed)
+        own = s**2 * np.eye(len(stiffness)) + s * drag + stiffness
+        held = self.circular[:, None] * np.linalg.solve(own, np.diag(self.circular))
+        return linalg.block_diag(1.0, np.eye(len(held)) - held)
+
 
 def modes(profile: Profile, gas: Gas, up_to: float, loss_factor: float | None = None) -> Duct:
     """The duct's modes below `up_to` Hz, the lowest pair at least.

@@ -27,10 +27,13 @@ _LEAST = 1e-12  # of a column's largest entry: below it is rounding
 
 
 class CavityTrace:
-    """The inner face of a body at its present displacement, over `count` waves. Collective."""
+    """The inner face of a body at its present displacement, over `count` waves, or as many as its
+    mesh can tell apart. Collective."""
 
-    def __init__(self, body: Body, count: int = WAVES):
-        self._body, self.count = body, count
+    def __init__(self, body: Body, count: int | None = None):
+        # More waves than a quarter of the nodes around are the mesh's own ripples.
+        self.count = count or max(min(WAVES, len(body.lattice.ring) // 4), 2)
+        self._body = body
         self._ends = _bead_ends(body)
         u, v = body.u, body.test
         # Waves are no polynomials: a few points more than a uniform pressure needs.

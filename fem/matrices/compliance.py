@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.cavity.column import Column
 from tireroad.fem.matrices.direct import multiply, solve_all, symmetric
 from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
@@ -83,42 +84,69 @@ class StaticShapes:
 
 
 def static_shapes(
-    operators: Operators, stiffness: PETSc.Mat, damping: PETSc.Mat, probes: sparse.csr_matrix
+    operators: Operators,
+    stiffness: PETSc.Mat,
+    damping: PETSc.Mat,
+    probes: sparse.csr_matrix,
+    air: Column | None = None,
 ) -> StaticShapes:
-    """Static shapes of the probes (p, 3 s), each a load and a reading. Collective.
+    """Static shapes of the probes (p, 3 s), each a load and a reading, with the air's. Collective.
 
     An unsymmetric stiffness is factorised a second time, transposed; a free tire that stands answers
     by inertia relief (fem.matrices.inertia_relief).
     """
     comm = operators.body.comm
     loads = on_own_rows(operators, probes)
-    x = statics(operators, stiffness, loads)
-    if symmetric(stiffness):
-        y = x
-    else:
+    pushed = loads if air is None else sparse.hstack([loads, air.pushed], format="csc")
+    x = y = statics(operators, stiffness, pushed)
+    if not symmetric(stiffness):
         transposed = stiffness.transpose(PETSc.Mat())
-        y = solve_all(transposed, loads)
+        y = solve_all(transposed, pushed)
         transposed.destroy()
-    return StaticShapes(
+    if air is not None:
+        x, y = air.with_air(x), air.with_air(y, transposed=True)
+    shapes = StaticShapes(
         x,
         comm.allreduce(loads.T @ x),
         comm.allreduce(y.T @ multiply(damping, x)),
         comm.allreduce(y.T @ (operators.mass[:, None] * x)),
         comm.allreduce(operators.carried @ x),
     )
+    return shapes if air is None else _with_following(shapes, air, x, y)
+
+
+def _with_following(
+    shapes: StaticShapes, air: Column, x: np.ndarray, y: np.ndarray
+) -> StaticShapes:
+    """The same with the damping, inertia and momentum of the air that follows the shapes. Collective."""
+    g, h = air.following(x), air.following(y, transposed=True)
+    drag, _ = air.duct.pencil(air.speed)
+    return replace(
+        shapes,
+        damping=shapes.damping + h.T @ drag @ g,
+        inertia=shapes.inertia + h.T @ g,
+        momentum=shapes.momentum + air.duct.momentum @ g,
+    )
 
 
 def compliance(
-    operators: Operators, stiffness: PETSc.Mat, outputs: sparse.csr_matrix, loads: sparse.csr_matrix
+    operators: Operators,
+    stiffness: PETSc.Mat,
+    outputs: sparse.csr_matrix,
+    loads: sparse.csr_matrix,
+    air: Column | None = None,
 ) -> np.ndarray:
-    """Displacement at the outputs per unit load, (r, k) m/N, on every process. Collective.
+    """Displacement at the outputs per unit load, (r, k) m/N, with the air's, on every process. Collective.
 
     `outputs` (r, 3 s) and `loads` (k, 3 s) weigh the nodes of the outer face, three dofs a node.
     Raises ConvergenceError when a solve leaves a relative residual above 1e-8.
     """
-    rows = on_own_rows(operators, outputs).T.tocsr()
-    solution = statics(operators, stiffness, on_own_rows(operators, loads))
-    return operators.body.comm.allreduce(rows @ solution)
+    rows, columns = on_own_rows(operators, outputs).T.tocsr(), on_own_rows(operators, loads)
+    if air is not None:
+        rows = sparse.vstack([rows, air.pushed.T], format="csr")
+        columns = sparse.hstack([columns, air.pushed], format="csc")
+    answers = operators.body.comm.allreduce(rows @ statics(operators, stiffness, columns))
+    return answers if air is None else air.mended(answers)
 
 
 def on_own_rows(operators: Operators, probes: sparse.csr_matrix) -> sparse.csr_matrix:

@@ -9,6 +9,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.cavity.column import Column
 from tireroad.fem.matrices.compliance import add_diagonal, on_own_rows
 from tireroad.fem.matrices.direct import solve_all
 from tireroad.fem.matrices.operators import Operators
@@ -22,10 +23,11 @@ def receptance(
     loads: sparse.csr_matrix,
     frequency: np.ndarray,
     moment: bool = False,
+    air: Column | None = None,
 ) -> np.ndarray:
     """H (f, r, k) complex, m/N, on every process, at the frequencies in Hz. Collective.
 
-    With `moment` three rows more: the first moment int rho u, kg m/N.
+    With `moment` three rows more: the first moment int rho u of the tire, kg m/N; `air` takes part.
     `stiffness` K_Omega and `damping` E as in fem.matrices.compliance. One unsymmetric factorisation of twice
     the unknowns a frequency. Raises ConvergenceError when a solve leaves a residual above 1e-8.
     """
@@ -34,14 +36,19 @@ def receptance(
     if moment:
         rows = sparse.vstack([rows, sparse.csr_matrix(operators.carried)], format="csr")
     columns = on_own_rows(operators, loads)
+    shape = rows.shape[0], columns.shape[1]
+    if air is not None:
+        rows = sparse.vstack([rows, air.pushed.T], format="csr")
+        columns = sparse.hstack([columns, air.pushed], format="csc")
     n = columns.shape[0]
     both = sparse.vstack([columns, sparse.csc_matrix(columns.shape)], format="csc")
-    H = np.empty((len(frequency), rows.shape[0], loads.shape[0]), complex)
+    H = np.empty((len(frequency), *shape), complex)
     for k, omega in enumerate(2 * np.pi * frequency):
         dynamic = _dynamic_stiffness(stiffness, damping, operators.mass, omega)
         solution = solve_all(dynamic, both)
         dynamic.destroy()
-        H[k] = comm.allreduce(rows @ (solution[:n] + 1j * solution[n:]))
+        answers = comm.allreduce(rows @ (solution[:n] + 1j * solution[n:]))
+        H[k] = answers if air is None else air.mended(answers, 1j * omega)
     return H
 
 

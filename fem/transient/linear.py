@@ -15,9 +15,11 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.cavity.column import Column
 from tireroad.fem.matrices.compliance import on_own_rows, rotating_damping, rotating_stiffness
 from tireroad.fem.matrices.direct import factorise, solve_columns
 from tireroad.fem.matrices.operators import Operators, Rotation
+from tireroad.fem.transient.air_step import AirStep
 
 # What a step needs of the one before; `balanced` is the mean of two accelerations that balances the
 # forces at the step's end.
@@ -28,7 +30,8 @@ class FullTire:
     """All degrees of freedom of the tire between the patch's forces and displacements.
 
     The interface of greens.recursion.Recursion, so the same contact loop runs on it. `outputs` (r,
-    3 s) and `loads` (k, 3 s) weigh the nodes of the outer face. All methods are collective.
+    3 s) and `loads` (k, 3 s) weigh the nodes of the outer face; `air` is what fills the cavity, its
+    coordinates after the tire's. All methods are collective.
     """
 
     def __init__(
@@ -42,10 +45,11 @@ class FullTire:
         loads: sparse.csr_matrix,
         inertia: str = "full",
         spectral_radius: float = 0.0,
+        air: Column | None = None,
     ):
         self._set_scheme(step, spectral_radius)
         self._operators, self._comm, self._step = operators, operators.body.comm, step
-        self._mass = operators.mass
+        self._mass, self._carried = operators.mass, operators.carried
         self._outputs = on_own_rows(operators, outputs).T.tocsr()
         self._drag = rotating_damping(operators, rotation, speed, damping, inertia)
         stiffness = rotating_stiffness(operators, rotation, speed, damping, inertia)
@@ -57,14 +61,26 @@ class FullTire:
         system.setDiagonal(diagonal)
         system.setOption(PETSc.Mat.Option.SYMMETRIC, speed == 0)
         self._solver = factorise(system)
-        columns = on_own_rows(operators, loads).toarray()
+        self._columns = on_own_rows(operators, loads).toarray()
         # Full motion per unit force at the end of a step: the step's answer is then one product.
-        self._answer = solve_columns(self._solver, system, columns)
-        self.same_step = self._comm.allreduce(self._outputs @ self._answer)
+        self._answer = solve_columns(self._solver, system, self._columns)
+        self._tire = len(self._mass)
+        self._air = self._with_air(air, system) if air else None
+        self.same_step = self._comm.allreduce(self._outputs @ self._answer[: self._tire])
         n = len(self._mass)
         self.displacement, self.velocity, self.acceleration, self.balanced = np.zeros((4, n))
-        self._columns = columns
         self._vectors = system.createVecs()
+
+    def _with_air(self, air: Column, system: PETSc.Mat) -> AirStep:
+        """Let the air take part: its unknowns are appended to all that has one row each. Collective."""
+        first = self._gamma / (self._beta * self._step)
+        second = (1 - self._a) / (self._beta * self._step**2)
+        part = AirStep(air, lambda b: solve_columns(self._solver, system, b), (first, second))
+        self._answer = part.complete(self._answer, np.zeros((part.count, self._answer.shape[1])))
+        self._columns = np.pad(self._columns, ((0, part.rows), (0, 0)))
+        self._mass = np.append(self._mass, np.ones(part.rows))
+        self._carried = np.hstack([self._carried, part.momentum()])
+        return part
 
     def _set_scheme(self, step: float, spectral_radius: float) -> None:
         self._a = (spectral_radius - 1) / (spectral_radius + 1)
@@ -82,19 +98,29 @@ class FullTire:
         right = (1 - a) * (moved / (beta * h**2) + kept) - a * self.acceleration
         rate = gamma / (beta * h) * moved - self.velocity
         rate += h * (gamma * kept - (1 - gamma) * self.acceleration)
-        right = self._mass * right + self._product(rate)
+        self._free = self._solved(self._mass * right + self._product(rate))
+        return self._comm.allreduce(self._outputs @ self._free[: self._tire])
+
+    def _solved(self, right: np.ndarray) -> np.ndarray:
+        """The displacement (own rows) that balances forces (own rows) at the end of the step."""
         b, x = self._vectors
-        b.array[:] = right
+        own, air = np.split(right, [self._tire])
+        if self._air:
+            air = self._air.shared(air)
+            own = self._air.right(own, air)
+        b.array[:] = own
         self._solver.apply(b, x)
-        self._free = x.array_r.copy()
-        return self._comm.allreduce(self._outputs @ self._free)
+        free = x.array_r.copy()
+        return self._air.complete(free, air) if self._air else free
 
     def _product(self, values: np.ndarray) -> np.ndarray:
         """(D + 2 Omega G) values, own rows."""
         b, x = self._vectors
-        b.array[:] = values
+        own, air = np.split(values, [self._tire])
+        b.array[:] = own
         self._drag.mult(b, x)
-        return x.array_r.copy()
+        product = x.array_r.copy()
+        return np.concatenate([product, self._air.dragged(air)]) if self._air else product
 
     def advance(self, force: np.ndarray) -> None:
         """Take the force (k,) N at the end of the step; after `predict`."""
@@ -108,16 +134,24 @@ class FullTire:
         self.displacement, self.acceleration = new, acceleration
 
     def snapshot(self) -> dict[str, np.ndarray]:
-        """The state at all nodes of the lattice, (n, 3) each: m, m/s, m/s2, m/s2. On every process."""
+        """The state at all nodes of the lattice, (n, 3) each: m, m/s, m/s2, m/s2. On every process. The
+        air's (4, a) beside it.
+        """
         spread, everywhere = self._operators.spread, self._operators.body.everywhere
-        return {name: everywhere(spread(getattr(self, name))) for name in _STATE}
+        states = {name: np.split(getattr(self, name), [self._tire]) for name in _STATE}
+        kept = {name: everywhere(spread(own)) for name, (own, _) in states.items()}
+        if self._air:
+            kept["air"] = self._air.shared(np.array([air for _, air in states.values()]))
+        return kept
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from a snapshot, between `advance` and `predict`; written on any number of processes."""
-        for name in _STATE:
-            own = kept[name][self._operators.body.ids]
-            setattr(self, name, self._operators.restrict(own))
+        for k, name in enumerate(_STATE):
+            own = self._operators.restrict(kept[name][self._operators.body.ids])
+            if self._air and self._air.mine:
+                own = np.concatenate([own, kept["air"][k]])
+            setattr(self, name, own)
 
     def inertia_force(self) -> np.ndarray:
-        """Rate of the tire's momentum (3,), N: the convective parts cancel around the ring."""
-        return self._comm.allreduce(self._operators.carried @ self.balanced)
+        """Rate of the momentum (3,) of tire and air, N: the convective parts cancel around the ring."""
+        return self._comm.allreduce(self._carried @ self.balanced)

@@ -100,6 +100,5 @@ def _mirrors(folder: Path, mesh: Mesh, keys: dict) -> list:
         found.append(work())
         times.append(time.perf_counter() - began)
     off = np.abs(found[1].frequency / found[0].frequency - 1).max()
-    planes = len(found[1].sectors).bit_length() - 1
-    what = f"the other half of a symmetric tire ({planes} mirror plane{'s' if planes > 1 else ''})"
+    what = f"the other half of a symmetric tire ({', '.join(found[1].symmetries)})"
     return [what, "modes", *times, times[0] / times[1], f"{off:.1g} of a frequency"]

@@ -57,7 +57,8 @@ def compute(session: Session, path: Path) -> None:
     if modes.segments > 1:
         record.headline["equal segments, solved by wave number"] = (modes.segments, "-")
     else:
-        record.headline["mirror planes"] = (len(modes.sectors).bit_length() - 1, "-")
+        symmetries = ", ".join(modes.symmetries) or "none used"
+        record.headline["symmetries"] = (symmetries, "-")
     record.indicators |= {
         "worst residual": (float(modes.residual.max()), "-"),
         "orthonormality": (modes.orthonormality, "-"),

@@ -266,7 +266,7 @@ def test_a_windows_file_is_read(tmp_path: Path) -> None:
     assert load(path).static.load == 3
 
 
-@pytest.mark.parametrize("name", ["quickstart", "point_force", "flat_rest"])
+@pytest.mark.parametrize("name", ["quickstart", "point_force", "flat_rest", "measured_road"])
 def test_shipped_scenes_are_valid(root: Path, name: str) -> None:
     scene = load(root / "runs" / "scenes" / f"{name}.toml")
     assert scene.name == name.replace("_", "-")
@@ -274,7 +274,9 @@ def test_shipped_scenes_are_valid(root: Path, name: str) -> None:
 
 def test_measured_road_scene_takes_a_road(root: Path, roads: Path) -> None:
     road = roads / "belgian_block.crg"
-    scene = load(root / "runs" / "scenes" / "measured_road.toml", [f"road.file={road}"])
+    scene = load(
+        root / "runs" / "scenes" / "measured_road.toml", ["road.kind=crg", f"road.file={road}"]
+    )
     assert scene.road.file == str(road.resolve()) and scene.contact is not None
 
 
