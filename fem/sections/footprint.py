@@ -8,8 +8,8 @@ from tireroad.fem.sections.grid import corners
 
 # (from, to) rad: up to where elements have the footprint's size, and from where the full one. A deflection
 # of 20 mm reaches 0.35 rad along a ring of 0.32 m and 0.6 rad along a section of 0.1 m.
-RING_NEAR = (0.3, 1.2)
-ARC_NEAR = (0.45, 1.1)
+RING_NEAR = (0.15, 1.2)
+ARC_NEAR = (0.2, 1.2)
 
 
 def near_road(distance: np.ndarray, footprint_size: float, near: tuple[float, float]) -> np.ndarray:

@@ -1,13 +1,14 @@
 """`tireroad check`: the resolved scene, the stages, the memory; no solver runs."""
 
-from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
-from tireroad.runs.scene.estimate import memory
-from tireroad.runs.scene.load import applies
+from tireroad.runs.scene.demand import check_demand, duration
+from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.schema import key_of, table_of
+from tireroad.runs.scene.road_check import check_road
+from tireroad.runs.scene.schema import applies, entries, key_of, table_of
 from tireroad.runs.scene.tables import Scene
 
 Row = tuple[str, str, str, str, str]
@@ -18,13 +19,13 @@ def _rows(holder: Any, path: str, title: str) -> list[tuple[str, list[Row]]]:
     """One (title, rows) for each table, in the order of the scene."""
     own: list[Row] = []
     below: list[tuple[str, list[Row]]] = []
-    for item in fields(holder):
-        value = getattr(holder, item.name)
+    for owner, item in entries(holder):
+        value = getattr(owner, item.name)
         part = table_of(item)
         inner = f"{path}.{item.name}" if path else item.name
         if part is None:
             key = key_of(item)
-            if applies(key, holder):
+            if applies(key, owner):
                 shown = "absent" if value is None else literal(value)
                 own.append((item.name, shown, key.unit, key.allowed, key.doc))
         elif part.many:
@@ -46,7 +47,8 @@ def _aligned(rows: list[Row], widths: list[int]) -> list[str]:
 
 
 def explain(scene: Scene) -> str:
-    """What `check` prints."""
+    """What `check` prints. InputError where the road cannot be used."""
+    check_road(scene)
     groups = _rows(scene, "", "scene")
     everything = [HEAD, *(row for _, rows in groups for row in rows)]
     widths = [min(max(len(row[column]) for row in everything), 44) for column in range(len(HEAD))]
@@ -59,7 +61,29 @@ def explain(scene: Scene) -> str:
         lines.append(
             f"  {stage:10}" + (f"skipped: {reasons[stage]}" if stage in reasons else "runs")
         )
-    parts = memory(scene)
-    lines += ["", f"estimated memory  {sum(parts.values()) / 1e9:.2f} GB in one process"]
-    lines += [f"  {name:26}{size / 1e9:6.2f} GB" for name, size in parts.items()]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_demand(scene)])
+
+
+def _demand(scene: Scene) -> list[str]:
+    """Memory, disk and time, and what the machine has too little of (InputError where by far)."""
+    wanted = estimate(scene)
+    size, parts = wanted.sizes, wanted.memory
+    counts = [f"{size.free} unknowns", f"{size.modes} modes"]
+    if scene.contact is not None:
+        counts.append(f"about {size.points} contact points")
+    if scene.time is not None:
+        about = "about " if scene.time.step == "auto" else ""
+        counts.append(f"{about}{size.steps} time steps")
+    if size.frequencies:
+        counts.append(f"{size.frequencies} frequencies")
+    if size.speeds:
+        counts.append(f"{size.speeds} speeds")
+    lines = [
+        "",
+        f"estimated sizes   {', '.join(counts)}",
+        f"estimated time    {duration(sum(wanted.seconds.values()))} of one core",
+        f"estimated disk    {sum(wanted.disk.values()) / 1e9:.2g} GB",
+        f"estimated memory  {sum(parts.values()) / 1e9:.2f} GB in one process",
+        *(f"  {name:26}{part / 1e9:6.2f} GB" for name, part in parts.items()),
+    ]
+    return lines + [f"warning: {text}" for text in check_demand(wanted, Path.cwd())]

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from tireroad.runs.scene.cavity_table import Cavity
 from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
 
 LINEAR = ("model", ("linear", "neo-hookean"))
@@ -61,6 +62,14 @@ class Material:
     )
 
 
+def _dynamic():
+    return number(1.0, "-", "modulus of the modes over that of the static state", above=0, most=100)
+
+
+def _loss_factor():
+    return number(0.0, "-", "tan δ of the rubber in the modes", least=0, most=2)
+
+
 @dataclass(frozen=True)
 class Region:
     arc: tuple[float, float] = vector(
@@ -71,6 +80,8 @@ class Region:
         (0.0, 1.0), "-", "from, to, through the wall; 0: inner face", least=0, most=1
     )
     material: Material = table(Material, "what the region is made of")
+    dynamic: float = _dynamic()
+    loss_factor: float = _loss_factor()
 
 
 @dataclass(frozen=True)
@@ -125,5 +136,16 @@ class Tire:
         most=1,
     )
     material: Material = table(Material, "what the wall is made of")
+<<<<<<< HEAD
     region: tuple[Region, ...] = tables(Region, "a part of the section of another material")
+=======
+    dynamic: float = _dynamic()
+    loss_factor: float = _loss_factor()
+    region: tuple[Region, ...] = tables(
+        Region, "a part of the section of another material; elements whose middle it holds"
+    )
+>>>>>>> main
     cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")
+    cavity: Cavity | None = table(
+        Cavity, "the air inside; absent: none in a torus, else this table's defaults", optional=True
+    )

@@ -19,7 +19,7 @@ from tireroad.contact.totals import Figures, Totals
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
-from tireroad.runs.process.mpi import Deferred, Stopped
+from tireroad.runs.process.signals import Deferred, Stopped
 from tireroad.runs.stages.contact_balance import balance
 from tireroad.runs.stages.contact_file import ContactFile
 from tireroad.runs.stages.point_forces import directions, histories, shortest_period
@@ -92,12 +92,11 @@ def _run(session: Session, loop: Loop, driven, file: ContactFile, totals, step, 
     watch = _Watch(session)
     with (
         Deferred() as deferred,
-        observe.Progress("contact", steps) as bar,
+        observe.Progress("contact", steps, begun=done) as bar,
         # A step's matrices, a megabyte, are read as fast by one core as by two; threads that wait for
         # each other in every product took ten times as long where cores are shared.
         threadpool_limits(1, "blas"),
     ):
-        bar.advance(done)
         for instant in instants:
             full = file.add(instant, driven.reading if driven else None)
             bar.advance()

@@ -7,8 +7,7 @@ from mpi4py import MPI
 
 from tireroad.fem.sections.ring import Ring
 from tireroad.runs.scene.tire_section import patch
-from tireroad.runs.scene.tire_tables import Material as MaterialTable
-from tireroad.runs.scene.tire_tables import Tire
+from tireroad.runs.scene.tire_tables import Region, Tire
 
 
 def make_lattice(section: Ring):
@@ -24,11 +23,12 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
 
-    def rubber(table: MaterialTable) -> Material:
-        return Material(**vars(table))
+    def rubber(part: Tire | Region) -> Material:
+        given = vars(part.material) | {"dynamic": part.dynamic, "loss_factor": part.loss_factor}
+        return Material(**given)
 
     names = [patch(i, region).name for i, region in enumerate(tire.region)]
-    materials = {name: rubber(r.material) for name, r in zip(names, tire.region, strict=True)}
+    materials = {name: rubber(r) for name, r in zip(names, tire.region, strict=True)}
     placed = {"depth", "arc", "angle"}
     cords = [
         Cords(
@@ -37,4 +37,4 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
         )
         for c in tire.cords
     ]
-    return Body(comm, section, {"wall": rubber(tire.material)} | materials, cords=cords)
+    return Body(comm, section, {"wall": rubber(tire)} | materials, cords=cords)
