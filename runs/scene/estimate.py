@@ -5,13 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-<<<<<<< HEAD
-=======
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.sizes import Sizes, sizes
->>>>>>> main
 from tireroad.runs.scene.tables import Scene
-from tireroad.runs.scene.tire_section import free_unknowns
 
 PROGRAM = 2.1e8
 """Bytes of one process with all libraries loaded and the mesh made (measured)."""

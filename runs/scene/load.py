@@ -16,11 +16,6 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described
 from tireroad.runs.scene import locate, rules
-<<<<<<< HEAD
-from tireroad.runs.scene.schema import Key, Table, described, key_of, names, table_of
-from tireroad.runs.scene.tables import Scene
-from tireroad.runs.scene.tire_section import with_elements
-=======
 from tireroad.runs.scene.cavity_table import filled
 from tireroad.runs.scene.schema import (
     Table,
@@ -34,7 +29,7 @@ from tireroad.runs.scene.schema import (
 )
 from tireroad.runs.scene.source import Source, shortened
 from tireroad.runs.scene.tables import Damping, Scene
->>>>>>> main
+from tireroad.runs.scene.tire_section import with_elements
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 LARGEST = 1_000_000
@@ -62,14 +57,9 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-<<<<<<< HEAD
-    scene = with_elements(_with_road_file(scene, source))
-    rules.check(scene, raw, source.error)
-=======
-    scene = filled(_with_damping(scene))
+    scene = with_elements(filled(_with_damping(scene)))
     rules.check(scene, raw, source)
     source.refuse()
->>>>>>> main
     return scene
 
 

@@ -9,12 +9,8 @@ from tireroad.fem.parameters import described
 from tireroad.runs.scene.cavity_table import check_cavity
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables import Scene
-<<<<<<< HEAD
-from tireroad.runs.scene.tire_section import free_unknowns
-=======
 from tireroad.runs.scene.tire_rules import check_cords, full_matrices
-from tireroad.runs.scene.tire_tables import Tire
->>>>>>> main
+from tireroad.runs.scene.tire_section import free_unknowns
 
 Where = Callable[[tuple[str, ...], str], InputError]
 
@@ -41,29 +37,6 @@ def refuse_later(raw: dict[str, Any], source: Source) -> None:
             del here[key]
 
 
-<<<<<<< HEAD
-def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Raise InputError for the first contradiction between keys or tables."""
-    _geometry(scene, error)
-    _static(scene, raw, error)
-    _rotation(scene, error)
-    _modal(scene, error)
-    if scene.contact is not None:
-        _contact(scene, error)
-    _force(scene, error)
-    _greens(scene, error)
-    if scene.road is not None:
-        _road(scene, error)
-    _time(scene, error)
-=======
-def free_unknowns(tire: Tire) -> int:
-    """Displacement unknowns of the torus without the clamped bead faces."""
-    around = tire.segments * tire.order
-    inner_arc = tire.elements_arc * tire.order - 1
-    through = tire.elements_thickness * tire.order + 1
-    return 3 * around * inner_arc * through
-
-
 def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
     """Note every contradiction between keys or tables, one of each rule.
 
@@ -78,7 +51,6 @@ def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
             rule(scene, raw, source.error)
         except InputError as error:
             source.problems.append(((), str(error)))
->>>>>>> main
 
 
 def _geometry(scene: Scene, raw: dict[str, Any], error: Where) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.road_check import least_travel, made
-from tireroad.runs.scene.rules import free_unknowns
+from tireroad.runs.scene.tire_section import free_unknowns
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables import Scene
 

@@ -14,7 +14,7 @@ from tireroad.runs.scene.tire_tables import Region, Tire
 
 # (segments, elements along the arc) where the scene does not say; by order.
 MESHES = {1: (160, 32), 2: (100, 16), 3: (30, 14)}
-NEAR_ROAD = 0.3  # footprint_size with a road
+NEAR_ROAD = 0.2  # footprint_size with a road
 
 
 def with_elements(scene: Scene) -> Scene:

@@ -131,20 +131,14 @@ class Tire:
     footprint_size: float | None = number(
         None,
         "-",
-        "length of elements at the footprint over that elsewhere; absent: 0.3 with a road, else 1",
+        "length of elements at the footprint over that elsewhere; absent: 0.2 with a road, else 1",
         least=0.05,
         most=1,
     )
     material: Material = table(Material, "what the wall is made of")
-<<<<<<< HEAD
-    region: tuple[Region, ...] = tables(Region, "a part of the section of another material")
-=======
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()
-    region: tuple[Region, ...] = tables(
-        Region, "a part of the section of another material; elements whose middle it holds"
-    )
->>>>>>> main
+    region: tuple[Region, ...] = tables(Region, "a part of the section of another material")
     cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")
     cavity: Cavity | None = table(
         Cavity, "the air inside; absent: none in a torus, else this table's defaults", optional=True
