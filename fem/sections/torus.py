@@ -41,14 +41,19 @@ class Torus:
         """Angles of the element corners around the axle, rad, from the lowest point towards +x."""
         return ring_corners(self.segments, self.footprint_size)
 
-    def arc_corners(self, between: Sequence[float] = ()) -> np.ndarray:
+    def arc_corners(self, between: Sequence[float] = (), ends: Sequence[float] = ()) -> np.ndarray:
         """Angles of the element corners along the section, rad, bead to bead; the crown is 0.
 
-        With corners at the angles `between` and at their mirror images.
+        With corners at the angles `between` and at their mirror images; smaller elements at `ends`, which
+        are among them.
         """
         both = np.concatenate([between, -np.asarray(between)])
         half, size = self.half_angle, self._size
-        return corners(self.elements_arc, lambda x: 1 / size(x), -half, half, both)
+
+        def density(arc: np.ndarray) -> np.ndarray:
+            return 1 / (size(arc) * _near_ends(arc, ends))
+
+        return corners(self.elements_arc, density, -half, half, both)
 
     def _size(self, arc: np.ndarray) -> np.ndarray:
         """Relative size of the elements at a section angle."""
@@ -70,12 +75,15 @@ class Torus:
     def lines(self, patches: Sequence[Patch], plies: Sequence[PlyLine]):
         """Corners through the wall, as shares of it, and along the arc, rad."""
         arcs = [end for patch in patches for arc in patch.arcs for end in arc]
-        arcs += [end for ply in plies for end in ply.arc]
-        arcs = [end for end in arcs if abs(end) < self.half_angle * (1 - 1e-9)]
+        ends = [end for ply in plies for end in ply.arc]
+        arcs, ends = (
+            [end for end in angles if abs(end) < self.half_angle * (1 - 1e-9)]
+            for angles in (arcs + ends, ends)
+        )
         depths = [end for patch in patches for end in patch.depth]
         depths += [ply.depth for ply in plies]
         wall = corners(self.elements_thickness, np.ones_like, 0.0, 1.0, depths)
-        return wall, self.arc_corners(arcs)
+        return wall, self.arc_corners(arcs, ends)
 
     def ring(self, patches: Sequence[Patch] = (), plies: Sequence[PlyLine] = ()) -> Ring:
         """The tire's elements, with edges exactly on those of patches and on plies."""
@@ -101,3 +109,18 @@ class Torus:
         wall = np.where(depth == 1.0, self.minor_radius, inner + depth * self.thickness)
         reach = self.outer_radius - self.minor_radius + wall * np.cos(arc)
         return np.stack([reach, wall * np.sin(arc)], axis=-1)
+
+
+# A belt ends in a singularity. Ten lowest frequencies of the belted torus (tests/verification/test_belted_torus),
+# worst of n = 0, 1, 2 above the reference: 16 elements along the arc 1.0 %, 20 elements 0.7 %;
+# ungraded, 16, 20, 24 and 32 elements: 1.8, 1.3, 0.8 and 0.5 %; more layers than one a ply gain nothing.
+_ENDS, _ENDS_DEPTH = np.radians(8), 0.7
+
+
+def _near_ends(angle: np.ndarray, ends: Sequence[float]) -> np.ndarray:
+    """Relative element size at section angles, rad, for the ends of plies and their mirror images."""
+    if not len(ends):
+        return np.ones_like(angle)
+    both = np.concatenate([ends, -np.asarray(ends)])
+    distance = np.abs(angle[:, None] - both).min(axis=1)
+    return 1 - _ENDS_DEPTH * np.exp(-((distance / _ENDS) ** 2))
