@@ -39,10 +39,12 @@ def attack(folder: Path, files: int, seed: int) -> list[str]:
         victim = dice.choice(sorted([*out.glob("*.h5"), *out.glob("*.h5"), *out.glob("s*.[jt]*")]))
         what = _damage(victim, dice)
         use = dice.choice(USES)
-        failures += [
+        found = [
             f"{number}: {victim.name} {what}, {use}: {failure}"
             for failure in _used(scene, out, victim, use, wanted, csv)
         ]
+        print(*found, sep="\n", end="\n" if found else "", flush=True)
+        failures += found
         if number % 10 == 9:
             print(f"{number + 1} files, {len(failures)} failures", flush=True)
     return failures
