@@ -48,7 +48,28 @@ def static(results: Results) -> Section:
         )
     )
     footprint(results, section)
+    cords(results, section)
     return section
+
+
+def cords(results: Results, section: Section) -> None:
+    """Adds a table of the cords' forces, where the tire has any."""
+    rows = []
+    for ply in results.scene.get("tire", {}).get("cords", ()):
+        force, area = (
+            results.optional("static.h5", f"cords/{ply['name']}/{part}")
+            for part in ("force", "area")
+        )
+        if force is None or area is None:
+            continue
+        mean, slack = (force * area).sum() / area.sum(), area[force < 0].sum() / area.sum()
+        forces = (quantity(float(value), "N") for value in (force.max(), mean, force.min()))
+        rows.append((ply["name"], *forces, f"{100 * slack:.3g} %"))
+    if rows:
+        section.notes.append(
+            "Force of one cord, tension positive; compressed: share of the ply's area whose cords are."
+        )
+        section.table = Table(("cords", "largest", "mean", "least", "compressed"), rows)
 
 
 def footprint(results: Results, section: Section) -> None:
