@@ -9,7 +9,10 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.parallel import ToldByRoot, on_root
 from tireroad.runs.files.disk import explained
+
+__all__ = ["ToldByRoot", "on_root"]  # at home in fem.parallel
 
 DONE, BUG, INPUT, GAVE_UP, STOPPED = 0, 1, 2, 3, 4
 TOGETHER = 3.0
@@ -24,10 +27,6 @@ class Stopped(BaseException):
 
     Not an Exception, so that no solver callback takes it for its own failure.
     """
-
-
-class ToldByRoot(RuntimeError):
-    """The root process failed unexpectedly and says so; the others end without a word."""
 
 
 class Deferred:
@@ -80,28 +79,6 @@ def rank_before_mpi() -> int:
         if os.environ.get(name, "").isdigit():
             return int(os.environ[name])
     return 0
-
-
-def on_root(comm: Any, function: Callable[[], Any]) -> Any:
-    """Run `function` on the root process; its value on every process.
-
-    Where it fails, every process raises: the same InputError or ConvergenceError, or on the others
-    ToldByRoot for an error that is a bug. Collective.
-    """
-    value, error = None, None
-    if comm.rank == 0:
-        try:
-            value = function()
-        except Exception as raised:
-            error = raised
-    if comm.size > 1:
-        clear = isinstance(error, InputError | ConvergenceError)
-        told = comm.bcast(error if clear or error is None else ToldByRoot())
-        value = comm.bcast(value if error is None else None)
-        error = error or told
-    if error is not None:
-        raise error
-    return value
 
 
 def handed_over(status: int) -> int:

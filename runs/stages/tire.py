@@ -33,11 +33,12 @@ def _patch(number: int, region: Region) -> Patch:
     return Patch(f"tire.region {number}", arcs, region.depth)
 
 
-def make_lattice(section: Ring):
-    """The nodes of the displacement field, without a mesh."""
-    from tireroad.fem.tire.mesh import field_lattice
+def make_tire(comm: MPI.Comm, tire: Tire):
+    """The tire without loads, its finite elements made when they are asked for."""
+    from tireroad.fem.model import TireModel
 
-    return field_lattice(section)
+    section = make_section(tire)
+    return TireModel(section, lambda: make_body(comm, tire, section))
 
 
 def make_body(comm: MPI.Comm, tire: Tire, section: Ring):

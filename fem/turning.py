@@ -1,0 +1,27 @@
+"""How a wheel turns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tireroad.fem.errors import InputError
+
+INERTIAS = ("full", "doppler")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turning:
+    """How the wheel turns: `speed` rad/s, `damping` (gamma1 1/s, gamma2 s) of the material, `inertia`
+    "full", or "doppler": without Coriolis and centrifugal forces. At speed 0 it stands.
+    """
+
+    speed: float = 0.0
+    damping: tuple[float, float] = (0.0, 0.0)
+    inertia: str = "full"
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.speed) and self.speed >= 0.0):
+            raise InputError(f"speed = {self.speed:g} rad/s must be 0 or more, and finite")
+        if self.inertia not in INERTIAS:
+            raise InputError(f'inertia = "{self.inertia}" is unknown: take "full" or "doppler"')
