@@ -10,16 +10,8 @@ from tireroad.contact.solver.choose import make_solver
 from tireroad.contact.solver.conditions import ContactSolver, checked_compliance
 from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance, SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
-from tireroad.contact.tread.compliance import (
-    Influence,
-    check_half_space,
-    dense_compliance,
-    half_space_influence,
-    no_tread,
-    winkler_compliance,
-)
 from tireroad.contact.tread.kernel import KernelTread
-from tireroad.contact.tread.layer import LayerInfluence
+from tireroad.contact.tread.law import TreadLaw
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
@@ -37,11 +29,7 @@ STEEPEST = 0.25
 class Spec(Protocol):
     """The table [contact] of a scene."""
 
-    tread: str
-    youngs_modulus: float
-    poisson_ratio: float
-    thickness: float
-    winkler_stiffness: float
+    law: TreadLaw
     solver: str
 
 
@@ -77,15 +65,8 @@ def step_solver(spec: Spec, patch: Patch, tire: Array) -> ContactSolver:
 
 def tread_matrix(spec: Spec, patch: Patch) -> Array:
     """Compliance of the tread between the points, (c, c) m/N."""
-    points = patch.points[:, :2]
-    if spec.tread == "winkler":
-        return winkler_compliance(patch.area, spec.winkler_stiffness)
-    if spec.tread == "none":
-        return no_tread(len(points))
-    check_half_space(points, patch.half_sizes, spec.youngs_modulus, spec.poisson_ratio)
-    influence = _influence(spec, patch)
     try:
-        return dense_compliance(points, patch.half_sizes, influence)
+        return spec.law.matrix(patch.points[:, :2], patch.half_sizes, _farthest(patch))
     except InputError as error:
         raise _out_of_reach(patch) or error from None
 
@@ -96,7 +77,7 @@ def _out_of_reach(patch: Patch) -> InputError | None:
     The tread's laws are those of a plane: points that rise by more than STEEPEST of their distance
     from the footprint lie above each other as seen by the road.
     """
-    highest = float(patch.gap.max())
+    highest = float(patch.gap[~patch.edge].max(initial=0.0))
     x0, x1, y0, y1 = patch.extent
     if highest <= STEEPEST * 0.5 * min(x1 - x0, y1 - y0):
         return None
@@ -111,29 +92,19 @@ def _out_of_reach(patch: Patch) -> InputError | None:
 
 def _product(spec: Spec, patch: Patch, tire: Array) -> Compliance:
     """A as a product. A grid has more points than nodes: without a tread A would be singular."""
-    if spec.tread == "none":
+    if not spec.law.compliant:
         raise InputError(
-            'contact.tread = "none" leaves a grid of points without compliance of its own: take a '
-            'tread, or points = "nodes"'
+            "contact.tread: the tread leaves a grid of points without compliance of its own: take "
+            'another, e.g. "half-space", or points = "nodes"'
         )
-    return SpreadCompliance(tire, patch.weights, KernelTread(patch.places, _influence(spec, patch)))
+    influence = spec.law.influence(_farthest(patch))
+    return SpreadCompliance(tire, patch.weights, KernelTread(patch.places, influence))
 
 
-def _influence(spec: Spec, patch: Patch) -> Influence:
-    elastic = spec.youngs_modulus, spec.poisson_ratio
-    if spec.tread == "layer":
-        x0, x1, y0, y1 = patch.extent
-        # The doubled grid of the convolution asks a step beyond the patch.
-        farthest = 2.1 * float(np.hypot(x1 - x0, y1 - y0)) + 4 * float(patch.half_sizes.max())
-        return LayerInfluence(*elastic, spec.thickness, farthest)
-    if spec.tread == "winkler":
+def _farthest(patch: Patch) -> float:
+    """Largest distance (m) at which the influence is read.
 
-        def spring(x: Array, y: Array, a: Array, b: Array) -> Array:
-            return np.where((x == 0) & (y == 0), 1 / (4 * a * b * spec.winkler_stiffness), 0.0)
-
-        return spring
-
-    def half_space(x: Array, y: Array, a: Array, b: Array) -> Array:
-        return half_space_influence(x, y, a, b, *elastic)
-
-    return half_space
+    The doubled grid of the convolution asks for a step beyond twice the patch.
+    """
+    x0, x1, y0, y1 = patch.extent
+    return 2.1 * float(np.hypot(x1 - x0, y1 - y0)) + 4 * float(patch.half_sizes.max())

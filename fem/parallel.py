@@ -16,10 +16,14 @@ class ToldByRoot(RuntimeError):
     """The root process failed unexpectedly and says so; the others end without a word."""
 
 
-def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
+def on_root(
+    comm: MPI.Comm,
+    function: Callable[[], T],
+    clear: tuple[type[Exception], ...] = (InputError, ConvergenceError),
+) -> T:
     """Run `function` on the root process; its value on every process.
 
-    Where it fails, every process raises: the same InputError or ConvergenceError, or on the others
+    Where it fails, every process raises: the same error where it is one of `clear`, or on the others
     ToldByRoot for an error that is a bug. Collective.
     """
     value, error = None, None
@@ -29,8 +33,8 @@ def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
         except Exception as raised:
             error = raised
     if comm.size > 1:
-        clear = isinstance(error, InputError | ConvergenceError)
-        told = comm.bcast(error if clear or error is None else ToldByRoot())
+        known = error is None or isinstance(error, clear)
+        told = comm.bcast(error if known else ToldByRoot())
         value = comm.bcast(value if error is None else None)
         error = error or told
     if error is not None:

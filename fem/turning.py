@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from tireroad.fem.errors import InputError
 
@@ -12,12 +13,12 @@ INERTIAS = ("full", "doppler")
 
 @dataclass(frozen=True, kw_only=True)
 class Turning:
-    """How the wheel turns: `speed` rad/s, `damping` (gamma1 1/s, gamma2 s) of the material, `inertia`
-    "full", or "doppler": without Coriolis and centrifugal forces. At speed 0 it stands.
+    """How the wheel turns: `speed` rad/s, `damping` of the material as in modal.damping, (gamma1 1/s,
+    gamma2 s) or by strain energy, `inertia` "full", or "doppler": without Coriolis and centrifugal forces. At speed 0 it stands.
     """
 
     speed: float = 0.0
-    damping: tuple[float, float] = (0.0, 0.0)
+    damping: Any = (0.0, 0.0)
     inertia: str = "full"
 
     def __post_init__(self) -> None:

@@ -13,6 +13,7 @@ from tireroad.greens.response import Response
 from tireroad.greens.state_selection import keep
 from tireroad.greens.truncation import Cutoff, estimate
 from tireroad.modal.basis import ModalBasis
+from tireroad.modal.damping import beyond
 from tireroad.modal.rolling import RollingModes
 
 RESIDUALS = ("none", "dirac", "static", "second-order", "attachment")
@@ -98,7 +99,7 @@ def band(rolling: RollingModes, wanted: Wanted) -> float:
 
 def cutoff(rolling: RollingModes) -> Cutoff:
     """The highest mode, or state of the full problem, and the damping of those beyond it."""
-    mass, stiffness = rolling.turning.damping
+    mass, stiffness = beyond(rolling.turning.damping, rolling.basis.projection)
     return Cutoff(rolling.highest, mass + stiffness * rolling.highest**2)
 
 

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 from tireroad.fem.matrices.operators import Operators
 from tireroad.modal import quadratic
+from tireroad.modal.damping import beyond
 from tireroad.modal.fields import gram
 from tireroad.modal.quadratic import FullModes, truncation
 from tireroad.modal.rolling import RollingModes
@@ -54,7 +55,7 @@ def _solve(operators, pencil, projected: RollingModes, count: int, window) -> tu
     whole = operators.mass, *pencil
     if not any(window):
         return quadratic.solve(*whole, count), {}
-    mass, stiffness = projected.turning.damping
+    mass, stiffness = beyond(projected.turning.damping, projected.basis.projection)
     s = projected.states.eigenvalue
     low, high = (2 * np.pi * f for f in window)
     rate = mass + stiffness * high**2

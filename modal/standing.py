@@ -53,7 +53,10 @@ def projected(
     """The basis of these modes: what they project and show. Collective."""
     operators = motions.operators
     matrices = motions.rotation if rotation else None
-    projection = project(modes, matrices, operators.carried, operators.body.comm)
+    comm, loss = operators.body.comm, operators.loss_stiffness()
+    projection = project(modes, matrices, operators.carried, comm, loss=loss)
+    if loss is not None:
+        loss.destroy()
     return ModalBasis(
         frequency=modes.frequency,
         shape=operators.trace(modes.vectors),

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 Array = NDArray[np.float64]
 
@@ -42,6 +41,8 @@ def wave_level(road, x0: float, x1: float, y0: float, y1: float, longest_wave: f
 
     Past its ends the profile is continued by reflection.
     """
+    from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
+
     x, profile = _profile(road, x0, x1, y0, y1)
     step = (x1 - x0) / len(x)
     return Level(x, gaussian_filter1d(profile, DEVIATION * longest_wave / step, mode="reflect"))

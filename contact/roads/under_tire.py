@@ -1,5 +1,6 @@
 """A road placed under the tire: the strip of a run, eased in and levelled."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -7,6 +8,7 @@ from numpy.typing import NDArray
 
 from tireroad.contact.roads.levelling import Level, mean_level, wave_level
 from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import Parameters, number
 
 Array = NDArray[np.float64]
 
@@ -36,13 +38,35 @@ class Road(Protocol):
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Road": ...
 
 
+@dataclass(frozen=True, kw_only=True)
+class Placement(Parameters):
+    """Where a road lies under the tire."""
+
+    owner = "road"
+
+    run_in: float = number(
+        0.1,
+        "m",
+        "length over which the heights grow from flat: the run starts at rest",
+        least=0,
+        most=1e4,
+    )
+    lateral: float = number(
+        0.0,
+        "m",
+        "y of the road under the tire's middle, positive to the left",
+        least=-1e4,
+        most=1e4,
+    )
+    start: float = number(0.0, "m", "x of the road under the axle at t = 0", least=-1e6, most=1e6)
+    offset: float = number(0.0, "m", "added to all heights, positive up", least=-10, most=10)
+
+
 class RoadUnderTire:
     """A road placed under the axle; `prepare` cuts out the strip a run drives over.
 
-    start (m): the road's x under the axle at t = 0; lateral (m): the road's y under the tire's
-    middle; run_in (m): the length over which heights are eased in, so that the run starts at rest;
-    offset (m): added to all heights; datum: "mean" subtracts the strip's mean height, "zero"
-    nothing; longest_wave (m): longer waves are taken out too, as an axle that follows them does.
+    start, lateral, run_in, offset (m): see Placement; datum: "mean" subtracts the strip's mean
+    height, "zero" nothing; longest_wave (m): longer waves are filtered out too.
     """
 
     def __init__(

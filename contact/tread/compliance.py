@@ -135,6 +135,15 @@ def _far_potential(x: Array, y: Array, a: Array, b: Array) -> Array:
 
 def check_half_space(points: Array, half_sizes: Array, youngs_modulus: float, nu: float) -> None:
     """InputError for points (n, 2) m, half sizes (n, 2) m, a modulus or ratio out of range."""
+    check_points(points, half_sizes)
+    if not (np.isfinite(youngs_modulus) and youngs_modulus > 0.0):
+        raise InputError(f"tread: Young's modulus {youngs_modulus:g} Pa must be positive")
+    if not -1.0 < nu <= 0.5:
+        raise InputError(f"tread: Poisson ratio {nu:g} must lie in (-1, 0.5]")
+
+
+def check_points(points: Array, half_sizes: Array) -> None:
+    """InputError for points (n, 2) m or half sizes (n, 2) m that are not finite or do not fit."""
     points, half_sizes = np.asarray(points, dtype=float), np.asarray(half_sizes, dtype=float)
     if points.ndim != 2 or points.shape[1] != 2 or half_sizes.shape != points.shape:
         raise InputError(
@@ -144,10 +153,6 @@ def check_half_space(points: Array, half_sizes: Array, youngs_modulus: float, nu
         raise InputError("tread: a point or half size is not finite (m)")
     if not np.all(half_sizes > 0.0):
         raise InputError("tread: every half size must be positive (m)")
-    if not (np.isfinite(youngs_modulus) and youngs_modulus > 0.0):
-        raise InputError(f"tread: Young's modulus {youngs_modulus:g} Pa must be positive")
-    if not -1.0 < nu <= 0.5:
-        raise InputError(f"tread: Poisson ratio {nu:g} must lie in (-1, 0.5]")
 
 
 def _check_positive_definite(compliance: Array) -> None:

@@ -12,7 +12,7 @@ from scipy import sparse
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.roads.flat import Flat
+from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.rolling import Drive, roll
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.friction import Friction

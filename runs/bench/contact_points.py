@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from tireroad.contact.roads.texture import Texture
+from tireroad.contact.roads.kinds.texture import Texture
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.grid_compliance import SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
@@ -52,7 +52,7 @@ def large() -> Table:
         nodes = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
         away = ((nodes[:, None] - nodes) ** 2).sum(axis=-1)
         tire = 1e-6 * (np.exp(-away / 0.0018) + 0.01 * np.eye(len(nodes)))
-        road = Texture(2e-4, 0.8, 0.05, 0.004, seed=1)
+        road = Texture(seed=1).make()
         for solver in (
             ActiveSet(SpreadCompliance(tire, weights, kernel)),
             ProjectedCG(SpreadCompliance(tire, weights, kernel)),
@@ -76,7 +76,7 @@ def rough() -> Table:
     """128 x 128 points from nothing; tamaas, where it is installed, in the last row."""
     n = 128
     x, y, kernel = _grid_case(n)
-    road = Texture(2e-4, 0.8, 0.05, 0.004, seed=2)
+    road = Texture(seed=2).make()
     q = -2e-4 - road.height(x, y)
     weights, tire = _none(n * n)
     compliance = SpreadCompliance(tire, weights, kernel)

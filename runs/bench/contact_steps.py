@@ -7,7 +7,7 @@ import time
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.contact.roads.flat import Flat
+from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.rolling import Drive, Tire, roll
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance

@@ -132,7 +132,7 @@ def rolled(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Rolled:
 def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
     """The response that the run would have with its first modes and another residual. Collective."""
     run, job = given.run, given.run.job
-    rolling = rolling_modes(run.fields.first(count), job.turning, job.comm)
+    rolling = rolling_modes(run.fields.first(count), run.wheel.turning, job.comm)
     points = nodes(given.trial.setup.patch.index, len(run.static.points), 2)
     pair = points, points, residual
     return make_response(lambda: run.wheel, rolling, *pair, lambda: rolling.basis)

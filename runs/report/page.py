@@ -3,7 +3,6 @@
 import json
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import fields
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from tireroad.runs.report import force_sections, tire_sections
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.report.verdicts import verdicts
 from tireroad.runs.scene.plan import STAGES
-from tireroad.runs.scene.schema import key_of, table_of
+from tireroad.runs.scene.schema import every_field, key_of, table_of
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.version import PROGRAM
 
@@ -190,7 +189,7 @@ def parameters(scene: Mapping) -> list[tuple[str, list[tuple[str, str]]]]:
     found: list[tuple[str, list[tuple[str, str]]]] = []
 
     def visit(title: str, table: Mapping, kind: type | None) -> None:
-        known = {item.name: item for item in fields(kind)} if kind else {}
+        known = every_field(kind) if kind else {}
         rows: list[tuple[str, str]] = []
         if title:
             found.append((title, rows))

@@ -1,13 +1,12 @@
 """`tireroad check`: the resolved scene, the stages, the memory; no solver runs."""
 
-from dataclasses import fields
 from typing import Any
 
 from tireroad.runs.scene.estimate import memory
-from tireroad.runs.scene.load import applies
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.schema import key_of, table_of
+from tireroad.runs.scene.road_check import check_road
+from tireroad.runs.scene.schema import applies, entries, key_of, table_of
 from tireroad.runs.scene.tables import Scene
 
 Row = tuple[str, str, str, str, str]
@@ -18,13 +17,13 @@ def _rows(holder: Any, path: str, title: str) -> list[tuple[str, list[Row]]]:
     """One (title, rows) for each table, in the order of the scene."""
     own: list[Row] = []
     below: list[tuple[str, list[Row]]] = []
-    for item in fields(holder):
-        value = getattr(holder, item.name)
+    for owner, item in entries(holder):
+        value = getattr(owner, item.name)
         part = table_of(item)
         inner = f"{path}.{item.name}" if path else item.name
         if part is None:
             key = key_of(item)
-            if applies(key, holder):
+            if applies(key, owner):
                 shown = "absent" if value is None else literal(value)
                 own.append((item.name, shown, key.unit, key.allowed, key.doc))
         elif part.many:
@@ -46,7 +45,8 @@ def _aligned(rows: list[Row], widths: list[int]) -> list[str]:
 
 
 def explain(scene: Scene) -> str:
-    """What `check` prints."""
+    """What `check` prints. InputError where the road cannot be used."""
+    check_road(scene)
     groups = _rows(scene, "", "scene")
     everything = [HEAD, *(row for _, rows in groups for row in rows)]
     widths = [min(max(len(row[column]) for row in everything), 44) for column in range(len(HEAD))]

@@ -1,49 +1,42 @@
 """A scene: read from TOML, checked in full, written back with every default.
 
 `load` ends with a `Scene` in which every value has its type and lies in its range and no two tables
-contradict each other, or with one InputError that names the key, where it stands and what to do.
+contradict each other, or with one InputError that lists all that is wrong: the key, where it stands
+and what to do.
 """
 
 import difflib
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import Key, ParameterError, described
 from tireroad.runs.scene import locate, rules
-from tireroad.runs.scene.schema import Key, Table, described, key_of, names, table_of
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.schema import (
+    Table,
+    applies,
+    every_field,
+    key_of,
+    names,
+    owners,
+    table_of,
+    variant_of,
+)
+from tireroad.runs.scene.source import Source, shortened
+from tireroad.runs.scene.tables import Damping, Scene
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 LARGEST = 1_000_000
 
 
-@dataclass(frozen=True)
-class Source:
-    """Where the values come from, for messages: the file, its text, the paths set by --set."""
-
-    path: Path
-    text: str
-    overridden: frozenset[tuple[str, ...]] = frozenset()
-
-    def where(self, path: tuple[str, ...]) -> str:
-        for length in range(len(path), 0, -1):
-            if path[:length] in self.overridden:
-                return f"--set {'.'.join(path[:length])}"
-        line = locate.line_of(self.text, path)
-        return f"{self.path}, line {line}" if line else f"{self.path}"
-
-    def error(self, path: tuple[str, ...], message: str) -> InputError:
-        return InputError(f"{self.where(path)}: {'.'.join(path)} {message}")
-
-
 def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     """The scene of a file with `overrides` ("table.key=value", as of --set) laid over it.
 
-    Raises InputError for all that is wrong with it. Not collective; reads one file.
+    Raises InputError with all that is wrong with it. Not collective; reads one file.
     """
     path = Path(path)
     text = _text(path)
@@ -56,15 +49,23 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     changed = frozenset(_override(raw, item) for item in overrides)
     source = Source(path, text, changed)
     raw.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "-", path.stem).lstrip(".-") or "scene")
-    rules.refuse_later(raw, source.error)
+    rules.refuse_later(raw, source)
     scene = _table(Scene, raw, (), source)
     if not NAME.fullmatch(scene.name):
-        raise source.error(
+        source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-    scene = _with_road_file(scene, source)
-    rules.check(scene, raw, source.error)
+    scene = _with_damping(scene)
+    rules.check(scene, raw, source)
+    source.refuse()
     return scene
+
+
+def _with_damping(scene: Scene) -> Scene:
+    """The default damping in proportion, where neither it nor the loss factor of a compound is given."""
+    tire = scene.tire
+    loses = any(part.loss_factor for part in (tire, *tire.region))
+    return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
 
 
 def _text(path: Path) -> str:
@@ -98,7 +99,7 @@ def _override(raw: dict[str, Any], item: str) -> tuple[str, ...]:
     dotted, equals, value = item.partition("=")
     path = locate.parts(dotted)
     if not equals or not all(path):
-        raise InputError(f"--set {item}: must be table.key=value, e.g. static.load=400")
+        raise InputError(f"--set {item[:80]}: must be table.key=value, e.g. static.load=400")
     here: Any = raw
     for depth, part in enumerate(path):
         last = depth == len(path) - 1
@@ -121,99 +122,155 @@ def _override(raw: dict[str, Any], item: str) -> tuple[str, ...]:
 
 
 def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:
-    """Dataclass `of` from a raw table: unknown keys, then values, then keys of other kinds."""
+    """Dataclass `of` from a raw table; what is wrong is noted, and has its default in the result."""
     if not isinstance(raw, dict):
-        raise source.error(path, f"must be a table, not {described(raw)}")
-    known = names(of)
+        source.add(path, f"must be a table, not {described(raw)}")
+        return of()
+    before = len(source.problems)
+    values = {}
+    for item in fields(of):
+        if item.name in raw and variant_of(item) is None:
+            values[item.name] = _field(item, raw[item.name], (*path, item.name), source)
+    known = set(names(of))
+    for item in fields(of):
+        if variant_of(item) is not None:
+            kind = _kind(of, item, values)
+            values[item.name] = _variant(kind, raw, path, source)
+            known |= set(names(kind))
     for name in raw:
         if name not in known:
-            raise _unknown(of, path, name, source)
-    values: dict[str, Any] = {}
-    for item in fields(of):
-        if item.name in raw:
-            inner = (*path, item.name)
-            part = table_of(item)
-            given = raw[item.name]
-            values[item.name] = (
-                _nested(part, given, inner, source)
-                if part
-                else _key(key_of(item), given, inner, source)
-            )
-    result = of(**values)
-    for item in fields(of):
-        key = key_of(item)
-        if key and item.name in raw and not applies(key, result):
-            selector, kinds = key.only_for
-            raise source.error(
-                (*path, item.name),
-                f"belongs to {selector} = {' or '.join(kinds)},"
-                f" and this is {getattr(result, selector)}",
-            )
+            _unknown(of, path, name, values, source)
+    values = {name: value for name, value in values.items() if value is not _WRONG}
+    if len(source.problems) > before:
+        return _without_checks(of, values)
+    try:
+        result = of(**values)
+    except ParameterError as error:
+        source.add((*path, error.parameter), error.reason)
+        return of()
+    _check_kinds(result, raw, path, source)
     return result
 
 
-def applies(key: Key, holder: Any) -> bool:
-    """Whether a key belongs to the kind that its table is."""
-    return key.only_for is None or getattr(holder, key.only_for[0]) in key.only_for[1]
+_WRONG = object()
+
+
+def _without_checks(of: type, values: dict[str, Any]) -> Any:
+    """The table as far as it goes, for the checks of other tables; its own may not hold."""
+    try:
+        return of(**values)
+    except (InputError, TypeError):
+        return of()
+
+
+def _kind(of: type, item: Field, values: dict[str, Any]) -> type:
+    """The class that a key of the table names; the default one where the name is wrong."""
+    part = variant_of(item)
+    default = next(f.default for f in fields(of) if f.name == part.selector)
+    selected = values.get(part.selector, default)
+    return part.registry[default if selected is _WRONG else selected]
+
+
+def _variant(kind: type, raw: dict, path: tuple[str, ...], source: Source) -> Any:
+    """An object of the class from that class's own keys; _WRONG where it cannot be made."""
+    before = len(source.problems)
+    own = {
+        f.name: _field(f, raw[f.name], (*path, f.name), source)
+        for f in fields(kind)
+        if f.name in raw
+    }
+    if len(source.problems) == before:
+        try:
+            return kind(**own)
+        except ParameterError as error:
+            if error.parameter in raw:
+                source.add((*path, error.parameter), error.reason)
+            else:
+                source.add(path, f"needs {error.parameter}, which {error.reason}")
+    return _WRONG
+
+
+def _check_kinds(result: Any, raw: dict, path: tuple[str, ...], source: Source) -> None:
+    """Keys that belong to another kind of this very table."""
+    for item in fields(result):
+        key = key_of(item)
+        if key and item.name in raw and not applies(key, result):
+            selector, kinds = key.only_for
+            _of_another_kind((*path, item.name), selector, kinds, getattr(result, selector), source)
+
+
+def _of_another_kind(path, selector: str, kinds, this: Any, source: Source) -> None:
+    source.add(path, f"belongs to {selector} = {' or '.join(kinds)}, and this is {this}")
+
+
+def _field(item: Field, raw: Any, path: tuple[str, ...], source: Source) -> Any:
+    part = table_of(item)
+    return _nested(part, raw, path, source) if part else _key(key_of(item), raw, path, source)
 
 
 def _nested(part: Table, raw: Any, path: tuple[str, ...], source: Source) -> Any:
     if not part.many:
         return _table(part.of, raw, path, source)
     if not isinstance(raw, list):
-        raise source.error(path, f"must be written [[{'.'.join(path)}]], one for each")
+        source.add(path, f"must be written [[{'.'.join(path)}]], one for each")
+        return ()
     return tuple(_table(part.of, one, (*path, str(i)), source) for i, one in enumerate(raw))
 
 
 def _key(key: Key, raw: Any, path: tuple[str, ...], source: Source) -> Any:
     try:
-        return key.read(raw)
+        value = key.read(raw)
     except ValueError as error:
-        raise source.error(path, str(error)) from None
+        source.add(path, str(error))
+        return _WRONG
+    return _file(value, path, source) if key.is_file else value
+
+
+def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
+    """The absolute path of a file; relative ones start at the scene's folder.
+
+    One given by --set is first looked for from the current folder, as shells complete it there.
+    """
+    given = Path(name).expanduser()
+    folders = [source.path.resolve().parent]
+    if path in source.overridden:
+        folders.insert(0, Path.cwd())
+    candidates = [(folder / given).resolve() for folder in folders]
+    file = next((one for one in candidates if one.is_file()), candidates[0])
+    if not file.is_file():
+        source.add(path, f"names no file: {file}")
+        return _WRONG
+    return str(file)
 
 
 def _everywhere(of: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
     """The paths of all keys and tables below dataclass `of`."""
     found = []
-    for item in fields(of):
-        found.append((*path, item.name))
+    for name, item in every_field(of).items():
+        found.append((*path, name))
         part = table_of(item)
         if part:
-            found += _everywhere(part.of, (*path, item.name))
+            found += _everywhere(part.of, (*path, name))
     return found
 
 
-def _unknown(of: type, path: tuple[str, ...], name: str, source: Source) -> InputError:
-    """The nearest known key of the same table, or the same key where it stands in another table."""
-    near = difflib.get_close_matches(name, names(of), 1, 0.6)
+def _unknown(of: type, path: tuple[str, ...], name: str, values: dict, source: Source) -> None:
+    """A key of another kind; else the nearest known one, here or in another table."""
+    other = owners(of, name)
+    if other is not None:
+        selector, kinds = other
+        default = next(f.default for f in fields(of) if f.name == selector)
+        this = values.get(selector, default)
+        if this is not _WRONG and this not in kinds:
+            _of_another_kind((*path, name), selector, kinds, this, source)
+        return
+    known = list(every_field(of))
+    near = difflib.get_close_matches(name, known, 1, 0.6)
+    hint = f"known here: {', '.join(known)}"
     if near:
         hint = f"did you mean {'.'.join((*path, near[0]))}?"
     else:
         elsewhere = [found for found in _everywhere(Scene) if found[-1] == name]
-        hint = (
-            f"did you mean {'.'.join(elsewhere[0])}?"
-            if elsewhere
-            else f"known here: {', '.join(names(of))}"
-        )
-    dotted = ".".join((*path, name))
-    return InputError(f"{source.where((*path, name))}: unknown key {dotted}; {hint}")
-
-
-def _with_road_file(scene: Scene, source: Source) -> Scene:
-    """The road's file as an absolute path; relative ones start at the scene's folder.
-
-    One given by --set is first looked for from the current folder, as shells complete it there.
-    """
-    if scene.road is None or scene.road.kind not in ("grid", "crg"):
-        return scene
-    if scene.road.file is None:
-        raise source.error(("road",), f'of kind "{scene.road.kind}" needs file = "…"')
-    given = Path(scene.road.file).expanduser()
-    folders = [source.path.resolve().parent]
-    if ("road", "file") in source.overridden:
-        folders.insert(0, Path.cwd())
-    candidates = [(folder / given).resolve() for folder in folders]
-    file = next((one for one in candidates if one.is_file()), candidates[0])
-    if not file.is_file():
-        raise source.error(("road", "file"), f"names no file: {file}")
-    return replace(scene, road=replace(scene.road, file=str(file)))
+        if elsewhere:
+            hint = f"did you mean {'.'.join(elsewhere[0])}? {hint}"
+    source.add_as_is((*path, name), f"unknown key {shortened((*path, name))}; {hint}")

@@ -1,11 +1,10 @@
 """The resolved scene as text: every default written back, units and meaning beside each key."""
 
 import json
-from dataclasses import fields
 from typing import Any
 
-from tireroad.runs.scene.load import applies
-from tireroad.runs.scene.schema import Key, Pitch, key_of, table_of
+from tireroad.fem.parameters import Key
+from tireroad.runs.scene.schema import Pitch, applies, entries, key_of, table_of
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
@@ -38,13 +37,13 @@ def note(key: Key) -> str:
 def _lines(holder: Any, path: str) -> list[str]:
     """The keys of one table, then its tables."""
     own, below = [], []
-    for item in fields(holder):
-        value = getattr(holder, item.name)
+    for owner, item in entries(holder):
+        value = getattr(owner, item.name)
         part = table_of(item)
         inner = f"{path}.{item.name}" if path else item.name
         if part is None:
             key = key_of(item)
-            if not applies(key, holder):
+            if not applies(key, owner):
                 continue
             if value is None:
                 own.append(f"# {item.name} absent  # {note(key)}")

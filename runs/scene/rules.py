@@ -5,9 +5,10 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.cord_rules import check_cords
-from tireroad.runs.scene.schema import described
+from tireroad.fem.parameters import described
+from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tire_rules import check_cords, full_matrices
 from tireroad.runs.scene.tire_tables import Tire
 
 Where = Callable[[tuple[str, ...], str], InputError]
@@ -17,20 +18,22 @@ Where = Callable[[tuple[str, ...], str], InputError]
 LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "tire.mesh": ((), 'only section = "torus" is supported in this version'),
     "tire.section": (("torus",), 'only "torus" is supported in this version'),
-    "output.vibration": ((False,), "only false is supported in this version"),
-    "output.fields": ((False,), "only false is supported in this version"),
 }
 
 
-def refuse_later(raw: dict[str, Any], error: Where) -> None:
-    """Raise for the first value in `raw` that is of the interface but not of this version."""
+MOST_FREQUENCIES = 1_000_000
+MOST_SPEEDS = 10_000
+
+
+def refuse_later(raw: dict[str, Any], source: Source) -> None:
+    """Note the values in `raw` that are of the interface but not of this version, and take them out."""
     for dotted, (supported, message) in LATER.items():
-        path = tuple(dotted.split("."))
-        here: Any = raw
-        for part in path:
-            here = here.get(part) if isinstance(here, dict) else None
-        if here is not None and here not in supported:
-            raise error(path, f"= {described(here)}: {message}")
+        table, key = dotted.split(".")
+        here = raw.get(table)
+        value = here.get(key) if isinstance(here, dict) else None
+        if value is not None and value not in supported:
+            source.add((table, key), f"= {described(value)}: {message}")
+            del here[key]
 
 
 def free_unknowns(tire: Tire) -> int:
@@ -41,22 +44,23 @@ def free_unknowns(tire: Tire) -> int:
     return 3 * around * inner_arc * through
 
 
-def check(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Raise InputError for the first contradiction between keys or tables."""
-    _geometry(scene, error)
-    _static(scene, raw, error)
-    _rotation(scene, error)
-    _modal(scene, error)
-    if scene.contact is not None:
-        _contact(scene, error)
-    _force(scene, error)
-    _greens(scene, error)
-    if scene.road is not None:
-        _road(scene, error)
-    _time(scene, error)
+def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
+    """Note every contradiction between keys or tables, one of each rule.
+
+    A rule is left out where something is wrong within a table that it reads: what it would say
+    could be a consequence.
+    """
+    broken = source.broken()
+    for tables, rule in RULES:
+        if broken & set(tables):
+            continue
+        try:
+            rule(scene, raw, source.error)
+        except InputError as error:
+            source.problems.append(((), str(error)))
 
 
-def _geometry(scene: Scene, error: Where) -> None:
+def _geometry(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     tire = scene.tire
     if tire.thickness >= tire.minor_radius:
         raise error(
@@ -87,7 +91,10 @@ def _geometry(scene: Scene, error: Where) -> None:
                     ("tire", "region", str(number), key), f"= [{low:g}, {high:g}] must ascend"
                 )
     check_cords(tire, error)
-    free = free_unknowns(tire)
+
+
+def _modes(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    free = free_unknowns(scene.tire)
     if scene.modal.up_to is None and scene.modal.count >= free:
         raise error(
             ("modal", "count"),
@@ -101,7 +108,7 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
 
 
-def _rotation(scene: Scene, error: Where) -> None:
+def _rotation(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     rotation = scene.rotation
     if rotation is None or not any(rotation.window):
         return
@@ -114,7 +121,7 @@ def _rotation(scene: Scene, error: Where) -> None:
         )
 
 
-def _modal(scene: Scene, error: Where) -> None:
+def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     modal, static, rotation = scene.modal, scene.static, scene.rotation
     road = (static.load, static.deflection, static.road_height) != (None, None, None)
     if modal.road == "held" and not road:
@@ -141,7 +148,7 @@ def _modal(scene: Scene, error: Where) -> None:
             ("static", "steady_rolling"),
             "= false leaves out the centrifugal tension that keeps a free turning wheel upright",
         )
-    if scene.damping.mass:
+    if scene.damping and scene.damping.mass:
         raise error(
             ("damping", "mass"),
             f"= {scene.damping.mass:g} 1/s acts against a wheel that turns about a fixed axle; a free one"
@@ -155,19 +162,42 @@ def _modal(scene: Scene, error: Where) -> None:
         )
 
 
-def _force(scene: Scene, error: Where) -> None:
+def _receptance(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     receptance = scene.output.receptance
-    if receptance is not None and not scene.force:
+    if receptance is None:
+        return
+    if not scene.force:
         raise error(("output", "receptance"), "is read at driven points: add a [[force]]")
-    if receptance is not None and receptance.step > receptance.to:
+    path = "output", "receptance", "step"
+    _count(path, "frequencies", receptance.to, receptance.step, "Hz", MOST_FREQUENCIES, error)
+
+
+def _campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    campbell = scene.rotation.campbell if scene.rotation else None
+    if campbell is not None:
+        path = "rotation", "campbell", "step"
+        _count(path, "speeds", campbell.to, campbell.step, "rad/s", MOST_SPEEDS, error)
+
+
+def _count(path, what: str, to: float, step: float, unit: str, most: int, error: Where) -> None:
+    """A step into a range that makes neither none nor too many."""
+    if step > to:
+        raise error(path, f"= {step:g} {unit} must not be more than to = {to:g} {unit}")
+    if to / step > most:
         raise error(
-            ("output", "receptance", "step"),
-            f"= {receptance.step:g} Hz must not be more than to = {receptance.to:g} Hz",
+            path,
+            f"= {step:g} {unit} makes {to / step:.3g} {what} up to to = {to:g} {unit}, "
+            f"more than {most}: take a larger step",
         )
+
+
+def _force(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    receptance = scene.output.receptance
     for key in ("velocity", "acceleration"):
         if scene.contact is not None and getattr(scene.output, key):
             raise error(
-                ("output", key), "is not told in contact: leave it out, or take out [contact]"
+                ("output", key),
+                "is not available in scenes with [contact]: leave it out, or take out [contact]",
             )
     if scene.force and scene.time is None and receptance is None:
         raise error(("force",), "has nothing to drive: add [time] or output.receptance")
@@ -181,7 +211,7 @@ def _force(scene: Scene, error: Where) -> None:
             )
 
 
-def _greens(scene: Scene, error: Where) -> None:
+def _greens(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     rotation, residual = scene.rotation, scene.greens.residual
     full = rotation is not None and rotation.speed > 0 and rotation.method == "full"
     if full and residual == "attachment":
@@ -191,7 +221,9 @@ def _greens(scene: Scene, error: Where) -> None:
         )
 
 
-def _contact(scene: Scene, error: Where) -> None:
+def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    if scene.contact is None:
+        return
     static = scene.static
     if scene.road is None:
         raise error(("contact",), 'needs a road: add [road], e.g. kind = "flat"')
@@ -207,24 +239,7 @@ def _contact(scene: Scene, error: Where) -> None:
         raise error(("contact", "slip"), "needs brush_stiffness (N/m) and a rolling tire")
 
 
-def _road(scene: Scene, error: Where) -> None:
-    road = scene.road
-    if road.kind == "cleat" and road.ramp >= road.length:
-        raise error(("road", "ramp"), f"must be less than length = {road.length:g} m")
-    if road.kind == "texture" and road.cut_off >= road.roll_off:
-        raise error(("road", "cut_off"), f"must be less than roll_off = {road.roll_off:g} m")
-    if road.kind != "cobblestones":
-        return
-    for side in ("block_length", "block_width"):
-        if road.joint_width >= getattr(road, side):
-            raise error(
-                ("road", "joint_width"),
-                f"= {road.joint_width:g} m must be less than"
-                f" {side} = {getattr(road, side):g} m, the size of a block",
-            )
-
-
-def _time(scene: Scene, error: Where) -> None:
+def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     time = scene.time
     if time is None or time.step == "auto":
         return
@@ -238,3 +253,19 @@ def _time(scene: Scene, error: Where) -> None:
             ("time", "step"),
             f"= {time.step:g} s makes {time.duration / time.step:.3g} steps; at most 1e8",
         )
+
+
+RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
+    (("tire",), _geometry),
+    (("static",), _static),
+    (("tire", "modal"), _modes),
+    (("rotation",), _rotation),
+    (("modal", "static", "rotation", "contact", "damping", "greens"), _modal),
+    (("damping", "rotation", "output"), full_matrices),
+    (("contact", "road", "time", "static", "rotation"), _contact),
+    (("output", "force"), _receptance),
+    (("rotation",), _campbell),
+    (("force", "output", "contact", "time", "tire"), _force),
+    (("greens", "rotation"), _greens),
+    (("time",), _time),
+)

@@ -1,29 +1,33 @@
-"""What a key of a scene may hold: its type, unit, range and choices, and how a value is checked.
+"""The tables of a scene: dataclasses of parameters (fem.parameters), of tables, and of variants.
 
-A table of a scene is a frozen dataclass whose fields are made by `number`, `integer`, `flag`,
-`choice`, `text`, `vector`, `points`, `table` and `tables`. Those fields are the only description of the
-scene: reading, writing, `check` and the error messages all come from them.
+A table's fields are made by the functions of `fem.parameters` and by `table`, `tables`, `points`,
+`registered` and `variant`. They are the only description of the scene: reading, writing, `check`, the
+key reference and the error messages all come from them.
+
+A variant is a class found in a registry by a key of the same table, e.g. the road by `road.kind`: its
+parameters are keys of that table, and the scene holds an object of that class.
 """
 
-import math
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import Field, dataclass, field, fields
 from typing import Any
 
-
-@dataclass(frozen=True)
-class Key:
-    """One key: how to read a value, what to show of it, and which kinds of its table have it.
-
-    `only_for` holds (name of the selecting key, its values) where a key belongs to some kinds only.
-    """
-
-    read: Callable[[Any], Any]
-    unit: str
-    doc: str
-    allowed: str
-    optional: bool = False
-    only_for: tuple[str, tuple[str, ...]] | None = None
+from tireroad.fem.parameters import (
+    Key,
+    Limits,
+    Parameters,
+    choice,
+    described,
+    finite,
+    flag,
+    integer,
+    key_of,
+    number,
+    parameter,
+    text,
+    vector,
+)
+from tireroad.fem.registry import Registry
 
 
 @dataclass(frozen=True)
@@ -36,145 +40,12 @@ class Table:
     many: bool = False
 
 
-def described(value: Any) -> str:
-    """A value as the user wrote it, short enough for a message."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return f'"{value[:60]}"'
-    if isinstance(value, dict):
-        return "a table"
-    return str(value)[:60]
+@dataclass(frozen=True)
+class Variant:
+    """Parameters of the class that `registry` has under the value of the key `selector`."""
 
-
-def _finite(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"must be a number, not {described(value)}")
-    try:
-        result = float(value)
-    except OverflowError:
-        raise ValueError("is too large a number") from None
-    if not math.isfinite(result):
-        raise ValueError(f"must be a finite number, not {described(value)}")
-    return result
-
-
-def _limits(least: float | None, above: float | None, most: float | None, below: float | None):
-    """The check of a range, and the range in words."""
-    low = f"≥ {least:g}" if least is not None else f"> {above:g}" if above is not None else ""
-    high = f"≤ {most:g}" if most is not None else f"< {below:g}" if below is not None else ""
-    words = ", ".join(part for part in (low, high) if part) or "any"
-
-    def check(value: float, unit: str) -> None:
-        inside = (
-            (least is None or value >= least)
-            and (above is None or value > above)
-            and (most is None or value <= most)
-            and (below is None or value < below)
-        )
-        if not inside:
-            shown = f"{value:g} {unit}".rstrip(" -")
-            raise ValueError(f"must be {words}{f' {unit}' if unit != '-' else ''}, not {shown}")
-
-    return check, words
-
-
-def _make(key: Key, default: Any) -> Any:
-    return field(default=default, metadata={"key": key})
-
-
-def number(
-    default: float | None,
-    unit: str,
-    doc: str,
-    *,
-    least: float | None = None,
-    above: float | None = None,
-    most: float | None = None,
-    below: float | None = None,
-    word: str | None = None,
-    only_for: tuple[str, tuple[str, ...]] | None = None,
-) -> Any:
-    """A finite real number (an integer is one, a bool is not), or the one `word` where given.
-
-    A default of None makes the key optional: it may be absent.
-    """
-    check, words = _limits(least, above, most, below)
-
-    def read(value: Any) -> float | str:
-        if word is not None and value == word:
-            return word
-        if word is not None and isinstance(value, str):
-            raise ValueError(f'must be a number or "{word}", not {described(value)}')
-        result = _finite(value)
-        check(result, unit)
-        return result
-
-    allowed = f'{words} or "{word}"' if word else words
-    return _make(Key(read, unit, doc, allowed, default is None, only_for), default)
-
-
-def integer(default: int | None, doc: str, *, least: int, most: int, only_for=None) -> Any:
-    """A whole number between least and most."""
-    check, words = _limits(least, None, most, None)
-
-    def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise ValueError(f"must be a whole number, not {described(value)}")
-        check(value, "-")
-        return value
-
-    return _make(Key(read, "-", doc, words, default is None, only_for), default)
-
-
-def flag(default: bool, doc: str, *, only_for=None) -> Any:
-    """true or false."""
-
-    def read(value: Any) -> bool:
-        if not isinstance(value, bool):
-            raise ValueError(f"must be true or false, not {described(value)}")
-        return value
-
-    return _make(Key(read, "-", doc, "true, false", False, only_for), default)
-
-
-def choice(default: str | None, choices: tuple[str, ...], doc: str, *, only_for=None) -> Any:
-    """One of a few words; a default of None makes the key optional."""
-    words = ", ".join(choices)
-
-    def read(value: Any) -> str:
-        if value not in choices:
-            raise ValueError(f"must be one of {words}, not {described(value)}")
-        return value
-
-    return _make(Key(read, "-", doc, words, default is None, only_for), default)
-
-
-def text(default: str | None, doc: str, *, only_for=None) -> Any:
-    """Any text that is not empty; a default of None makes the key optional."""
-
-    def read(value: Any) -> str:
-        if not isinstance(value, str) or not value.strip() or "\0" in value:
-            raise ValueError(f"must be a text, not {described(value)}")
-        return value
-
-    return _make(Key(read, "-", doc, "text", default is None, only_for), default)
-
-
-def vector(default: tuple[float, ...], unit: str, doc: str, *, least=None, most=None) -> Any:
-    """A list of as many finite numbers as the default has."""
-    size = len(default)
-    check, words = _limits(least, None, most, None)
-
-    def read(value: Any) -> tuple[float, ...]:
-        if not isinstance(value, list | tuple) or len(value) != size:
-            raise ValueError(f"must be a list of {size} numbers, not {described(value)}")
-        result = tuple(_finite(part) for part in value)
-        for part in result:
-            check(part, unit)
-        return result
-
-    return _make(Key(read, unit, doc, f"{size} numbers, {words}", False, None), default)
+    selector: str
+    registry: Registry
 
 
 @dataclass(frozen=True)
@@ -185,23 +56,43 @@ class Pitch:
     dy: float
 
 
-def points(doc: str, *, above: float, most: float) -> Any:
+def points(doc: str, *, least: float, most: float) -> Any:
     """ "nodes", or the pitch { dx = ..., dy = ... } of a grid in m."""
-    check, words = _limits(None, above, most, None)
+    limits = Limits(least=least, most=most)
 
     def read(value: Any) -> str | Pitch:
-        if value == "nodes":
-            return "nodes"
+        if value == "nodes" or isinstance(value, Pitch):
+            return value
         if not isinstance(value, dict) or set(value) != {"dx", "dy"}:
             raise ValueError(
                 f'must be "nodes" or {{ dx = 0.002, dy = 0.002 }}, not {described(value)}'
             )
-        pitch = Pitch(_finite(value["dx"]), _finite(value["dy"]))
-        check(pitch.dx, "m")
-        check(pitch.dy, "m")
-        return pitch
+        pitch = {}
+        for name, given in value.items():
+            try:
+                pitch[name] = finite(given)
+                limits.check(pitch[name], "m")
+            except ValueError as error:
+                raise ValueError(f"{name} {error}") from None
+        return Pitch(**pitch)
 
-    return _make(Key(read, "m", doc, f'"nodes" or {{dx, dy}}, {words}', False, None), "nodes")
+    return parameter(
+        Key(read=read, unit="m", doc=doc, values=f'"nodes" or {{dx, dy}}, {limits}', limits=limits),
+        "nodes",
+    )
+
+
+def later(doc: str) -> Any:
+    """A key of the public interface that this version does not compute: false is its only value."""
+
+    def read(value: Any) -> bool:
+        if value is not False:
+            raise ValueError(
+                f"must be false, the only value supported in this version, not {described(value)}"
+            )
+        return value
+
+    return parameter(Key(read=read, doc=f"{doc}: not in this version", values="false"), False)
 
 
 def table(of: type, doc: str, *, optional: bool = False) -> Any:
@@ -217,14 +108,128 @@ def tables(of: type, doc: str) -> Any:
     return field(default=(), metadata={"table": Table(of, doc, many=True)})
 
 
-def key_of(item: Field) -> Key | None:
-    return item.metadata.get("key")
+def registered(registry: Registry, default: str, doc: str) -> Any:
+    """The name of a variant; which there are is looked up each time, as a user may register one."""
+
+    def read(value: Any) -> str:
+        if not isinstance(value, str) or value not in registry:
+            raise ValueError(f"must be one of {', '.join(registry)}, not {described(value)}")
+        return value
+
+    return parameter(Key(read=read, doc=doc, choices=registry), default)
+
+
+def variant(selector: str, registry: Registry) -> Any:
+    """The parameters of the class named by the key `selector`; all its defaults where not given."""
+    return field(default=None, metadata={"variant": Variant(selector, registry)})
+
+
+class Variants(Parameters):
+    """Base of tables with variants: puts the named class's defaults where none is given."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for item in fields(self):
+            part = variant_of(item)
+            if part is None:
+                continue
+            name = getattr(self, part.selector)
+            if getattr(self, item.name) is None:
+                object.__setattr__(self, item.name, part.registry[name]())
+            elif not isinstance(getattr(self, item.name), part.registry[name]):
+                raise TypeError(f"{item.name} is no {part.selector} = {name}")
 
 
 def table_of(item: Field) -> Table | None:
+    """The nested table of a field, None where it is none."""
     return item.metadata.get("table")
 
 
+def variant_of(item: Field) -> Variant | None:
+    """The variant of a field, None where it is none."""
+    return item.metadata.get("variant")
+
+
 def names(of: type) -> list[str]:
-    """The keys and tables that dataclass `of` has, in their order."""
-    return [item.name for item in fields(of)]
+    """The keys and tables that dataclass `of` has in every variant, in their order."""
+    return [item.name for item in fields(of) if variant_of(item) is None]
+
+
+def every_field(of: type) -> dict[str, Field]:
+    """The keys and tables that dataclass `of` has in any variant, by name."""
+    found = {}
+    for item in fields(of):
+        part = variant_of(item)
+        if part is None:
+            found[item.name] = item
+            continue
+        for kind in part.registry:
+            found = every_field(part.registry[kind]) | found
+    return found
+
+
+def owners(of: type, name: str) -> tuple[str, list[str]] | None:
+    """(selecting key, its values) of the variants that have a key; None where none has."""
+    for item in fields(of):
+        part = variant_of(item)
+        kinds = part.registry.owners(name) if part else []
+        if kinds:
+            return part.selector, kinds
+    return None
+
+
+def entries(holder: Any) -> Iterator[tuple[Any, Field]]:
+    """(object, field) of all keys and tables of a table, those of its variants in their place."""
+    for item in fields(holder):
+        if variant_of(item) is None:
+            yield holder, item
+        else:
+            yield from entries(getattr(holder, item.name))
+
+
+def walk(of: type, path: str = "") -> Iterator[tuple[str, type, Field, Key]]:
+    """(dotted name, dataclass, field, description) of every key in every variant; [] marks arrays."""
+    for item in fields(of):
+        name = f"{path}.{item.name}" if path else item.name
+        part, kinds, key = table_of(item), variant_of(item), key_of(item)
+        if part is not None:
+            yield from walk(part.of, f"{name}[]" if part.many else name)
+        elif kinds is not None:
+            for kind in kinds.registry:
+                yield from walk(kinds.registry[kind], path)
+        elif key is not None:
+            yield name, of, item, key
+
+
+def applies(key: Key, holder: Any) -> bool:
+    """Whether a key belongs to the kind that its table is."""
+    return key.only_for is None or getattr(holder, key.only_for[0]) in key.only_for[1]
+
+
+__all__ = [
+    "Pitch",
+    "Table",
+    "Variant",
+    "Variants",
+    "applies",
+    "choice",
+    "entries",
+    "every_field",
+    "flag",
+    "integer",
+    "key_of",
+    "later",
+    "names",
+    "number",
+    "owners",
+    "points",
+    "registered",
+    "table",
+    "table_of",
+    "tables",
+    "text",
+    "variant",
+    "variant_of",
+    "vector",
+    "walk",
+]

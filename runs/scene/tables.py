@@ -2,82 +2,110 @@
 
 from dataclasses import dataclass
 
+from tireroad.contact.tread.law import TREADS, TreadLaw
+from tireroad.fem.parameters import choice, flag, integer, number, text, vector
 from tireroad.runs.scene.road_tables import Road
 from tireroad.runs.scene.schema import (
     Pitch,
-    choice,
-    flag,
-    integer,
-    number,
+    Variants,
+    later,
     points,
+    registered,
     table,
     tables,
-    text,
-    vector,
+    variant,
 )
 from tireroad.runs.scene.tire_tables import Tire
 
 
 @dataclass(frozen=True)
 class Static:
-    inflation: float = number(2.0e5, "Pa", "pressure on the inner face", least=0, most=1e8)
-    load: float | None = number(None, "N", "vertical load on the road", above=0, most=1e8)
-    deflection: float | None = number(
-        None, "m", "road raised from first touch of the inflated tire", above=0, most=10
+    inflation: float = number(
+        2.0e5, "Pa", "inflation pressure on the inner face", least=0, most=1e8
     )
-    road_height: float | None = number(None, "m", "z of the road plane", least=-10, below=0)
+    load: float | None = number(
+        None, "N", "vertical load of the tire on the road", least=1e-3, most=1e8
+    )
+    deflection: float | None = number(
+        None,
+        "m",
+        "deflection from the first touch of the inflated tire, instead of load",
+        least=1e-9,
+        most=10,
+    )
+    road_height: float | None = number(
+        None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, below=0
+    )
     steady_rolling: bool = flag(
-        True, "inertia and damping of the rolling shape; false: the state at rest"
+        True, "inertia and material damping of the rolling shape; false: the state at rest"
     )
     error_estimate: bool = flag(
-        True, "how far the load is from that of finer elements, by a run on coarser ones"
+        True, "estimate of the load's discretisation error, by a solution on coarser elements"
     )
 
 
 @dataclass(frozen=True)
 class Modal:
-    count: int = integer(500, "lowest modes wanted", least=1, most=100000)
+    count: int = integer(500, "number of modes, from the lowest", least=1, most=100000)
     up_to: float | None = number(
-        None, "Hz", "all modes below it are wanted, instead of count", above=0, most=1e6
+        None, "Hz", "all modes below this frequency, instead of count", least=1e-3, most=1e6
     )
     rim: str = choice(
-        "fixed", ("fixed", "free"), "the bead faces: clamped, or one rigid body that nothing holds"
+        "fixed",
+        ("fixed", "free"),
+        "bead faces: fixed, or one massless rigid body that is free",
     )
     road: str = choice(
         "forces",
         ("forces", "held"),
-        "after the static state: its forces, or its nodes' height held",
+        "road in the modes: its forces of the static state, or its nodes held in height",
     )
 
 
 @dataclass(frozen=True)
 class Damping:
-    mass: float = number(500.0, "1/s", "γ1, times the mass", least=0, most=1e7)
-    stiffness: float = number(0.0, "s", "γ2, times the stiffness", least=0, most=1.0)
+    mass: float = number(500.0, "1/s", "Rayleigh damping γ1, times the mass", least=0, most=1e7)
+    stiffness: float = number(
+        0.0, "s", "Rayleigh damping γ2, times the stiffness", least=0, most=1.0
+    )
 
 
 @dataclass(frozen=True)
 class Campbell:
-    to: float = number(200.0, "rad/s", "highest speed", above=0, most=2000)
-    step: float = number(10.0, "rad/s", "between two speeds", above=0, most=2000)
-    branches: int = integer(20, "followed, from the lowest", least=1, most=1000)
+    to: float = number(200.0, "rad/s", "highest speed", least=1e-3, most=2000)
+    step: float = number(10.0, "rad/s", "step between two speeds", least=1e-3, most=2000)
+    branches: int = integer(20, "number of branches followed, from the lowest", least=1, most=1000)
 
 
 @dataclass(frozen=True)
 class Rotation:
-    speed: float = number(100.0, "rad/s", "of the wheel; 0: standing", least=0, most=2000)
-    inertia: str = choice("full", ("full", "doppler"), "doppler: without Coriolis, centrifugal")
-    method: str = choice("projected", ("projected", "full"), "second eigenproblem")
-    count: int = integer(40, "pairs wanted of method full", least=1, most=10000)
+    speed: float = number(
+        100.0, "rad/s", "speed of rotation of the wheel; 0: standing", least=0, most=2000
+    )
+    inertia: str = choice(
+        "full",
+        ("full", "doppler"),
+        "inertia forces of rotation: all, or without Coriolis and centrifugal forces",
+    )
+    method: str = choice(
+        "projected",
+        ("projected", "full"),
+        "eigenproblem of the rotating tire: on the modes, or on the finite elements",
+    )
+    count: int = integer(40, "number of pairs of method full", least=1, most=10000)
     window: tuple[float, float] = vector(
         (0.0, 0.0),
         "Hz",
-        "from, to: all states of method full in it; 0, 0: count",
+        "from, to: all states of method full in this band, instead of count; 0, 0: count",
         least=0,
         most=1e6,
     )
     rolling_radius: float | None = number(
-        None, "m", "effective; absent: from the static state", above=0, most=10
+        None,
+        "m",
+        "effective rolling radius: road speed over speed of rotation; absent: from the static state",
+        least=1e-3,
+        most=10,
     )
     campbell: Campbell | None = table(
         Campbell, "eigenvalues over speed, on the modes of this one static state", optional=True
@@ -89,116 +117,160 @@ class Greens:
     residual: str = choice(
         "static",
         ("none", "dirac", "static", "second-order", "attachment"),
-        "flexibility of the modes left out",
+        "residual flexibility: what stands for the modes that are left out",
     )
     dynamic: int | None = integer(
-        None, "states kept dynamic, the others follow statically; absent: all", least=1, most=200000
+        None,
+        "number of states kept dynamic, the others follow statically; absent: all",
+        least=1,
+        most=200000,
     )
     choice: str = choice(
         "participation",
         ("participation", "frequency"),
-        "of the dynamic states: in the band, or the slowest",
+        "selection of the dynamic states: by participation in the band, or lowest first",
     )
     band: float | None = number(
-        None, "Hz", "that matters; absent: up to half the highest mode", above=0, most=1e6
+        None,
+        "Hz",
+        "highest frequency of interest; absent: half the highest mode",
+        least=1e-3,
+        most=1e6,
     )
 
 
 @dataclass(frozen=True)
 class PointForce:
     angle: float = number(
-        0.0, "deg", "around the axle from the lowest point, towards +x", least=-360, most=360
+        0.0,
+        "deg",
+        "angle around the axle from the lowest point, positive towards +x",
+        least=-360,
+        most=360,
     )
     arc: float = number(
-        0.0, "deg", "along the section from the crown, towards +y", least=-175, most=175
+        0.0,
+        "deg",
+        "angle along the section from the crown, positive towards +y",
+        least=-175,
+        most=175,
     )
     spread: tuple[float, float] = vector(
-        (0.0, 0.0), "deg", "half widths (angle, arc); 0: one point", least=0, most=180
+        (0.0, 0.0),
+        "deg",
+        "half widths (angle, arc) of a uniform traction; 0, 0: one point",
+        least=0,
+        most=180,
     )
-    direction: tuple[float, float, float] = vector((0.0, 0.0, 1.0), "-", "of the force")
-    amplitude: float = number(1.0, "N", "of the force", least=-1e8, most=1e8)
-    frequency: float = number(5.0, "Hz", "0: a constant switched on at t = 0", least=0, most=1e6)
+    direction: tuple[float, float, float] = vector(
+        (0.0, 0.0, 1.0), "-", "direction of the force, of any length"
+    )
+    amplitude: float = number(1.0, "N", "amplitude of the force", least=-1e8, most=1e8)
+    frequency: float = number(
+        5.0, "Hz", "frequency of the sine; 0: a constant switched on at t = 0", least=0, most=1e6
+    )
 
 
-@dataclass(frozen=True)
-class Contact:
-    tread: str = choice(
-        "half-space", ("half-space", "layer", "winkler", "none"), "local compliance"
+@dataclass(frozen=True, kw_only=True)
+class Contact(Variants):
+    tread: str = registered(TREADS, "half-space", "local compliance of the tread")
+    law: TreadLaw = variant("tread", TREADS)
+    points: str | Pitch = points(
+        "contact points: the nodes of the mesh, or a grid of this pitch", least=1e-5, most=1
     )
-    youngs_modulus: float = number(3.4e8, "Pa", "of the half-space or layer", above=0, most=1e13)
-    poisson_ratio: float = number(0.49, "-", "of the half-space or layer", above=-1, most=0.5)
-    thickness: float = number(
-        0.010,
-        "m",
-        "of the layer on its stiff base",
-        above=0,
-        most=1,
-        only_for=("tread", ("layer",)),
-    )
-    winkler_stiffness: float = number(2.0e8, "N/m³", "of the winkler tread", above=0, most=1e15)
-    points: str | Pitch = points("contact points: the nodes, or a grid of pitch", above=0, most=1)
     brush_stiffness: float | None = number(
-        None, "N/m", "per point; absent: no horizontal forces", above=0, most=1e12
+        None,
+        "N/m",
+        "tangential stiffness of a point's bristle; absent: no horizontal forces",
+        least=1e-3,
+        most=1e12,
     )
     brush: str = choice(
-        "rolling", ("rolling", "spring"), "transported through the patch, or the thesis's spring"
+        "rolling",
+        ("rolling", "spring"),
+        "bristles that pass through the patch with the tire, or springs fixed at the points",
     )
-    friction: float | None = number(None, "-", "absent: never slips", least=0, most=10)
+    friction: float | None = number(
+        None,
+        "-",
+        "coefficient of Coulomb friction; absent: the bristles never slip",
+        least=0,
+        most=10,
+    )
     slip: tuple[float, float] = vector(
-        (0.0, 0.0), "-", "of the rolling tire: longitudinal (> 0 drives), lateral", least=-1, most=1
+        (0.0, 0.0), "-", "slip of the tire: longitudinal (> 0 drives), lateral", least=-1, most=1
     )
     solver: str = choice(
         "auto",
         ("auto", "active-set", "projected-cg", "snes-vi"),
-        "of the complementarity problem",
+        "solver of the complementarity problem of a step",
     )
     reach: float | None = number(
-        None, "m", "gap up to which points take part; absent: from the road", above=0, most=1
+        None,
+        "m",
+        "static gap up to which points take part; absent: 1.5 times the road's height and 5 mm",
+        least=1e-6,
+        most=1,
     )
 
 
 @dataclass(frozen=True)
 class Time:
-    duration: float = number(0.1, "s", "of the run", above=0, most=1e5)
+    duration: float = number(0.1, "s", "duration of the run", least=1e-7, most=1e5)
     step: float | str = number(
-        "auto", "s", "of the time integration", above=0, most=1e3, word="auto"
+        "auto", "s", "step of the time integration", least=1e-9, most=1e3, word="auto"
     )
-    scheme: str = choice("auto", ("auto", "linear", "constant", "convolution"), "force over a step")
-    checkpoint: float = number(60.0, "s", "wall-clock time between checkpoints", above=0, most=1e6)
+    scheme: str = choice(
+        "auto",
+        ("auto", "linear", "constant", "convolution"),
+        "contact force within a step; auto is linear",
+    )
+    checkpoint: float = number(
+        60.0, "s", "wall-clock time between two checkpoints", least=0.1, most=1e6
+    )
 
 
 @dataclass(frozen=True)
 class Receptance:
-    to: float = number(500.0, "Hz", "highest frequency", above=0, most=1e6)
-    step: float = number(2.0, "Hz", "between two frequencies", above=0, most=1e6)
+    to: float = number(500.0, "Hz", "highest frequency", least=1e-3, most=1e6)
+    step: float = number(2.0, "Hz", "step between two frequencies", least=1e-4, most=1e6)
     direct: int = integer(
-        0, "frequencies also solved on the full matrices, as a check", least=0, most=1000
+        0, "number of frequencies also solved on the full matrices, as a check", least=0, most=1000
     )
 
 
 @dataclass(frozen=True)
 class Output:
-    spectra: bool = flag(True, "of contact and axle force")
-    axle_force: bool = flag(True, "from momentum")
-    impulse: bool = flag(False, "Green's functions between the driven points, over [time]")
-    velocity: bool = flag(False, "of the driven points")
-    acceleration: bool = flag(False, "of the driven points")
-    vibration: bool = flag(False, "u(ω) on the whole tire")
-    fields: bool = flag(False, "XDMF of every kept step")
-    receptance: Receptance | None = table(Receptance, "of the driven points", optional=True)
+    spectra: bool = flag(True, "spectra of the contact force and the axle force")
+    axle_force: bool = flag(True, "axle force, from the momentum of the tire")
+    impulse: bool = flag(
+        False, "impulse responses (Green's functions) between the driven points, over [time]"
+    )
+    velocity: bool = flag(False, "velocity of the driven points")
+    acceleration: bool = flag(False, "acceleration of the driven points")
+    vibration: bool = later("u(ω) on the whole tire")
+    fields: bool = later("motion of the whole tire in time, as XDMF")
+    receptance: Receptance | None = table(
+        Receptance, "receptances between the driven points", optional=True
+    )
 
 
 @dataclass(frozen=True)
 class Scene:
-    name: str = text("scene", "of the result folder")
-    tire: Tire = table(Tire, "geometry and mesh")
-    static: Static = table(Static, "inflation and road of the static state")
+    name: str = text("scene", "name of the scene and its result folder")
+    tire: Tire = table(Tire, "geometry, mesh and materials of the tire")
+    static: Static = table(Static, "inflation and load of the static state")
     modal: Modal = table(Modal, "modes at the static state")
-    damping: Damping = table(Damping, "of the material")
-    rotation: Rotation | None = table(Rotation, "of the wheel", optional=True)
+    damping: Damping | None = table(
+        Damping,
+        "Rayleigh damping of the material; absent: by the loss factors of the compounds, where "
+        "there are any, else with its defaults",
+        optional=True,
+    )
+    rotation: Rotation | None = table(Rotation, "rotation of the wheel", optional=True)
     greens: Greens = table(Greens, "Green's functions")
-    force: tuple[PointForce, ...] = tables(PointForce, "prescribed point forces")
-    contact: Contact | None = table(Contact, "with the road, in time", optional=True)
+    force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")
+    contact: Contact | None = table(Contact, "contact with the road in time", optional=True)
     road: Road | None = table(Road, "the road driven over", optional=True)
-    time: Time | None = table(Time, "of the run", optional=True)
-    output: Output = table(Output, "what is kept")
+    time: Time | None = table(Time, "the run in time", optional=True)
+    output: Output = table(Output, "what is computed and kept")

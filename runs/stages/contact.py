@@ -22,7 +22,7 @@ from tireroad.fem.static.state import StaticState
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
-from tireroad.runs.process.mpi import Deferred, Stopped
+from tireroad.runs.process.signals import Deferred, Stopped
 from tireroad.runs.stages.contact_file import ContactFile, ContactHistory
 from tireroad.runs.stages.energy import describe_energy
 from tireroad.runs.stages.greens import Responses
@@ -137,12 +137,11 @@ class ContactStage(Stage[ContactHistory]):
         watch = Watch(self.job.comm, self.job.scene.time.checkpoint)
         with (
             Deferred() as deferred,
-            observe.Progress("contact", steps) as bar,
+            observe.Progress("contact", steps, begun=done) as bar,
             # A step's matrices, a megabyte, are read as fast by one core as by two; threads that wait
             # for each other in every product took ten times as long where cores are shared.
             threadpool_limits(1, "blas"),
         ):
-            bar.advance(done)
             for instant in instants:
                 full = file.add(instant, driven.reading if driven else None)
                 bar.advance()

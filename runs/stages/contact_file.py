@@ -13,11 +13,11 @@ import numpy as np
 
 from tireroad.contact.rolling import Instant
 from tireroad.contact.setup import ContactSetup
-from tireroad.fem.parallel import on_root
 from tireroad.runs.files import packed, store
 from tireroad.runs.files.checksum import seal
 from tireroad.runs.files.disk import part_of, replacing
 from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.job import Job
 
 BLOCK = 512  # steps kept in memory between two writes
@@ -71,7 +71,7 @@ class ContactFile:
         self._job, self._key, self._patch = job, key, setup.patch
         self._attributes = attributes | {
             "road": job.scene.road.kind,
-            "speed": job.turning.speed,
+            "speed": job.speed,
             "road_speed": setup.rolled.speed,
         }
         self._checkpoint = job.directory / CHECKPOINT

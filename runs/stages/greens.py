@@ -19,6 +19,7 @@ from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.responses import fill_response, read_responses
 from tireroad.runs.stages.setup import components, probes
 from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.turning import turning_of
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class GreensStage(Computed[Responses]):
         scene, setup = self.job.scene, self.setup.product
         return {
             "modes": self.rotating.key,
-            "damping": self.job.turning.damping,
+            "damping": repr(turning_of(self.job).damping),
             "greens": asdict(scene.greens),
             "forces": [asdict(force) for force in scene.force],
             "points": setup.patch.index.tolist() if setup else [],

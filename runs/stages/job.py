@@ -11,9 +11,8 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from tireroad.fem.model import TireModel
-from tireroad.fem.parallel import on_root
-from tireroad.fem.turning import Turning
 from tireroad.runs.files import store
+from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.stages.tire import make_tire
@@ -30,14 +29,10 @@ class Job:
     comm: MPI.Comm
     fresh: bool = False
 
-    @cached_property
-    def turning(self) -> Turning:
-        """How the wheel turns."""
-        damping = self.scene.damping.mass, self.scene.damping.stiffness
-        rotation = self.scene.rotation
-        if rotation is None or rotation.speed == 0:
-            return Turning(damping=damping)
-        return Turning(speed=rotation.speed, damping=damping, inertia=rotation.inertia)
+    @property
+    def speed(self) -> float:
+        """Speed of rotation, rad/s; 0 when the wheel stands."""
+        return self.scene.rotation.speed if self.scene.rotation else 0.0
 
     @cached_property
     def tire(self) -> TireModel:

@@ -10,6 +10,7 @@ import numpy as np
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.basis import ModalBasis, Projection
+from tireroad.modal.damping import Damping, StrainEnergy
 from tireroad.modal.standing import projected, solved, with_fields
 from tireroad.modal.undamped import Modes
 from tireroad.modal.waves import Labels, label
@@ -17,6 +18,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done, Shared
+from tireroad.runs.stages.turning import damping_of
 
 _NAMED = 8  # modes of a round tire shown by name
 
@@ -27,6 +29,7 @@ _UNITS = {
     "body": "1/rad",
     "body_convective": "1/rad2",
     "momentum": "kg^1/2",
+    "loss_factor": "-",
 }
 
 
@@ -56,7 +59,7 @@ class ModesStage(Computed[ModalBasis]):
         return {
             "static": self.static.key,
             "modal": asdict(self.job.scene.modal),
-            "rotating": self.job.turning.speed != 0,
+            "rotating": self.job.speed != 0,
         }
 
     def compute(self, record: Record) -> ModalBasis:
@@ -67,9 +70,10 @@ class ModesStage(Computed[ModalBasis]):
         with record.timing("eigensolver"):
             modes = solved(operators, count=wanted.count, up_to=wanted.up_to)
         with record.timing("projection"):
-            basis = projected(motions, modes, self.job.turning.speed != 0)
+            basis = projected(motions, modes, self.job.speed != 0)
             labels = _labels(motions, modes.vectors)
         _describe(record, modes)
+        record.headline["damping"] = (_damping(damping_of(self.job), basis.projection), "-")
         if labels is not None:
             _say_names(modes.frequency, labels)
         return replace(basis, labels=labels)
@@ -127,6 +131,15 @@ def _describe(record: Record, modes: Modes) -> None:
     }
 
 
+def _damping(given: Damping, projection: Projection) -> str:
+    """Which damping acts, in words."""
+    if not isinstance(given, StrainEnergy):
+        unused = "" if projection.loss_factor is None else "; the loss factors do not act"
+        return f"γ1 = {given.mass:g} 1/s, γ2 = {given.stiffness:g} s{unused}"
+    low, high = projection.loss_factor.min(), projection.loss_factor.max()
+    return f"modal strain energy, loss factors {low:.3g} to {high:.3g}"
+
+
 def _say_names(frequency: np.ndarray, labels) -> None:
     """The lowest modes of a round tire by name, each of a pair once."""
     named = zip(labels.wave, labels.section, frequency, strict=True)
@@ -151,6 +164,8 @@ def _fill(file, basis: ModalBasis, points: np.ndarray) -> None:
     m, modes, labels = len(basis.frequency), basis.modes, basis.labels
     put(file, "frequency", basis.frequency, "Hz")
     put(file, "residual", modes.residual, "-")
+    if basis.projection.loss_factor is not None:
+        put(file, "loss_factor", basis.projection.loss_factor, "-")
     put(file, "surface/points", points, "m")
     face = 3 * len(points)
     put(file, "surface/shape", basis.shape[:face].T.reshape(m, -1, 3), "kg^-1/2")

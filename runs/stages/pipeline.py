@@ -9,10 +9,8 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from tireroad.contact.roads.road import make_road
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.model import SmallMotions
-from tireroad.fem.parallel import on_root
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
 from tireroad.modal.basis import ModalBasis
@@ -23,8 +21,10 @@ from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.folder import Summary
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import peak_memory
+from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.road_check import check_road
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.greens import GreensStage, Responses
@@ -112,7 +112,7 @@ def run_scene(
     on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
     if scene.road is not None:
         # A road file that cannot be used should be told before hours of solving, not after.
-        on_root(comm, lambda: make_road(scene.road) and None)
+        on_root(comm, lambda: check_road(scene))
     reasons = skipped(scene, until)
     if petsc_options:
         observe.say(f"PETSc options: {' '.join(petsc_options)}")

@@ -13,6 +13,7 @@ from tireroad.fem.parallel import on_root
 from tireroad.greens.coupling import Wheel, wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
+from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.full_states import full_states
 from tireroad.modal.rolling import RollingModes, pencil, rolling_modes
 from tireroad.modal.rotating import StateModes, checks
@@ -20,6 +21,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done, Shared
+from tireroad.runs.stages.turning import turning_of
 
 _UNITS = {
     "eigenvalue": "1/s",
@@ -39,10 +41,14 @@ class FullMatrices(Shared[Wheel]):
 
     name: ClassVar[str] = "wheel"
     motions: Done[SmallMotions]
+    modes: Done[ModalBasis]
 
     def make(self) -> Wheel:
         """Collective."""
-        return wheel_of(self.motions.product, self.job.turning)
+        turning, projection = turning_of(self.job), None
+        if isinstance(turning.damping, StrainEnergy):
+            projection = self.modes.product.projection
+        return wheel_of(self.motions.product, turning, projection=projection)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,17 +62,17 @@ class RotatingStage(Computed[RollingModes]):
     @classmethod
     def instead(cls, job: Job, done: Mapping[str, Done]) -> Done[RollingModes] | None:
         """The wheel stands: the states follow from the modes by a closed formula."""
-        if "modes" not in done or job.turning.speed:
+        if "modes" not in done or job.speed:
             return None
         modes = done["modes"]
-        return Done(modes.key, lambda: rolling_modes(modes.product, job.turning, job.comm))
+        return Done(modes.key, lambda: rolling_modes(modes.product, turning_of(job), job.comm))
 
     def inputs(self) -> dict:
         """The modes, the damping, the speed and the inertia; how many states only where it counts."""
-        wanted, turning = self.job.scene.rotation, self.job.turning
+        wanted, turning = self.job.scene.rotation, turning_of(self.job)
         return {
             "modes": self.modes.key,
-            "damping": turning.damping,
+            "damping": repr(turning.damping),
             "speed": turning.speed,
             "inertia": turning.inertia,
             "campbell": asdict(wanted.campbell) if wanted.campbell else None,
@@ -76,14 +82,14 @@ class RotatingStage(Computed[RollingModes]):
     def compute(self, record: Record) -> RollingModes:
         """Solve on the root process, share, check. Collective."""
         job, basis = self.job, self.modes.product
-        problem = pencil(basis.projection, job.turning)
+        problem = pencil(basis.projection, turning_of(job))
         with record.timing("eigensolver"):
-            rolling = rolling_modes(basis, job.turning, job.comm)
+            rolling = rolling_modes(basis, turning_of(job), job.comm)
             figures = on_root(job.comm, lambda: checks(rolling.states, *problem))
         record.indicators |= {f"projected: {n}": (figure, "-") for n, figure in figures.items()}
         if job.scene.rotation.method == "full":
             rolling = self._full(record, rolling)
-        _describe(record, rolling, critical_speed(basis.projection, job.turning.inertia))
+        _describe(record, rolling, critical_speed(basis.projection, turning_of(job).inertia))
         if rolling.states.unstable:
             record.warnings.append(_growth(job, rolling, basis))
         return replace(rolling, campbell=self._campbell(record))
@@ -101,7 +107,7 @@ class RotatingStage(Computed[RollingModes]):
 
     def _campbell(self, record: Record) -> Campbell | None:
         """Branches of eigenvalues over speed, where the scene asks for them. Collective."""
-        wanted, turning = self.job.scene.rotation.campbell, self.job.turning
+        wanted, turning = self.job.scene.rotation.campbell, turning_of(self.job)
         if wanted is None:
             return None
         speeds = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
@@ -129,7 +135,7 @@ class RotatingStage(Computed[RollingModes]):
         if own:
             projection = replace(basis.projection, momentum=own["momentum"])
             basis = replace(basis, shape=own["shape"], projection=projection, modes=None)
-        turning = self.job.turning
+        turning = turning_of(self.job)
         return RollingModes(basis=basis, states=states, turning=turning, full=bool(own))
 
 

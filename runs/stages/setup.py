@@ -53,7 +53,7 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
 def rolling_speed(job: Job, state: StaticState) -> float:
     """Speed of the road under the tire, m/s: the wheel's by its effective rolling radius."""
     given = job.scene.rotation.rolling_radius if job.scene.rotation else None
-    return job.turning.speed * (given or state.rolling_radius())
+    return job.speed * (given or state.rolling_radius())
 
 
 def components(job: Job) -> tuple[int, ...]:

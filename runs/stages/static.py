@@ -10,7 +10,6 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.model import TireModel
-from tireroad.fem.parallel import on_root
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_error import load_error
 from tireroad.fem.static.loading import Loader
@@ -18,6 +17,7 @@ from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed
@@ -27,10 +27,12 @@ COARSE = 0.02  # estimated error of the load above which the user is warned
 
 def steady_rolling(job: Job) -> Rolling:
     """The steady rolling that the static state is computed for; at rest where the scene wants that."""
-    turning = job.turning
-    if not job.scene.static.steady_rolling or turning.speed == 0:
+    scene = job.scene
+    if not scene.static.steady_rolling or job.speed == 0:
         return AT_REST
-    return Rolling(turning.speed, *turning.damping, turning.inertia)
+    # By strain energy there is no damping before there are modes: the shape has inertia alone.
+    damping = (scene.damping.mass, scene.damping.stiffness) if scene.damping else (0.0, 0.0)
+    return Rolling(job.speed, *damping, scene.rotation.inertia)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +82,7 @@ class StaticStage(Computed[StaticState]):
         raise ConvergenceError(f"{error} The last state that converged is in {last}.") from None
 
     def _warn_at_rest(self, record: Record) -> None:
-        if self.job.turning.speed and not self.job.scene.static.steady_rolling:
+        if self.job.speed and not self.job.scene.static.steady_rolling:
             record.warnings.append(
                 "the tire rolls on its state at rest (static.steady_rolling = false): centrifugal and "
                 "damping forces of the rolling shape are left out of it"

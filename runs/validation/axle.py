@@ -150,7 +150,7 @@ def _free_rim(tires: Tires) -> Iterator[Found]:
     """Modes of the same static state with its rim let go."""
     loads, motions = tires.probes.loads, tires.motions
     free = SmallMotions(motions.tire, motions.static, rim="free")
-    wheel, modes = wheel_of(free, tires.job.turning), solved(free.operators, count=max(COUNTS))
+    wheel, modes = wheel_of(free, tires.wheel.turning), solved(free.operators, count=max(COUNTS))
     for count in COUNTS:
         began = time.perf_counter()
         transfer = wheel.axle(modes.first(count), loads, FREQUENCY)

@@ -10,8 +10,8 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.roads.flat import Flat
-from tireroad.contact.roads.obstacle import Obstacle
+from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.kinds.obstacle import Cleat, Step
 from tireroad.contact.rolling import Drive, roll
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.friction import Friction
@@ -147,9 +147,9 @@ def cases() -> Iterator[Case]:
         yield Case(f"tread of 1e{power} N/m3", tread=tread, drive=waves)
     for damping in (0.0, 10.0, 1e3, 1e5):
         yield Case(f"damping {damping:g} 1/s", Strip(speed=20.0, damping=damping), drive=waves)
-    spike = Obstacle(0.3, 0.010, 0.002, 0.001, 0.0)
+    spike = Cleat(height=0.010, length=0.002, ramp=0.001).make()
     yield Case("spike of 10 mm, 2 mm long", drive=Drive(spike.height, lambda t: 0.0, 20.0))
-    step = Obstacle(0.3, 0.010, np.inf, 0.0, 0.0)
+    step = Step(height=0.010, ramp=0.0).make()
     yield Case("step of 10 mm", drive=Drive(step.height, lambda t: 0.0, 20.0))
     yield Case("road falls away for 20 ms and comes back", drive=Drive(
         Flat().height, lambda t: -0.1 if 0.01 < t < 0.03 else 0.0, 20.0))  # fmt: skip

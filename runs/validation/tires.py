@@ -10,16 +10,19 @@ from pathlib import Path
 from mpi4py import MPI
 
 from tireroad.fem.transient.linear import FullTire
+from tireroad.fem.transient.modal_damping import ModalDamping
 from tireroad.fem.transient.nonlinear import NonlinearTire
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
+from tireroad.modal.damping import StrainEnergy, beyond, rates
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.runs.stages.setup import probes, scene_setup
+from tireroad.runs.stages.turning import turning_of
 from tireroad.runs.validation.histories import Trial
 
 # Of the full finite elements' scheme. Axle force on a cleat at steps of 1e-4 s with 0, 0.5 and 0.8: 5.4, 2.8
@@ -108,7 +111,7 @@ class Tires:
         """The response of the lowest modes, as the program's own stages make it."""
         if count not in self._rolling:
             few = self.modes.first(count)
-            self._rolling[count] = rolling_modes(few, self.job.turning, self.job.comm)
+            self._rolling[count] = rolling_modes(few, turning_of(self.job), self.job.comm)
         rolling, points = self._rolling[count], self.probes
         given = points.outputs, points.loads, residual
         return make_response(lambda: self.wheel, rolling, *given, lambda: rolling.basis)
@@ -117,16 +120,28 @@ class Tires:
         """All degrees of freedom between the same points; step; set-up in s."""
         wheel, points = self.wheel, self.probes
         began = time.perf_counter()
-        given = wheel.operators, wheel.rotation, wheel.speed, wheel.damping, step
+        damping, modal = self._damping()
+        given = wheel.operators, wheel.rotation, wheel.speed, damping, step
         given = *given, points.outputs, points.loads, wheel.inertia
-        tire = FullTire(*given, spectral_radius=radius)
+        tire = FullTire(*given, spectral_radius=radius, modal=modal)
         return tire, step, time.perf_counter() - began
+
+    def _damping(self) -> tuple[tuple[float, float], ModalDamping | None]:
+        """What damps the full matrices uniformly, and mode by mode beside it. Collective."""
+        wheel, modes = self.wheel, self.modes
+        if not isinstance(wheel.damping, StrainEnergy):
+            return wheel.damping, None
+        uniform = beyond(wheel.damping, modes.projection)
+        excess = rates(wheel.damping, modes.projection) - uniform.mass
+        turning = (wheel.rotation.body, wheel.speed) if wheel.speed else ()
+        return uniform, ModalDamping(wheel.operators, modes.modes.vectors, excess, *turning)
 
     def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
         """The full finite elements with large motions, standing; step; set-up in s."""
         points, static = self.probes, self.run.static
         began = time.perf_counter()
-        given = self.motions.operators, static.inflation, self.job.turning.damping, step
+        damping, modal = self._damping()
+        given = self.motions.operators, static.inflation, damping, step
         given = *given, points.outputs, points.loads
-        tire = NonlinearTire(*given, spectral_radius=RADIUS)
+        tire = NonlinearTire(*given, spectral_radius=RADIUS, modal=modal)
         return tire, step, time.perf_counter() - began

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from tireroad.contact.driven import Driven
 from tireroad.contact.patch import Patch
-from tireroad.contact.roads.flat import Flat
+from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.rolling import Drive, roll
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.greens.recursion import Recursion

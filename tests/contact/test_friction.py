@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.roads.flat import Flat
+from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.rolling import Drive, Loop, roll
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.friction import Friction

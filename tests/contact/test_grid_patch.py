@@ -8,6 +8,7 @@ from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.fem.tire.mesh import Torus, field_lattice
@@ -73,7 +74,7 @@ def test_settled_state_keeps_the_load(tread, pitch: float) -> None:
     nodal = force[patch.index]
     p = len(patch.index)
     flexibility = 1e-5 * (np.eye(p) + 0.5)
-    spec = Contact(youngs_modulus=5e6, points=Pitch(pitch, pitch))
+    spec = Contact(law=HalfSpace(youngs_modulus=5e6), points=Pitch(pitch, pitch))
     settled, rise = settle(patch, step_solver(spec, patch, flexibility), flexibility, nodal)
     assert settled.force.sum() == pytest.approx(500.0, rel=1e-7)
     assert settled.force.min() >= 0 and settled.gap.min() >= 0

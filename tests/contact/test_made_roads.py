@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from tireroad.contact.roads.iso8608 import CHUNK, CLASSES, Iso8608
-from tireroad.contact.roads.obstacle import Obstacle
+from tireroad.contact.roads.kinds.iso8608 import CHUNK, CLASSES, Iso8608
+from tireroad.contact.roads.kinds.obstacle import Cleat
+from tireroad.contact.roads.kinds.texture import Texture
 from tireroad.contact.roads.road import make_road
-from tireroad.contact.roads.texture import Texture
 from tireroad.fem.errors import InputError
 
 
@@ -26,13 +26,13 @@ def test_cleat_and_step() -> None:
     assert np.array_equal(step.road.height(edge + np.array([-1e-9, 1e-9]), side), [0.0, -0.02])
     assert (step.road.highest(0, 1, 0, 1), step.road.lowest(0, 1, 0, 1)) == (0.0, -0.02)
     with pytest.raises(InputError, match="ramp"):
-        Obstacle(0.3, 0.01, 0.02, 0.03, 0.0)
+        Cleat(length=0.02, ramp=0.03)
 
 
 def test_iso8608_has_its_class_spectrum() -> None:
     pitch = 0.05
     x = pitch * np.arange(200_000)
-    z = Iso8608("C", 0.5, seed=3).height(x, 0 * x)
+    z = Iso8608(road_class="C", shortest_wave=0.5, seed=3).make().height(x, 0 * x)
     frequency, density = signal.welch(z, 1 / pitch, nperseg=8192)
     for low, high in ((0.02, 0.1), (0.1, 0.5), (0.5, 1.8)):
         band = (frequency >= low) & (frequency < high)
@@ -42,7 +42,7 @@ def test_iso8608_has_its_class_spectrum() -> None:
 
 
 def test_iso8608_is_smooth_repeatable_and_bounded() -> None:
-    road, again = Iso8608("D", 0.1, 5), Iso8608("D", 0.1, 5)
+    road, again = (Iso8608(road_class="D", seed=5).make() for _ in range(2))
     seam = CHUNK * 0.1 / 16
     x = seam + np.linspace(-1e-3, 1e-3, 2001)
     z = road.height(x, 0 * x)
@@ -50,7 +50,7 @@ def test_iso8608_is_smooth_repeatable_and_bounded() -> None:
     exact = np.cos(np.outer(x, road._wavenumber) + road._phase) @ road._amplitude
     assert np.abs(z - exact).max() < 1e-2 * road._amplitude[-1]
     assert np.array_equal(z, again.height(x, 0 * x))
-    assert not np.allclose(z, Iso8608("D", 0.1, 6).height(x, 0 * x))
+    assert not np.allclose(z, Iso8608(road_class="D", seed=6).make().height(x, 0 * x))
     far = np.linspace(3.0, 40.0, 50001)
     heights = road.height(far, 0 * far)
     assert road.lowest(3, 40, 0, 0) <= heights.min() and heights.max() <= road.highest(3, 40, 0, 0)
@@ -58,7 +58,7 @@ def test_iso8608_is_smooth_repeatable_and_bounded() -> None:
 
 
 def test_ten_kilometres_take_no_more_memory_than_ten_metres() -> None:
-    road = Iso8608("C", 0.5)
+    road = Iso8608(road_class="C", shortest_wave=0.5).make()
     patch = np.linspace(-0.1, 0.1, 50)
     road.height(patch, patch)
     tracemalloc.start()
@@ -70,7 +70,7 @@ def test_ten_kilometres_take_no_more_memory_than_ten_metres() -> None:
 
 
 def test_texture_spectrum() -> None:
-    road = Texture(2e-4, 0.8, 0.02, 0.002, seed=1)
+    road = Texture(roll_off=0.02, cut_off=0.002, seed=1).make()
     tile = road._tile(3)
     assert tile.std() == pytest.approx(2e-4)
     assert abs(tile.mean()) < 1e-12
@@ -87,11 +87,11 @@ def test_texture_spectrum() -> None:
     assert slope == pytest.approx(-3.6, abs=0.15)
     assert power[(q > 510) | ((q < 49) & (q > 0))].max() < 1e-20 * power.max()
     with pytest.raises(InputError, match="cut_off"):
-        Texture(1e-4, 0.8, 1.0, 1e-5)
+        Texture(roll_off=1.0, cut_off=1e-5)
 
 
 def test_texture_is_continuous_repeatable_and_bounded() -> None:
-    road, again = Texture(2e-4, 0.8, 0.02, 0.002, 1), Texture(2e-4, 0.8, 0.02, 0.002, 1)
+    road, again = (Texture(roll_off=0.02, cut_off=0.002, seed=1).make() for _ in range(2))
     half = 0.16
     for seam in (-half, 0.0, 3 * half):
         x = seam + np.array([-1e-9, 1e-9])
@@ -104,7 +104,7 @@ def test_texture_is_continuous_repeatable_and_bounded() -> None:
 
 def test_texture_never_repeats_and_keeps_its_variance_along() -> None:
     """The mean over many places of z(x) z(x + lag) is near 0 at every lag, that of z z near rms²."""
-    road = Texture(2e-4, 0.8, 0.02, 0.002, seed=1)
+    road = Texture(roll_off=0.02, cut_off=0.002, seed=1).make()
     pitch = 0.0005
     x = pitch * np.arange(round(8.0 / pitch))
     rows = np.array([road.height(x, np.full(len(x), 0.029 * k)) for k in range(20)]) / 2e-4

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.kinds.sine import Sine
 from tireroad.contact.roads.motion import make_motion
 from tireroad.contact.roads.road import make_road
-from tireroad.contact.roads.sine import Sine
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
 from tireroad.fem.errors import InputError
 
@@ -78,8 +78,10 @@ def make_road_of(grid: Grid, datum: str) -> PreparedRoad:
 
 
 def test_run_in_starts_flat_and_is_twice_differentiable() -> None:
-    road = RoadUnderTire(Sine(1e-3, 0.8, 0.5 * np.pi), run_in=0.4).prepare(*STRIP)
-    bare = Sine(1e-3, 0.8, 0.5 * np.pi)
+    road = RoadUnderTire(Sine(amplitude=1e-3, wavelength=0.8, phase=90.0), run_in=0.4).prepare(
+        *STRIP
+    )
+    bare = Sine(amplitude=1e-3, wavelength=0.8, phase=90.0)
     under_the_tire = np.linspace(-0.3, 0.1, 40)
     assert np.all(road.height(under_the_tire, np.zeros(40)) == 0.0)
     beyond = np.linspace(0.5, 5.0, 100)
@@ -136,8 +138,13 @@ def test_factory_takes_a_scenes_object_and_ignores_what_is_none() -> None:
     ("keys", "message"),
     [
         ({"kind": "gravel"}, "gravel"),
-        ({"kind": "sine", "amplitude": 1e-3}, "wavelength is missing"),
-        ({"kind": "sine", "amplitude": 1e-3, "wavelength": 0.0}, "wavelength 0 m"),
+        ({"kind": "sine", "wavelenght": 1e-3}, "wavelenght does not belong to kind = sine"),
+        ({"kind": "grid"}, "file is missing"),
+        ({}, "kind is missing"),
+        (
+            {"kind": "sine", "amplitude": 1e-3, "wavelength": 0.0},
+            "wavelength must be ≥ 0.001, .* not 0 m",
+        ),
         ({"kind": "sine", "amplitude": -1.0, "wavelength": 1.0}, "amplitude"),
         ({**STONES, "datum": "median"}, "median"),
         ({"kind": "flat", "run_in": -1.0}, "run_in"),
@@ -164,8 +171,8 @@ def test_motions() -> None:
     assert sine(0.0) == 0.0 and sine(0.005) == pytest.approx(1e-3)
     for keys, message in (
         ({"kind": "hop"}, "hop"),
-        ({"kind": "ramp", "amplitude": 1.0}, "duration"),
-        ({"kind": "sine", "amplitude": 1.0}, "frequency"),
+        ({"kind": "ramp", "duration": 0.0}, "duration must be"),
+        ({"kind": "sine", "frequency": 0.0}, "frequency must be"),
     ):
         with pytest.raises(InputError, match=message):
             make_motion(**keys)

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.energy import Work
-from tireroad.contact.roads.flat import Flat
+from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.rolling import Drive, _roads, roll
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance

@@ -49,7 +49,7 @@ def test_check_is_light_and_shows_all(launch, scene: Path) -> None:
     done = launch("-c", LIGHT, "check", scene, "--set", "static.load=400")
     assert done.returncode == 0, done.stderr
     lines = [line.split() for line in done.stdout.splitlines()]
-    assert ["load", "400.0", "N", ">", "0,", "≤", "1e+08", "vertical", "load"] in [
+    assert ["load", "400.0", "N", "≥", "0.001,", "≤", "1e+08", "vertical", "load"] in [
         line[:9] for line in lines
     ]
     assert ["rotating", "runs"] in lines

@@ -3,14 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.roads.kind import EndlessRoad, road_kind
+
 Array = NDArray[np.float64]
 
 
-class Flat:
+@road_kind("flat", "flat: all heights are 0")
+class Flat(EndlessRoad):
     """Heights 0 m, endless."""
-
-    extent = ((-np.inf, np.inf), (-np.inf, np.inf))
-    spacing = np.inf
 
     def height(self, x: Array, y: Array) -> Array:
         """Zeros in the shape of x, m."""
@@ -23,7 +23,3 @@ class Flat:
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """0 m."""
         return 0.0
-
-    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Flat":
-        """Nothing to prepare."""
-        return self

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.fem.errors import InputError
+from tireroad.contact.roads.kind import RoadKind, road_kind
+from tireroad.fem.parameters import ParameterError, integer, number
 
 Array = NDArray[np.float64]
 
@@ -14,11 +15,47 @@ MOST_PLACES = 16_000_000  # of a tile: 128 MB
 KEPT = 3  # blended halves of tiles in memory
 
 
-class Texture:
+@road_kind("texture", "an isotropic, self-affine random texture")
+class Texture(RoadKind):
+    """Spectrum and seed of a texture."""
+
+    rms: float = number(2e-4, "m", "root mean square of the heights", least=0, most=1)
+    hurst: float = number(
+        0.8, "-", "Hurst exponent H: the spectrum falls as wave number^(-2-2H)", least=0, most=1
+    )
+    roll_off: float = number(0.05, "m", "longest wavelength", least=1e-4, most=100)
+    cut_off: float = number(0.004, "m", "shortest wavelength", least=1e-5, most=100)
+    seed: int = integer(0, "seed of the random generator", least=0, most=2**31 - 1)
+
+    def validate(self) -> None:
+        """A band of waves, and a tile that fits into memory."""
+        if self.cut_off >= self.roll_off:
+            raise ParameterError(
+                "cut_off", f"= {self.cut_off:g} m must be less than roll_off = {self.roll_off:g} m"
+            )
+        pitch, (along, across) = self.cut_off / PER_WAVE, self.tile
+        if along * across > MOST_PLACES * pitch**2:
+            raise ParameterError(
+                "cut_off",
+                f"= {self.cut_off:g} m makes {along * across / pitch**2:.3g} places of a tile of "
+                f"{along:.3g} m x {across:.3g} m (roll_off = {self.roll_off:g} m), more than "
+                f"{MOST_PLACES:g}: take a longer cut_off or a shorter roll_off",
+            )
+
+    @property
+    def tile(self) -> tuple[float, float]:
+        """Length and width of a tile, m."""
+        return WAVES[0] * self.roll_off, max(WAVES[1] * self.roll_off, WIDEST)
+
+    def make(self) -> "Tiles":
+        """The road of this texture."""
+        return Tiles(self)
+
+
+class Tiles:
     """Isotropic, Gaussian: power of a wave vector q ~ |q|^(-2 - 2H) between the two cut-offs.
 
-    `rms` (m) of the heights, `hurst` exponent H in [0, 1], waves from `longest` down to `shortest`
-    (m), `seed`. Along the road independent tiles T_k, each 16 longest waves long and drawn when it
+    H the Hurst exponent, cut-offs the longest and the shortest wave. Along the road independent tiles T_k, each 16 longest waves long and drawn when it
     is reached, overlap by half:
 
         z = cos(pi s/2) T_k(x) + sin(pi s/2) T_{k+1}(x),   s in [0, 1] over the overlap,
@@ -31,36 +68,21 @@ class Texture:
 
     extent = ((-np.inf, np.inf), (-np.inf, np.inf))
 
-    def __init__(
-        self, rms: float, hurst: float, longest: float, shortest: float, seed: int = 0
-    ) -> None:
-        if not 0.0 < shortest < longest:
-            raise InputError(
-                f"road: cut_off {shortest:g} m must be positive and below roll_off {longest:g} m"
-            )
-        if not (rms >= 0.0 and 0.0 <= hurst <= 1.0):
-            raise InputError(f"road: rms {rms:g} m must not be negative, hurst {hurst:g} in [0, 1]")
-        self._pitch = shortest / PER_WAVE
-        self._shape = self._sizes(longest, shortest)
-        self._rms, self._seed, self._filter = rms, seed, None
-        self._hurst, self._longest, self._shortest = hurst, longest, shortest
+    def __init__(self, spec: Texture) -> None:
+        self._spec = spec
+        self._pitch = spec.cut_off / PER_WAVE
+        self._shape = self._places()
+        self._filter: Array | None = None
         self._halves: dict[int, Array] = {}
-        self.spacing = 0.5 * shortest
+        self.spacing = 0.5 * spec.cut_off
 
-    def _sizes(self, longest: float, shortest: float) -> tuple[int, int]:
+    def _places(self) -> tuple[int, int]:
         """Places of a tile along and across, the first even."""
         from scipy import fft
 
-        lengths = WAVES[0] * longest, max(WAVES[1] * longest, WIDEST)
-        if lengths[0] * lengths[1] > MOST_PLACES * self._pitch**2:
-            raise InputError(
-                f"road: a tile of the texture, {lengths[0]:.3g} m x {lengths[1]:.3g} m every "
-                f"{self._pitch:.3g} m, would have more than {MOST_PLACES:g} places; raise cut_off "
-                f"({shortest:g} m) or lower roll_off ({longest:g} m)"
-            )
         half, across = (
             fft.next_fast_len(int(np.ceil(length / self._pitch / part)), real=True)
-            for length, part in zip(lengths, (2, 1), strict=True)
+            for length, part in zip(self._spec.tile, (2, 1), strict=True)
         )
         return 2 * half, across
 
@@ -68,16 +90,17 @@ class Texture:
         """The independent tile `number`: filtered white noise of exactly the expected variance."""
         from scipy import fft
 
+        spec = self._spec
         if self._filter is None:
             qx = fft.fftfreq(self._shape[0], self._pitch)[:, None]
             qy = fft.rfftfreq(self._shape[1], self._pitch)[None, :]
             q = np.hypot(qx, qy)
-            kept = (q >= 1.0 / self._longest) & (q <= 1.0 / self._shortest)
-            self._filter = np.where(kept, np.where(kept, q, 1.0) ** (-1.0 - self._hurst), 0.0)
+            kept = (q >= 1.0 / spec.roll_off) & (q <= 1.0 / spec.cut_off)
+            self._filter = np.where(kept, np.where(kept, q, 1.0) ** (-1.0 - spec.hurst), 0.0)
         # Python's remainder: tiles before the beginning have numbers of their own.
-        rng = np.random.default_rng([self._seed, number % 2**64])
+        rng = np.random.default_rng([spec.seed, number % 2**64])
         z = fft.irfft2(fft.rfft2(rng.standard_normal(self._shape)) * self._filter, self._shape)
-        return z * (self._rms / z.std())
+        return z * (spec.rms / z.std())
 
     def _half(self, number: int) -> Array:
         """Heights over the overlap of tiles number - 1 and number, with the row that follows."""
@@ -127,9 +150,9 @@ class Texture:
 
     def _strip(self, x0: float, x1: float):
         length = self._shape[0] // 2 * self._pitch
-        for number in range(int(np.floor(x0 / length)), int(np.floor(x1 / length)) + 1):
-            yield self._half(number)
+        for index in range(int(np.floor(x0 / length)), int(np.floor(x1 / length)) + 1):
+            yield self._half(index)
 
-    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Texture":
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Tiles":
         """Nothing to prepare."""
         return self

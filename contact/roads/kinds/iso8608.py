@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.fem.errors import InputError
+from tireroad.contact.roads.kind import Levelled, road_kind
+from tireroad.fem.parameters import choice, integer, number
 
 Array = NDArray[np.float64]
 
@@ -16,26 +17,38 @@ CHUNK = 4096  # places of the profile made at once: 13 MB of waves at work, 33 k
 KEPT = 8  # chunks
 
 
-class Iso8608:
+@road_kind("iso8608", "a random profile of an ISO 8608 class, the same over the whole width")
+class Iso8608(Levelled):
+    """Class, shortest wave and seed of a profile."""
+
+    road_class: str = choice("C", tuple(CLASSES), "road class of ISO 8608, A smooth to H rough")
+    shortest_wave: float = number(
+        0.1, "m", "shortest wavelength of the profile", least=1e-3, most=50
+    )
+    seed: int = integer(0, "seed of the random generator", least=0, most=2**31 - 1)
+
+    def make(self) -> "Profile":
+        """The road of this class."""
+        return Profile(self)
+
+
+class Profile:
     """z(x) = sum_k sqrt(2 G_d(n_k) dn_k) cos(2 pi n_k x + phase_k), n_k evenly spaced in log n.
 
-    `road_class` A to H, `shortest` wavelength in m, phases by `seed`. The profile is made in chunks
+    G_d by road class, n up to 1/shortest wave, phases by seed. The profile is made in chunks
     with 16 places a shortest wave and read by cubic interpolation (Catmull-Rom, error below 1 % of
     that wave's amplitude): the memory does not grow with the way.
     """
 
     extent = ((-np.inf, np.inf), (-np.inf, np.inf))
 
-    def __init__(self, road_class: str, shortest: float = 0.1, seed: int = 0) -> None:
-        if road_class not in CLASSES:
-            raise InputError(f"road: road_class {road_class!r} is none of {', '.join(CLASSES)}")
-        if not 0.0 < shortest < LONGEST:
-            raise InputError(f"road: shortest wave {shortest:g} m must be below {LONGEST:.0f} m")
+    def __init__(self, spec: Iso8608) -> None:
+        shortest = spec.shortest_wave
         edges = np.geomspace(1.0 / LONGEST, 1.0 / shortest, WAVES + 1)
         n = np.sqrt(edges[1:] * edges[:-1])
-        density = CLASSES[road_class] * (n / REFERENCE) ** -2
+        density = CLASSES[spec.road_class] * (n / REFERENCE) ** -2
         self._amplitude = np.sqrt(2.0 * density * np.diff(edges))
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(spec.seed)
         # Each wave anywhere in its band: evenly spaced ones would repeat.
         n = edges[:-1] * (edges[1:] / edges[:-1]) ** rng.random(WAVES)
         self._wavenumber = 2.0 * np.pi * n
@@ -88,13 +101,13 @@ class Iso8608:
     def _extreme(self, x0: float, x1: float, pick) -> float:
         first, last = (int(np.floor(v / self._pitch / CHUNK)) for v in (x0, x1))
         worst = -np.inf
-        for number in range(first, last + 1):
-            place = np.clip(np.array([x0, x1]) / self._pitch - number * CHUNK, 0, CHUNK)
-            part = self._chunk(number)[int(place[0]) : int(place[1]) + 4]
+        for index in range(first, last + 1):
+            place = np.clip(np.array([x0, x1]) / self._pitch - index * CHUNK, 0, CHUNK)
+            part = self._chunk(index)[int(place[0]) : int(place[1]) + 4]
             worst = max(worst, float(pick(part)))
         # z'' p^2/8 of all waves at once bounds what a place between two can add.
         return worst + float(self._amplitude @ self._wavenumber**2) * self._pitch**2 / 8.0
 
-    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Iso8608":
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Profile":
         """Nothing to prepare: chunks are made as they come."""
         return self

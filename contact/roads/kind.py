@@ -1,0 +1,88 @@
+"""What a kind of road is: parameters, and the heights that follow from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.roads.under_tire import Road
+from tireroad.fem.parameters import Parameters, choice, number
+from tireroad.fem.registry import Registry
+
+Array = NDArray[np.float64]
+Extent = tuple[tuple[float, float], tuple[float, float]]
+
+
+class RoadKind(Parameters):
+    """Base of all kinds: the parameters of a road, and `make`, which gives its heights.
+
+    Where these need tables or files, `make` returns another object; else the kind is its own road.
+    """
+
+    owner = "road"
+
+    def make(self) -> Road:
+        """The road of these parameters. InputError where files do not serve."""
+        raise NotImplementedError
+
+
+class EndlessRoad(RoadKind):
+    """Base of roads without ends, whose heights follow from a formula.
+
+    A derived class gives `height(x, y)` (m), its bounds `highest` and `lowest` (m) in a strip x0,
+    x1, y0, y1 (m), and `spacing` (m), the shortest length it resolves: half the shortest wave.
+    """
+
+    extent: Extent = ((-np.inf, np.inf), (-np.inf, np.inf))
+
+    @property
+    def spacing(self) -> float:
+        """Half the shortest wave, m: 16 steps of an automatic time step resolve it."""
+        return np.inf
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Heights (m) at x along and y to the left (m), in their shape."""
+        raise NotImplementedError
+
+    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Upper bound of the heights in a strip, m."""
+        raise NotImplementedError
+
+    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Lower bound of the heights in a strip, m."""
+        raise NotImplementedError
+
+    def make(self) -> Road:
+        """The kind itself."""
+        return self
+
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> EndlessRoad:
+        """Nothing to prepare."""
+        return self
+
+
+@dataclass(frozen=True, kw_only=True)
+class Levelled(RoadKind):
+    """Base of roads whose heights have a mean, or waves longer than matter, that are taken out.
+
+    A derived class is decorated like any other; these two parameters come with it.
+    """
+
+    datum: str = choice(
+        "mean",
+        ("mean", "zero"),
+        "height of the road laid on the static road plane: the mean of the strip, or its own zero",
+    )
+    longest_wave: float | None = number(
+        None,
+        "m",
+        "longer waves are filtered out, as the axle follows them; absent: all stay",
+        least=1e-3,
+        most=1e4,
+    )
+
+
+ROADS: Registry[RoadKind] = Registry("road.kind", "tireroad.contact.roads.kinds", RoadKind)
+road_kind = ROADS.register

@@ -1,0 +1,72 @@
+"""Measured roads, in files: a regular grid, or OpenCRG."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.grid_file import UNITS, read_grid
+from tireroad.contact.roads.kind import Levelled, road_kind
+from tireroad.contact.roads.opencrg import read_opencrg
+from tireroad.fem.parameters import ParameterError, choice, filename
+
+_LAYOUT = (
+    "measured road: .npz or .h5 with arrays x, y, z; or .csv, either a line of a corner and all y, then "
+    "lines of an x and its heights, or a line x,y,z, then a point a line"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured(Levelled):
+    """What roads in files have in common; `file` is required, `what` is what it holds."""
+
+    what = "the road"
+
+    holes: str = choice(
+        "refuse",
+        ("refuse", "fill"),
+        "heights missing in the strip driven over: an error, or filled",
+    )
+    end: str = choice(
+        "refuse", ("refuse", "mirror"), "a run longer than the road: an error, or the road mirrored"
+    )
+
+    def validate(self) -> None:
+        """A file is named."""
+        if self.file is None:
+            raise ParameterError("file", f'is missing: name a file for {self.what} by file = "…"')
+
+
+@road_kind("grid", "heights measured on a regular grid, in a .npz, .csv or .h5 file")
+class GridFile(Measured):
+    """Heights on a grid, bilinear in between."""
+
+    what = "the measured grid"
+    file: str | None = filename(_LAYOUT)
+    length_unit: str | None = choice(
+        None, tuple(UNITS), "unit of x and y in the file; absent: m, if the sizes can be metres"
+    )
+    height_unit: str | None = choice(
+        None, tuple(UNITS), "unit of the heights in the file; absent: as length_unit"
+    )
+
+    def make(self) -> Grid:
+        """The road in the file; InputError where it cannot be used."""
+        return read_grid(
+            Path(self.file),
+            holes=self.holes,
+            end=self.end,
+            length_unit=self.length_unit,
+            height_unit=self.height_unit,
+        )
+
+
+@road_kind("crg", "a measured road in an OpenCRG file")
+class CrgFile(Measured):
+    """Heights along the reference line of an OpenCRG file."""
+
+    what = "the OpenCRG road (crg)"
+    file: str | None = filename("measured road in OpenCRG 1.1, text or binary")
+
+    def make(self) -> Grid:
+        """The road in the file; InputError where it cannot be used."""
+        return read_opencrg(Path(self.file), holes=self.holes, end=self.end)

@@ -1,0 +1,98 @@
+"""A step, or a cleat, on an otherwise flat road, square to the rolling direction or at an angle."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.roads.kind import RoadKind, road_kind
+from tireroad.fem.parameters import ParameterError, number
+
+Array = NDArray[np.float64]
+
+SHARP = 1e-3  # m: what counts as the length of an edge without a ramp
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edges(RoadKind):
+    """What steps and cleats have in common."""
+
+    position: float = number(
+        0.3, "m", "x of the foot of the first edge on the road's middle line", least=-1e6, most=1e6
+    )
+    height: float = number(0.01, "m", "height of the step or cleat, positive up", least=-1, most=1)
+    ramp: float = number(
+        0.005, "m", "length over which an edge rises; 0: a jump", least=0, most=1e4
+    )
+    angle: float = number(0.0, "deg", "angle between the edge and the axle", least=-89, most=89)
+
+
+@road_kind("step", "a step up or down")
+class Step(Edges):
+    """A single edge."""
+
+    def make(self) -> "Obstacle":
+        """The road with the step."""
+        return Obstacle(self, math.inf)
+
+
+@road_kind("cleat", "a bar across the road, or a groove")
+class Cleat(Edges):
+    """Two edges."""
+
+    length: float = number(0.02, "m", "length from foot to foot", least=1e-4, most=1e4)
+
+    def validate(self) -> None:
+        """The second edge begins after the first has ended."""
+        if self.ramp >= self.length:
+            raise ParameterError(
+                "ramp", f"= {self.ramp:g} m must be less than length = {self.length:g} m"
+            )
+
+    def make(self) -> "Obstacle":
+        """The road with the cleat."""
+        return Obstacle(self, self.length)
+
+
+class Obstacle:
+    """z = h [s(xi/r) - s((xi - l)/r)], xi = x cos(a) + y sin(a) - position; a step ends nowhere.
+
+    h, r, a, position: `height`, `ramp`, `angle` and `position` of `edges`; l = `length` (m) from edge
+    to edge, infinite for a step; s(t) = 3 t^2 - 2 t^3 on [0, 1], constant outside (a jump for r = 0).
+    """
+
+    extent = ((-np.inf, np.inf), (-np.inf, np.inf))
+
+    def __init__(self, edges: Edges, length: float) -> None:
+        self._position, self._height = edges.position, edges.height
+        self._length, self._ramp = length, edges.ramp
+        angle = math.radians(edges.angle)
+        self._along, self._across = math.cos(angle), math.sin(angle)
+        self.spacing = max(edges.ramp, SHARP)
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Heights (m) at x, y (m) of equal shape."""
+        xi = np.asarray(x) * self._along + np.asarray(y) * self._across - self._position
+        rise = self._edge(xi)
+        if np.isfinite(self._length):
+            rise = rise - self._edge(xi - self._length)
+        return self._height * rise
+
+    def _edge(self, xi: Array) -> Array:
+        if self._ramp == 0.0:
+            return (xi > 0.0).astype(float)
+        s = np.clip(xi / self._ramp, 0.0, 1.0)
+        return s * s * (3.0 - 2.0 * s)
+
+    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Bound of any strip, m."""
+        return max(self._height, 0.0)
+
+    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Bound of any strip, m."""
+        return min(self._height, 0.0)
+
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Obstacle":
+        """Nothing to prepare."""
+        return self

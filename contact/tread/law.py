@@ -1,0 +1,43 @@
+"""What a tread law is: parameters, and the compliance between contact points that follows from them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.tread.compliance import Influence, check_points, dense_compliance
+from tireroad.fem.parameters import Parameters
+from tireroad.fem.registry import Registry
+
+Array = NDArray[np.float64]
+
+
+class TreadLaw(Parameters):
+    """Base of linear tread laws: the approach of a point to the carcass under a force on another.
+
+    A derived class gives `influence`; `matrix` where the law is not one of distances alone. A law
+    without compliance of its own (`compliant` False) serves on the nodes of the mesh only: a grid of
+    points, of which there are more than nodes, would leave the contact problem singular.
+    """
+
+    owner = "contact"
+    compliant = True
+
+    def influence(self, farthest: float) -> Influence:
+        """Approach (m/N) at offsets x, y (m) from rectangles of half sizes a, b (m) under a unit force.
+
+        `farthest` (m): the largest distance that will be asked for.
+        """
+        raise NotImplementedError
+
+    def matrix(self, points: Array, half_sizes: Array, farthest: float) -> Array:
+        """Compliance (c, c) m/N between points (c, 2) m with rectangles of half sizes (c, 2) m.
+
+        InputError where it is not positive definite.
+        """
+        check_points(points, half_sizes)
+        return dense_compliance(points, half_sizes, self.influence(farthest))
+
+
+TREADS: Registry[TreadLaw] = Registry("contact.tread", "tireroad.contact.tread.laws", TreadLaw)
+tread_law = TREADS.register

@@ -1,0 +1,48 @@
+"""Elastic treads: a half-space, or a layer bonded to a stiff base, which the belt is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.tread.compliance import Influence, half_space_influence
+from tireroad.contact.tread.law import TreadLaw, tread_law
+from tireroad.fem.parameters import number
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Elastic(TreadLaw):
+    """An isotropic rubber."""
+
+    youngs_modulus: float = number(
+        3.4e8, "Pa", "Young's modulus of the tread; rubber has about 1e7", least=1e3, most=1e13
+    )
+    poisson_ratio: float = number(0.49, "-", "Poisson's ratio of the tread", least=-0.99, most=0.5)
+
+
+@tread_law("half-space", "elastic half-space (Love's formula)")
+class HalfSpace(Elastic):
+    """Uniform pressure on the rectangle of each point."""
+
+    def influence(self, farthest: float) -> Influence:
+        """Love's formula; see contact.tread.compliance."""
+
+        def of(x: Array, y: Array, a: Array, b: Array) -> Array:
+            return half_space_influence(x, y, a, b, self.youngs_modulus, self.poisson_ratio)
+
+        return of
+
+
+@tread_law("layer", "elastic layer bonded to a stiff base")
+class Layer(Elastic):
+    """A tread of finite thickness on the belt."""
+
+    thickness: float = number(0.010, "m", "thickness of the layer", least=1e-4, most=1)
+
+    def influence(self, farthest: float) -> Influence:
+        """The half-space's with a correction; see contact.tread.layer."""
+        from tireroad.contact.tread.layer import LayerInfluence  # scipy, not needed to read a scene
+
+        return LayerInfluence(self.youngs_modulus, self.poisson_ratio, self.thickness, farthest)

@@ -1,0 +1,283 @@
+"""Parameters of models: type, unit, range and meaning of each, and how a value is checked.
+
+A field of a dataclass is made by `number`, `integer`, `flag`, `choice`, `text`, `filename` or `vector`;
+those fields are the only description of a parameter: the constructor, the scene file, `check`, the
+key reference and the error messages all follow from them. Like `fem.errors` this is a common root
+that all packages may import; it needs nothing but the standard library.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import Field, dataclass, field, fields
+from typing import Any
+
+from tireroad.fem.errors import InputError
+
+OnlyFor = tuple[str, tuple[str, ...]] | None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """A range: `least` and `most` belong to it, `above` and `below` do not; None: no limit."""
+
+    least: float | None = None
+    above: float | None = None
+    most: float | None = None
+    below: float | None = None
+
+    def __str__(self) -> str:
+        low = f"≥ {self.least:g}" if self.least is not None else ""
+        low = f"> {self.above:g}" if self.above is not None else low
+        high = f"≤ {self.most:g}" if self.most is not None else ""
+        high = f"< {self.below:g}" if self.below is not None else high
+        return ", ".join(part for part in (low, high) if part) or "any"
+
+    def check(self, value: float, unit: str) -> None:
+        """ValueError for a value outside the range."""
+        inside = (
+            (self.least is None or value >= self.least)
+            and (self.above is None or value > self.above)
+            and (self.most is None or value <= self.most)
+            and (self.below is None or value < self.below)
+        )
+        if not inside:
+            shown = f"{value:g} {unit}".rstrip(" -")
+            raise ValueError(f"must be {self}{f' {unit}' if unit != '-' else ''}, not {shown}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Key:
+    """One parameter: how to read a value, its unit, meaning and allowed values.
+
+    `values` says in words what is allowed, unless `choices` are the words that are; `limits` is the
+    range of numbers; `optional`: it may be absent (None); `is_file`: the name of a file; `only_for`: (name of the selecting key, its values)
+    where a parameter belongs to some kinds of its table only.
+    """
+
+    read: Callable[[Any], Any]
+    unit: str = "-"
+    doc: str
+    values: str = ""
+    optional: bool = False
+    only_for: OnlyFor = None
+    limits: Limits | None = None
+    choices: Iterable[str] = ()
+    is_file: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """What values it may have."""
+        return self.values or ", ".join(self.choices)
+
+
+class ParameterError(InputError):
+    """A parameter that does not fit; `parameter` is its name, `reason` what is wrong."""
+
+    def __init__(self, parameter: str, reason: str, owner: str = "") -> None:
+        super().__init__(f"{owner}: {parameter} {reason}" if owner else f"{parameter} {reason}")
+        self.parameter, self.reason = parameter, reason
+
+
+class Parameters:
+    """Base of dataclasses made of parameters: the constructor checks every value, then `validate`.
+
+    Raises ParameterError (an InputError) that names the parameter, its value and its range.
+    """
+
+    owner = ""  # whose parameters they are, for messages
+
+    def __post_init__(self) -> None:
+        for item, key in keys(type(self)):
+            value = getattr(self, item.name)
+            if value is None and key.optional:
+                continue
+            try:
+                object.__setattr__(self, item.name, key.read(value))
+            except ValueError as error:
+                raise ParameterError(item.name, str(error), self.owner) from None
+        try:
+            self.validate()
+        except ParameterError as error:
+            raise ParameterError(error.parameter, error.reason, self.owner) from None
+
+    def validate(self) -> None:
+        """Conditions between parameters: raise ParameterError(name, reason) where one is not met."""
+
+
+def key_of(item: Field) -> Key | None:
+    """The description of a field, None where it is no parameter."""
+    return item.metadata.get("key")
+
+
+def keys(of: type) -> Iterator[tuple[Field, Key]]:
+    """The parameters of a dataclass in their order."""
+    for item in fields(of):
+        key = key_of(item)
+        if key is not None:
+            yield item, key
+
+
+def described(value: Any) -> str:
+    """A value as the user wrote it, short enough for a message."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value[:60]}"'
+    if isinstance(value, dict):
+        return "a table"
+    return str(value)[:60]
+
+
+def finite(value: Any) -> float:
+    """A finite real number as a float (an integer is one, a bool is not), else ValueError."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"must be a number, not {described(value)}")
+    try:
+        result = float(value)
+    except OverflowError:
+        raise ValueError("is too large a number") from None
+    if not math.isfinite(result):
+        raise ValueError(f"must be a finite number, not {described(value)}")
+    return result
+
+
+def parameter(key: Key, default: Any) -> Any:
+    """A dataclass field of the given description."""
+    return field(default=default, metadata={"key": key})
+
+
+def number(
+    default: float | str | None,
+    unit: str,
+    doc: str,
+    *,
+    least: float | None = None,
+    above: float | None = None,
+    most: float | None = None,
+    below: float | None = None,
+    word: str | None = None,
+    only_for: OnlyFor = None,
+) -> Any:
+    """A finite real number, or the one `word` where given. A default of None makes it optional."""
+    limits = Limits(least, above, most, below)
+
+    def read(value: Any) -> float | str:
+        if word is not None and value == word:
+            return word
+        if word is not None and isinstance(value, str):
+            raise ValueError(f'must be a number or "{word}", not {described(value)}')
+        result = finite(value)
+        limits.check(result, unit)
+        return result
+
+    allowed = f'{limits} or "{word}"' if word else str(limits)
+    optional = default is None
+    key = Key(
+        read=read,
+        unit=unit,
+        doc=doc,
+        values=allowed,
+        optional=optional,
+        only_for=only_for,
+        limits=limits,
+    )
+    return parameter(key, default)
+
+
+def integer(
+    default: int | None, doc: str, *, least: int, most: int, only_for: OnlyFor = None
+) -> Any:
+    """A whole number between least and most. A default of None makes it optional."""
+    limits = Limits(least=least, most=most)
+
+    def read(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise ValueError(f"must be a whole number, not {described(value)}")
+        limits.check(value, "-")
+        return value
+
+    optional = default is None
+    key = Key(
+        read=read,
+        doc=doc,
+        values=str(limits),
+        optional=optional,
+        only_for=only_for,
+        limits=limits,
+    )
+    return parameter(key, default)
+
+
+def flag(default: bool, doc: str, *, only_for: OnlyFor = None) -> Any:
+    """true or false."""
+
+    def read(value: Any) -> bool:
+        if not isinstance(value, bool):
+            raise ValueError(f"must be true or false, not {described(value)}")
+        return value
+
+    return parameter(Key(read=read, doc=doc, values="true, false", only_for=only_for), default)
+
+
+def choice(
+    default: str | None, choices: tuple[str, ...], doc: str, *, only_for: OnlyFor = None
+) -> Any:
+    """One of a few words. A default of None makes it optional."""
+    words = ", ".join(choices)
+
+    def read(value: Any) -> str:
+        if not isinstance(value, str) or value not in choices:
+            raise ValueError(f"must be one of {words}, not {described(value)}")
+        return value
+
+    optional = default is None
+    key = Key(read=read, doc=doc, optional=optional, only_for=only_for, choices=choices)
+    return parameter(key, default)
+
+
+def text(default: str | None, doc: str, *, only_for: OnlyFor = None) -> Any:
+    """Any text that is not empty. A default of None makes it optional."""
+    optional = default is None
+    key = Key(read=_read_text, doc=doc, values="text", optional=optional, only_for=only_for)
+    return parameter(key, default)
+
+
+def filename(doc: str) -> Any:
+    """The name of a file; in a scene relative to it. Absent by default."""
+    return parameter(
+        Key(read=_read_file, doc=doc, values="file", optional=True, is_file=True), None
+    )
+
+
+def _read_text(value: Any) -> str:
+    if not isinstance(value, str) or not value.strip() or "\0" in value:
+        raise ValueError(f"must be a text, not {described(value)}")
+    return value
+
+
+def _read_file(value: Any) -> str:
+    return _read_text(str(value) if hasattr(value, "__fspath__") else value)
+
+
+def vector(
+    default: tuple[float, ...],
+    unit: str,
+    doc: str,
+    *,
+    least: float | None = None,
+    most: float | None = None,
+) -> Any:
+    """A list of as many finite numbers as the default has."""
+    size = len(default)
+    limits = Limits(least=least, most=most)
+
+    def read(value: Any) -> tuple[float, ...]:
+        if not isinstance(value, list | tuple) or len(value) != size:
+            raise ValueError(f"must be a list of {size} numbers, not {described(value)}")
+        result = tuple(finite(part) for part in value)
+        for part in result:
+            limits.check(part, unit)
+        return result
+
+    allowed = f"{size} numbers, {limits}"
+    return parameter(Key(read=read, unit=unit, doc=doc, values=allowed, limits=limits), default)

@@ -1,0 +1,78 @@
+"""Named variants of a model: a new one is a class with a decorator, in a file of its own or a user's."""
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Generic, TypeVar, dataclass_transform
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import Parameters
+
+T = TypeVar("T", bound=Parameters)
+
+
+class Registry(Generic[T]):
+    """Classes of parameters by name.
+
+    `label` is what they are ("road kind"), `package` the one whose modules are imported when a name
+    is first asked for, so that a file put there is found.
+    """
+
+    def __init__(self, label: str, package: str, base: type[T]) -> None:
+        self.label = label
+        self._package, self._base = package, base
+        self._classes: dict[str, type[T]] = {}
+        self._docs: dict[str, str] = {}
+        self._found = False
+
+    @dataclass_transform(frozen_default=True, kw_only_default=True)
+    def register(self, name: str, doc: str) -> Callable[[type], type]:
+        """Decorator: makes a frozen dataclass of keywords out of a class, known by `name`.
+
+        `doc` is its line in the key reference. InputError for a name that is taken or a class that
+        is not derived from the registry's base.
+        """
+
+        def decorate(of: type) -> type:
+            if not issubclass(of, self._base):
+                raise InputError(f"{self.label} {name}: must be derived from {self._base.__name__}")
+            made = dataclass(frozen=True, kw_only=True)(of)
+            known = self._classes.get(name)
+            if known is not None and known.__qualname__ != made.__qualname__:
+                raise InputError(f"{self.label} {name}: is taken by {known.__qualname__}")
+            self._classes[name], self._docs[name] = made, doc
+            return made
+
+        return decorate
+
+    def _find(self) -> None:
+        if self._found:
+            return
+        self._found = True
+        package = importlib.import_module(self._package)
+        for module in pkgutil.iter_modules(package.__path__):
+            importlib.import_module(f"{self._package}.{module.name}")
+
+    def __getitem__(self, name: str) -> type[T]:
+        self._find()
+        if name not in self._classes:
+            raise InputError(f"{self.label} {name!r} is unknown: take one of {', '.join(self)}")
+        return self._classes[name]
+
+    def __contains__(self, name: object) -> bool:
+        self._find()
+        return name in self._classes
+
+    def __iter__(self) -> Iterator[str]:
+        self._find()
+        return iter(sorted(self._classes))
+
+    def doc(self, name: str) -> str:
+        """What the variant is, in a line."""
+        self._find()
+        return self._docs[name]
+
+    def owners(self, parameter: str) -> list[str]:
+        """The variants that have a parameter of that name."""
+        return [name for name in self if parameter in self[name].__dataclass_fields__]

@@ -1,0 +1,66 @@
+"""What `check` says of a road before anything is solved, and that `run` says the same."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.scene.check import explain
+from tireroad.runs.scene.load import load
+
+SCENE = """
+[static]
+load = 500
+[rotation]
+speed = 50
+[contact]
+[road]
+kind = "grid"
+file = "road.npz"
+[time]
+duration = 0.1
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    x, y = np.arange(0.0, 2.0, 0.01), np.arange(-0.2, 0.2, 0.01)
+    np.savez(tmp_path / "road.npz", x=x, y=y, z=np.zeros((len(x), len(y))))
+    (tmp_path / "scene.toml").write_text(SCENE)
+    return tmp_path / "scene.toml"
+
+
+def test_a_road_that_is_long_enough_passes(scene: Path) -> None:
+    """0.1 s at 50 rad/s of 0.32 m: 1.6 m."""
+    assert "contact" in explain(load(scene))
+    explain(load(scene, ["time.duration=1.0", "road.end=mirror"]))
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("time.duration=0.2", ["2.72 m", "1.99 m", "mirror"]),
+        ("road.start=1.0", ["from 1 to", "[road] start"]),
+        ("road.lateral=0.5", ["road.lateral = 0.5 m", "-0.2 to 0.19"]),
+    ],
+)
+def test_a_road_that_is_too_short_is_said_by_check(scene: Path, override, words) -> None:
+    with pytest.raises(InputError) as caught:
+        explain(load(scene, [override]))
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_check_opens_the_file(scene: Path) -> None:
+    (scene.parent / "road.npz").write_bytes(b"PK\x03\x04 no more")
+    with pytest.raises(InputError, match=r"road\.npz: cannot be read"):
+        explain(load(scene))
+
+
+def test_run_refuses_before_it_solves(scene: Path, launch, tmp_path: Path) -> None:
+    done = launch(
+        *("-m", "runs", "run", scene, "--out", tmp_path / "out", "--set", "time.duration=0.2")
+    )
+    assert done.returncode == 2 and "2.72 m" in done.stderr
+    assert not list((tmp_path / "out").glob("*.h5"))
