@@ -16,6 +16,7 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described
 from tireroad.runs.scene import locate, rules
+from tireroad.runs.scene.cavity_table import filled
 from tireroad.runs.scene.schema import (
     Table,
     applies,
@@ -55,7 +56,7 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-    scene = _with_damping(scene)
+    scene = filled(_with_damping(scene))
     rules.check(scene, raw, source)
     source.refuse()
     return scene

@@ -6,6 +6,7 @@ from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import described
+from tireroad.runs.scene.cavity_table import check_cavity
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_rules import check_cords, full_matrices
@@ -267,5 +268,6 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("rotation",), _campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),
+    (("tire", "rotation", "modal", "greens"), check_cavity),
     (("time",), _time),
 )

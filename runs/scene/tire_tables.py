@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from tireroad.runs.scene.cavity_table import Cavity
 from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
 
 LINEAR = ("model", ("linear", "neo-hookean"))
@@ -131,3 +132,6 @@ class Tire:
         Region, "a part of the section of another material; elements whose middle it holds"
     )
     cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")
+    cavity: Cavity | None = table(
+        Cavity, "the air inside; absent: none in a torus, else this table's defaults", optional=True
+    )

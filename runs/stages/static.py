@@ -42,10 +42,10 @@ class StaticStage(Computed[StaticState]):
     name: ClassVar[str] = "static"
 
     def inputs(self) -> dict:
-        """The tire, the static loads, and the rolling terms where they take part."""
+        """The tire without its air, the static loads, and the rolling terms where they take part."""
         scene = self.job.scene
         return {
-            "tire": asdict(scene.tire),
+            "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
             "static": asdict(scene.static),
             "rolling": asdict(steady_rolling(self.job)),
         }
