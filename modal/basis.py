@@ -55,6 +55,15 @@ class Projection:
             cut["air"] = replace(self.air, coupling=self.air.coupling[:, :count])
         return replace(self, **cut)
 
+    def among(self, wanted: np.ndarray) -> Projection:
+        """On the coordinates where `wanted` (m,) is true, before any air joins them."""
+        small = {
+            name: None if value is None else value[np.ix_(*[wanted] * value.ndim)]
+            for name, value in vars(self).items()
+            if name not in ("momentum", "air")
+        }
+        return Projection(momentum=self.momentum[:, wanted], **small)
+
 
 @dataclass(frozen=True, kw_only=True)
 class ModalBasis:

@@ -172,10 +172,9 @@ def _growth(job: Job, rolling: RollingModes, basis: ModalBasis) -> str:
             return turning.speed  # only the full problem has it
         return onset(basis.projection, *given, turning.speed)
 
-    fastest = max([*states.eigenvalue.real, *np.linalg.eigvals(states.block).real])
     return (
         f"{states.unstable} motion(s) of the rolling tire grow by themselves, the fastest at "
-        f"{fastest:.3g} 1/s; on this static state that begins at {on_root(job.comm, first):.4g} "
+        f"{states.fastest_growth:.3g} 1/s; on this static state that begins at {on_root(job.comm, first):.4g} "
         "rad/s: the wheel turns beyond its critical speed"
     )
 
