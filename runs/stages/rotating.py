@@ -102,10 +102,11 @@ class RotatingStage(Computed[RollingModes]):
         wheel, wanted = self.wheel.product, self.job.scene.rotation
         with record.timing("full eigensolver"):
             matrices = wheel.rotating_damping, wheel.rotating_stiffness
-            found, figures = full_states(
+            found, figures, warnings = full_states(
                 wheel.operators, matrices, projected, count=wanted.count, window=wanted.window
             )
         record.indicators |= figures
+        record.warnings += warnings
         return found
 
     def _campbell(self, record: Record) -> Campbell | None:
