@@ -3,6 +3,7 @@
 from typing import Any
 
 from tireroad.runs.scene.estimate import memory
+from tireroad.runs.scene.own_tire import described
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.road_check import check_road
@@ -59,6 +60,7 @@ def explain(scene: Scene) -> str:
         lines.append(
             f"  {stage:10}" + (f"skipped: {reasons[stage]}" if stage in reasons else "runs")
         )
+    lines += ["", *described(scene.tire)] if scene.tire.section == "file" else []
     parts = memory(scene)
     lines += ["", f"estimated memory  {sum(parts.values()) / 1e9:.2f} GB in one process"]
     lines += [f"  {name:26}{size / 1e9:6.2f} GB" for name, size in parts.items()]

@@ -16,6 +16,7 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described
 from tireroad.runs.scene import locate, rules
+from tireroad.runs.scene.own_tire import with_own_section
 from tireroad.runs.scene.schema import (
     Table,
     applies,
@@ -55,6 +56,8 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
+    if "tire" not in source.broken():
+        scene = with_own_section(scene, source)
     rules.check(scene, raw, source)
     source.refuse()
     return scene

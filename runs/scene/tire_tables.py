@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
+from tireroad.fem.parameters import filename, flag, texts
 from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
 
+TORUS, FILE = ("section", ("torus",)), ("section", ("file",))
 LINEAR = ("model", ("linear", "neo-hookean"))
 
 
@@ -63,6 +65,7 @@ class Material:
 
 @dataclass(frozen=True)
 class Region:
+    name: str | None = text(None, "region of a file that this is; a torus has none of its own")
     arc: tuple[float, float] = vector(
         (0.0, 45.0), "deg", "from, to, measured from the crown", least=0, most=175
     )
@@ -70,7 +73,9 @@ class Region:
     depth: tuple[float, float] = vector(
         (0.0, 1.0), "-", "from, to, through the wall; 0: inner face", least=0, most=1
     )
-    material: Material = table(Material, "what the region is made of")
+    material: Material | None = table(
+        Material, "what the region is made of; absent: as the file says", optional=True
+    )
 
 
 @dataclass(frozen=True)
@@ -101,16 +106,26 @@ class Cords:
 # 0.1 and 0.8 % of fewer unknowns in about the same time, but the fewest nodes under the road.
 @dataclass(frozen=True)
 class Tire:
-    section: str = choice("torus", ("torus",), "shape of the section")
-    outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10)
-    minor_radius: float = number(0.10, "m", "of the section, to its outer face", above=0, most=10)
-    thickness: float = number(0.012, "m", "of the wall", above=0, most=5)
-    half_angle: float = number(120.0, "deg", "arc from the crown to each bead", least=10, most=175)
+    section: str = choice("torus", ("torus", "file"), "shape of the section")
+    outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10, only_for=TORUS)
+    minor_radius: float = number(
+        0.10, "m", "of the section, to its outer face", above=0, most=10, only_for=TORUS
+    )
+    thickness: float = number(0.012, "m", "of the wall", above=0, most=5, only_for=TORUS)
+    half_angle: float = number(
+        120.0, "deg", "arc from the crown to each bead", least=10, most=175, only_for=TORUS
+    )
     segments: int = integer(100, "elements around", least=8, most=4000)
-    elements_arc: int = integer(16, "elements from bead to bead", least=2, most=1000)
-    elements_thickness: int = integer(1, "elements through the wall", least=1, most=20)
+    elements_arc: int = integer(
+        16, "elements from bead to bead", least=2, most=1000, only_for=TORUS
+    )
+    elements_thickness: int = integer(
+        1, "elements through the wall", least=1, most=20, only_for=TORUS
+    )
     order: int = integer(2, "of the elements", least=1, most=3)
-    grading: str = choice("bead", ("bead", "uniform"), "of the elements along the arc")
+    grading: str = choice(
+        "bead", ("bead", "uniform"), "of the elements along the arc", only_for=TORUS
+    )
     footprint_size: float = number(
         1.0, "-", "length of elements at the footprint, relative to ungraded", least=0.05, most=1
     )
@@ -118,4 +133,17 @@ class Tire:
     region: tuple[Region, ...] = tables(
         Region, "a part of the section of another material; elements whose middle it holds"
     )
+    file: str | None = filename(
+        "Abaqus deck (.inp) or Gmsh mesh (.msh) of the section or the body", only_for=FILE
+    )
+    inner: str | None = text(None, "surface or node set of the face under pressure", only_for=FILE)
+    tread: str | None = text(None, "surface or node set that can touch the road", only_for=FILE)
+    rim: tuple[str, ...] = texts("surfaces or node sets that the wheel holds", only_for=FILE)
+    length_unit: str = choice(
+        "m",
+        ("m", "mm", "in"),
+        "of the file; mm: with N, MPa and tonnes; in: lbf, psi",
+        only_for=FILE,
+    )
+    mirror: bool = flag(False, "the file has half the section, which ends on z = 0", only_for=FILE)
     cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")

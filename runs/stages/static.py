@@ -12,6 +12,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.scene.own_tire import fingerprint
 from tireroad.runs.stages.session import Session
 
 COARSE = 0.02  # estimated error of the load above which the user is warned
@@ -22,6 +23,7 @@ def inputs(session: Session) -> dict:
     scene = session.scene
     return {
         "tire": asdict(scene.tire),
+        "file": fingerprint(scene.tire),
         "static": asdict(scene.static),
         "rolling": session.rolling,
     }

@@ -10,12 +10,15 @@ from mpi4py import MPI
 from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
+from tireroad.runs.scene.own_tire import own_ring
 from tireroad.runs.scene.tire_tables import Material as MaterialTable
 from tireroad.runs.scene.tire_tables import Region, Tire
 
 
 def make_section(tire: Tire) -> Ring:
     """The shape of the tire and its elements."""
+    if tire.section == "file":
+        return own_ring(tire)
     names = {f.name for f in fields(Torus)} - {"half_angle"}
     given = {name: getattr(tire, name) for name in names}
     torus = Torus(half_angle=np.radians(tire.half_angle), **given)
@@ -45,12 +48,19 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
     from tireroad.fem.tire.body import Body
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
+    from tireroad.runs.stages.own_tire import own_cords, own_materials
+
+    if tire.section == "file":
+        return Body(comm, section, own_materials(tire), cords=own_cords(tire))
 
     def rubber(table: MaterialTable) -> Material:
         return Material(**vars(table))
 
     names = [_patch(i, region).name for i, region in enumerate(tire.region)]
-    materials = {name: rubber(r.material) for name, r in zip(names, tire.region, strict=True)}
+    materials = {
+        name: rubber(r.material or MaterialTable())
+        for name, r in zip(names, tire.region, strict=True)
+    }
     placed = {"depth", "arc", "angle"}
     cords = [
         Cords(
