@@ -23,9 +23,10 @@ from tireroad.fem.matrices.receptance import receptance
 from tireroad.greens.attachment import with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
-from tireroad.greens.second_order import Moments, second_order
+from tireroad.greens.second_order import Moments, modal_moments, second_order
 from tireroad.modal.air import Air
 from tireroad.modal.basis import Projection, project
+from tireroad.modal.damping import Damping, tail_loss
 from tireroad.modal.rotating import StateModes, matrices, rotating, standing
 from tireroad.modal.undamped import Modes
 from tireroad.runs.process.mpi import on_root
@@ -53,17 +54,39 @@ class Basis:
         return seen if air is None else np.pad(seen, ((0, 0), (0, air.count)))
 
 
+def regained(
+    basis: Basis, true: tuple, uniform: tuple, outputs: sparse.csr_matrix, loads: sparse.csr_matrix
+) -> Moments:
+    """What the modes answer under their true damping beyond what they do under that of the full matrices.
+
+    The moments of full matrices with it are those of matrices that damp the modes truly, and the rest
+    uniformly. `true`, `uniform`: D~ and K~ of both.
+    """
+    own = basis.projection.squares > 0
+    flexible = np.pad(own, (0, len(true[0]) - len(own)), constant_values=True)  # the air's are
+    seen = basis.seen(outputs)[:, flexible], basis.seen(loads)[:, flexible]
+    carried = basis.projection.carried[:, flexible]
+    parts = [
+        [matrix[np.ix_(flexible, flexible)] for matrix in pencil] for pencil in (true, uniform)
+    ]
+    one, other = (modal_moments(*pencil, *seen, carried) for pencil in parts)
+    return one.minus(other)
+
+
 @dataclass(frozen=True)
 class Wheel:
-    """The full matrices of a tire that turns: `damping` is (gamma1 1/s, gamma2 s), `rotation` None
-    when it stands. Its properties are collective at their first use."""
+    """The full matrices of a tire that turns: `damping` as in modal.damping, `rotation` None when it
+    stands. `beyond` (gamma1 1/s, gamma2 s) damps what no mode has, and the full matrices: given where
+    `damping` is by strain energy, of which there are no full matrices. Its properties are collective
+    at their first use."""
 
     operators: Operators
     rotation: Rotation | None
     speed: float
-    damping: tuple[float, float]
+    damping: Damping
     inertia: str
     air: Column | None = None
+    beyond: tuple[float, float] | None = None
 
     @cached_property
     def rotating_stiffness(self):
@@ -77,7 +100,24 @@ class Wheel:
 
     @property
     def _given(self) -> tuple:
-        return self.operators, self.rotation, self.speed, self.damping, self.inertia
+        return self.operators, self.rotation, self.speed, self._uniform, self.inertia
+
+    @property
+    def _uniform(self) -> tuple[float, float]:
+        """What the full matrices are damped by."""
+        return self.damping if self.beyond is None else self.beyond
+
+    @cached_property
+    def _loss(self):
+        """sum_r eta_r K_r, or None."""
+        return self.operators.loss_stiffness()
+
+    def _pencils(self, projection: Projection) -> tuple:
+        """The projected pencil as the modes are damped, and as the full matrices are."""
+        return tuple(
+            matrices(projection, self.speed, damping, self.inertia)
+            for damping in (self.damping, self._uniform)
+        )
 
     def respond(
         self,
@@ -95,6 +135,9 @@ class Wheel:
             flexibility = compliance(
                 self.operators, self.rotating_stiffness, outputs, loads, self.air
             )
+            if self.beyond is not None:
+                pencils = self._pencils(basis.projection)
+                flexibility += regained(basis, *pencils, outputs, loads).compliance
             return replace(basis.couple(outputs, loads, flexibility), pulse=option == "dirac")
         r, k = outputs.shape[0], loads.shape[0]
         same = outputs is loads
@@ -105,8 +148,12 @@ class Wheel:
             shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
             poles = basis.couple(probes, probes)
-            carried = basis.projection.carried
-            whole = second_order(poles, basis.states, basis.seen(probes), carried, moments)
+            carried, loss = basis.projection.carried, None
+            if self.beyond is not None:
+                pencils = self._pencils(basis.projection)
+                moments = moments.plus(regained(basis, *pencils, probes, probes))
+                loss = self.beyond[0], tail_loss(basis.projection)
+            whole = second_order(poles, basis.states, basis.seen(probes), carried, moments, loss)
         return whole if same else whole.between(slice(r), slice(r, r + k))
 
     def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
@@ -120,7 +167,11 @@ class Wheel:
         if not self._drifts:
             shapes = self._static_shapes(probes)
             grown = self._grown(modes, shapes.columns, known)
-            return grown.couple(probes, probes, shapes.compliance)
+            flexibility = shapes.compliance
+            if self.beyond is not None:
+                pencils = self._pencils(grown.projection)
+                flexibility = flexibility + regained(grown, *pencils, probes, probes).compliance
+            return grown.couple(probes, probes, flexibility)
         return self._standing_attachments(modes, probes).couple(probes, probes)
 
     @property
@@ -147,15 +198,17 @@ class Wheel:
         # What damps by the mass is the tire, not the air.
         moment = np.where(np.arange(carried.shape[1]) < grown.projection.own, carried, 0.0)
         response = couple(grown.states, np.vstack([seen[:6], moment]), seen, carried)
-        turning = self.speed, self.damping[0]
+        # By strain energy a rigid motion is not damped, so nothing acts against the wheel.
+        turning = self.speed, self.damping[0] if self.beyond is None else 0.0
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
     def _grown(self, modes: Modes, columns: np.ndarray, known: Projection | None = None) -> Basis:
         """The basis with attachment modes; `known` is the projection on the modes. Collective."""
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
+        loss = None if self.beyond is None else self._loss
         projection = self.with_air(
-            project(grown, self.rotation, operators.carried, comm, known), grown
+            project(grown, self.rotation, operators.carried, comm, known, loss), grown
         )
         shape = operators.trace(grown.vectors)
         return Basis(shape, projection, self.decouple(projection, comm))

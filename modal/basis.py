@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.modal.air import Air
-from tireroad.modal.fields import gram, multiply
+from tireroad.modal.fields import CHUNK, gram, multiply
 from tireroad.modal.undamped import Modes
 
 
@@ -17,7 +17,8 @@ class Projection:
 
     `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad skew; `convective`, `body_convective`
     (m, m) 1/rad2 symmetric, all four None for a wheel that stands; `momentum` (3, m) kg^1/2:
-    int rho phi_k, the mass each mode moves. `air`: what else takes part, a coordinates after the m.
+    int rho phi_k, the mass each mode moves; `loss_factor` (m,) by strain energy (modal.damping), None where
+    no compound has one. `air`: what else takes part, a coordinates after the m.
     """
 
     squares: np.ndarray
@@ -26,6 +27,7 @@ class Projection:
     convective: np.ndarray | None = None
     body: np.ndarray | None = None
     body_convective: np.ndarray | None = None
+    loss_factor: np.ndarray | None = None
     air: Air | None = None
 
     @property
@@ -42,15 +44,17 @@ class Projection:
 
 
 def project(
-    modes: Modes, rotation, carried: np.ndarray, comm, known: Projection | None = None
+    modes: Modes, rotation, carried: np.ndarray, comm, known: Projection | None = None, loss=None
 ) -> Projection:
     """Project the rotation matrices (fem.operators.Rotation, or None) and the momentum: `carried` (3, n)
     kg of own rows, as in fem.operators. `known`, the projection on the first of the modes, is taken
-    over: a basis that grows costs the products with what joins it. Collective.
+    over: a basis that grows costs the products with what joins it. `loss`: the loss stiffness of
+    fem.operators, or None. Collective.
     """
     moved = comm.allreduce(carried @ modes.vectors)
+    losing = None if loss is None else _loss_factors(modes, loss, comm, known)
     if rotation is None:
-        return Projection(modes.squares, moved)
+        return Projection(modes.squares, moved, loss_factor=losing)
 
     def reduced(name: str, sign: int) -> np.ndarray:
         old = None if known is None else getattr(known, name)
@@ -63,7 +67,20 @@ def project(
         reduced("convective", 1),
         reduced("body", -1),
         reduced("body_convective", 1),
+        losing,
     )
+
+
+def _loss_factors(modes: Modes, loss, comm, known: Projection | None) -> np.ndarray:
+    """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of modes of unit mass; 0 of rigid ones. Collective."""
+    done = np.zeros(0) if known is None else known.loss_factor
+    lost = np.empty(modes.vectors.shape[1] - len(done))
+    for start in range(0, len(lost), CHUNK):
+        some = modes.vectors[:, len(done) + start : len(done) + start + CHUNK]
+        lost[start : start + CHUNK] = (some * multiply(loss, some)).sum(axis=0)
+    squares = modes.squares[len(done) :]
+    eta = np.divide(comm.allreduce(lost), squares, out=np.zeros(len(squares)), where=squares > 0)
+    return np.concatenate([done, eta])
 
 
 def _reduced(comm, vectors: np.ndarray, matrix, sign: int, known: np.ndarray | None) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.files.read import Results, Section, Table, attributes
-from tireroad.runs.report import figures, surface_figures
+from tireroad.runs.report import cavity, figures, surface_figures
 from tireroad.runs.report.quantities import quantity
 
 LISTED = 16  # rows of a table of modes; the files hold them all
@@ -92,6 +92,7 @@ def modes(results: Results) -> Section:
     if residual is not None:
         columns.append([quantity(float(value)) for value in residual[:LISTED]])
     head = ["mode", "frequency", "residual"][: 1 + len(columns)]
+    cavity.duct(results, section)
     wave, number = (results.optional(name, key) for key in ("wave_number", "section_mode"))
     if wave is not None and number is not None:
         columns.append([_named(*pair) for pair in zip(wave[:LISTED], number[:LISTED], strict=True)])
@@ -149,6 +150,7 @@ def rotating(results: Results) -> Section:
         for q in rising[:LISTED]
     ]
     section.table = Table(("frequency", "Re s", "of critical damping", *present), rows)
+    cavity.resonances(results, section, name, "air_share", value)
     if len(rising) > LISTED:
         listed = f"The table lists {LISTED} of {len(rising)} pairs, by frequency."
         section.notes.append(listed)

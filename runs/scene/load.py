@@ -9,14 +9,15 @@ import difflib
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import Field, fields
+from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described
 from tireroad.runs.scene import locate, rules
-from tireroad.runs.scene.own_tire import with_own_section
+from tireroad.runs.scene.cavity_table import filled
+from tireroad.runs.scene.own_tire import file_has_losses, with_own_section
 from tireroad.runs.scene.schema import (
     Table,
     applies,
@@ -28,7 +29,7 @@ from tireroad.runs.scene.schema import (
     variant_of,
 )
 from tireroad.runs.scene.source import Source, shortened
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables import Damping, Scene
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 LARGEST = 1_000_000
@@ -58,9 +59,17 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         )
     if "tire" not in source.broken():
         scene = with_own_section(scene, source)
+    scene = filled(_with_damping(scene))
     rules.check(scene, raw, source)
     source.refuse()
     return scene
+
+
+def _with_damping(scene: Scene) -> Scene:
+    """The default damping in proportion, where neither it nor the loss factor of a compound is given."""
+    tire = scene.tire
+    loses = any(part.loss_factor for part in (tire, *tire.region)) or file_has_losses(tire)
+    return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
 
 
 def _text(path: Path) -> str:

@@ -116,6 +116,16 @@ def fingerprint(tire: Tire) -> str | None:
     return found.hexdigest()
 
 
+def file_has_losses(tire: Tire) -> bool:
+    """Whether a compound of the tire's file has a loss factor."""
+    if tire.section != "file" or tire.file is None:
+        return False
+    try:
+        return any(rubber and rubber.loss_factor for rubber in own_section(tire).rubbers)
+    except InputError:  # noted where the file is read first
+        return False
+
+
 def region_of(tire: Tire, name: str) -> Region | None:
     """The scene's [[tire.region]] of a region of the file."""
     return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)

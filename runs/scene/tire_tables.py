@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from tireroad.fem.parameters import filename, flag, texts
+from tireroad.runs.scene.cavity_table import Cavity
 from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
 
 TORUS, FILE = ("section", ("torus",)), ("section", ("file",))
@@ -63,6 +64,14 @@ class Material:
     )
 
 
+def _dynamic():
+    return number(1.0, "-", "modulus of the modes over that of the static state", above=0, most=100)
+
+
+def _loss_factor():
+    return number(0.0, "-", "tan δ of the rubber in the modes", least=0, most=2)
+
+
 @dataclass(frozen=True)
 class Region:
     name: str | None = text(None, "region of a file that this is; a torus has none of its own")
@@ -76,6 +85,8 @@ class Region:
     material: Material | None = table(
         Material, "what the region is made of; absent: as the file says", optional=True
     )
+    dynamic: float = _dynamic()
+    loss_factor: float = _loss_factor()
 
 
 @dataclass(frozen=True)
@@ -130,6 +141,8 @@ class Tire:
         1.0, "-", "length of elements at the footprint, relative to ungraded", least=0.05, most=1
     )
     material: Material = table(Material, "what the wall is made of")
+    dynamic: float = _dynamic()
+    loss_factor: float = _loss_factor()
     region: tuple[Region, ...] = tables(
         Region, "a part of the section of another material; elements whose middle it holds"
     )
@@ -147,3 +160,6 @@ class Tire:
     )
     mirror: bool = flag(False, "the file has half the section, which ends on z = 0", only_for=FILE)
     cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")
+    cavity: Cavity | None = table(
+        Cavity, "the air inside; absent: none in a torus, else this table's defaults", optional=True
+    )

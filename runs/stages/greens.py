@@ -15,6 +15,8 @@ from tireroad.contact.roads.road import make_road
 from tireroad.greens.response import Response
 from tireroad.modal.rotating import standing
 from tireroad.runs.files.store import put
+from tireroad.runs.scene.cavity_table import has_air
+from tireroad.runs.stages import cavity
 from tireroad.runs.stages.responses import chosen, fill_response, judge, make, read_responses
 from tireroad.runs.stages.session import Session
 from tireroad.runs.stages.stepping import run_time
@@ -29,7 +31,7 @@ def inputs(session: Session) -> dict:
     prepare(session)
     return {
         "modes": session.hashes.get("rotating", session.hashes["modes"]),
-        "damping": session.damping,
+        "damping": repr(session.damping),
         "greens": asdict(scene.greens),
         "forces": [asdict(force) for force in scene.force],
         "points": session.patch.index.tolist() if scene.contact else [],
@@ -46,7 +48,7 @@ def _components(session: Session) -> tuple[int, ...]:
 def prepare(session: Session) -> None:
     """The road, the patch and the probes: cheap, and made in every run."""
     scene = session.scene
-    if session.speed == 0:
+    if session.speed == 0 and not has_air(scene):
         session.state_modes = standing(session.modal.projection, session.damping)
     if scene.contact:
         _prepare_contact(session)
@@ -125,6 +127,11 @@ def _prepare_forces(session: Session) -> None:
 
 def compute(session: Session, path: Path) -> None:
     """Responses with their residual, the choice of dynamic states, and their file. Collective."""
+    if _stands_with_air(session):
+        with session.record.timing("states with air"):
+            projection = session.modal.projection
+            session.state_modes = session.wheel.decouple(projection, session.comm)
+        cavity.describe(session)
     name, outputs, loads = probes(session)
     whole = make(session, outputs, loads)
     responses = {name: chosen(session, whole)}
@@ -137,10 +144,17 @@ def compute(session: Session, path: Path) -> None:
     def fill(file) -> None:
         for name, response in responses.items():
             fill_response(file, name, response)
+        if _stands_with_air(session):
+            cavity.fill_states(file, session)
         if session.scene.contact:
             put(file, "contact/index", session.patch.index, "-")
 
     session.write(path, "greens", fill)
+
+
+def _stands_with_air(session: Session) -> bool:
+    """Whether the states are found here: those of a standing tire alone have a closed formula."""
+    return session.speed == 0 and has_air(session.scene)
 
 
 def probes(session: Session) -> tuple:
@@ -206,5 +220,7 @@ def _share_of_residual(record, where: str, response: Response) -> None:
 
 def reuse(session: Session, path: Path) -> None:
     """Read the responses back. Collective."""
+    if _stands_with_air(session):
+        session.state_modes = session.read(path, cavity.read_states)
     pulse = session.scene.greens.residual == "dirac"
     _take(session, session.read(path, lambda file: read_responses(file, pulse)))

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.symmetry import Sites
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
+from tireroad.runs.stages import cavity
 from tireroad.runs.stages.session import Session
 
 _NAMED = 8  # modes of a round tire shown by name
@@ -32,6 +34,7 @@ def inputs(session: Session) -> dict:
         "static": session.hashes["static"],
         "modal": asdict(session.scene.modal),
         "rotating": session.speed != 0,
+        "cavity": cavity.inputs(session),
     }
 
 
@@ -44,16 +47,21 @@ def compute(session: Session, path: Path) -> None:
         modes = solve(session)
     rotation = session.rotation_matrices if session.speed else None
     with record.timing("projection"):
-        projection = project(modes, rotation, operators.carried, session.comm)
+        loss = operators.loss_stiffness()
+        projection = project(modes, rotation, operators.carried, session.comm, loss=loss)
+        if loss is not None:
+            loss.destroy()
         shape = operators.trace(modes.vectors)
         labels = _labels(session, modes.vectors)
     session.modes = modes
     session.modal = ModalBasis(modes.frequency, shape, projection)
+    cavity.join(session, modes)
     record.headline |= {
         "modes": (len(modes.squares), "-"),
         "lowest": (float(modes.frequency[0]), "Hz"),
         "highest": (float(modes.frequency[-1]), "Hz"),
     }
+    record.headline["damping"] = (_damping(session, projection), "-")
     if modes.segments > 1:
         record.headline["equal segments, solved by wave number"] = (modes.segments, "-")
     else:
@@ -70,6 +78,16 @@ def compute(session: Session, path: Path) -> None:
     if labels is not None:
         _say_names(modes.frequency, labels)
     session.write(path, "modes", lambda file: _fill(file, session, modes, labels))
+
+
+def _damping(session: Session, projection) -> str:
+    """Which damping acts, in words."""
+    given = session.damping
+    if not isinstance(given, StrainEnergy):
+        unused = "" if projection.loss_factor is None else "; the loss factors do not act"
+        return f"γ1 = {given.mass:g} 1/s, γ2 = {given.stiffness:g} s{unused}"
+    low, high = projection.loss_factor.min(), projection.loss_factor.max()
+    return f"modal strain energy, loss factors {low:.3g} to {high:.3g}"
 
 
 def _say_names(frequency: np.ndarray, labels) -> None:
@@ -118,6 +136,8 @@ def _fill(file, session: Session, modes, labels) -> None:
     m = len(basis.frequency)
     put(file, "frequency", basis.frequency, "Hz")
     put(file, "residual", modes.residual, "-")
+    if basis.projection.loss_factor is not None:
+        put(file, "loss_factor", basis.projection.loss_factor, "-")
     put(file, "surface/points", session.static.points, "m")
     face = 3 * len(session.static.points)
     put(file, "surface/shape", basis.shape[:face].T.reshape(m, -1, 3), "kg^-1/2")
@@ -131,6 +151,7 @@ def _fill(file, session: Session, modes, labels) -> None:
     for name, unit in _UNITS.items():
         if getattr(basis.projection, name) is not None:
             put(file, f"projected/{name}", getattr(basis.projection, name), unit)
+    cavity.fill(file, basis.projection.air)
     file.attrs["inertia_count"] = modes.inertia_count
     file.attrs["rigid_modes"] = modes.rigid
 
@@ -142,6 +163,7 @@ _UNITS = {
     "body": "1/rad",
     "body_convective": "1/rad2",
     "momentum": "kg^1/2",
+    "loss_factor": "-",
 }
 
 
@@ -155,6 +177,7 @@ def reuse(session: Session, path: Path) -> None:
             parts += [file["rim/translation"][:], file["rim/rotation"][:]]
         shape = np.hstack([part.reshape(len(part), -1) for part in parts]).T.copy()
         matrices = {name: values[:] for name, values in file["projected"].items()}
-        return ModalBasis(file["frequency"][:], shape, Projection(**matrices))
+        projection = Projection(**matrices, air=cavity.read(file))
+        return ModalBasis(file["frequency"][:], shape, projection)
 
     session.modal = session.read(path, pick)

@@ -10,6 +10,7 @@ import numpy as np
 from tireroad.greens.response import Response
 from tireroad.greens.state_selection import keep
 from tireroad.greens.truncation import Cutoff, estimate
+from tireroad.modal.damping import beyond
 from tireroad.runs.files.store import put
 from tireroad.runs.stages.session import Session
 
@@ -72,7 +73,8 @@ def _cutoff(session: Session) -> Cutoff:
     circular = 2 * np.pi * session.modal.frequency[-1]
     if session.speed and session.scene.rotation.method == "full":
         circular = np.abs(session.state_modes.eigenvalue.imag).max()
-    return Cutoff(circular, session.damping[0] + session.damping[1] * circular**2)
+    mass, stiffness = beyond(session.damping, session.modal.projection)
+    return Cutoff(circular, mass + stiffness * circular**2)
 
 
 def judge(session: Session, name: str, whole: Response, response: Response) -> None:
@@ -108,5 +110,5 @@ def read_responses(file: h5py.File, pulse: bool) -> dict[str, Response]:
             rigid=int(group.attrs["rigid_states"]),
         )
         for name, group in file.items()
-        if "eigenvalue" in group
+        if "output" in group
     }

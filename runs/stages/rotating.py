@@ -11,7 +11,7 @@ from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, swe
 from tireroad.modal.rotating import StateModes, checks, matrices, rotating
 from tireroad.runs.files.store import put
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages import full_states
+from tireroad.runs.stages import cavity, full_states
 from tireroad.runs.stages.session import Session
 
 _UNITS = {
@@ -31,7 +31,7 @@ def inputs(session: Session) -> dict:
     wanted = session.scene.rotation
     return {
         "modes": session.hashes["modes"],
-        "damping": session.damping,
+        "damping": repr(session.damping),
         "speed": session.speed,
         "inertia": wanted.inertia,
         "campbell": asdict(wanted.campbell) if wanted.campbell else None,
@@ -87,6 +87,8 @@ def _describe(session: Session, critical: float) -> None:
         "speed": (session.speed, "rad/s"),
         "critical speed": (critical, "rad/s"),
     }
+    if session.modal.projection.air is not None:
+        cavity.describe(session)
     if len(oscillating):
         record.headline["lowest"] = (float(oscillating.imag.min() / (2 * np.pi)), "Hz")
     record.indicators |= {
@@ -122,6 +124,8 @@ def _fill(file, session: Session, lines: Campbell | None) -> None:
     if session.scene.rotation.method == "full":
         put(file, "basis/shape", session.modal.shape, "kg^-1/2")
         put(file, "basis/momentum", session.modal.projection.momentum, "kg^1/2")
+    if session.modal.projection.air is not None:
+        put(file, "air_share", cavity.share(session), "-")
     if lines is not None:
         put(file, "campbell/speed", lines.speed, "rad/s")
         put(file, "campbell/eigenvalue", lines.eigenvalue, "1/s")

@@ -12,6 +12,7 @@ from typing import Any
 from mpi4py import MPI
 
 from tireroad.fem.timing import Timing
+from tireroad.modal.damping import Damping, Proportional, StrainEnergy, beyond
 from tireroad.runs.files import store
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.resolved import dumps
@@ -65,16 +66,19 @@ class Session:
         return self.scene.rotation.speed if self.scene.rotation else 0.0
 
     @property
-    def damping(self) -> tuple[float, float]:
-        """gamma1 (1/s) and gamma2 (s)."""
-        return self.scene.damping.mass, self.scene.damping.stiffness
+    def damping(self) -> Damping:
+        """In proportion where the scene says so, else by the loss factors of the compounds."""
+        given = self.scene.damping
+        return StrainEnergy() if given is None else Proportional(given.mass, given.stiffness)
 
     @property
     def rolling(self) -> tuple[float, float, float, str]:
         """Speed, damping and inertia of the steady-rolling static state; zeros at rest."""
         if not self.scene.static.steady_rolling or self.speed == 0:
             return 0.0, 0.0, 0.0, "full"
-        return self.speed, *self.damping, self.scene.rotation.inertia
+        # By strain energy there is no damping before there are modes: the shape has inertia alone.
+        damping = (0.0, 0.0) if isinstance(self.damping, StrainEnergy) else self.damping
+        return self.speed, *damping, self.scene.rotation.inertia
 
     @cached_property
     def section(self):
@@ -128,7 +132,17 @@ class Session:
 
         rotation = self.rotation_matrices if self.speed else None
         inertia = self.scene.rotation.inertia if self.speed else "full"
-        return Wheel(self.operators, rotation, self.speed, self.damping, inertia)
+        tail = None
+        if isinstance(self.damping, StrainEnergy):
+            tail = beyond(self.damping, self.modal.projection)
+        return Wheel(self.operators, rotation, self.speed, self.damping, inertia, self.air, tail)
+
+    @cached_property
+    def air(self):
+        """The air at the wall of the static state, once the modes are known; None without it. Collective."""
+        from tireroad.runs.stages.cavity import make
+
+        return make(self)
 
     @cached_property
     def modes(self):

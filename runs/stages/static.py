@@ -19,10 +19,10 @@ COARSE = 0.02  # estimated error of the load above which the user is warned
 
 
 def inputs(session: Session) -> dict:
-    """The tire, the static loads, and the rolling terms where they take part."""
+    """The tire without its air, the static loads, and the rolling terms where they take part."""
     scene = session.scene
     return {
-        "tire": asdict(scene.tire),
+        "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
         "file": fingerprint(scene.tire),
         "static": asdict(scene.static),
         "rolling": session.rolling,

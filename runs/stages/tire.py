@@ -53,14 +53,15 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
     if tire.section == "file":
         return Body(comm, section, own_materials(tire), cords=own_cords(tire))
 
-    def rubber(table: MaterialTable) -> Material:
-        return Material(**vars(table))
+    def rubber(part: Tire | Region) -> Material:
+        given = vars(part.material or MaterialTable()) | {
+            "dynamic": part.dynamic,
+            "loss_factor": part.loss_factor,
+        }
+        return Material(**given)
 
     names = [_patch(i, region).name for i, region in enumerate(tire.region)]
-    materials = {
-        name: rubber(r.material or MaterialTable())
-        for name, r in zip(names, tire.region, strict=True)
-    }
+    materials = {name: rubber(r) for name, r in zip(names, tire.region, strict=True)}
     placed = {"depth", "arc", "angle"}
     cords = [
         Cords(
@@ -69,4 +70,4 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
         )
         for c in tire.cords
     ]
-    return Body(comm, section, {"wall": rubber(tire.material)} | materials, cords=cords)
+    return Body(comm, section, {"wall": rubber(tire)} | materials, cords=cords)

@@ -11,10 +11,12 @@ import numpy as np
 from mpi4py import MPI
 
 from tireroad.fem.transient.linear import FullTire
+from tireroad.fem.transient.modal_damping import ModalDamping
 from tireroad.fem.transient.nonlinear import NonlinearTire
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.basis import Projection
+from tireroad.modal.damping import StrainEnergy, beyond, rates
 from tireroad.modal.rotating import StateModes
 from tireroad.modal.undamped import Modes
 from tireroad.runs.process import observe
@@ -131,9 +133,22 @@ class Tires:
         rotation = session.rotation_matrices if session.speed else None
         _, outputs, loads = greens.probes(session)
         began = time.perf_counter()
-        given = session.operators, rotation, session.speed, session.damping, step, outputs, loads
-        tire = FullTire(*given, spectral_radius=radius)
+        damping, modal = self._damping()
+        given = session.operators, rotation, session.speed, damping, step, outputs, loads
+        tire = FullTire(*given, spectral_radius=radius, modal=modal)
         return tire, step, time.perf_counter() - began
+
+    def _damping(self) -> tuple[tuple[float, float], ModalDamping | None]:
+        """What damps the full matrices uniformly, and mode by mode beside it. Collective."""
+        session = self.session
+        if not isinstance(session.damping, StrainEnergy):
+            return session.damping, None
+        projection = self._modal.projection
+        uniform = beyond(session.damping, projection)
+        excess = rates(session.damping, projection) - uniform.mass
+        turning = (session.rotation_matrices.body, session.speed) if session.speed else ()
+        modal = ModalDamping(session.operators, self._modes.vectors, excess, *turning)
+        return uniform, modal
 
     def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
         """The full finite elements with large motions, standing; step; set-up in s."""
@@ -141,6 +156,7 @@ class Tires:
         _, outputs, loads = greens.probes(session)
         began = time.perf_counter()
         inflation = session.scene.static.inflation
-        given = session.operators, inflation, session.damping, step, outputs, loads
-        tire = NonlinearTire(*given, spectral_radius=RADIUS)
+        damping, modal = self._damping()
+        given = session.operators, inflation, damping, step, outputs, loads
+        tire = NonlinearTire(*given, spectral_radius=RADIUS, modal=modal)
         return tire, step, time.perf_counter() - began
