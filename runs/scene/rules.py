@@ -17,7 +17,7 @@ Where = Callable[[tuple[str, ...], str], InputError]
 # Keys of the public interface that this version does not compute, with the values it does take and
 # what to write instead. A later version takes its lines out.
 LATER: dict[str, tuple[tuple[Any, ...], str]] = {
-    "tire.mesh": ((), 'write section = "file" and file = "…"'),
+    "tire.mesh": ((), 'is not supported: write section = "file" and file = "…"'),
     "tire.section": (("torus", "file"), 'only "torus" and "file" are supported in this version'),
 }
 
