@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from typing import TYPE_CHECKING
 
 import numpy as np
-from mpi4py import MPI
 
 from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
@@ -13,6 +13,9 @@ from tireroad.fem.sections.torus import Torus
 from tireroad.runs.scene.own_tire import own_ring
 from tireroad.runs.scene.tire_tables import Material as MaterialTable
 from tireroad.runs.scene.tire_tables import Region, Tire
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 
 def make_section(tire: Tire) -> Ring:
