@@ -9,7 +9,7 @@ import numpy as np
 from tireroad.runs.report.section_figure import save_section
 from tireroad.runs.scene.own_tire import own_section
 from tireroad.runs.scene.tables import Scene
-from tireroad.runs.stages.tire import make_section
+from tireroad.runs.scene.tire_section import make_section
 
 NAME = "section.png"
 

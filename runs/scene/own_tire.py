@@ -101,6 +101,16 @@ def own_ring(tire: Tire) -> Ring:
     return ring(tire.segments)
 
 
+def own_free_unknowns(tire: Tire) -> int:
+    """Displacement unknowns without those held by the rim; 1 where the file cannot be read."""
+    try:
+        mesh = own_section(tire).mesh.of_order(tire.order)
+    except (InputError, TypeError):  # noted where the file is read first
+        return 1
+    free = len(mesh.nodes) - len(np.unique(mesh.side(mesh.rim)))
+    return 3 * tire.segments * tire.order * free
+
+
 def fingerprint(tire: Tire) -> str | None:
     """A hash of all that the run takes from the tire's file; None without one."""
     if tire.section != "file":
