@@ -72,9 +72,7 @@ def _tire(comm: MPI.Comm, segments: int, elements_arc: int) -> Operators:
 
 def _basis(wheel: Wheel, modes: Modes, count: int) -> tuple[Basis, Modes]:
     """The first `count` modes. Collective."""
-    few = Modes(
-        **{**vars(modes), "squares": modes.squares[:count], "vectors": modes.vectors[:, :count]}
-    )
+    few = modes.among(np.arange(count))
     operators = wheel.operators
     comm = operators.body.comm
     projection = project(few, wheel.rotation, operators.carried, comm)

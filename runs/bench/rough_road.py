@@ -136,15 +136,13 @@ def settle_on_points(session: Session) -> None:
 def fewer_modes(session: Session, count: int, residual: str) -> Response:
     """The response that the session would have with its first modes and another residual. Collective."""
     from tireroad.fem.matrices.probe import nodes
-    from tireroad.modal.undamped import Modes
     from tireroad.runs.stages.modes import ModalBasis
     from tireroad.runs.stages.responses import make
 
     few, modes, basis = copy.copy(session), session.modes, session.modal
     greens = replace(session.scene.greens, residual=residual)
     few.scene = replace(session.scene, greens=greens)
-    first = {"squares": modes.squares[:count], "vectors": modes.vectors[:, :count]}
-    few.modes = Modes(**vars(modes) | first)
+    few.modes = modes.among(np.arange(count))
     square = {
         name: matrix if matrix is None else matrix[:count, :count]
         for name, matrix in vars(basis.projection).items()
