@@ -74,3 +74,15 @@ def test_directions_that_are_left_out_add_up_to_less_than_the_tolerance():
     assert (np.abs(lost) <= attachment.TOLERANCE * np.sqrt(np.outer(own, own))).all()
     assert attachment.foremost(missing, 1e-30 * own).shape[1] == 40
     assert attachment.foremost(missing, 1e6 * own).shape[1] == 0
+
+
+def test_points_closer_than_nodes_need_no_load_each():
+    """Their unit loads and weights make them up again; fewer points than touched numbers stay as they are."""
+    random = np.random.default_rng(3)
+    probes = sparse.csr_matrix(random.random((12, 4)) @ np.eye(30)[[3, 7, 8, 21]])
+    weights, loads = attachment.fewest(probes)
+    assert loads.shape == (4, 30)
+    np.testing.assert_array_equal((weights @ loads).toarray(), probes.toarray())
+    weights, loads = attachment.fewest(probes[:3])
+    assert loads.shape == (3, 30)
+    np.testing.assert_array_equal((weights @ loads).toarray(), probes[:3].toarray())
