@@ -13,6 +13,7 @@ from tireroad.fem.model import TireModel
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_error import load_error
 from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.press import place
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.runs.files.store import put
@@ -62,7 +63,7 @@ class StaticStage(Computed[StaticState]):
         began = time.perf_counter()
         try:
             loader.inflate(wanted.inflation)
-            _place(loader, wanted)
+            place(loader, wanted.load, wanted.deflection, wanted.road_height)
         except ConvergenceError as error:
             self._keep_last(static_state(equilibrium, loader.lowest()), error)
         record.cost |= equilibrium.cost
@@ -120,16 +121,6 @@ class StaticStage(Computed[StaticState]):
             rolling=steady_rolling(self.job),
             **cords_file.read(file),
         )
-
-
-def _place(loader, wanted) -> None:
-    """Press the tire on the road. Collective."""
-    if wanted.load is not None:
-        loader.carry(wanted.load)
-    elif wanted.deflection is not None:
-        loader.deflect(wanted.deflection)
-    elif wanted.road_height is not None:
-        loader.deflect(wanted.road_height - loader.touch)
 
 
 def _estimate(record: Record, state: StaticState, loader: Loader) -> None:
