@@ -53,7 +53,11 @@ def compute(session: Session, path: Path) -> None:
     if session.scene.rotation.method == "full":
         modes = full_states.compute(session, modes)
     session.state_modes = modes
-    _describe(session, critical_speed(projection, inertia))
+    free_at = session.speed if session.scene.modal.rim == "free" else None
+    critical = critical_speed(projection, inertia, free_at)
+    _describe(session, critical)
+    if session.speed > critical:
+        record.warnings.append(beyond_critical(session.speed, critical))
     if modes.unstable:
         record.warnings.append(_growth(session, projection))
     lines = _campbell(session, projection)
@@ -77,6 +81,15 @@ def _campbell(session: Session, projection) -> Campbell | None:
         "-",
     )
     return lines
+
+
+def beyond_critical(speed: float, critical: float) -> str:
+    """What to say of a speed beyond the critical one (rad/s)."""
+    return (
+        f"rotation.speed = {speed:g} rad/s lies beyond the tire's critical speed of {critical:.4g} "
+        "rad/s, at which a wave stands still on the road and grows without end: what follows has "
+        "little meaning; take a lower speed, a higher static.inflation or a stiffer material"
+    )
 
 
 def _describe(session: Session, critical: float) -> None:

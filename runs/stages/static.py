@@ -30,6 +30,7 @@ def inputs(session: Session) -> dict:
 
 def compute(session: Session, path: Path) -> None:
     """Solve and store. Collective."""
+    from tireroad.fem.static.diagnosis import with_cause
     from tireroad.fem.static.equilibrium import Equilibrium
     from tireroad.fem.static.loading import Loader
     from tireroad.fem.static.state import static_state
@@ -42,11 +43,11 @@ def compute(session: Session, path: Path) -> None:
     began = time.perf_counter()
     last = path.with_name("static_last.h5")
     try:
-        loader.inflate(wanted.inflation)
-        _place(loader, wanted)
+        _press(loader, wanted)
     except ConvergenceError as error:
         session.static = static_state(equilibrium, loader.lowest())
         session.write(last, "static", lambda file: _fill(file, session, equilibrium))
+        error = with_cause(error, loader, Rolling(*session.rolling), lambda it: _press(it, wanted))
         raise ConvergenceError(f"{error} The last state that converged is in {last}.") from None
     record.cost |= equilibrium.cost
     record.cost["other"] = time.perf_counter() - began - sum(equilibrium.cost.values())
@@ -58,6 +59,12 @@ def compute(session: Session, path: Path) -> None:
     observe.say(f"  {_parts(record.cost)}")
     session.write(path, "static", lambda file: _fill(file, session, equilibrium))
     on_root(session.comm, lambda: last.unlink(missing_ok=True))
+
+
+def _press(loader, wanted) -> None:
+    """Inflate the tire and press it on the road. Collective."""
+    loader.inflate(wanted.inflation)
+    _place(loader, wanted)
 
 
 def _place(loader, wanted) -> None:
