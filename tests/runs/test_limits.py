@@ -33,7 +33,7 @@ def test_a_road_up_to_the_flanks_is_named(launch, tmp_path: Path) -> None:
     assert done.returncode == 2, done.stderr
     assert "road's height" in done.stderr and "contact.reach" in done.stderr
     again = _run(launch, tmp_path, "contact.points={dx=1e-5,dy=1e-5}")
-    assert again.returncode == 2 and "contact.points: dx" in again.stderr
+    assert again.returncode == 2 and "contact.points" in again.stderr
 
 
 def test_beyond_the_critical_speed_is_said(launch, tmp_path: Path) -> None:
