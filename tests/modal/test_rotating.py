@@ -197,3 +197,17 @@ def test_critical_speed_of_a_free_ring() -> None:
         free = Projection(squares, zero[:3], zero, convective, zero, convective)
         assert critical_speed(free, "full") == pytest.approx(speed)
         assert critical_speed(free, "full", speed) == pytest.approx(45.0)
+
+
+def test_states_come_in_one_order_and_phase():
+    """The same pencil in coordinates of other order: the same eigenvalues in place, the same vectors."""
+    drag, stiffness = matrices(random_tire(20), 20.0, (30.0, 0.0), "full")
+    plain = rotating(drag, stiffness)
+    assert (np.diff(plain.eigenvalue.imag) >= 0).all()
+    mixed = np.random.default_rng(2).permutation(20)
+    other = rotating(drag[np.ix_(mixed, mixed)], stiffness[np.ix_(mixed, mixed)])
+    np.testing.assert_allclose(other.eigenvalue, plain.eigenvalue, rtol=1e-10)
+    right, left = np.empty_like(plain.right), np.empty_like(plain.left)
+    right[mixed], left[:, mixed] = other.right, other.left
+    np.testing.assert_allclose(right, plain.right, atol=1e-9)
+    np.testing.assert_allclose(left, plain.left, atol=1e-9 * np.abs(left).max())
