@@ -24,7 +24,7 @@ from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning
-from tireroad.greens.attachment import dynamic, foremost, with_attachments
+from tireroad.greens.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, modal_moments, second_order
@@ -197,10 +197,12 @@ class Wheel:
         """Response of the modes and the attachment modes of all probes. Collective."""
         self._check_same(basis, modes)
         if not self._drifts:
+            weights, loads = fewest(probes)
             full = self.operators, self.rotating_stiffness
-            shapes, flexibility = loaded_shapes(*full, probes, self.air)
+            shapes, flexibility = loaded_shapes(*full, loads, self.air)
+            flexibility = weights @ (weights @ flexibility.T).T
             missing = flexibility - basis.couple(probes, probes).static()
-            columns = shapes @ foremost(missing, np.abs(np.diag(flexibility)))
+            columns = shapes @ (weights.T @ foremost(missing, np.abs(np.diag(flexibility))))
             grown = self._grown(modes, columns, basis.projection, every=False)
             if self.beyond is not None:
                 pencils = self._pencils(grown.projection)
