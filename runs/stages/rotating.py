@@ -16,8 +16,8 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
 from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.full_states import full_states
-from tireroad.modal.rolling import RollingModes, pencil, rolling_modes
-from tireroad.modal.rotating import StateModes, checks
+from tireroad.modal.rolling import RollingModes, rolling_modes
+from tireroad.modal.rotating import StateModes
 from tireroad.runs.files.store import put
 from tireroad.runs.stages import cavity
 from tireroad.runs.stages.job import Job
@@ -85,11 +85,12 @@ class RotatingStage(Computed[RollingModes]):
     def compute(self, record: Record) -> RollingModes:
         """Solve on the root process, share, check. Collective."""
         job, basis = self.job, self.modes.product
-        problem = pencil(basis.projection, turning_of(job))
         with record.timing("eigensolver"):
             rolling = rolling_modes(basis, turning_of(job), job.comm)
-            figures = on_root(job.comm, lambda: checks(rolling.states, *problem))
-        record.indicators |= {f"projected: {n}": (figure, "-") for n, figure in figures.items()}
+        projected = {
+            f"projected: {name}": (figure, "-") for name, figure in rolling.figures.items()
+        }
+        record.indicators |= projected
         if job.scene.rotation.method == "full":
             rolling = self._full(record, rolling)
         speed = rolling.turning.speed
