@@ -93,7 +93,12 @@ class RotatingStage(Computed[RollingModes]):
         record.indicators |= projected
         if job.scene.rotation.method == "full":
             rolling = self._full(record, rolling)
-        _describe(record, rolling, critical_speed(basis.projection, turning_of(job).inertia))
+        speed = rolling.turning.speed
+        free_at = speed if job.scene.modal.rim == "free" else None
+        critical = critical_speed(basis.projection, rolling.turning.inertia, free_at)
+        _describe(record, rolling, critical)
+        if speed > critical:
+            record.warnings.append(_beyond(speed, critical))
         if rolling.states.unstable:
             record.warnings.append(_growth(job, rolling, basis))
         return replace(rolling, campbell=self._campbell(record))
@@ -142,6 +147,15 @@ class RotatingStage(Computed[RollingModes]):
             basis = replace(basis, shape=own["shape"], projection=projection, modes=None)
         turning = turning_of(self.job)
         return RollingModes(basis=basis, states=states, turning=turning, full=bool(own))
+
+
+def _beyond(speed: float, critical: float) -> str:
+    """What to say of a speed beyond the critical one (rad/s)."""
+    return (
+        f"rotation.speed = {speed:g} rad/s lies beyond the tire's critical speed of {critical:.4g} "
+        "rad/s, at which a wave stands still on the road and grows without end: what follows has "
+        "little meaning; take a lower speed, a higher static.inflation or a stiffer material"
+    )
 
 
 def _describe(record: Record, rolling: RollingModes, critical: float) -> None:

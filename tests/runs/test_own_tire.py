@@ -14,7 +14,7 @@ from torus_decks import CORDS, HALF_ANGLE, Torus, membranes, plain
 from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.own_tire import fingerprint
+from tireroad.runs.scene.own_tire import fingerprint, own_section
 from tireroad.runs.scene.resolved import dumps
 
 TIRE = """
@@ -138,3 +138,18 @@ def test_materials_of_the_scene(folder):
     assert own_materials(tire)["WALL"].youngs_modulus == 9e6
     (belt,) = own_cords(tire)
     assert (np.degrees(belt.angle), belt.area) == (pytest.approx(30), 3e-7)
+
+
+def test_documented_example(folder):
+    """The first scene of docs/how-to/own-tire.md: half a deck in millimetres, tonnes and MPa."""
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "own-tire.md"
+    (folder / "half.toml").write_text(page.read_text().split("```toml\n")[1].split("```")[0])
+    rubber = "*MATERIAL, NAME=RUBBER\n*HYPERELASTIC, NEO HOOKE\n1.0\n*DENSITY\n1.2E-9\n"
+    deck = plain(Torus(half=True, scale=1e3), materials=rubber)
+    deck = deck.replace("RIMNODES", "RIMNOD").replace("OUTSIDE", "STREAD")
+    (folder / "AXI.inp").write_text(deck)
+    tire = load(folder / "half.toml").tire
+    assert (tire.outer_radius, tire.elements_arc) == (pytest.approx(0.32), 12)
+    (compound,) = own_section(tire).rubbers
+    assert compound.density == pytest.approx(1200)
+    assert compound.coefficients["youngs_modulus"] == pytest.approx(2e6 * 2 * 1.49)
