@@ -100,7 +100,7 @@ def _run(mesh: dict[str, int]) -> list[Table]:
         for name, scene in scenes.items():
             tires.change(scene)
             found = compare(tires, STEPS, CHOICES, ("contact force", "axle force"))
-            points = len(tires.session.patch.points)
+            points = len(tires.trial.setup.patch.points)
             tables.append(found.table(f"{name}: {points} contact points, {tires.setting}"))
             rows += [found.verdict(name, *target, tires.modes_seconds) for target in TARGETS]
     note = (
