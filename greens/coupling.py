@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.fem.cavity.column import Column
+from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
     StaticShapes,
     compliance,
@@ -20,15 +21,19 @@ from tireroad.fem.matrices.compliance import (
 from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
+from tireroad.fem.model import SmallMotions
+from tireroad.fem.turning import Turning
 from tireroad.greens.attachment import with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
-from tireroad.greens.second_order import Moments, second_order
-from tireroad.modal.air import Air
-from tireroad.modal.basis import Projection, project
-from tireroad.modal.rotating import StateModes, matrices, rotating, standing
+from tireroad.greens.second_order import Moments, modal_moments, second_order
+from tireroad.modal.basis import Projection, project, with_air
+from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_loss
+from tireroad.modal.rolling import RollingModes, decouple
+from tireroad.modal.rotating import StateModes, matrices
 from tireroad.modal.undamped import Modes
-from tireroad.runs.process.mpi import on_root
+
+_SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by their sign at least
 
 
 @dataclass(frozen=True)
@@ -40,6 +45,11 @@ class Basis:
     shape: np.ndarray
     projection: Projection
     states: StateModes
+
+    @staticmethod
+    def of(rolling: RollingModes) -> Basis:
+        """The states of a rolling tire, as probes see them."""
+        return Basis(rolling.basis.shape, rolling.basis.projection, rolling.states)
 
     def couple(self, outputs, loads, flexibility: np.ndarray | None = None) -> Response:
         """Response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s), or 3 s + 6 wide."""
@@ -53,17 +63,59 @@ class Basis:
         return seen if air is None else np.pad(seen, ((0, 0), (0, air.count)))
 
 
+def regained(
+    basis: Basis, true: tuple, uniform: tuple, outputs: sparse.csr_matrix, loads: sparse.csr_matrix
+) -> Moments:
+    """What the modes answer under their true damping beyond what they do under that of the full matrices.
+
+    The moments of full matrices with it are those of matrices that damp the modes truly, and the rest
+    uniformly. `true`, `uniform`: D~ and K~ of both.
+    """
+    own = basis.projection.squares > 0
+    flexible = np.pad(own, (0, len(true[0]) - len(own)), constant_values=True)  # the air's are
+    seen = basis.seen(outputs)[:, flexible], basis.seen(loads)[:, flexible]
+    carried = basis.projection.carried[:, flexible]
+    parts = [
+        [matrix[np.ix_(flexible, flexible)] for matrix in pencil] for pencil in (true, uniform)
+    ]
+    one, other = (modal_moments(*pencil, *seen, carried) for pencil in parts)
+    return one.minus(other)
+
+
+def wheel_of(
+    motions: SmallMotions,
+    turning: Turning,
+    air: Column | None = None,
+    projection: Projection | None = None,
+) -> Wheel:
+    """The full matrices of a tire at its static state as the wheel turns, with the `air` in it.
+
+    `projection` on the modes: for damping by strain energy only, which has no full matrices. Collective.
+    """
+    tail = None
+    if isinstance(turning.damping, StrainEnergy):
+        if projection is None:
+            raise InputError("damping by strain energy is known by the modes: give their projection")
+        tail = beyond(turning.damping, projection)
+    rotation = motions.rotation if turning.speed else None
+    given = turning.speed, turning.damping, turning.inertia
+    return Wheel(motions.operators, rotation, *given, air, tail)
+
+
 @dataclass(frozen=True)
 class Wheel:
-    """The full matrices of a tire that turns: `damping` is (gamma1 1/s, gamma2 s), `rotation` None
-    when it stands. Its properties are collective at their first use."""
+    """The full matrices of a tire that turns: `damping` as in modal.damping, `rotation` None when it
+    stands. `beyond` (gamma1 1/s, gamma2 s) damps what no mode has, and the full matrices: given where
+    `damping` is by strain energy, of which there are no full matrices. Its properties are collective
+    at their first use."""
 
     operators: Operators
     rotation: Rotation | None
     speed: float
-    damping: tuple[float, float]
+    damping: Damping
     inertia: str
     air: Column | None = None
+    beyond: tuple[float, float] | None = None
 
     @cached_property
     def rotating_stiffness(self):
@@ -77,7 +129,24 @@ class Wheel:
 
     @property
     def _given(self) -> tuple:
-        return self.operators, self.rotation, self.speed, self.damping, self.inertia
+        return self.operators, self.rotation, self.speed, self._uniform, self.inertia
+
+    @property
+    def _uniform(self) -> tuple[float, float]:
+        """What the full matrices are damped by."""
+        return self.damping if self.beyond is None else self.beyond
+
+    @cached_property
+    def _loss(self):
+        """sum_r eta_r K_r, or None."""
+        return self.operators.loss_stiffness()
+
+    def _pencils(self, projection: Projection) -> tuple:
+        """The projected pencil as the modes are damped, and as the full matrices are."""
+        return tuple(
+            matrices(projection, self.speed, damping, self.inertia)
+            for damping in (self.damping, self._uniform)
+        )
 
     def respond(
         self,
@@ -86,42 +155,63 @@ class Wheel:
         outputs: sparse.csr_matrix,
         loads: sparse.csr_matrix,
         option: str,
-        known: Projection | None = None,
     ) -> Response:
-        """Response with the residual `option`; `modes` (all rows) for "attachment" only, with `known`,
-        the projection on these very vectors where there is one: another solution of the same problem
-        has other signs, and other vectors of repeated frequencies. Collective."""
+        """Response with the residual `option`. Collective.
+
+        For "attachment" only: `modes` on all unknowns, the very solution that `basis` projects. InputError
+        for another one: its signs and its vectors of repeated frequencies differ.
+        """
         if option in ("static", "dirac"):
             flexibility = compliance(
                 self.operators, self.rotating_stiffness, outputs, loads, self.air
             )
+            if self.beyond is not None:
+                pencils = self._pencils(basis.projection)
+                flexibility += regained(basis, *pencils, outputs, loads).compliance
             return replace(basis.couple(outputs, loads, flexibility), pulse=option == "dirac")
         r, k = outputs.shape[0], loads.shape[0]
         same = outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
-            whole = self._attached(modes, probes, known)
+            whole = self._attached(basis, modes, probes)
         else:
             shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
             poles = basis.couple(probes, probes)
-            carried = basis.projection.carried
-            whole = second_order(poles, basis.states, basis.seen(probes), carried, moments)
+            carried, loss = basis.projection.carried, None
+            if self.beyond is not None:
+                pencils = self._pencils(basis.projection)
+                moments = moments.plus(regained(basis, *pencils, probes, probes))
+                loss = self.beyond[0], tail_loss(basis.projection)
+            whole = second_order(poles, basis.states, basis.seen(probes), carried, moments, loss)
         return whole if same else whole.between(slice(r), slice(r, r + k))
 
     def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
         full = self.rotating_stiffness, self.rotating_damping
         return static_shapes(self.operators, *full, probes, self.air)
 
-    def _attached(
-        self, modes: Modes, probes: sparse.csr_matrix, known: Projection | None
-    ) -> Response:
+    def _attached(self, basis: Basis, modes: Modes, probes: sparse.csr_matrix) -> Response:
         """Response of the modes and the attachment modes of all probes. Collective."""
+        self._check_same(basis, modes)
         if not self._drifts:
             shapes = self._static_shapes(probes)
-            grown = self._grown(modes, shapes.columns, known)
-            return grown.couple(probes, probes, shapes.compliance)
+            grown = self._grown(modes, shapes.columns, basis.projection)
+            flexibility = shapes.compliance
+            if self.beyond is not None:
+                pencils = self._pencils(grown.projection)
+                flexibility = flexibility + regained(grown, *pencils, probes, probes).compliance
+            return grown.couple(probes, probes, flexibility)
         return self._standing_attachments(modes, probes).couple(probes, probes)
+
+    def _check_same(self, basis: Basis, modes: Modes) -> None:
+        """InputError where these modes are not those of the basis. Collective."""
+        found, known = self.operators.trace(modes.vectors), basis.shape
+        alike = np.shape(found) == np.shape(known)
+        if not alike or np.abs(found - known).max(initial=0.0) > _SAME * np.abs(known).max():
+            raise InputError(
+                "attachment modes: the modes on all unknowns are not those that the basis shows; take "
+                "both from one solution (modal.standing.with_fields)"
+            )
 
     @property
     def _drifts(self) -> bool:
@@ -147,33 +237,33 @@ class Wheel:
         # What damps by the mass is the tire, not the air.
         moment = np.where(np.arange(carried.shape[1]) < grown.projection.own, carried, 0.0)
         response = couple(grown.states, np.vstack([seen[:6], moment]), seen, carried)
-        turning = self.speed, self.damping[0]
+        # By strain energy a rigid motion is not damped, so nothing acts against the wheel.
+        turning = self.speed, self.damping[0] if self.beyond is None else 0.0
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
     def _grown(self, modes: Modes, columns: np.ndarray, known: Projection | None = None) -> Basis:
         """The basis with attachment modes; `known` is the projection on the modes. Collective."""
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
+        loss = None if self.beyond is None else self._loss
         projection = self.with_air(
-            project(grown, self.rotation, operators.carried, comm, known), grown
+            project(grown, self.rotation, operators.carried, comm, known, loss), grown
         )
         shape = operators.trace(grown.vectors)
         return Basis(shape, projection, self.decouple(projection, comm))
 
+    @property
+    def turning(self) -> Turning:
+        """How the wheel turns."""
+        return Turning(speed=self.speed, damping=self.damping, inertia=self.inertia)
+
     def with_air(self, projection: Projection, modes: Modes) -> Projection:
         """The projection on the modes (all rows), joined by the air where there is any. Collective."""
-        if self.air is None:
-            return projection
-        air = Air(self.air.duct, self.air.coupling(modes.vectors))
-        return replace(projection, air=air)
+        return with_air(projection, modes, self.air)
 
     def decouple(self, projection: Projection, comm) -> StateModes:
         """The second eigenproblem, or the closed formula of a tire without air that stands. Collective."""
-        if self.speed == 0 and projection.air is None:
-            return standing(projection, self.damping)
-        pencil = matrices(projection, self.speed, self.damping, self.inertia)
-        # One process solves: LAPACK on another could order repeated eigenvalues differently.
-        return on_root(comm, lambda: rotating(*pencil))
+        return decouple(projection, self.turning, comm)
 
     def receptance(
         self, outputs: sparse.csr_matrix, loads: sparse.csr_matrix, frequency: np.ndarray

@@ -36,13 +36,44 @@ class Moments:
     inertia: np.ndarray
     momentum: np.ndarray
 
+    def plus(self, other: Moments) -> Moments:
+        """Sum, term by term."""
+        return Moments(*(a + b for a, b in zip(_parts(self), _parts(other), strict=True)))
+
+    def minus(self, other: Moments) -> Moments:
+        """Difference, term by term."""
+        return Moments(*(a - b for a, b in zip(_parts(self), _parts(other), strict=True)))
+
+
+def _parts(moments: Moments) -> tuple[np.ndarray, ...]:
+    return moments.compliance, moments.damping, moments.inertia, moments.momentum
+
+
+def modal_moments(
+    drag: np.ndarray,
+    stiffness: np.ndarray,
+    outputs: np.ndarray,
+    loads: np.ndarray,
+    carried: np.ndarray,
+) -> Moments:
+    """The moments between outputs (r, m) and loads (k, m) of a projected pencil D~, K~ of unit mass."""
+    x, y = np.linalg.solve(stiffness, loads.T), np.linalg.solve(stiffness.T, outputs.T).T
+    return Moments(outputs @ x, y @ drag @ x, y @ x, carried @ x)
+
 
 def second_order(
-    response: Response, modes: StateModes, shape: np.ndarray, carried: np.ndarray, moments: Moments
+    response: Response,
+    modes: StateModes,
+    shape: np.ndarray,
+    carried: np.ndarray,
+    moments: Moments,
+    loss: tuple[float, float] | None = None,
 ) -> Response:
     """The response of p probes (outputs = forces) with residual states and an exact static limit.
 
-    `shape` (p, m) are the modal shapes at the probes and `carried` (3, m) the modes' momentum.
+    `shape` (p, m) are the modal shapes at the probes and `carried` (3, m) the modes' momentum. `loss`: the
+    uniform rate (1/s) by which the moments' damping has them damped, and the loss factor that damps
+    them in its place, each at eta times its own circular frequency.
     """
     missing = _missing(response, modes, shape, carried, moments)
     flexibility = missing.compliance
@@ -56,9 +87,12 @@ def second_order(
     kept = sizes > _MASSLESS * sizes.max()
     basis = basis @ directions[:, kept] / np.sqrt(sizes[kept])
     inverse = np.linalg.inv(basis.T @ missing.inertia @ basis)
-    states = rotating(
-        inverse @ (basis.T @ missing.damping @ basis), inverse @ (basis.T @ flexibility @ basis)
+    drag, stiffness = (
+        inverse @ (basis.T @ matrix @ basis) for matrix in (missing.damping, flexibility)
     )
+    if loss is not None:
+        drag = drag + _by_loss_factor(stiffness, *loss)
+    states = rotating(drag, stiffness)
     output = flexibility @ basis
     forces = inverse @ (basis.T @ flexibility)
     extra = couple(states, output, forces.T, missing.momentum @ basis)
@@ -66,6 +100,13 @@ def second_order(
     still = GROWS * np.abs(extra.eigenvalue).max(initial=0.0)
     whole = response.joined(extra.keeping(extra.eigenvalue.real <= still))
     return replace(whole, residual=moments.compliance - whole.static())
+
+
+def _by_loss_factor(stiffness: np.ndarray, rate: float, factor: float) -> np.ndarray:
+    """eta sqrt(K) - rate: damping at a loss factor in the place of a uniform rate, for unit mass."""
+    squares, turn = np.linalg.eigh((stiffness + stiffness.T) / 2)
+    own = factor * np.sqrt(np.maximum(squares, 0.0))
+    return (turn * own) @ turn.T - rate * np.eye(len(squares))
 
 
 def _missing(

@@ -11,6 +11,7 @@ import numpy as np
 from scipy import linalg, optimize
 
 from tireroad.modal.basis import Projection
+from tireroad.modal.damping import Damping
 from tireroad.modal.rotating import GROWS, StateModes, matrices, overlap, rotating
 
 
@@ -33,7 +34,7 @@ class Campbell:
 
 def sweep(
     projection: Projection,
-    damping: tuple[float, float],
+    damping: Damping,
     inertia: str,
     speeds: np.ndarray,
     branches: int,
@@ -92,9 +93,7 @@ def critical_speed(projection: Projection, inertia: str) -> float:
     return float(1 / np.sqrt(largest)) if largest > 0 else np.inf
 
 
-def onset(
-    projection: Projection, damping: tuple[float, float], inertia: str, unstable: float
-) -> float:
+def onset(projection: Projection, damping: Damping, inertia: str, unstable: float) -> float:
     """The speed (rad/s) at which a motion begins to grow, at or below one where it does; within 0.1 %.
 
     By bisection from rest: of several windows of instability it finds the edge of one. Static state
@@ -110,9 +109,7 @@ def onset(
     return unstable
 
 
-def growth(
-    projection: Projection, speed: float, damping: tuple[float, float], inertia: str
-) -> float:
+def growth(projection: Projection, speed: float, damping: Damping, inertia: str) -> float:
     """Largest Re s (1/s) at a speed; 0 when it is rounding."""
     drag, stiffness = matrices(projection, speed, damping, inertia)
     m = len(drag)

@@ -1,6 +1,6 @@
 """The second eigenproblem on the modal basis: the tire as it turns, seen in the non-rotating frame.
 
-    s^2 I + s (D_mod + 2 Omega G) + (Lambda + Omega^2 S + Omega D_mod B),  D_mod = gamma1 I + gamma2 Lambda
+    s^2 I + s (D_mod + 2 Omega G) + (Lambda + Omega^2 S + Omega D_mod B),  D_mod as in modal.damping
 
 (thesis (2.1)-(2.5), put right; the doppler form takes B for G and S_B for S). Its response to modal
 forces is kept as  eta(t) = Re[R z(t)] + R_b y(t),  z' = s z + L f,  y' = T y + L_b f:  one complex
@@ -17,6 +17,7 @@ from scipy import linalg
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.basis import Projection
+from tireroad.modal.damping import Damping, rates
 
 # Above this condition an eigenvector loses ten of sixteen digits; such eigenvalues go to the block.
 DEFECTIVE = 1e6
@@ -57,19 +58,19 @@ class StateModes:
 
 
 def matrices(
-    projection: Projection, speed: float, damping: tuple[float, float], inertia: str
+    projection: Projection, speed: float, damping: Damping, inertia: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """D~ (1/s) and K~ (1/s2) of the projected problem; damping is (gamma1 in 1/s, gamma2 in s)."""
+    """D~ (1/s) and K~ (1/s2) of the projected problem; `damping` as in modal.damping."""
     pencil = _tire_matrices(projection, speed, damping, inertia)
     air = projection.air
     return pencil if air is None else air.joined(*pencil, speed)
 
 
 def _tire_matrices(
-    projection: Projection, speed: float, damping: tuple[float, float], inertia: str
+    projection: Projection, speed: float, damping: Damping, inertia: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same of the tire without the air in it."""
-    rate = damping[0] + damping[1] * projection.squares
+    rate = rates(damping, projection)
     stiffness, drag = np.diag(projection.squares), np.diag(rate)
     if speed == 0:
         return drag, stiffness
@@ -80,11 +81,11 @@ def _tire_matrices(
     return drag + 2 * speed * gyroscopic, stiffness + speed**2 * convective + turning
 
 
-def standing(projection: Projection, damping: tuple[float, float]) -> StateModes:
+def standing(projection: Projection, damping: Damping) -> StateModes:
     """Without rotation the modes stay uncoupled: s = -d/2 +- sqrt(d^2/4 - omega^2), a = 2 s + d."""
     squares = projection.squares
     m = len(squares)
-    half = (damping[0] + damping[1] * squares) / 2
+    half = rates(damping, projection) / 2
     root = np.sqrt(half.astype(complex) ** 2 - squares)
     # Condition of the eigenvectors of one mode's companion matrix is about omega / |root|.
     size = np.maximum(np.maximum(np.sqrt(np.abs(squares)), half), np.finfo(float).tiny)

@@ -10,7 +10,7 @@ are then measured on A itself.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -57,6 +57,15 @@ class Modes:
     def frequency(self) -> np.ndarray:
         """Natural frequencies (m,), Hz; 0 for rigid modes."""
         return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * np.pi)
+
+    def first(self, count: int) -> Modes:
+        """The `count` lowest of them."""
+        return replace(
+            self,
+            squares=self.squares[:count],
+            vectors=self.vectors[:, :count],
+            residual=self.residual[:count],
+        )
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ exit status:
   0  done
   2  the input is wrong: one message, nothing written over
   3  a solver gave up: what, where, what to try; finished stages are kept
-  4  stopped on request (SIGINT, SIGTERM); the same command, or resume, goes on
+  4  stopped on request (SIGINT, SIGTERM, SIGHUP); the same command, or resume, goes on
   anything else is a bug
 """
 ABOUT = """\
@@ -96,13 +96,19 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def _folder(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError("the name of the folder is empty")
+    return Path(text)
+
+
 def _run_arguments(run: argparse.ArgumentParser) -> None:
     run.add_argument("scene", type=Path, metavar="SCENE.toml")
     run.add_argument(
         "-n", type=int, metavar="N", dest="processes", help="MPI processes (the launcher's)"
     )
     run.add_argument(
-        "--out", type=Path, metavar="DIR", help="result folder; results/<scene name> by default"
+        "--out", type=_folder, metavar="DIR", help="result folder; results/<scene name> by default"
     )
     run.add_argument("--set", action="append", default=[], metavar="a.b=value", help=SET_HELP)
     run.add_argument(

@@ -11,17 +11,24 @@ from pathlib import Path
 from tireroad.fem import form_cache
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.arguments import parser
-from tireroad.runs.process import mpi, observe
+from tireroad.runs.process import mpi, observe, signals
+from tireroad.runs.process.statuses import DONE, handed_over, rank_before_mpi
+from tireroad.runs.process.surroundings import check_surroundings
 
 
 def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
     """The main job. Collective over all processes."""
+    status, message = mpi.judged(check_surroundings)
+    if status != DONE:
+        if rank_before_mpi() == 0:
+            print(message, file=sys.stderr)
+        return status
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
     observe.set_root(comm.rank == 0)
     _only_warnings()
-    mpi.stop_on_signals()
+    signals.stop_on_signals()
     return mpi.guarded(comm, lambda: _run_inside(args, petsc_options, comm))
 
 
@@ -144,9 +151,9 @@ ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
 
 def _alone(function: Callable[[], None]) -> int:
     """A command of one process; under mpirun the root does it."""
-    if mpi.rank_before_mpi() != 0:
-        return mpi.DONE
-    mpi.stop_on_signals()
+    if rank_before_mpi() != 0:
+        return DONE
+    signals.stop_on_signals()
     status, message = mpi.judged(function)
     if message:
         print(message, file=sys.stderr)
@@ -165,25 +172,14 @@ def main(argv: list[str]) -> int:
         argv, options = argv[:cut], argv[cut + 1 :]
     try:
         with open(os.devnull, "w") as nowhere, ExitStack() as quiet:
-            if mpi.rank_before_mpi() != 0:
+            if rank_before_mpi() != 0:
                 quiet.enter_context(redirect_stdout(nowhere))
                 quiet.enter_context(redirect_stderr(nowhere))
             args = parser().parse_args(argv)
     except SystemExit as ending:
-        return mpi.handed_over(int(ending.code or 0))
+        return handed_over(int(ending.code or 0))
     if args.command == "resume":
         args = _resumed(args)
     if args.command == "run":
-        return mpi.handed_over(_run(args, options))
-    try:
-        return _alone(lambda: ALONE[args.command](args))
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return mpi.DONE
-
-
-def program() -> None:
-    """The command `tireroad`: the process's own arguments and exit status."""
-    for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="replace")
-    sys.exit(main(sys.argv[1:]))
+        return handed_over(_run(args, options))
+    return _alone(lambda: ALONE[args.command](args))

@@ -34,6 +34,6 @@ def launch() -> Callable[..., subprocess.CompletedProcess]:
         if processes > 1:
             command = ["mpirun", "-n", str(processes), *command]
         options.setdefault("env", environment())
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
+        return subprocess.run(command, capture_output=True, text=True, timeout=1200, **options)
 
     return run

@@ -1,7 +1,7 @@
 """Matrices of small motions about a static state, on the unknowns that its support leaves.
 
 For basis functions phi on the undeformed mesh, w = e_y x X (speed taken out), K the tangent with
-geometric and follower-pressure stiffness:
+geometric and follower-pressure stiffness, the rubber's part at its dynamic moduli:
 
     M_ij = int rho phi_i . phi_j                    G_ij = skew part of int rho phi_i . (grad phi_j w)
     S_ij = -int rho (grad phi_i w) . (grad phi_j w) Q_ij = int rho phi_i . (e_y x phi_j),  B = G - Q
@@ -22,6 +22,7 @@ from tireroad.fem.matrices.support import FIXED, Support, Unknowns
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,
+    added_stress,
     body_rate_form,
     convection_form,
     static_residual,
@@ -79,7 +80,22 @@ class Operators:
 
     def _tangent(self, inflation: float):
         pressure = fem.Constant(self.body.mesh, inflation)
-        return tangent(self.body, static_residual(self.body, pressure, AT_REST))
+        static = tangent(self.body, static_residual(self.body, pressure, AT_REST))
+        wall = self.body.wall
+        return static + self._material(wall.stiffening()) if wall.stiffens else static
+
+    def _material(self, share):
+        """A share (a field of the cells) of the material part of the rubber's tangent, in UFL."""
+        here = fem.Function(self.body.space)
+        here.x.array[:] = self.body.u.x.array
+        return tangent(self.body, added_stress(self.body, share, here))
+
+    def loss_stiffness(self) -> PETSc.Mat | None:
+        """sum_r eta_r K_r, N/m, of the material parts of the regions' dynamic tangents, which a complex
+        modulus has beside K as its imaginary part; None where nothing loses. Collective.
+        """
+        wall = self.body.wall
+        return self._assemble(self._material(wall.losses())) if wall.loses else None
 
     def rotation(self) -> Rotation:
         """The matrices of the rotating frame. Collective."""

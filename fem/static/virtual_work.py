@@ -53,6 +53,41 @@ def elastic_work(body: Body, pressure):
     return work + pressure * kinematics.pressure_virtual_work(u, v, normal) * body.inner_ds
 
 
+def added_stress(body: Body, share, before: fem.Function):
+    """int share (S(C) - S(C_0)) : delta E: virtual work of a share of the rubber's stress since the state `before`.
+
+    `share` a field of the cells. Its derivative there is that share of the material part of the tangent:
+    what turns the stresses, and pressure and cords, have no part in it.
+    """
+    u, v = body.u, body.test
+    F, F0 = kinematics.deformation_gradient(u), kinematics.deformation_gradient(before)
+
+    def part(number: int):
+        added = second_stress(body, number, F.T * F) - second_stress(body, number, F0.T * F0)
+        return share * ufl.inner(F * added, ufl.grad(v))
+
+    return part(0) * body.dx + part(1) * body.reduced_dx
+
+
+def added_energy(body: Body, share, before: fem.Function):
+    """The potential of `added_stress`: int share (W(C) - W(C_0) - S(C_0) : (E - E_0)), J."""
+    F, F0 = kinematics.deformation_gradient(body.u), kinematics.deformation_gradient(before)
+    C, C0 = F.T * F, F0.T * F0
+
+    def part(number: int):
+        stress = second_stress(body, number, C0)
+        stored = body.wall.energy(C)[number] - body.wall.energy(C0)[number]
+        return share * (stored - ufl.inner(stress, C - C0) / 2)
+
+    return part(0) * body.dx + part(1) * body.reduced_dx
+
+
+def second_stress(body: Body, part: int, C):
+    """Second Piola-Kirchhoff stress of the rubber, Pa; part 0 of the distortion, 1 of the dilatation."""
+    C = ufl.variable(C)
+    return 2 * ufl.diff(body.wall.energy(C)[part], C)
+
+
 def _rolling_work(body: Body, rolling: Rolling):
     """The virtual work of inertia and of damping by the mass."""
     u, v = body.u, body.test
@@ -107,8 +142,7 @@ def stress_prediction(body: Body, before: fem.Function):
 
     def correction(part: int):
         def stress(C):
-            C = ufl.variable(C)
-            return 2 * ufl.diff(body.wall.energy(C)[part], C)
+            return second_stress(body, part, C)
 
         slope = ufl.diff(stress(F0.T * F0 + reach * rate), reach)
         return ufl.inner(stress(F0.T * F0) + slope - stress(F.T * F), bending)

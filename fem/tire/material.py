@@ -19,6 +19,8 @@ from tireroad.fem.errors import InputError
 class Material:
     """A rubber: law by name, moduli in Pa, density in kg/m3.
 
+    `dynamic`: modulus of small motions over that of the static state; `loss_factor` of small motions.
+
     Laws of Young's modulus and Poisson's ratio leave the coefficients at 0, and the others way round.
     """
 
@@ -31,6 +33,8 @@ class Material:
     c20: float = 0.0
     c30: float = 0.0
     bulk_modulus: float = 0.0
+    dynamic: float = 1.0
+    loss_factor: float = 0.0
 
     def __post_init__(self):
         if self.model not in LAWS:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +58,8 @@ class Wall:
         self._owner = section.region[tire.section_cell]  # of each cell: the number of its region
         self._materials = [materials[name] for name in section.regions]
         self.density = self._field("density", None)
+        self.stiffens = any(m.dynamic != 1 for m in self._materials)
+        self.loses = any(m.loss_factor for m in self._materials)
         self._laws = [
             (law.energy, [self._field(name, model) for name in law.coefficients])
             for model, law in LAWS.items()
@@ -66,10 +68,23 @@ class Wall:
 
     def _field(self, name: str, model: str | None) -> fem.Function:
         """An attribute of the materials by cell; 0 where the material follows another law."""
-        values = [getattr(m, name) if model in (None, m.model) else 0.0 for m in self._materials]
+        materials = self._materials
+        return self._by_cell(
+            [getattr(m, name) if model in (None, m.model) else 0.0 for m in materials]
+        )
+
+    def _by_cell(self, values: Sequence[float]) -> fem.Function:
         field = fem.Function(self._space)
         field.x.array[:] = np.array(values)[self._owner]
         return field
+
+    def stiffening(self) -> fem.Function:
+        """What small motions feel beside the static modulus, as a share of it: dynamic - 1."""
+        return self._by_cell([m.dynamic - 1 for m in self._materials])
+
+    def losses(self) -> fem.Function:
+        """Imaginary part of the modulus of small motions over the static modulus."""
+        return self._by_cell([m.dynamic * m.loss_factor for m in self._materials])
 
     def energy(self, C):
         """Strain energy density as (distortion, dilatation), J/m3, in UFL."""

@@ -20,6 +20,7 @@ from tireroad.fem.matrices.compliance import on_own_rows, rotating_damping, rota
 from tireroad.fem.matrices.direct import factorise, solve_columns
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.transient.air_step import AirStep
+from tireroad.fem.transient.modal_damping import ModalDamping
 
 # What a step needs of the one before; `balanced` is the mean of two accelerations that balances the
 # forces at the step's end.
@@ -31,7 +32,8 @@ class FullTire:
 
     The interface of greens.recursion.Recursion, so the same contact loop runs on it. `outputs` (r,
     3 s) and `loads` (k, 3 s) weigh the nodes of the outer face; `air` is what fills the cavity, its
-    coordinates after the tire's. All methods are collective.
+    coordinates after the tire's; `modal` damps mode by mode beside `damping`, (gamma1 1/s, gamma2 s).
+    All methods are collective.
     """
 
     def __init__(
@@ -46,6 +48,7 @@ class FullTire:
         inertia: str = "full",
         spectral_radius: float = 0.0,
         air: Column | None = None,
+        modal: ModalDamping | None = None,
     ):
         self._set_scheme(step, spectral_radius)
         self._operators, self._comm, self._step = operators, operators.body.comm, step
@@ -55,27 +58,30 @@ class FullTire:
         stiffness = rotating_stiffness(operators, rotation, speed, damping, inertia)
         system = stiffness.copy()
         different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
-        system.axpy(self._gamma / (self._beta * step), self._drag, different)
+        share = self._gamma / (self._beta * step)
+        system.axpy(share, self._drag, different)
         diagonal = system.getDiagonal()
         diagonal.array[:] += (1 - self._a) / (self._beta * step**2) * self._mass
         system.setDiagonal(diagonal)
         system.setOption(PETSc.Mat.Option.SYMMETRIC, speed == 0)
         self._solver = factorise(system)
         self._columns = on_own_rows(operators, loads).toarray()
+        self._modal, self._system = modal, system
+        self._joined = modal.joined(self._by_factors, share) if modal else None
         # Full motion per unit force at the end of a step: the step's answer is then one product.
-        self._answer = solve_columns(self._solver, system, self._columns)
+        self._answer = self._solved_columns(self._columns)
         self._tire = len(self._mass)
-        self._air = self._with_air(air, system) if air else None
+        self._air = self._with_air(air) if air else None
         self.same_step = self._comm.allreduce(self._outputs @ self._answer[: self._tire])
         n = len(self._mass)
         self.displacement, self.velocity, self.acceleration, self.balanced = np.zeros((4, n))
         self._vectors = system.createVecs()
 
-    def _with_air(self, air: Column, system: PETSc.Mat) -> AirStep:
+    def _with_air(self, air: Column) -> AirStep:
         """Let the air take part: its unknowns are appended to all that has one row each. Collective."""
         first = self._gamma / (self._beta * self._step)
         second = (1 - self._a) / (self._beta * self._step**2)
-        part = AirStep(air, lambda b: solve_columns(self._solver, system, b), (first, second))
+        part = AirStep(air, self._solved_columns, (first, second))
         self._answer = part.complete(self._answer, np.zeros((part.count, self._answer.shape[1])))
         self._columns = np.pad(self._columns, ((0, part.rows), (0, 0)))
         self._mass = np.append(self._mass, np.ones(part.rows))
@@ -101,16 +107,27 @@ class FullTire:
         self._free = self._solved(self._mass * right + self._product(rate))
         return self._comm.allreduce(self._outputs @ self._free[: self._tire])
 
+    def _by_factors(self, right: np.ndarray) -> np.ndarray:
+        """Own rows (n, k) of the sparse system^-1 right, checked."""
+        return solve_columns(self._solver, self._system, right)
+
+    def _solved_columns(self, right: np.ndarray) -> np.ndarray:
+        """The same with the damping mode by mode in the system."""
+        return (self._joined or self._by_factors)(right)
+
     def _solved(self, right: np.ndarray) -> np.ndarray:
         """The displacement (own rows) that balances forces (own rows) at the end of the step."""
-        b, x = self._vectors
         own, air = np.split(right, [self._tire])
         if self._air:
             air = self._air.shared(air)
             own = self._air.right(own, air)
-        b.array[:] = own
-        self._solver.apply(b, x)
-        free = x.array_r.copy()
+        if self._joined:
+            free = self._joined(own[:, None])[:, 0]
+        else:
+            b, x = self._vectors
+            b.array[:] = own
+            self._solver.apply(b, x)
+            free = x.array_r.copy()
         return self._air.complete(free, air) if self._air else free
 
     def _product(self, values: np.ndarray) -> np.ndarray:
@@ -120,6 +137,8 @@ class FullTire:
         b.array[:] = own
         self._drag.mult(b, x)
         product = x.array_r.copy()
+        if self._modal:
+            product += self._modal.force(own)
         return np.concatenate([product, self._air.dragged(air)]) if self._air else product
 
     def advance(self, force: np.ndarray) -> None:

@@ -2,7 +2,7 @@
 
     M u'' + D u' + F(u) = W^T f + f_static,   D = gamma1 M + gamma2 K,
 
-F the forces of the hyperelastic wall and of the follower pressure at the total displacement, K their
+F the forces of the hyperelastic wall, of its cords and of the follower pressure at the total displacement, K their
 tangent at the static state, by the same method of Wood, Bossak and Zienkiewicz as `fem.transient.linear`: the
 two differ in F alone. Each step is solved by iterations on the one factorisation of the linear step,
 which inertia keeps near the true one; contact is solved anew in each.
@@ -20,8 +20,9 @@ from scipy import sparse
 from tireroad.fem import compat, kinematics
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
-from tireroad.fem.static.virtual_work import AT_REST, static_residual
+from tireroad.fem.static.virtual_work import AT_REST, added_energy, added_stress, static_residual
 from tireroad.fem.transient.linear import FullTire
+from tireroad.fem.transient.modal_damping import ModalDamping
 
 TOLERANCE = 1e-9  # of the largest displacement
 _FLOOR = 1e-11  # of the wall's thickness: rounding of F
@@ -45,18 +46,32 @@ class NonlinearTire(FullTire):
         outputs: sparse.csr_matrix,
         loads: sparse.csr_matrix,
         spectral_radius: float = 0.0,
+        modal: ModalDamping | None = None,
     ):
         if operators.unknowns.rim:
             raise InputError('nonlinear tire in time: modal.rim = "free" is linear; take "fixed"')
         super().__init__(
-            operators, None, 0.0, damping, step, outputs, loads, spectral_radius=spectral_radius
+            operators,
+            None,
+            0.0,
+            damping,
+            step,
+            outputs,
+            loads,
+            spectral_radius=spectral_radius,
+            modal=modal,
         )
         body = operators.body
         self._body, self._small = body, _FLOOR * body.ring.thickness
         self._static = body.u.x.array.copy()
         pressure = fem.Constant(body.mesh, float(inflation))
-        self._force_form = compat.form(static_residual(body, pressure, AT_REST))
-        self._potential_form = compat.form(_potential(body, pressure))
+        work, potential = static_residual(body, pressure, AT_REST), _potential(body, pressure)
+        if body.wall.stiffens:
+            before, share = fem.Function(body.space), body.wall.stiffening()
+            before.x.array[:] = self._static
+            work += added_stress(body, share, before)
+            potential += added_energy(body, share, before)
+        self._force_form, self._potential_form = compat.form(work), compat.form(potential)
         self._assembled = fem.petsc.create_vector(self._force_form)
         n = len(self._mass)
         self._rest = self._at(np.zeros(n), self._forces)
@@ -107,12 +122,6 @@ class NonlinearTire(FullTire):
         rate = self.velocity + h * ((1 - gamma) * self.acceleration + gamma * acceleration)
         balanced = (1 - a) * acceleration + a * self.acceleration
         return self._mass * balanced + self._product(rate)
-
-    def _solved(self, right: np.ndarray) -> np.ndarray:
-        b, x = self._vectors
-        b.array[:] = right
-        self._solver.apply(b, x)
-        return x.array_r.copy()
 
     def _at(self, motion: np.ndarray, work):
         """What `work()` says at the static state plus a motion; the body is put back."""

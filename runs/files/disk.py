@@ -2,6 +2,7 @@
 
 import errno
 import os
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -36,9 +37,33 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
+class Removed(FileNotFoundError):
+    """The result folder, or a file being written in it, was removed: exit status 3."""
+
+
 def part_of(path: Path) -> Path:
     """The temporary name of this process beside `path`."""
-    return path.with_name(f".{path.name}.{os.getpid()}.part")
+    return path.with_name(f".{path.name}.{socket.gethostname()}.{os.getpid()}.part")
+
+
+def remove_leftovers(directory: Path) -> None:
+    """Remove the temporary files of processes of this machine that were killed while they wrote."""
+    for part in directory.glob(".*.part"):
+        rest, _, process = part.name.removesuffix(".part").rpartition(".")
+        here = rest.endswith(f".{socket.gethostname()}")
+        if here and process.isdigit() and not _lives(int(process)):
+            with suppress(OSError):
+                part.unlink()
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        pass
+    return process != os.getpid()
 
 
 @contextmanager
@@ -53,6 +78,11 @@ def replacing(path: Path) -> Iterator[Path]:
     except BaseException as error:
         with suppress(OSError):
             part.unlink()
+        if isinstance(error, FileNotFoundError):
+            raise Removed(
+                f"{path.parent}: the result folder, or what was being written in it, was removed"
+                " during the run: run it again"
+            ) from error
         clear = explained(error, path) if isinstance(error, OSError | RuntimeError) else None
         if clear is not None:
             raise clear from error

@@ -13,7 +13,7 @@ from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed, signed_table
-from tireroad.runs.files.disk import explained, write_text
+from tireroad.runs.files.disk import explained, remove_leftovers, write_text
 from tireroad.runs.files.store import plain
 from tireroad.runs.scene.resolved import MARK
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
@@ -114,6 +114,8 @@ def claimed(directory: Path, scene_name: str) -> Iterator[None]:
         except OSError:
             pass  # a file system without locks
         check_owner(directory, scene_name)
+        _check_purpose(directory)
+        remove_leftovers(directory)
         try:
             tempfile.TemporaryFile(dir=directory).close()
         except OSError as error:
@@ -121,6 +123,18 @@ def claimed(directory: Path, scene_name: str) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def _check_purpose(directory: Path) -> None:
+    """The folder one stands in is taken only when it is empty or holds results already."""
+    if directory.resolve() != Path.cwd() or (directory / "summary.json").exists():
+        return
+    if (directory / "scene.toml").exists() or not any(directory.iterdir()):
+        return
+    raise InputError(
+        f"{directory}: this is the working folder, with other files in it: give results a folder of"
+        " their own with --out"
+    )
 
 
 def _unusable(directory: Path, error: OSError) -> InputError:

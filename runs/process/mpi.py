@@ -1,66 +1,24 @@
 """How a run on several processes ends: all together, with one message and one exit status."""
 
-import os
 import signal
 import sys
 import time
 import traceback
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
+from tireroad.fem import parallel
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.files.disk import explained
+from tireroad.fem.parallel import ToldByRoot
+from tireroad.runs.files.disk import Removed, explained
+from tireroad.runs.process.packages import missing
+from tireroad.runs.process.signals import STOP_SIGNALS, Stopped
+from tireroad.runs.process.statuses import BUG, DONE, GAVE_UP, INPUT, STOPPED
 
-DONE, BUG, INPUT, GAVE_UP, STOPPED = 0, 1, 2, 3, 4
+T = TypeVar("T")
+
 TOGETHER = 3.0
 """Seconds a failing process waits for the others to fail likewise before it ends them all."""
-
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
-"""SIGUSR1 is what mpirun hands on to every process; the launcher uses it."""
-
-
-class Stopped(BaseException):
-    """The user (SIGINT) or the batch system (SIGTERM, SIGUSR1) asked to stop: exit status 4.
-
-    Not an Exception, so that no solver callback takes it for its own failure.
-    """
-
-
-class ToldByRoot(RuntimeError):
-    """The root process failed unexpectedly and says so; the others end without a word."""
-
-
-class Deferred:
-    """While one is entered, the first stop signal is only noted: `asked` is its name, or "".
-
-    A loop that can be gone on with looks at it after each step, stops where its state is whole, and
-    raises `Stopped` itself. A second signal stops at once.
-    """
-
-    _current: "Deferred | None" = None
-
-    def __init__(self) -> None:
-        self.asked = ""
-
-    def __enter__(self) -> "Deferred":
-        Deferred._current = self
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        Deferred._current = None
-
-
-def stop_on_signals() -> None:
-    """Turn the stop signals into `Stopped`, or into a note where they are deferred."""
-
-    def stop(number: int, _frame: Any) -> None:
-        name, current = signal.Signals(number).name, Deferred._current
-        if current is None or current.asked:
-            raise Stopped(name)
-        current.asked = name
-
-    for number in STOP_SIGNALS:
-        signal.signal(number, stop)
 
 
 def start_petsc(options: list[str]) -> None:
@@ -74,48 +32,9 @@ def start_petsc(options: list[str]) -> None:
     petsc4py.init(["tireroad", "-no_signal_handler", *options])
 
 
-def rank_before_mpi() -> int:
-    """The rank as the process manager tells it, for commands that never start MPI."""
-    for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"):
-        if os.environ.get(name, "").isdigit():
-            return int(os.environ[name])
-    return 0
-
-
-def on_root(comm: Any, function: Callable[[], Any]) -> Any:
-    """Run `function` on the root process; its value on every process.
-
-    Where it fails, every process raises: the same InputError or ConvergenceError, or on the others
-    ToldByRoot for an error that is a bug. Collective.
-    """
-    value, error = None, None
-    if comm.rank == 0:
-        try:
-            value = function()
-        except Exception as raised:
-            error = raised
-    if comm.size > 1:
-        clear = isinstance(error, InputError | ConvergenceError)
-        told = comm.bcast(error if clear or error is None else ToldByRoot())
-        value = comm.bcast(value if error is None else None)
-        error = error or told
-    if error is not None:
-        raise error
-    return value
-
-
-def handed_over(status: int) -> int:
-    """Leave the status where the launcher asked for it (TIREROAD_STATUS), and 0 to mpirun.
-
-    Without a launcher on this machine, the status itself. Not collective.
-    """
-    file = os.environ.get("TIREROAD_STATUS", "")
-    if not os.path.exists(file):
-        return status
-    if rank_before_mpi() == 0:
-        with open(file, "w", encoding="ascii") as stream:
-            stream.write(str(status))
-    return DONE
+def on_root(comm: Any, function: Callable[[], T]) -> T:
+    """As fem.parallel.on_root; a result folder that was removed is told on every process too. Collective."""
+    return parallel.on_root(comm, function, (InputError, ConvergenceError, Removed))
 
 
 def judged(function: Callable[[], None]) -> tuple[int, str]:
@@ -124,7 +43,7 @@ def judged(function: Callable[[], None]) -> tuple[int, str]:
         function()
     except InputError as error:
         return INPUT, f"error: {error}"
-    except ConvergenceError as error:
+    except (ConvergenceError, Removed) as error:
         return GAVE_UP, f"error: {error}"
     except Stopped as stop:
         return (
@@ -135,6 +54,9 @@ def judged(function: Callable[[], None]) -> tuple[int, str]:
         return GAVE_UP, f"error: out of memory ({error}): use a coarser mesh, fewer modes or points"
     except ToldByRoot:
         return BUG, ""
+    except ModuleNotFoundError as error:
+        message = missing(error)
+        return (INPUT, message) if message else (BUG, traceback.format_exc())
     except Exception as error:
         clear = explained(error, getattr(error, "filename", None) or "the result folder")
         return (INPUT, f"error: {clear}") if clear else (BUG, traceback.format_exc())

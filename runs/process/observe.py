@@ -37,12 +37,20 @@ def log_to(path: Path) -> Iterator[None]:
     if not _State.root:
         yield
         return
-    with path.open("a", encoding="utf-8") as _State.log:
+    with _own_file(path) as _State.log:
         print(time.strftime("--- %Y-%m-%d %H:%M:%S %z"), file=_State.log)
         try:
             yield
         finally:
             _State.log = None
+
+
+def _own_file(path: Path) -> TextIO:
+    """The file for appending; a link in its place is replaced, what it points to is not ours."""
+    if path.is_symlink():
+        path.unlink()
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW
+    return open(os.open(path, flags, 0o666), "a", encoding="utf-8", errors="replace")
 
 
 @contextmanager
@@ -100,12 +108,15 @@ class Progress:
 
     Appears after two seconds, with rate and time left; on a terminal as a bar (rich), else as a
     line every ten seconds. `advance` costs about 0.1 µs to 0.2 µs until there is something to show.
-    `total` None: only what is done and the time so far are shown.
+    `total` None: only what is done and the time so far are shown. `begun` are done already, in an
+    earlier run: they count in what is done and not in the rate.
     """
 
-    def __init__(self, title: str, total: int | None = None, unit: str = "steps") -> None:
+    def __init__(
+        self, title: str, total: int | None = None, unit: str = "steps", begun: int = 0
+    ) -> None:
         self.title, self.total, self.unit = title, total, unit
-        self.done = 0
+        self.done = self.begun = begun
         self.text = ""
         self._rich: Any = None
         self._began = time.perf_counter()
@@ -149,12 +160,12 @@ class Progress:
     def line(self) -> str:
         """The state in words: done of total, rate, time left."""
         spent = time.perf_counter() - self._began
-        rate = self.done / spent if spent > 0 else 0.0
+        rate = (self.done - self.begun) / spent if spent > 0 else 0.0
         words = [f"{self.title}: {self.done}"]
         if self.total is not None:
             words[0] += f" of {self.total}"
         words[0] += f" {self.unit}"
-        if self.done:
+        if rate > 0:
             words.append(f"{rate:.3g} {self.unit}/s")
         if self.total is not None and rate > 0:
             words.append(f"{seconds(max(self.total - self.done, 0) / rate)} left")

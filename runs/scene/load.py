@@ -9,7 +9,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import Field, fields
+from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from tireroad.runs.scene.schema import (
     variant_of,
 )
 from tireroad.runs.scene.source import Source, shortened
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables import Damping, Scene
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 LARGEST = 1_000_000
@@ -55,9 +55,17 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
+    scene = _with_damping(scene)
     rules.check(scene, raw, source)
     source.refuse()
     return scene
+
+
+def _with_damping(scene: Scene) -> Scene:
+    """The default damping in proportion, where neither it nor the loss factor of a compound is given."""
+    tire = scene.tire
+    loses = any(part.loss_factor for part in (tire, *tire.region))
+    return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
 
 
 def _text(path: Path) -> str:

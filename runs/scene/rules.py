@@ -6,9 +6,9 @@ from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import described
-from tireroad.runs.scene.cord_rules import check_cords
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tire_rules import check_cords, full_matrices
 from tireroad.runs.scene.tire_tables import Tire
 
 Where = Callable[[tuple[str, ...], str], InputError]
@@ -148,7 +148,7 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             ("static", "steady_rolling"),
             "= false leaves out the centrifugal tension that keeps a free turning wheel upright",
         )
-    if scene.damping.mass:
+    if scene.damping and scene.damping.mass:
         raise error(
             ("damping", "mass"),
             f"= {scene.damping.mass:g} 1/s acts against a wheel that turns about a fixed axle; a free one"
@@ -261,6 +261,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("tire", "modal"), _modes),
     (("rotation",), _rotation),
     (("modal", "static", "rotation", "contact", "damping", "greens"), _modal),
+    (("damping", "rotation", "output"), full_matrices),
     (("contact", "road", "time", "static", "rotation"), _contact),
     (("output", "force"), _receptance),
     (("rotation",), _campbell),

@@ -261,7 +261,12 @@ class Scene:
     tire: Tire = table(Tire, "geometry, mesh and materials of the tire")
     static: Static = table(Static, "inflation and load of the static state")
     modal: Modal = table(Modal, "modes at the static state")
-    damping: Damping = table(Damping, "Rayleigh damping of the material")
+    damping: Damping | None = table(
+        Damping,
+        "Rayleigh damping of the material; absent: by the loss factors of the compounds, where "
+        "there are any, else with its defaults",
+        optional=True,
+    )
     rotation: Rotation | None = table(Rotation, "rotation of the wheel", optional=True)
     greens: Greens = table(Greens, "Green's functions")
     force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")

@@ -61,6 +61,14 @@ class Material:
     )
 
 
+def _dynamic():
+    return number(1.0, "-", "modulus of the modes over that of the static state", above=0, most=100)
+
+
+def _loss_factor():
+    return number(0.0, "-", "tan δ of the rubber in the modes", least=0, most=2)
+
+
 @dataclass(frozen=True)
 class Region:
     arc: tuple[float, float] = vector(
@@ -71,6 +79,8 @@ class Region:
         (0.0, 1.0), "-", "from, to, through the wall; 0: inner face", least=0, most=1
     )
     material: Material = table(Material, "what the region is made of")
+    dynamic: float = _dynamic()
+    loss_factor: float = _loss_factor()
 
 
 @dataclass(frozen=True)
@@ -115,6 +125,8 @@ class Tire:
         1.0, "-", "length of elements at the footprint, relative to ungraded", least=0.05, most=1
     )
     material: Material = table(Material, "what the wall is made of")
+    dynamic: float = _dynamic()
+    loss_factor: float = _loss_factor()
     region: tuple[Region, ...] = tables(
         Region, "a part of the section of another material; elements whose middle it holds"
     )

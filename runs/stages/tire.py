@@ -10,7 +10,6 @@ from mpi4py import MPI
 from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
-from tireroad.runs.scene.tire_tables import Material as MaterialTable
 from tireroad.runs.scene.tire_tables import Region, Tire
 
 
@@ -33,11 +32,12 @@ def _patch(number: int, region: Region) -> Patch:
     return Patch(f"tire.region {number}", arcs, region.depth)
 
 
-def make_lattice(section: Ring):
-    """The nodes of the displacement field, without a mesh."""
-    from tireroad.fem.tire.mesh import field_lattice
+def make_tire(comm: MPI.Comm, tire: Tire):
+    """The tire without loads, its finite elements made when they are asked for."""
+    from tireroad.fem.model import TireModel
 
-    return field_lattice(section)
+    section = make_section(tire)
+    return TireModel(section, lambda: make_body(comm, tire, section))
 
 
 def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
@@ -46,11 +46,12 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
 
-    def rubber(table: MaterialTable) -> Material:
-        return Material(**vars(table))
+    def rubber(part: Tire | Region) -> Material:
+        given = vars(part.material) | {"dynamic": part.dynamic, "loss_factor": part.loss_factor}
+        return Material(**given)
 
     names = [_patch(i, region).name for i, region in enumerate(tire.region)]
-    materials = {name: rubber(r.material) for name, r in zip(names, tire.region, strict=True)}
+    materials = {name: rubber(r) for name, r in zip(names, tire.region, strict=True)}
     placed = {"depth", "arc", "angle"}
     cords = [
         Cords(
@@ -59,4 +60,4 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
         )
         for c in tire.cords
     ]
-    return Body(comm, section, {"wall": rubber(tire.material)} | materials, cords=cords)
+    return Body(comm, section, {"wall": rubber(tire)} | materials, cords=cords)

@@ -20,7 +20,7 @@ import ufl
 from dolfinx import mesh
 from mpi4py import MPI
 from tireroad.fem import compat
-from tireroad.runs.process import mpi
+from tireroad.runs.process import mpi, signals
 
 def compile_one():
     box = mesh.create_unit_cube(MPI.COMM_WORLD, 2, 2, 2, mesh.CellType.hexahedron)
@@ -29,7 +29,7 @@ def compile_one():
     compat.form(ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx)
     print("compiled", flush=True)
 
-mpi.stop_on_signals()
+signals.stop_on_signals()
 sys.exit(mpi.guarded(MPI.COMM_WORLD, compile_one))
 """
 

@@ -33,5 +33,5 @@ def test_ci(
     fake = tmp_path / "tireroad"
     fake.write_text(FAKE.format(collected=collected, last=last, status=status))
     fake.chmod(0o755)
-    done = subprocess.run([tmp_path / ".ci" / "run"], capture_output=True, text=True, timeout=30)
+    done = subprocess.run([tmp_path / ".ci" / "run"], capture_output=True, text=True, timeout=300)
     assert done.returncode == expected, done.stdout + done.stderr

@@ -35,6 +35,14 @@ def test_long_things_show_rate_and_time_left(capsys, monkeypatch) -> None:
     assert "steps/s" in lines[1] and "30 s left" in lines[1] and "residual 1e-9" in lines[1]
 
 
+def test_what_an_earlier_run_has_done_is_not_in_the_rate() -> None:
+    with observe.Progress("contact", 1000, "steps", begun=500) as bar:
+        late(bar)
+        bar.advance(250)
+        line = bar.line()
+    assert line.startswith("contact: 750 of 1000 steps, 25 steps/s, 10 s left")
+
+
 def test_bar_on_a_terminal(capsys, monkeypatch) -> None:
     monkeypatch.setattr(observe, "is_terminal", lambda: True)
     monkeypatch.setenv("COLUMNS", "120")
@@ -85,10 +93,10 @@ def test_log_keeps_what_was_said(capsys, tmp_path: Path) -> None:
 
 def test_advance_costs_little() -> None:
     with observe.Progress("contact", 10**6) as bar:
-        began = time.perf_counter()
+        began = time.thread_time()
         for _ in range(20_000):
             bar.advance()
-        spent = time.perf_counter() - began
+        spent = time.thread_time() - began
     assert spent / 20_000 < 5e-6
 
 

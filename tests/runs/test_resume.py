@@ -56,7 +56,7 @@ def test_stopped_and_resumed(tmp_path: Path, launch, name: str) -> None:
         assert process.poll() is None
     time.sleep(0.5)
     process.send_signal(getattr(signal, name))
-    _, error = process.communicate(timeout=60)
+    _, error = process.communicate(timeout=600)
     assert process.returncode == 4, error
     assert f"stopped by {name}" in error and "resume" in error
     assert (broken / "checkpoint.h5").exists() and not (broken / "contact.h5").exists()

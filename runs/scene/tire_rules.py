@@ -1,8 +1,10 @@
-"""What the cords of a scene must keep to: names of their own, and a place inside the wall."""
+"""What the cords and the compounds of a scene must keep to."""
 
 from collections.abc import Callable
+from typing import Any
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_tables import Tire
 
 Where = Callable[[tuple[str, ...], str], InputError]
@@ -33,3 +35,15 @@ def check_cords(tire: Tire, error: Where) -> None:
             raise error(
                 (*place, "name"), f'= "{cords.name}" must hold no "/": results are named so'
             )
+
+
+def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """What is solved on the full matrices needs a damping that they have."""
+    if scene.damping is not None:
+        return
+    advice = "needs full matrices of damping, and loss factors make none: add [damping]"
+    if scene.rotation is not None and scene.rotation.method == "full":
+        raise error(("rotation", "method"), f'= "full" {advice}')
+    receptance = scene.output.receptance
+    if receptance is not None and receptance.direct:
+        raise error(("output", "receptance", "direct"), f"= {receptance.direct} {advice}")

@@ -9,49 +9,68 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from petsc4py import PETSc
 
+from tireroad.fem.matrices.operators import Operators
 from tireroad.modal import quadratic
+from tireroad.modal.damping import beyond
 from tireroad.modal.fields import gram
 from tireroad.modal.quadratic import FullModes, truncation
+from tireroad.modal.rolling import RollingModes
 from tireroad.modal.rotating import StateModes
-from tireroad.runs.stages.session import Session
 
 _ROUNDING = 1e-14  # of the largest squared length: directions below are the fields' rounding
 
-
-def compute(session: Session, projected: StateModes) -> StateModes:
-    """Solve, put the fields into `session.modal`, and say how far the projected states are off. Collective."""
-    operators, wheel = session.operators, session.wheel
-    with session.record.timing("full eigensolver"):
-        pencil = operators.mass, wheel.rotating_damping, wheel.rotating_stiffness
-        found = _solve(session, pencil, projected.eigenvalue)
-    basis, coordinates = _orthonormal(session, found)
-    momenta = session.comm.allreduce(operators.carried @ basis)
-    replace_basis(session, operators.trace(basis), momenta)
-    _compare(session, found, projected)
-    return _states(found, coordinates)
+Figures = dict[str, tuple[float, str]]
 
 
-def _solve(session: Session, pencil, projected: np.ndarray) -> FullModes:
-    """As many pairs as the scene wants, or all in its window. Collective."""
-    wanted, (mass, stiffness) = session.scene.rotation, session.damping
-    if not any(wanted.window):
-        return quadratic.solve(*pencil, wanted.count)
-    low, high = (2 * np.pi * f for f in wanted.window)
+def full_states(
+    operators: Operators,
+    pencil: tuple[PETSc.Mat, PETSc.Mat],
+    projected: RollingModes,
+    *,
+    count: int,
+    window: tuple[float, float] = (0.0, 0.0),
+) -> tuple[RollingModes, Figures]:
+    """`count` pairs nearest to zero, or all in the `window` (Hz), and how far the projected states are
+    off them. `pencil`: D + 2 Omega G and K_Omega as in fem.matrices.compliance. Collective.
+    """
+    found, figures = _solve(operators, pencil, projected, count, window)
+    fields, coordinates = _orthonormal(operators, found)
+    comm, old = operators.body.comm, projected.basis
+    momenta = comm.allreduce(operators.carried @ fields)
+    basis = replace(
+        old,
+        shape=operators.trace(fields),
+        projection=replace(old.projection, momentum=momenta),
+        modes=None,
+    )
+    states = _states(found, coordinates)
+    full = RollingModes(basis=basis, states=states, turning=projected.turning, full=True)
+    return full, figures | _compared(found, projected.states)
+
+
+def _solve(operators, pencil, projected: RollingModes, count: int, window) -> tuple:
+    """As many pairs as wanted, or all in the window. Collective."""
+    whole = operators.mass, *pencil
+    if not any(window):
+        return quadratic.solve(*whole, count), {}
+    mass, stiffness = beyond(projected.turning.damping, projected.basis.projection)
+    s = projected.states.eigenvalue
+    low, high = (2 * np.pi * f for f in window)
     rate = mass + stiffness * high**2
-    below = int((np.abs(projected) <= np.hypot(high, rate / 2)).sum())
-    found = quadratic.window(*pencil, (low, high), rate, below)
-    inside = int(((projected.imag >= low) & (projected.imag <= high)).sum())
-    session.record.indicators |= {
+    below = int((np.abs(s) <= np.hypot(high, rate / 2)).sum())
+    found = quadratic.window(*whole, (low, high), rate, below)
+    inside = int(((s.imag >= low) & (s.imag <= high)).sum())
+    return found, {
         "states in the window": (len(found.eigenvalue), "-"),
         "projected states in the window": (inside, "-"),
     }
-    return found
 
 
-def _orthonormal(session: Session, found: FullModes) -> tuple[np.ndarray, np.ndarray]:
+def _orthonormal(operators: Operators, found: FullModes) -> tuple[np.ndarray, np.ndarray]:
     """An M-orthonormal basis (own rows n, p) of all fields, and their coordinates (p, 4 q). Collective."""
-    comm, mass = session.comm, session.operators.mass[:, None]
+    comm, mass = operators.body.comm, operators.mass[:, None]
     fields = np.hstack([found.right.real, found.right.imag, found.left.real, found.left.imag])
     lengths = np.sqrt(comm.allreduce((mass * fields**2).sum(axis=0)))
     lengths[lengths == 0] = 1.0  # the imaginary part of a real state
@@ -61,14 +80,6 @@ def _orthonormal(session: Session, found: FullModes) -> tuple[np.ndarray, np.nda
     turn = directions[:, kept] / np.sqrt(sizes[kept])
     coordinates = (directions[:, kept] * np.sqrt(sizes[kept])).T * lengths
     return fields / lengths @ turn, coordinates
-
-
-def replace_basis(session: Session, shape: np.ndarray, momenta: np.ndarray) -> None:
-    """Later stages read the traces (3 s, p) and momenta (3, p) of this basis, not those of the modes."""
-    modal = session.modal
-    session.modal = replace(
-        modal, shape=shape, projection=replace(modal.projection, momentum=momenta)
-    )
 
 
 def _states(found: FullModes, coordinates: np.ndarray) -> StateModes:
@@ -88,11 +99,11 @@ def _states(found: FullModes, coordinates: np.ndarray) -> StateModes:
     )
 
 
-def _compare(session: Session, found: FullModes, projected: StateModes) -> None:
+def _compared(found: FullModes, projected: StateModes) -> Figures:
     """Truncation error of the projected eigenvalues: how many modes are enough."""
     error = truncation(found.eigenvalue, projected.eigenvalue)
     half = error[: max(len(error) // 2, 1)]
-    session.record.indicators |= {
+    return {
         "truncation error of the projected eigenvalues, lower half": (float(half.max()), "-"),
         "truncation error of the projected eigenvalues": (float(error.max()), "-"),
     }

@@ -1,0 +1,1 @@
+"""What a file says, read as data: Abaqus decks and Gmsh meshes."""

@@ -1,0 +1,229 @@
+"""An Abaqus deck read into a `Deck`: keyword by keyword, and what is not used kept as a list."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+import numpy as np
+
+from tireroad.fem.decks.deck import SCOPE, Deck, Sets
+from tireroad.fem.decks.files.abaqus_sections import SectionReader
+from tireroad.fem.decks.files.abaqus_sets import SetReader
+from tireroad.fem.decks.files.elements import Block, kind
+from tireroad.fem.decks.files.lines import Card, Data, Place, cards
+from tireroad.fem.decks.files.numbers import LABEL, records, rows
+from tireroad.fem.errors import InputError
+
+# Keywords that describe an analysis and not the tire; anything else unknown is called so.
+_ANALYSIS = frozenset(
+    """AMPLITUDE|ANALYTICAL SURFACE|ASSEMBLY|BOUNDARY|CHANGE FRICTION|CONSTRAINT CONTROLS|CONTACT|
+CONTACT PAIR|CONTROLS|CLOAD|CONTACT CONTROLS|CONTACT INCLUSIONS|CONTACT OUTPUT|CONTACT PRINT|CONTACT FILE|
+CONTACT PROPERTY ASSIGNMENT|CONTACT INITIALIZATION DATA|COUPLING|DISTRIBUTING|KINEMATIC|DISTRIBUTION|
+DISTRIBUTION TABLE|DLOAD|DSLOAD|DYNAMIC|EL FILE|EL PRINT|ELEMENT OUTPUT|END ASSEMBLY|END INSTANCE|END PART|
+END STEP|ENERGY PRINT|EQUATION|FILE FORMAT|FILM|FIELD|FILTER|FLUID BEHAVIOR|FLUID CAVITY|FLUID DENSITY|
+FLUID INFLATOR|FREQUENCY|FRICTION|GAP|HEADING|HOURGLASS STIFFNESS|IMPORT|INITIAL CONDITIONS|
+INTEGRATED OUTPUT|MASS|MASS SCALING|MODEL CHANGE|MONITOR|MPC|NODE FILE|NODE OUTPUT|NODE PRINT|OUTPUT|
+PARAMETER|PERTURBATION|PHYSICAL CONSTANTS|PREPRINT|PRE-TENSION SECTION|PRINT|RADIATION|RESTART|
+RIGID SURFACE|ROTARY INERTIA|SECTION CONTROLS|SPRING|STATIC|STEADY STATE DYNAMICS|STEADY STATE TRANSPORT|
+STEP|SURFACE BEHAVIOR|SURFACE INTERACTION|SYMMETRIC MODEL GENERATION|SYMMETRIC RESULTS TRANSFER|SYSTEM|
+TEMPERATURE|TIE|TIME POINTS|TRANSFORM|TRANSPORT VELOCITY|USER SUBROUTINES|VISCO|SURFACE SMOOTHING|MOTION|
+CONTACT DAMPING|FASTENER|CONNECTOR SECTION|CONNECTOR BEHAVIOR|BEAM SECTION|SHELL SECTION|RELEASE""".replace(
+        "\n", ""
+    ).split("|")
+)
+
+
+def read(path: Path) -> Deck:
+    """The deck of a file. Raises InputError with file and line for what is wrong in it."""
+    reader = _Reader(path)
+    for item in cards(path):
+        if isinstance(item, Card):
+            reader.begin(item)
+        else:
+            reader.data(item)
+    return reader.finish()
+
+
+class _Reader:
+    """Keeps the data of a keyword that is used until the next one begins, and then reads it."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.card: Card | None = None
+        self.lines: list[Data] = []
+        self.scope = 0
+        self.parts: dict[str, int] = {}
+        self.step: Place | None = None
+        self.part: Place | None = None
+        self.nodes: list[tuple[np.ndarray, np.ndarray]] = []
+        self.blocks: list[Block] = []
+        self.sets = SetReader()
+        self.sections = SectionReader()
+        self.unused: dict[str, list] = {}
+        self.handlers = {
+            "NODE": self._node,
+            "ELEMENT": self._element,
+            "NSET": self.sets.nodes_of,
+            "ELSET": self.sets.elements_of,
+            "SURFACE": self.sets.surface,
+            "DSLOAD": self.sets.pressure,
+            **self.sections.handlers,
+        }
+
+    def begin(self, card: Card) -> None:
+        """A keyword begins: what the one before it held is read."""
+        self._end()
+        self.card = card
+        structure = {
+            "STEP": self._step,
+            "END STEP": self._end_step,
+            "PART": self._part,
+            "END PART": self._end_part,
+            "INSTANCE": self._instance,
+        }.get(card.keyword)
+        if structure:
+            structure(card)
+        self.used = card.keyword in self.handlers and (
+            self.step is None or card.keyword == "DSLOAD"
+        )
+        if not self.used and not structure:
+            self.unused.setdefault(card.keyword, []).append(card.place)
+
+    def data(self, data: Data) -> None:
+        if self.card is None:
+            raise data.place.error("data before the first keyword: this is no Abaqus deck")
+        if self.used or self.card.keyword == "INSTANCE":
+            self.lines.append(data)
+
+    def _end(self) -> None:
+        if self.card is not None and self.used:
+            self.handlers[self.card.keyword](self.card, self.lines, self.scope)
+        elif self.card is not None and self.card.keyword == "INSTANCE" and self.lines:
+            self.unused.setdefault("INSTANCE, place of", []).append(self.card.place)
+        self.lines = []
+
+    def _step(self, card: Card) -> None:
+        self.step = card.place
+        self.unused.setdefault("STEP", []).append(card.place)
+
+    def _end_step(self, _: Card) -> None:
+        self.step = None
+
+    def _part(self, card: Card) -> None:
+        self.part = card.place
+        name = card.options.get("NAME", f"part {len(self.parts) + 1}").upper()
+        self.scope = self.parts[name] = len(self.parts) + 1
+
+    def _end_part(self, _: Card) -> None:
+        self.part, self.scope = None, 0
+
+    def _instance(self, card: Card) -> None:
+        part = card.options.get("PART", "").upper()
+        if part in self.parts:
+            self.sets.scopes[card.options.get("NAME", part).upper()] = self.parts[part]
+
+    def _node(self, card: Card, lines: list[Data], scope: int) -> None:
+        system = card.options.get("SYSTEM", "R").upper()
+        if system not in ("R", "C"):
+            raise card.place.error(f"*NODE with SYSTEM={system}: R and C are read")
+        table = rows(lines, 7)
+        labels = table[:, 0]
+        wrong = (labels != np.floor(labels)) | (labels < 1) | (labels > LABEL)
+        if wrong.any():
+            raise card.place.error(f"*NODE: {labels[wrong][0]:g} is no label of a node")
+        points = table[:, 1:4]
+        if system == "C":
+            radius, angle = points[:, 0].copy(), np.radians(points[:, 1])
+            points[:, 0], points[:, 1] = radius * np.cos(angle), radius * np.sin(angle)
+        labels = labels.astype(np.int64) + scope * SCOPE
+        self.nodes.append((labels, points))
+        self.sets.add_nodes(card, labels)
+
+    def _element(self, card: Card, lines: list[Data], scope: int) -> None:
+        name = card.options.get("TYPE", "").upper()
+        if not name:
+            raise card.place.error("*ELEMENT without TYPE=")
+        shape = kind(name)
+        if shape is None:
+            self.unused.setdefault(f"ELEMENT, TYPE={name}", []).append(card.place)
+            self.sets.add_elements(card, np.empty(0, np.int64))
+            return
+        table = records(lines, shape.nodes + 1)
+        table = table + scope * SCOPE
+        self.blocks.append(Block(name, shape, table[:, 0], table[:, 1:], card.place))
+        self.sets.add_elements(card, table[:, 0])
+
+    def finish(self) -> Deck:
+        """The deck, once the file has ended."""
+        self._end()
+        if self.step or self.part:
+            what, place = ("STEP", self.step) if self.step else ("PART", self.part)
+            raise place.error(f"*{what} has no *END {what}: is the deck cut short?")
+        if self.card is None:
+            raise InputError(f"{self.path}: no keyword in it: this is no Abaqus deck")
+        labels, points = self._all_nodes()
+        elements = np.sort(
+            np.concatenate([np.empty(0, np.int64), *(b.labels for b in self.blocks)])
+        )
+        self._unique(elements)
+        return Deck(
+            file=self.path.name,
+            labels=labels,
+            points=points,
+            blocks=tuple(self.blocks),
+            node_sets=Sets("node set", self.sets.node_sets, labels),
+            element_sets=Sets("element set", self.sets.element_sets, elements),
+            surfaces=self.sets.resolved_surfaces(elements),
+            solids=tuple(self.sections.solids),
+            layers=tuple(self.sections.layers),
+            embedded=tuple(self.sections.embedded),
+            held=tuple(self.sections.held),
+            pressed=tuple(self.sets.pressed),
+            materials=self.sections.materials(),
+            orientations=self.sections.orientations,
+            used=tuple(self._used()),
+            unused=tuple(self._not_used()),
+        )
+
+    def _all_nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Labels ascending and their points; a node given twice must be at one place."""
+        labels = np.concatenate([np.empty(0, np.int64), *(part[0] for part in self.nodes)])
+        points = np.concatenate([np.empty((0, 3)), *(part[1] for part in self.nodes)])
+        order = np.argsort(labels, kind="stable")
+        labels, points = labels[order], points[order]
+        again = np.flatnonzero(labels[1:] == labels[:-1])
+        moved = again[(points[again] != points[again + 1]).any(axis=1)]
+        if len(moved):
+            raise InputError(
+                f"{self.path.name}: node {labels[moved[0]] % SCOPE} is defined twice, at two places"
+            )
+        keep = np.append(labels[1:] != labels[:-1], True)[: len(labels)]
+        return labels[keep], points[keep]
+
+    def _unique(self, elements: np.ndarray) -> None:
+        again = elements[1:][elements[1:] == elements[:-1]]
+        if len(again):
+            block = next(b for b in reversed(self.blocks) if again[0] in b.labels)
+            raise block.place.error(f"element {again[0] % SCOPE} is defined twice")
+
+    def _used(self):
+        """One line for each kind of thing that is read."""
+        count = sum(len(part[0]) for part in self.nodes)
+        yield f"{count} nodes in {len(self.nodes)} blocks"
+        for block in self.blocks:
+            yield f"{len(block.labels)} elements {block.type} ({block.place})"
+        yield from self.sections.used()
+
+    def _not_used(self):
+        """One line for each keyword that is not used, with the first line it stands in."""
+        for name, places in self.unused.items():
+            keyword = name.split(",")[0]
+            known = keyword in _ANALYSIS or keyword in self.handlers or keyword == "INSTANCE"
+            near = [] if known else difflib.get_close_matches(keyword, self.handlers, 1, 0.75)
+            hint = f"; did you mean *{near[0]}?" if near else ""
+            times = f", {len(places)} times" if len(places) > 1 else ""
+            what = "not used" if known else "unknown keyword, not used"
+            yield f"*{name}: {what} ({places[0]}{times}){hint}"
+        yield from self.sections.unused
+        yield from self.sets.unused

@@ -1,0 +1,87 @@
+"""The element types of Abaqus that a tire's section or body is made of."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A shape: `role` solid or membrane, dimension of the deck, nodes, and nodes of each face.
+
+    A face is given by its corner nodes, in the order S1, S2, ... of the manual.
+    """
+
+    role: str
+    dimension: int
+    nodes: int
+    corners: int
+    faces: tuple[tuple[int, ...], ...] = ()
+
+
+_TRIANGLE = ((0, 1), (1, 2), (2, 0))
+_QUAD = ((0, 1), (1, 2), (2, 3), (3, 0))
+_WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
+_HEXAHEDRON = (
+    (0, 1, 2, 3),
+    (4, 7, 6, 5),
+    (0, 4, 5, 1),
+    (1, 5, 6, 2),
+    (2, 6, 7, 3),
+    (3, 7, 4, 0),
+)
+
+# H hybrid, R reduced, I incompatible modes, T coupled temperature, M modified: ways to integrate, which
+# the program does in its own way.
+_FAMILIES = (
+    (re.compile(r"(?:CGAX|CAX)([3468])[RHIMT]*"), "solid", 2),
+    (re.compile(r"C3D(4|6|8|10|15|20|27)[RHIMST]*"), "solid", 3),
+    (re.compile(r"(?:SFMGAX|SFMAX|MGAX|MAX)([12])[RHT]*"), "membrane", 2),
+    (re.compile(r"(?:SFM3D|M3D)([34689])[R]*"), "membrane", 3),
+)
+_SOLIDS = {
+    (2, 3): Kind("solid", 2, 3, 3, _TRIANGLE),
+    (2, 4): Kind("solid", 2, 4, 4, _QUAD),
+    (2, 6): Kind("solid", 2, 6, 3, _TRIANGLE),
+    (2, 8): Kind("solid", 2, 8, 4, _QUAD),
+    (3, 4): Kind("solid", 3, 4, 4),
+    (3, 10): Kind("solid", 3, 10, 4),
+    (3, 6): Kind("solid", 3, 6, 6, _WEDGE),
+    (3, 15): Kind("solid", 3, 15, 6, _WEDGE),
+    (3, 8): Kind("solid", 3, 8, 8, _HEXAHEDRON),
+    (3, 20): Kind("solid", 3, 20, 8, _HEXAHEDRON),
+    (3, 27): Kind("solid", 3, 27, 8, _HEXAHEDRON),
+}
+_MEMBRANES = {
+    (2, 1): Kind("membrane", 2, 2, 2),
+    (2, 2): Kind("membrane", 2, 3, 2),
+    (3, 3): Kind("membrane", 3, 3, 3),
+    (3, 4): Kind("membrane", 3, 4, 4),
+    (3, 6): Kind("membrane", 3, 6, 3),
+    (3, 8): Kind("membrane", 3, 8, 4),
+    (3, 9): Kind("membrane", 3, 9, 4),
+}
+
+
+def kind(name: str) -> Kind | None:
+    """The shape of an Abaqus type in capitals; None for one that is not used."""
+    for pattern, role, dimension in _FAMILIES:
+        match = pattern.fullmatch(name)
+        if match:
+            shapes = _SOLIDS if role == "solid" else _MEMBRANES
+            return shapes.get((dimension, int(match[1])))
+    return None
+
+
+@dataclass(frozen=True)
+class Block:
+    """Elements of one type: labels (n,), nodes (n, k) by label, and the line that began them."""
+
+    type: str
+    kind: Kind
+    labels: np.ndarray
+    nodes: np.ndarray
+    place: object

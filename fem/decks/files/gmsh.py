@@ -1,0 +1,251 @@
+"""Gmsh meshes, .msh 2.2 and 4.1, text and binary, read into a `Deck`.
+
+Physical groups of the highest dimension are element sets, those of one dimension less surfaces. A section
+lies in the plane z = 0 with x the distance from the axle and y along it. Counts are held against what the
+file has before memory is taken.
+"""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import numpy as np
+
+from tireroad.fem.decks.deck import ALL_FACES, Deck, Members, Sets
+from tireroad.fem.decks.files.elements import Block, kind
+from tireroad.fem.decks.files.gmsh_numbers import LARGEST, BinaryNumbers, Part, TextNumbers, parts
+from tireroad.fem.decks.files.numbers import LABEL
+from tireroad.fem.errors import InputError
+
+# Number of the type: dimension, nodes, Abaqus name, which of its nodes in Abaqus's order.
+_HEXAHEDRON = (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)
+_WEDGE = (*range(6), 6, 9, 7, 12, 14, 13, 8, 10, 11)
+_TYPES = {
+    1: (1, 2, "SFMGAX1", (0, 1)),
+    8: (1, 3, "SFMGAX2", (0, 1, 2)),
+    2: (2, 3, "CGAX3", (0, 1, 2)),
+    3: (2, 4, "CGAX4", (0, 1, 2, 3)),
+    9: (2, 6, "CGAX6", tuple(range(6))),
+    10: (2, 9, "CGAX8", tuple(range(8))),
+    16: (2, 8, "CGAX8", tuple(range(8))),
+    5: (3, 8, "C3D8", tuple(range(8))),
+    6: (3, 6, "C3D6", tuple(range(6))),
+    17: (3, 20, "C3D20", _HEXAHEDRON),
+    12: (3, 27, "C3D20", _HEXAHEDRON),
+    18: (3, 15, "C3D15", _WEDGE),
+    13: (3, 18, "C3D15", _WEDGE),
+    15: (0, 1, "", (0,)),
+}
+_FACES = {2: ("M3D3", 3), 3: ("M3D4", 4), 9: ("M3D6", 6), 10: ("M3D9", 9), 16: ("M3D8", 8)}
+
+Elements = list[tuple[int, int, int, np.ndarray]]  # type, physical group, label, nodes
+
+
+def read(path: Path) -> Deck:
+    """The mesh of a file. Raises InputError with file and line for what is wrong in it."""
+    try:
+        size = path.stat().st_size
+        if size > LARGEST:
+            raise InputError(f"{path}: larger than {LARGEST >> 20} MB")
+        found = parts(path.read_bytes(), path.name)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
+    version, binary = _format(found, path)
+    needed = ("Nodes", "Elements") + (("Entities",) if version == "4.1" else ())
+    for name in needed:
+        if name not in found:
+            raise InputError(f"{path.name}: no ${name} in it: is the file cut short?")
+    numbers = BinaryNumbers if binary else TextNumbers
+    names = _names(found.get("PhysicalNames"))
+    if version == "4.1":
+        groups = _entities(numbers(found["Entities"]))
+        labels, points = _nodes_4(numbers(found["Nodes"]))
+        elements = _elements_4(numbers(found["Elements"]), groups)
+    else:
+        labels, points = _nodes_2(numbers(found["Nodes"]))
+        elements = _elements_2(numbers(found["Elements"]), binary)
+    return _deck(path, labels, points, elements, names, found["Elements"])
+
+
+def _format(found: dict[str, Part], path: Path) -> tuple[str, bool]:
+    part = found.get("MeshFormat")
+    if part is None:
+        raise InputError(f"{path}: no $MeshFormat: this is no Gmsh mesh")
+    words = part.text.split(None, 3)[:3]
+    if len(words) < 3 or words[0] not in (b"2.2", b"4.1") or words[1] not in (b"0", b"1"):
+        raise part.place.error("the mesh must be of format 2.2 or 4.1 (gmsh -format msh41)")
+    if words[1] == b"1" and b"\1\0\0\0" not in part.text:
+        raise part.place.error("a binary mesh of another byte order is not read")
+    return words[0].decode(), words[1] == b"1"
+
+
+def _names(part: Part | None) -> dict[tuple[int, int], str]:
+    """(dimension, number) -> name of the physical groups."""
+    names: dict[tuple[int, int], str] = {}
+    for offset, line in enumerate(part.text.splitlines() if part else ()):
+        words = line.decode("utf-8", "replace").split(None, 2)
+        if len(words) < 3:
+            continue
+        try:
+            name = shlex.split(words[2])[0]
+            names[int(words[0]), int(words[1])] = name
+        except (ValueError, IndexError):
+            raise part.line(offset).error('a physical name is: dimension number "name"') from None
+    return names
+
+
+def _entities(numbers) -> dict[tuple[int, int], int]:
+    """(dimension, entity) -> physical group, the first where there are several."""
+    groups = {}
+    counts = numbers.sizes(4)
+    for dimension, count in enumerate(counts):
+        for _ in range(numbers.fits(count, 4)):
+            (tag,) = numbers.ints(1)
+            numbers.reals(3 if dimension == 0 else 6)
+            physical = numbers.ints(numbers.fits(numbers.sizes(1)[0], 4))
+            if dimension:
+                numbers.ints(numbers.fits(numbers.sizes(1)[0], 4))
+            if len(physical):
+                groups[dimension, int(tag)] = abs(int(physical[0]))
+    return groups
+
+
+def _nodes_4(numbers):
+    blocks, total, *_ = numbers.sizes(4)
+    numbers.fits(total, 8)
+    labels, points = [np.empty(0, np.int64)], [np.empty((0, 3))]
+    for _ in range(numbers.fits(blocks, 4)):
+        dimension, _, parametric = numbers.ints(3)
+        count = numbers.fits(numbers.sizes(1)[0], 8)
+        labels.append(numbers.sizes(count))
+        if not 0 <= dimension <= 3:
+            raise numbers.error(f"nodes of an entity of dimension {dimension}")
+        width = 3 + (int(dimension) if parametric else 0)
+        points.append(numbers.reals(width * count).reshape(count, width)[:, :3])
+    return np.concatenate(labels), np.concatenate(points)
+
+
+def _elements_4(numbers, groups) -> Elements:
+    blocks, total, *_ = numbers.sizes(4)
+    numbers.fits(total, 8)
+    found: Elements = []
+    for _ in range(numbers.fits(blocks, 4)):
+        dimension, tag, sort = (int(value) for value in numbers.ints(3))
+        count = numbers.fits(numbers.sizes(1)[0], 8)
+        width = 1 + _nodes_of(sort, numbers)
+        table = numbers.sizes(count * width).reshape(count, width)
+        group = groups.get((dimension, tag), 0)
+        found += [(sort, group, int(row[0]), row[1:]) for row in table]
+    return found
+
+
+def _nodes_of(sort: int, numbers) -> int:
+    if sort not in _TYPES:
+        raise numbers.error(
+            f"element type {sort} of Gmsh is not read: lines, triangles, quadrilaterals, hexahedra and "
+            "wedges of first and second order are"
+        )
+    return _TYPES[sort][1]
+
+
+def _nodes_2(numbers):
+    (count,) = numbers.ints(1)
+    numbers.fits(count, 4)
+    return numbers.labelled_points(int(count))
+
+
+def _elements_2(numbers, binary: bool) -> Elements:
+    (count,) = numbers.ints(1)
+    numbers.fits(count, 4)
+    found: Elements = []
+    while len(found) < count:
+        if binary:
+            sort, many, tags = (int(value) for value in numbers.ints(3))
+        else:
+            label, sort, tags = (int(value) for value in numbers.ints(3))
+            many = 1
+        if many < 1 or not 0 <= tags <= 100:
+            raise numbers.error(f"elements with {tags} tags")
+        width = _nodes_of(sort, numbers) + tags + (1 if binary else 0)
+        table = numbers.ints(numbers.fits(many, 4 * width) * width).reshape(many, width)
+        if not binary:
+            table = np.insert(table, 0, label, axis=1)
+        group = table[:, 1] if tags else np.zeros(many, np.int64)
+        found += [
+            (sort, int(g), int(row[0]), row[1 + tags :])
+            for g, row in zip(group, table, strict=True)
+        ]
+    return found
+
+
+def _deck(path: Path, labels, points, elements: Elements, names, part: Part) -> Deck:
+    dimension = max((_TYPES[sort][0] for sort, *_ in elements), default=0)
+    order = np.argsort(labels, kind="stable")
+    labels, points = labels[order], points[order]
+    if len(labels) and (labels[0] < 1 or labels[-1] > LABEL or (np.diff(labels) < 1).any()):
+        raise InputError(f"{path.name}: node labels must be different and from 1 to {LABEL}")
+    if not np.isfinite(points).all():
+        raise InputError(f"{path.name}: a coordinate is not a number")
+    if dimension == 2 and np.abs(points[:, 2]).max() > 1e-9 * max(np.ptp(points), 1e-300):
+        raise InputError(f"{path.name}: a section must lie in z = 0, x from the axle, y along it")
+    blocks, sets, surfaces = _groups(elements, dimension, names, part)
+    known = np.unique([e[2] for e in elements])
+    deck = Deck(
+        file=path.name,
+        labels=labels,
+        points=points,
+        blocks=tuple(blocks),
+        node_sets=Sets("node set", {}, labels),
+        element_sets=Sets("element set", sets, known),
+        surfaces=surfaces,
+        used=(f"{len(labels)} nodes", *(f"{len(b.labels)} elements {b.type}" for b in blocks)),
+        lines=tuple(surfaces),
+    )
+    return _counter_clockwise(deck) if dimension == 2 else deck
+
+
+def _groups(elements: Elements, dimension: int, names, part: Part):
+    """Blocks by type, element sets and surfaces by group."""
+    by_type: dict[int, list] = {}
+    for element in elements:
+        by_type.setdefault(element[0], []).append(element)
+    blocks, sets, surfaces = [], {}, {}
+    for sort, those in by_type.items():
+        own, _, name, take = _TYPES[sort]
+        if own not in (dimension, dimension - 1) or own == 0:
+            continue
+        if own == 2 and dimension == 3:
+            name, count = _FACES[sort]
+            take = tuple(range(count))
+        labels = np.array([e[2] for e in those], np.int64)
+        nodes = np.array([e[3] for e in those], np.int64)[:, list(take)]
+        blocks.append(Block(name, kind(name), labels, nodes, part.place))
+        group = np.array([e[1] for e in those])
+        for number in np.unique(group):
+            title = names.get((own, int(number)), f"{'group' if number else 'no group'} {number}")
+            mine = labels[group == number]
+            if own == dimension:
+                sets.setdefault(title.upper(), Members()).labels.append(mine)
+            elif number:
+                rows = np.column_stack([mine, np.full(len(mine), ALL_FACES)])
+                surfaces[title] = np.concatenate(
+                    [surfaces.get(title, np.empty((0, 2), np.int64)), rows]
+                )
+    return blocks, sets, surfaces
+
+
+def _counter_clockwise(deck: Deck) -> Deck:
+    """Gmsh numbers nodes as each surface was drawn: those drawn the other way round are turned."""
+    for block in deck.blocks:
+        count = block.kind.corners
+        if block.kind.role != "solid":
+            continue
+        corners = deck.points[deck.rows(block.nodes[:, :count], block.place)][:, :, :2]
+        x, y = corners[..., 0], corners[..., 1]
+        area = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
+        turn = [0, *range(count - 1, 0, -1)]
+        if block.kind.nodes > count:
+            turn += [2 * count - 1 - k for k in range(count)]
+        block.nodes[area < 0] = block.nodes[area < 0][:, turn]
+    return deck

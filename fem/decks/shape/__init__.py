@@ -1,0 +1,1 @@
+"""From elements to quadrilaterals that carry faces and lines of cords."""

@@ -1,0 +1,1 @@
+"""Three-dimensional bodies of revolution and their sections."""

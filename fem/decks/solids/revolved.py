@@ -1,0 +1,231 @@
+"""Three-dimensional decks that are bodies of revolution, reduced to their section.
+
+The program's rolling states are those of a body that is undeformed the same at every angle, so any
+other body is refused, with the reason.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tireroad.fem.decks.deck import SCOPE, Deck, Members, Sets
+from tireroad.fem.decks.files.elements import Block, kind
+from tireroad.fem.decks.solids.revolved_cords import meridian_layers
+from tireroad.fem.decks.solids.rings import Rings, find_rings
+from tireroad.fem.errors import InputError
+
+_NODES = 2_000_000
+
+
+@dataclass
+class _Section:
+    """The section so far: which of its elements each solid and membrane belongs to (`owner`), the corners of
+    its cells (ring numbers), and the corners of all faces of every solid.
+    """
+
+    rings: Rings
+    owner: dict[int, int] = field(default_factory=dict)
+    corners: dict[int, list[int]] = field(default_factory=dict)
+    faces: dict[int, list[frozenset]] = field(default_factory=dict)
+
+
+def reduced(deck: Deck) -> tuple[Deck, np.ndarray | None]:
+    """A two-dimensional deck as it is; a body of revolution as its section and its ring angles (rad)."""
+    if deck.dimension == 2:
+        return deck, None
+    if len(deck.points) > _NODES:
+        raise InputError(f"{deck.file}: more than {_NODES} nodes: bring the section alone")
+    solids = [b for b in deck.blocks if b.kind.role == "solid"]
+    bad = next((b for b in solids if not b.kind.faces), None)
+    if bad:
+        raise bad.place.error(
+            f"{bad.type}: tetrahedra cannot be a body of revolution; hexahedra and wedges can"
+        )
+    corners = [deck.rows(b.nodes[:, : b.kind.corners], b.place) for b in solids]
+    for block, rows in zip(solids, corners, strict=True):
+        _positive(deck, block, rows)
+    rings = find_rings(deck, np.unique(np.concatenate([c.ravel() for c in corners])))
+    section = _Section(rings)
+    blocks = []
+    for block, rows in zip(solids, corners, strict=True):
+        blocks += _sections(deck, block, rows, section)
+    _same_all_round(section, deck)
+    membranes, senses = _membranes(deck, section)
+    flat = replace(
+        deck,
+        labels=np.arange(1, len(rings.places) + 1),
+        points=np.pad(rings.places, ((0, 0), (0, 1))),
+        blocks=(*blocks, *membranes),
+        node_sets=_node_sets(deck, rings),
+        element_sets=_element_sets(deck, section.owner),
+        surfaces={name: _surface(rows, section) for name, rows in deck.surfaces.items()},
+        layers=meridian_layers(deck, senses, rings.axis),
+        used=(*deck.used, f"a body of revolution about {'xyz'[rings.axis]}: its section is used"),
+    )
+    return flat, rings.angles
+
+
+def _positive(deck: Deck, block: Block, rows: np.ndarray) -> None:
+    """That the corner at the first node of every solid has a positive volume."""
+    third, up = (3, 4) if block.kind.corners == 8 else (2, 3)
+    at = deck.points[rows]
+    edges = [at[:, k] - at[:, 0] for k in (1, third, up)]
+    volume = np.einsum("ij,ij->i", np.cross(edges[0], edges[1]), edges[2])
+    wrong = np.flatnonzero(volume <= 0)
+    if len(wrong):
+        raise block.place.error(
+            f"element {block.labels[wrong[0]] % SCOPE} has a negative volume; {len(wrong)} of this block"
+        )
+
+
+def _sections(deck: Deck, block: Block, rows: np.ndarray, section: _Section) -> list[Block]:
+    """The section cells of a block: the face of each solid that lies in a meridian plane, each once."""
+    shape, rings = block.kind, section.rings
+    every = rings.ring[deck.rows(block.nodes, block.place)]
+    start = _meridian_faces(rings, shape.faces, rows, block)
+    middle = _middles(shape)
+    seen: dict[tuple, int] = {}
+    cells: dict[int, list] = {}
+    for label, ring, face in zip(block.labels.tolist(), every, start, strict=True):
+        nodes = _cell(ring, shape.faces[face], middle, rings)
+        key = tuple(sorted(nodes))
+        if key not in seen:
+            seen[key] = label
+            cells.setdefault(len(nodes), []).append((label, nodes))
+            section.corners[label] = nodes[: len(shape.faces[face])]
+        section.owner[label] = seen[key]
+        section.faces[label] = [frozenset(ring[list(f)].tolist()) for f in shape.faces]
+    made = []
+    for size, those in cells.items():
+        labels, nodes = np.array([c[0] for c in those]), np.array([c[1] for c in those]) + 1
+        made.append(Block(f"CGAX{size}", kind(f"CGAX{size}"), labels, nodes, block.place))
+    return made
+
+
+def _cell(ring: np.ndarray, face: tuple, middle: dict, rings: Rings) -> list[int]:
+    """Ring numbers of a section cell's nodes, corners first, counter-clockwise in (r, along)."""
+    r, along = rings.places[ring[list(face)]].T
+    if (r * np.roll(along, -1) - along * np.roll(r, -1)).sum() < 0:
+        face = face[::-1]
+    local = [*face]
+    if middle:
+        local += [middle[frozenset(pair)] for pair in zip(face, face[1:] + face[:1], strict=True)]
+    return ring[local].tolist()
+
+
+def _meridian_faces(rings: Rings, faces, rows: np.ndarray, block: Block) -> np.ndarray:
+    """For each solid the number of its first face whose corners have one angle and different rings."""
+    found = np.full(len(rows), -1)
+    for number in reversed(range(len(faces))):
+        angle, ring = rings.angle[rows[:, faces[number]]], rings.ring[rows[:, faces[number]]]
+        flat = (angle == angle[:, :1]).all(axis=1)
+        apart = (np.diff(np.sort(ring, axis=1), axis=1) > 0).all(axis=1)
+        found[flat & apart] = number
+    spans = np.array([len(np.unique(angle)) for angle in rings.angle[rows]])
+    wrong = np.flatnonzero((found < 0) | (spans != 2))
+    if len(wrong):
+        raise block.place.error(
+            f"element {block.labels[wrong[0]] % SCOPE} does not reach from one meridian plane to the next: "
+            "the body is not its section revolved"
+        )
+    return found
+
+
+def _middles(shape) -> dict[frozenset, int]:
+    """Local node between two corners, of quadratic solids, in Abaqus's order."""
+    if shape.nodes in (6, 8):
+        return {}
+    count = shape.corners // 2
+    around = [(k, (k + 1) % count) for k in range(count)]
+    pairs = around + [(a + count, b + count) for a, b in around]
+    return {frozenset(pair): shape.corners + k for k, pair in enumerate(pairs)}
+
+
+def _same_all_round(section: _Section, deck: Deck) -> None:
+    """That every cell of the section is there once in each step around."""
+    solids = [section.owner[label] for label in section.faces]
+    _, counts = np.unique(np.array(solids), return_counts=True)
+    around = len(section.rings.angles)
+    if (counts != counts[0]).any() or counts[0] not in (around, around - 1):
+        raise InputError(
+            f"{deck.file}: not a body of revolution: cells of its section are there between {counts.min()} and "
+            f"{counts.max()} times around, at {around} angles"
+        )
+
+
+def _membranes(deck: Deck, section: _Section) -> tuple[list[Block], dict]:
+    """Membranes as lines of the section, towards the end farther along the axis, and for each label whether
+    its normal x that direction is the direction of growing angle (+1) or the other (-1).
+    """
+    rings, blocks, senses = section.rings, [], {}
+    for block in deck.blocks:
+        if block.kind.role != "membrane" or block.kind.corners != 4:
+            continue
+        labels, nodes, seen = [], [], {}
+        for label, rows in zip(
+            block.labels.tolist(), deck.rows(block.nodes, block.place), strict=True
+        ):
+            ends = sorted(
+                {int(n) for n in rings.ring[rows[:4]]},
+                key=lambda n: (rings.places[n, 1], rings.places[n, 0]),
+            )
+            if len(ends) != 2:
+                raise block.place.error(
+                    f"membrane {label % SCOPE} does not reach from one meridian plane to the next"
+                )
+            key = tuple(ends)
+            if key not in seen:
+                seen[key] = label
+                labels.append(label)
+                nodes.append([n + 1 for n in ends])
+            section.owner[label] = seen[key]
+            senses[label] = _sense(deck.points[rows[:4]], rings, rows[:4], ends)
+        if labels:
+            blocks.append(
+                Block("SFMGAX1", kind("SFMGAX1"), np.array(labels), np.array(nodes), block.place)
+            )
+    return blocks, senses
+
+
+def _sense(corners: np.ndarray, rings: Rings, rows: np.ndarray, ends: list[int]) -> int:
+    normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
+    last = rings.ring[rows] == ends[1]
+    along = corners[last].mean(axis=0) - corners[~last].mean(axis=0)
+    turning = np.cross(np.eye(3)[rings.axis], corners.mean(axis=0))
+    return 1 if np.cross(normal, along) @ turning > 0 else -1
+
+
+def _node_sets(deck: Deck, rings: Rings) -> Sets:
+    members = {}
+    for name in deck.node_sets.names:
+        labels = deck.node_sets.labels(name)
+        labels = labels[np.isin(labels, deck.labels)]
+        members[name] = Members([np.unique(rings.ring[deck.rows(labels)]) + 1])
+    return Sets("node set", members, np.arange(1, len(rings.places) + 1))
+
+
+def _element_sets(deck: Deck, owner: dict) -> Sets:
+    members = {}
+    for name in deck.element_sets.names:
+        labels = deck.element_sets.labels(name).tolist()
+        kept = sorted({owner[label] for label in labels if label in owner})
+        members[name] = Members([np.array(kept, np.int64)])
+    return Sets("element set", members, np.unique(np.array(list(owner.values()), np.int64)))
+
+
+def _surface(rows: np.ndarray, section: _Section) -> np.ndarray:
+    """(section label, face of its cell) of faces that reach around the axis; membranes as they are."""
+    found = set()
+    for label, face in rows.tolist():
+        cell = section.owner.get(label)
+        if cell is None:
+            continue
+        if label not in section.faces or face < 0:
+            found.add((cell, face))
+        elif face < len(section.faces[label]):
+            ends, corners = section.faces[label][face], section.corners[cell]
+            pairs = [{a, b} for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
+            found |= {(cell, k) for k, pair in enumerate(pairs) if pair == ends}
+    return np.array(sorted(found), np.int64).reshape(-1, 2)

@@ -1,0 +1,67 @@
+"""How the modes of a tire are damped: in proportion to its matrices, or by the strain energy of its rubber.
+
+    D_mod = diag(d_k),   d_k = gamma1 + gamma2 omega_k^2   or   d_k = 2 zeta_k omega_k = eta_k omega_k,
+
+    eta_k = sum_r eta_r (phi_k . K_r phi_k) / (phi_k . K phi_k),
+
+K_r the material part of the tangent of region r, of loss factor eta_r; cords, pressure and the turning of stresses
+store energy and lose none (Ungar and Kerwin 1962; Johnson and Kienholz 1982, doi 10.2514/3.51195). D_mod acts on
+the body rate: the rolling pencil has Omega D_mod P besides.
+
+Motions that no mode of the basis has are damped too: gamma1, gamma2, or, with loss factors, at the uniform
+rate of the highest modes,
+
+    D = M Phi diag(d_k - d_c) Phi^T M + d_c M,   d_c = eta_c omega_m,
+
+eta_c the mean loss factor of the upper quarter of the modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tireroad.fem.errors import InputError
+from tireroad.modal.basis import Projection
+
+
+class Proportional(NamedTuple):
+    """D = mass M + stiffness K: gamma1 in 1/s, gamma2 in s."""
+
+    mass: float = 0.0
+    stiffness: float = 0.0
+
+
+@dataclass(frozen=True)
+class StrainEnergy:
+    """By the loss factors of the modes, `Projection.loss_factor`."""
+
+
+Damping = Proportional | tuple[float, float] | StrainEnergy
+
+
+def rates(damping: Damping, projection: Projection) -> np.ndarray:
+    """d_k (m,) 1/s of the modes."""
+    if isinstance(damping, StrainEnergy):
+        if projection.loss_factor is None:
+            raise InputError(
+                "damping: no compound of the tire has a loss_factor: give one, or a [damping] table"
+            )
+        return projection.loss_factor * np.sqrt(np.maximum(projection.squares, 0.0))
+    mass, stiffness = damping
+    return mass + stiffness * projection.squares
+
+
+def beyond(damping: Damping, projection: Projection) -> Proportional:
+    """What damps the motions that no mode has."""
+    if isinstance(damping, StrainEnergy):
+        highest = np.sqrt(max(float(projection.squares.max()), 0.0))
+        return Proportional(tail_loss(projection) * highest, 0.0)
+    return Proportional(*damping)
+
+
+def tail_loss(projection: Projection) -> float:
+    """Loss factor eta_c of motions beyond the modes: the mean of the upper quarter."""
+    return float(projection.loss_factor[-max(len(projection.squares) // 4, 1) :].mean())

@@ -1,0 +1,45 @@
+"""What a run finds around it, looked at before MPI and HDF5 fail of it without a word."""
+
+import os
+import resource
+import tempfile
+from pathlib import Path
+
+from tireroad.fem.errors import InputError
+
+LEAST_ADDRESSES = 2e9  # bytes; the libraries alone reserve 1 GB, OpenBLAS waits for ever for more
+LEAST_FILE = 64e6  # bytes of a file: shared memory of MPI, results
+LEAST_TEMPORARY = 16e6  # bytes free for MPI's session and shared memory
+
+
+def check_surroundings() -> None:
+    """Raise InputError where the program could not even start. Not collective."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        raise InputError("the working folder was removed: change to one that exists") from None
+    for limit, least, name in (
+        (resource.RLIMIT_AS, LEAST_ADDRESSES, "ulimit -v"),
+        (resource.RLIMIT_FSIZE, LEAST_FILE, "ulimit -f"),
+    ):
+        allowed = resource.getrlimit(limit)[0]
+        if allowed != resource.RLIM_INFINITY and allowed < least:
+            raise InputError(
+                f"{name} allows {1e-6 * allowed:.4g} MB, and at least {1e-6 * least:.4g} MB are"
+                " needed: raise the limit"
+            )
+    _check_temporary()
+
+
+def _check_temporary() -> None:
+    try:
+        folder = Path(tempfile.gettempdir())
+    except FileNotFoundError:
+        raise InputError("no folder for temporary files can be written: set TMPDIR") from None
+    found = os.statvfs(folder)
+    free = found.f_bavail * found.f_frsize
+    if free < LEAST_TEMPORARY:
+        raise InputError(
+            f"{folder} has {1e-6 * free:.3g} MB free, and MPI needs about"
+            f" {1e-6 * LEAST_TEMPORARY:.3g} MB there: set TMPDIR to another folder, or free some room"
+        )

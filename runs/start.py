@@ -1,0 +1,45 @@
+"""The first thing that runs: streams and signals are in order before anything heavy is imported."""
+
+import os
+import signal
+import sys
+
+from tireroad.runs.process import signals, streams
+from tireroad.runs.process.packages import missing
+from tireroad.runs.process.statuses import DONE, INPUT, STOPPED, handed_over
+
+
+def program() -> None:
+    """The command `tireroad`: the process's own arguments and exit status."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, signals.STOP_SIGNALS)
+    streams.mend()
+    arguments = sys.argv[1:]
+    sys.argv[1:] = []  # libraries that read them stumble over names that are no text
+    if arguments[:1] in (["run"], ["resume"]) and not {"-h", "--help"} & set(arguments):
+        from tireroad.runs.process.supervisor import supervise
+
+        supervise()
+    try:
+        signals.stop_on_signals()
+        sys.exit(_status(arguments))
+    except signals.Stopped as stop:
+        print(f"stopped by {stop} before anything was begun", file=sys.stderr)
+        os._exit(handed_over(STOPPED, for_all=False))
+
+
+def _status(arguments: list[str]) -> int:
+    try:
+        from tireroad.runs.cli import main
+
+        status = main(arguments)
+    except ModuleNotFoundError as error:
+        message = missing(error)
+        if message is None:
+            raise
+        print(message, file=sys.stderr)
+        return INPUT
+    refused = streams.refused()
+    if status == DONE and refused is not None and arguments[:1] not in (["run"], ["resume"]):
+        print(f"error: standard output cannot be written: {refused.strerror}", file=sys.stderr)
+        return INPUT
+    return status

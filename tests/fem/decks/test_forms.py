@@ -1,0 +1,161 @@
+"""The same tire in every form a deck may have gives the same section."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ring_decks import solids
+from torus_decks import CENTRE, HALF_ANGLE, MINOR, RUBBER, WALL, Torus, plain
+
+from tireroad.fem.decks.own import read
+
+EXACT = 2 * np.pi * HALF_ANGLE * (MINOR**2 - (MINOR - WALL) ** 2) * CENTRE + 2 * np.pi * (
+    2 * np.sin(HALF_ANGLE) * (MINOR**3 - (MINOR - WALL) ** 3) / 3
+)  # volume of the torus, Pappus
+
+
+def volume(mesh):
+    """2 pi int r dA by Gauss's rule on every cell."""
+    t, w = np.polynomial.legendre.leggauss(4)
+    t, w = (t + 1) / 2, w / 2
+    total, step = 0.0, 1e-6
+    cells = np.arange(len(mesh.cells))
+    for xi, a in zip(t, w, strict=True):
+        for eta, b in zip(t, w, strict=True):
+            x, y = np.full(len(cells), xi), np.full(len(cells), eta)
+            along = (mesh.at(cells, x + step, y) - mesh.at(cells, x - step, y)) / (2 * step)
+            across = (mesh.at(cells, x, y + step) - mesh.at(cells, x, y - step)) / (2 * step)
+            area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+            total += a * b * (area * mesh.at(cells, x, y)[:, 0]).sum()
+    return 2 * np.pi * total
+
+
+FULL = ("inner", "INSIDE"), ("tread", "outside")
+
+
+@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "quadratic", "triangles", "tolerance"),
+    [
+        ("CGAX8H", True, False, 2e-5),
+        ("cax8r", True, False, 2e-5),
+        ("CGAX6", True, True, 2e-5),
+        ("CAX4", False, False, 2e-2),
+        ("CGAX4RH", False, False, 2e-2),
+        ("CAX3", False, True, 2e-2),
+    ],
+)
+def test_axisymmetric_types(own, kind, quadratic, triangles, tolerance, half):
+    torus = Torus(quadratic, arcs=16, triangles=triangles, half=half)
+    found = own(plain(torus, kind), mirror=half, **dict(FULL))
+    assert volume(found.mesh) == pytest.approx(EXACT, rel=tolerance)
+    sides = 32 if triangles else 16
+    assert [len(found.mesh.outer), len(found.mesh.inner), len(found.mesh.tread)] == [sides] * 3
+    assert any("triangles" in note for note in found.notes) == triangles
+
+
+def test_half_equals_full(own):
+    """Mirrored nodes are those of the full section, in some order."""
+    half = own(plain(Torus(half=True)), mirror=True).mesh.nodes
+    full = own(plain(Torus())).mesh.nodes
+    order = [np.lexsort(np.round(nodes, 9).T) for nodes in (half, full)]
+    assert np.allclose(half[order[0]], full[order[1]], atol=1e-12)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize(("quadratic", "triangles"), [(False, False), (True, False), (False, True)])
+def test_bodies_of_revolution(own, axis, quadratic, triangles):
+    """C3D8, C3D20 and C3D6 about any axis, at uneven angles, reduce to the section of the 2-D deck."""
+    torus = Torus(quadratic, arcs=8, triangles=triangles)
+    angles = np.cumsum([0.0, 0.5, 0.7, 0.9, 0.8, 1.0, 0.6])
+    found = own(solids(torus, angles, axis), **dict(FULL))
+    kind = {(False, False): "CAX4", (True, False): "CAX8", (False, True): "CAX3"}[
+        quadratic, triangles
+    ]
+    assert volume(found.mesh) == pytest.approx(volume(own(plain(torus, kind)).mesh), rel=1e-9)
+    assert np.allclose(found.ring_angles, angles)
+    assert len(found.mesh.inner) == len(found.mesh.outer) == (16 if triangles else 8)
+
+
+MESHES = sorted((Path(__file__).parent / "meshes").glob("*.msh"))
+
+
+@pytest.mark.parametrize("file", MESHES, ids=lambda path: path.stem)
+def test_gmsh(file):
+    """Files written by Gmsh itself: 2.2 and 4.1, text and binary, first and second order."""
+    found = read(file)
+    exact = 2e-4 if "quad" in file.stem else 5e-2
+    assert volume(found.mesh) == pytest.approx(EXACT, rel=exact)
+    assert found.mesh.regions == ("LINER", "TREAD RUBBER")
+    assert {name: len(sides) for name, sides in found.mesh.plies.items()} == {"belt 1": 8}
+    radius = np.hypot(
+        *(found.mesh.nodes[found.mesh.chain(found.mesh.plies["belt 1"])] - [CENTRE, 0]).T
+    )
+    assert radius[::2] == pytest.approx(MINOR - WALL / 2, abs=1e-12)
+
+
+def test_there_are_gmsh_files():
+    assert len(MESHES) == 6
+
+
+@pytest.mark.parametrize(
+    ("unit", "scale", "stress", "density"),
+    [("mm", 1e3, 1e-6, 1e-12), ("in", 1 / 0.0254, 1 / 6894.757293, 1 / 1.0686896e7)],
+)
+def test_units(own, unit, scale, stress, density):
+    """A deck in millimetres and tonnes, or in inches and pounds, is the deck in metres."""
+    materials = f"*MATERIAL, NAME=RUBBER\n*ELASTIC\n{6e6 * stress:.12g}, 0.45\n*DENSITY\n{1200 * density:.12g}\n"
+    found = own(plain(Torus(scale=scale), materials=materials), length_unit=unit)
+    metres = own(plain(Torus()))
+    assert np.allclose(found.mesh.nodes, metres.mesh.nodes, atol=1e-12)
+    (rubber,), (known,) = found.rubbers, metres.rubbers
+    assert rubber.density == pytest.approx(known.density, rel=1e-6)
+    assert rubber.coefficients["youngs_modulus"] == pytest.approx(6e6, rel=1e-6)
+
+
+def test_tolerance_of_the_reader(own, tmp_path):
+    """Lower case, tabs, CRLF, comments, includes, continued keywords, sets of later sets, parts, D exponents."""
+    torus = Torus()
+    text = plain(torus)
+    nodes = text[text.index("*NODE") : text.index("*ELEMENT")]
+    (tmp_path / "nodes.inc").write_text(nodes + "99001, , \n99002\n99003, 0.1\n")
+    text = text.replace(nodes, "*Include, Input=nodes.inc\n")
+    text = text.replace(
+        "*ELEMENT, TYPE=CGAX8H, ELSET=WALL", "*element,\n type=cgax8h,\n elset = wall"
+    )
+    text = text.replace(
+        "*NSET, NSET=RIMNODES\n", "*nset, nset=RimNodes\nBEADS\n*NSET, NSET=beads\n"
+    )
+    text = text.replace("6.0E6, 0.45", "6.0D6,\t.45").replace("\n", "\r\n")
+    text += (
+        "** nothing\r\n*STEP\r\n*STATIC\r\n1., 1.\r\n*DSLOAD\r\nINSIDE, P, 2.E5\r\n*END STEP\r\n"
+    )
+    found = own("\ufeff" + text)
+    assert np.allclose(found.mesh.nodes, own(plain(torus)).mesh.nodes)
+    assert found.rubbers[0].coefficients["youngs_modulus"] == 6e6
+    assert sum("*STATIC: not used" in line for line in found.unused) == 1
+
+
+def test_generate_and_surfaces(own):
+    """Faces by GENERATE, by *SURFACE with S1 to S4, and by set and face, are the same sides."""
+    torus = Torus(arcs=6, wall=1)
+    text = plain(torus).replace(RUBBER, "")
+    faces = "*ELSET, ELSET=EVERY, GENERATE\n1, 6, 1\n*SURFACE, NAME=IN, TYPE=ELEMENT\nEVERY, S4\n"
+    faces += "*SURFACE, NAME=OUT\n1, S2\n2, s2\nREST, S2\n*ELSET, ELSET=REST, GENERATE\n3, 6\n"
+    by_face = own(text + faces + RUBBER, inner="in", tread="OUT").mesh
+    by_node = own(text + RUBBER, inner="INSIDE", tread="OUTSIDE").mesh
+    assert np.array_equal(np.unique(by_face.inner, axis=0), np.unique(by_node.inner, axis=0))
+    assert np.array_equal(np.unique(by_face.tread, axis=0), np.unique(by_node.tread, axis=0))
+
+
+def test_parts_and_instances(own):
+    """A deck of parts: the wheel's nodes may have the tire's numbers."""
+    tire = plain(Torus()).replace(RUBBER, "").replace("*HEADING\na torus\n", "")
+    text = (
+        "*HEADING\nparts\n*PART, NAME=TIRE\n"
+        + tire
+        + "*END PART\n*PART, NAME=WHEEL\n*NODE\n1, 0., 0.\n*END PART\n"
+    )
+    text += "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=T-1, PART=TIRE\n*END INSTANCE\n*NSET, NSET=AIR, INSTANCE=T-1\nINSIDE\n"
+    text += "*END ASSEMBLY\n" + RUBBER
+    assert len(own(text, inner="AIR").mesh.inner) == 12
