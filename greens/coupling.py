@@ -95,7 +95,9 @@ def wheel_of(
     tail = None
     if isinstance(turning.damping, StrainEnergy):
         if projection is None:
-            raise InputError("damping by strain energy is known by the modes: give their projection")
+            raise InputError(
+                "damping by strain energy is known by the modes: give their projection"
+            )
         tail = beyond(turning.damping, projection)
     rotation = motions.rotation if turning.speed else None
     given = turning.speed, turning.damping, turning.inertia
