@@ -41,7 +41,9 @@ class Limits:
             and (self.below is None or value < self.below)
         )
         if not inside:
-            shown = f"{value:g} {unit}".rstrip(" -")
+            # A whole number may be too large for the format of real ones.
+            written = f"{value:g}" if isinstance(value, float) else described(value)
+            shown = f"{written} {unit}".rstrip(" -")
             raise ValueError(f"must be {self}{f' {unit}' if unit != '-' else ''}, not {shown}")
 
 

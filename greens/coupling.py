@@ -13,6 +13,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
     StaticShapes,
     compliance,
+    loaded_shapes,
     on_own_rows,
     rotating_damping,
     rotating_stiffness,
@@ -23,7 +24,7 @@ from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning
-from tireroad.greens.attachment import with_attachments
+from tireroad.greens.attachment import dynamic, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, modal_moments, second_order
@@ -196,9 +197,11 @@ class Wheel:
         """Response of the modes and the attachment modes of all probes. Collective."""
         self._check_same(basis, modes)
         if not self._drifts:
-            shapes = self._static_shapes(probes)
-            grown = self._grown(modes, shapes.columns, basis.projection)
-            flexibility = shapes.compliance
+            full = self.operators, self.rotating_stiffness
+            shapes, flexibility = loaded_shapes(*full, probes, self.air)
+            missing = flexibility - basis.couple(probes, probes).static()
+            columns = shapes @ foremost(missing, np.abs(np.diag(flexibility)))
+            grown = self._grown(modes, columns, basis.projection, every=False)
             if self.beyond is not None:
                 pencils = self._pencils(grown.projection)
                 flexibility = flexibility + regained(grown, *pencils, probes, probes).compliance
@@ -243,14 +246,20 @@ class Wheel:
         turning = self.speed, self.damping[0] if self.beyond is None else 0.0
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
-    def _grown(self, modes: Modes, columns: np.ndarray, known: Projection | None = None) -> Basis:
-        """The basis with attachment modes; `known` is the projection on the modes. Collective."""
+    def _grown(
+        self, modes: Modes, columns: np.ndarray, known: Projection | None = None, every: bool = True
+    ) -> Basis:
+        """The basis with attachment modes, or those that are more than static; `known` is the projection on
+        the modes. Collective.
+        """
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
         loss = None if self.beyond is None else self._loss
-        projection = self.with_air(
-            project(grown, self.rotation, operators.carried, comm, known, loss), grown
-        )
+        projection = project(grown, self.rotation, operators.carried, comm, known, loss)
+        if not every:
+            stays = dynamic(projection, self.speed, len(modes.squares))
+            projection, grown = projection.among(stays), grown.among(stays)
+        projection = self.with_air(projection, grown)
         shape = operators.trace(grown.vectors)
         return Basis(shape, projection, self.decouple(projection, comm))
 

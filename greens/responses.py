@@ -14,7 +14,7 @@ from tireroad.greens.state_selection import keep
 from tireroad.greens.truncation import Cutoff, estimate
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.damping import beyond
-from tireroad.modal.rolling import RollingModes
+from tireroad.modal.rolling import RollingModes, rolling_modes
 
 RESIDUALS = ("none", "dirac", "static", "second-order", "attachment")
 CHOICES = ("participation", "frequency")
@@ -72,16 +72,16 @@ def make_response(
         return Basis.of(rolling).couple(outputs, loads)
     if residual == "attachment":
         found = fields()
-        # All of the attachments' own problem comes from these fields: only the states are the rolling tire's.
-        basis = Basis(found.shape, found.projection, rolling.states)
-        response = wheel().respond(basis, found.modes, outputs, loads, residual)
+        if found is not rolling.basis:  # solved once more: their states, too, are their own
+            rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)
+        response = wheel().respond(Basis.of(rolling), found.modes, outputs, loads, residual)
     else:
         response = wheel().respond(Basis.of(rolling), None, outputs, loads, residual)
     if residual in ("static", "dirac"):
         return response
     highest = cutoff(rolling)
     limit = _FASTEST * max(highest.circular, highest.rate)
-    return response.keeping(np.abs(response.eigenvalue) <= limit)
+    return response.keeping_where(lambda s: np.abs(s) <= limit)
 
 
 def selected(whole: Response, rolling: RollingModes, wanted: Wanted) -> Response:

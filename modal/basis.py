@@ -55,6 +55,15 @@ class Projection:
             cut["air"] = replace(self.air, coupling=self.air.coupling[:, :count])
         return replace(self, **cut)
 
+    def among(self, wanted: np.ndarray) -> Projection:
+        """On the coordinates where `wanted` (m,) is true, before any air joins them."""
+        small = {
+            name: None if value is None else value[np.ix_(*[wanted] * value.ndim)]
+            for name, value in vars(self).items()
+            if name not in ("momentum", "air")
+        }
+        return Projection(momentum=self.momentum[:, wanted], **small)
+
 
 @dataclass(frozen=True, kw_only=True)
 class ModalBasis:
@@ -62,7 +71,8 @@ class ModalBasis:
 
     `frequency` (m,) Hz; `shape` kg^-1/2 of the outer face (3 s, m), of a free rim after it (+ 6);
     `projection` the small matrices on these very fields. `modes`: the fields on all unknowns, where
-    this process solved for them and they are not read from a file; `labels` of a round tire. Signs of eigenvectors, and vectors
+    this process solved for them and they are not read from a file; `labels` of a round tire;
+    `column`: the air that joined them, where this process made it. Signs of eigenvectors, and vectors
     of repeated frequencies, are of one solution only: never combine two bases' parts.
     """
 
@@ -71,6 +81,7 @@ class ModalBasis:
     projection: Projection
     modes: Modes | None = None
     labels: Labels | None = None
+    column: Column | None = None
 
     def first(self, count: int) -> ModalBasis:
         """The first `count` modes."""
@@ -80,6 +91,7 @@ class ModalBasis:
             projection=self.projection.first(count),
             modes=self.modes and self.modes.first(count),
             labels=self.labels and self.labels.first(count),
+            column=self.column,
         )
 
 

@@ -13,9 +13,10 @@ from petsc4py import PETSc
 
 from tireroad.fem.matrices.operators import Operators
 from tireroad.modal import quadratic
+from tireroad.modal.agreement import missing, truncation
 from tireroad.modal.damping import beyond
 from tireroad.modal.fields import gram
-from tireroad.modal.quadratic import FullModes, truncation
+from tireroad.modal.quadratic import FullModes
 from tireroad.modal.rolling import RollingModes
 from tireroad.modal.rotating import StateModes
 
@@ -31,11 +32,11 @@ def full_states(
     *,
     count: int,
     window: tuple[float, float] = (0.0, 0.0),
-) -> tuple[RollingModes, Figures]:
-    """`count` pairs nearest to zero, or all in the `window` (Hz), and how far the projected states are
-    off them. `pencil`: D + 2 Omega G and K_Omega as in fem.matrices.compliance. Collective.
+) -> tuple[RollingModes, Figures, list[str]]:
+    """`count` pairs nearest to zero, or all in the `window` (Hz), how far the projected states are off them,
+    and warnings. `pencil`: D + 2 Omega G and K_Omega as in fem.matrices.compliance. Collective.
     """
-    found, figures = _solve(operators, pencil, projected, count, window)
+    found, figures, lacking = _solve(operators, pencil, projected, count, window)
     fields, coordinates = _orthonormal(operators, found)
     comm, old = operators.body.comm, projected.basis
     momenta = comm.allreduce(operators.carried @ fields)
@@ -47,25 +48,35 @@ def full_states(
     )
     states = _states(found, coordinates)
     full = RollingModes(basis=basis, states=states, turning=projected.turning, full=True)
-    return full, figures | _compared(found, projected.states)
+    warnings = (
+        []
+        if not lacking
+        else [
+            f'rotation.method = "full" found {lacking} state(s) fewer than the projected problem has in the same '
+            "range: some may be missing. Ask for more by rotation.count or a wider rotation.window."
+        ]
+    )
+    return full, figures | _compared(found, projected.states), warnings
 
 
 def _solve(operators, pencil, projected: RollingModes, count: int, window) -> tuple:
     """As many pairs as wanted, or all in the window. Collective."""
-    whole = operators.mass, *pencil
+    whole, s = (operators.mass, *pencil), projected.states.eigenvalue
     if not any(window):
-        return quadratic.solve(*whole, count), {}
+        found = quadratic.solve(*whole, count)
+        sizes = np.abs(found.eigenvalue), np.abs(s)
+        return found, {}, missing(*sizes, 0.0, float(sizes[0].max()))
     mass, stiffness = beyond(projected.turning.damping, projected.basis.projection)
-    s = projected.states.eigenvalue
     low, high = (2 * np.pi * f for f in window)
     rate = mass + stiffness * high**2
     below = int((np.abs(s) <= np.hypot(high, rate / 2)).sum())
     found = quadratic.window(*whole, (low, high), rate, below)
     inside = int(((s.imag >= low) & (s.imag <= high)).sum())
-    return found, {
+    figures = {
         "states in the window": (len(found.eigenvalue), "-"),
         "projected states in the window": (inside, "-"),
     }
+    return found, figures, missing(found.eigenvalue.imag, s.imag, low, high)
 
 
 def _orthonormal(operators: Operators, found: FullModes) -> tuple[np.ndarray, np.ndarray]:

@@ -10,51 +10,19 @@ to have usable vectors of their own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy import linalg
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.basis import Projection
 from tireroad.modal.damping import Damping, rates
+from tireroad.modal.states import StateModes
 
 # Above this condition an eigenvector loses ten of sixteen digits; such eigenvalues go to the block.
 DEFECTIVE = 1e6
 SINGULAR = 1e13  # condition of K~ beyond which it has no inverse
 # States slower than this part of the fastest drift, as rigid modes do, unless their vectors are apart.
 _AT_REST, _SKEWED = 1e-5, 1e2
-GROWS = 1e-9  # of the largest |s|: a growth rate below is rounding
-
-
-@dataclass(frozen=True)
-class StateModes:
-    """The decoupled equations of motion for m modal coordinates.
-
-    `eigenvalue` (q,) 1/s, Im >= 0; `right` (m, q) with the weight 2 of a pair already in it; `left`
-    (q, m), transposed and not conjugated, divided by a_q; `block` (k, k), `block_right` (m, k),
-    `block_left` (k, m). `residual`, `left_residual` (q,) relative to the terms of the quadratic
-    problem; `condition` the worst eigenvector condition among those kept as vectors. The last `rigid`
-    states of the block belong to rigid modes: they drift, and have no static answer.
-    """
-
-    eigenvalue: np.ndarray
-    right: np.ndarray
-    left: np.ndarray
-    block: np.ndarray
-    block_right: np.ndarray
-    block_left: np.ndarray
-    residual: np.ndarray
-    left_residual: np.ndarray
-    condition: float
-    rigid: int = 0
-
-    @property
-    def unstable(self) -> int:
-        """Eigenvalues with a growing motion, beyond rounding."""
-        rates = np.concatenate([self.eigenvalue.real, np.linalg.eigvals(self.block).real])
-        fastest = np.abs(self.eigenvalue).max(initial=1.0)
-        return int((rates > GROWS * fastest).sum())
 
 
 def matrices(
@@ -184,7 +152,7 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
     companion = np.block([[np.zeros((m, m)), scale * np.eye(m)], [-stiffness / scale, -drag]])
     values, vectors = linalg.eig(companion)
     upper = values.imag >= 0
-    values, vectors = values[upper], vectors[:, upper] / np.linalg.norm(vectors[:, upper], axis=0)
+    values, vectors = _in_order(values[upper], vectors[:, upper])
     block, block_vectors = np.zeros((0, 0)), np.zeros((2 * m, 0))
     inverse, _ = _inverse(values, vectors, block_vectors)
     condition = np.linalg.norm(inverse, axis=1)
@@ -207,6 +175,18 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
         _quadratic_residual(drag.T, stiffness.T, values, left.T),
         float(condition[good].max(initial=1.0)),
     )
+
+
+def _in_order(values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ascending in Im s, then from fast to slow decay; vectors of length 1, whose largest component, or the
+    first of those within a thousandth, is real and positive.
+    """
+    order = np.lexsort((values.real, values.imag))
+    values, vectors = values[order], vectors[:, order]
+    size = np.abs(vectors)
+    first = (size >= 0.999 * size.max(axis=0)).argmax(axis=0)
+    turn = np.exp(-1j * np.angle(vectors[first, np.arange(len(values))]))
+    return values, vectors * turn / np.linalg.norm(vectors, axis=0)
 
 
 def _inverse(values, vectors, block_vectors) -> tuple[np.ndarray, np.ndarray]:

@@ -62,6 +62,7 @@ def projected(
         shape=operators.trace(modes.vectors),
         projection=with_air(projection, modes, air),
         modes=modes,
+        column=air,
     )
 
 

@@ -67,6 +67,10 @@ class Modes:
             residual=self.residual[:count],
         )
 
+    def among(self, wanted: np.ndarray) -> Modes:
+        """With the squares and vectors where `wanted` (m,) is true."""
+        return replace(self, squares=self.squares[wanted], vectors=self.vectors[:, wanted])
+
 
 @dataclass(frozen=True)
 class _Split:
@@ -149,7 +153,7 @@ class _Problem:
         """By slices of the parts. Collective."""
         spectrum = Spectrum(self.comm, split.parts)
         bottom = spectrum.bottom()
-        _check_stable(bottom)
+        bottom.check_stable()
         boundaries = spectrum.boundaries(bottom, count, limit)
         proof = _Proof(bottom, boundaries[-1][0], int(boundaries[-1][1].sum()))
         if proof.inertia == 0:
@@ -245,14 +249,3 @@ def _families(parts: list[Part], found: list[Slice]) -> np.ndarray:
         most * one.part + np.arange(len(one.values)) % parts[one.part].copies for one in found
     ]
     return np.concatenate(numbers)
-
-
-def _check_stable(bottom: Bottom) -> None:
-    if bottom.negative:
-        growth = np.sqrt(-min(bottom.near[0], -bottom.zero))
-        raise ConvergenceError(
-            f"modes: the tangent stiffness has {bottom.negative} negative eigenvalue(s) (growth rate "
-            f"about {growth:.3g} 1/s): the state is unstable once the road is replaced by its "
-            "forces: the tire buckles, or topples if its rim is free. Lower the load, raise the "
-            "inflation or stiffen the wall; let a free rim stand on no road."
-        )

@@ -110,3 +110,18 @@ def test_read_results(launch, tmp_path: Path) -> None:
     found = read_results.main(str(tmp_path / "out"))
     assert found["load at rest"] == pytest.approx(300.0, rel=1e-6)
     assert found["mean"] == pytest.approx(300.0, rel=0.05) and found["deviation"] > 0
+
+
+def test_own_road_and_tread(capsys: pytest.CaptureFixture[str]) -> None:
+    """Registered classes serve in a scene as ours do; pinned when it was written."""
+    import own_road
+
+    from tireroad.contact.roads.kind import ROADS
+    from tireroad.contact.tread.law import TREADS
+
+    try:
+        assert own_road.main() == pytest.approx(839.94, rel=1e-3)
+        assert capsys.readouterr().out.endswith("N at most\n")
+    finally:
+        ROADS.forget("humps")
+        TREADS.forget("brush-blocks")

@@ -118,16 +118,9 @@ def rim_cone(end: tuple[float, float], other: tuple[float, float], count: int) -
 
 
 def _bead_ends(body: Body) -> tuple[tuple[float, float], tuple[float, float]]:
-    """(radius, y) m of the inner face's ends, nearest to the axle on either side, by y. Collective."""
-    facets = body.tire.facets.indices[body.tire.facets.values == INNER]
-    nodes = fem.locate_dofs_topological(body.space, 2, facets)
-    points = body.space.tabulate_dof_coordinates()[nodes]
-    moved = body.u.x.array.reshape(-1, 3)[nodes]
-    place = np.concatenate([part for part in body.comm.allgather(np.hstack([points, moved]))])
-    radius, y = np.hypot(place[:, 0], place[:, 2]), place[:, 1]
-    ends = []
-    for side in (y < (y.min() + y.max()) / 2, y > (y.min() + y.max()) / 2):
-        nearest = np.flatnonzero(side)[np.argmin(radius[side])]
-        here = place[nearest, :3] + place[nearest, 3:]
-        ends.append((float(np.hypot(here[0], here[2])), float(here[1])))
-    return ends[0], ends[1]
+    """(radius, y) m of the inner face's two ends, by y: the rim holds them."""
+    lattice = body.lattice
+    section = lattice.tire.section
+    line = lattice.section[section.chain(section.inner)]
+    low, high = sorted((line[0], line[-1]), key=lambda end: end[1])
+    return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))

@@ -1,8 +1,10 @@
 """`tireroad check`: the resolved scene, the stages, the memory; no solver runs."""
 
+from pathlib import Path
 from typing import Any
 
-from tireroad.runs.scene.estimate import memory
+from tireroad.runs.scene.demand import check_demand, duration
+from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.road_check import check_road
@@ -59,7 +61,29 @@ def explain(scene: Scene) -> str:
         lines.append(
             f"  {stage:10}" + (f"skipped: {reasons[stage]}" if stage in reasons else "runs")
         )
-    parts = memory(scene)
-    lines += ["", f"estimated memory  {sum(parts.values()) / 1e9:.2f} GB in one process"]
-    lines += [f"  {name:26}{size / 1e9:6.2f} GB" for name, size in parts.items()]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_demand(scene)])
+
+
+def _demand(scene: Scene) -> list[str]:
+    """Memory, disk and time, and what the machine has too little of (InputError where by far)."""
+    wanted = estimate(scene)
+    size, parts = wanted.sizes, wanted.memory
+    counts = [f"{size.free} unknowns", f"{size.modes} modes"]
+    if scene.contact is not None:
+        counts.append(f"about {size.points} contact points")
+    if scene.time is not None:
+        about = "about " if scene.time.step == "auto" else ""
+        counts.append(f"{about}{size.steps} time steps")
+    if size.frequencies:
+        counts.append(f"{size.frequencies} frequencies")
+    if size.speeds:
+        counts.append(f"{size.speeds} speeds")
+    lines = [
+        "",
+        f"estimated sizes   {', '.join(counts)}",
+        f"estimated time    {duration(sum(wanted.seconds.values()))} of one core",
+        f"estimated disk    {sum(wanted.disk.values()) / 1e9:.2g} GB",
+        f"estimated memory  {sum(parts.values()) / 1e9:.2f} GB in one process",
+        *(f"  {name:26}{part / 1e9:6.2f} GB" for name, part in parts.items()),
+    ]
+    return lines + [f"warning: {text}" for text in check_demand(wanted, Path.cwd())]

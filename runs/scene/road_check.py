@@ -1,9 +1,10 @@
 """Whether the road of a scene can be driven on, before anything is solved: its file, its length."""
 
 import math
+from functools import lru_cache
 
-from tireroad.contact.roads.road import make_road
-from tireroad.contact.roads.under_tire import RoadUnderTire
+from tireroad.contact.roads.kind import RoadKind
+from tireroad.contact.roads.under_tire import Road
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables import Scene
 
@@ -20,14 +21,20 @@ def check_road(scene: Scene) -> None:
     """
     if scene.road is None:
         return
-    road = make_road(scene.road)
+    road = made(scene.road.surface)
     if scene.contact is not None and scene.time is not None:
         _check_extent(scene, road)
 
 
-def _check_extent(scene: Scene, road: RoadUnderTire) -> None:
-    placed, source = scene.road, getattr(road.road, "source", "road")
-    (x0, x1), (y0, y1) = road.road.extent
+@lru_cache(maxsize=1)
+def made(surface: RoadKind) -> Road:
+    """The road of a scene; the last one is kept, as reading a file may take seconds."""
+    return surface.make()
+
+
+def _check_extent(scene: Scene, road: Road) -> None:
+    placed, source = scene.road, getattr(road, "source", "road")
+    (x0, x1), (y0, y1) = road.extent
     if not y0 <= placed.lateral <= y1:
         raise InputError(
             f"{source}: road.lateral = {placed.lateral:g} m lies beside the road, which has y from "

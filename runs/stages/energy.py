@@ -29,7 +29,7 @@ def describe_energy(
     record.indicators["work of contact on the tire"] = (contact.total, "J")
     if driven is not None:
         record.indicators["work of the prescribed forces"] = (driven, "J")
-    if not own_states(response, rolling):
+    if not own_states(response, rolling) or len(kept["block_state"]) != len(rolling.states.block):
         observe.say(f"  energy: contact and forces put {work:.4g} J into the tire")
         return
     turns = rolling.turning.speed > 0

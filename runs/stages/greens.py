@@ -15,6 +15,8 @@ from tireroad.greens.responses import Wanted, judged, make_response, selected
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
+from tireroad.runs.scene.cavity_table import has_air
+from tireroad.runs.stages import cavity
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.responses import fill_response, read_responses
 from tireroad.runs.stages.setup import components, probes
@@ -61,6 +63,11 @@ class GreensStage(Computed[Responses]):
         }
 
     @property
+    def _stands_with_air(self) -> bool:
+        """Whether the states are first told here: those of a standing tire alone are its modes'."""
+        return self.job.speed == 0 and has_air(self.job.scene)
+
+    @property
     def _wanted(self) -> Wanted:
         given = self.job.scene.greens
         return Wanted(
@@ -70,6 +77,8 @@ class GreensStage(Computed[Responses]):
     def compute(self, record: Record) -> Responses:
         """All that is between the probes. Collective."""
         rolling, wanted = self.rotating.product, self._wanted
+        if self._stands_with_air:
+            cavity.describe(record, rolling)
         points = probes(self.job, self.static.product, self.setup.product)
         whole = self._whole(record, rolling, points, wanted.residual)
         response = selected(whole, rolling, wanted)
@@ -126,6 +135,8 @@ class GreensStage(Computed[Responses]):
         """The responses by name, and the nodes of the patch."""
         for name, response in product.named.items():
             fill_response(file, name, response)
+        if self._stands_with_air:
+            cavity.fill_states(file, self.rotating.product)
         if self.setup.product:
             put(file, "contact/index", self.setup.product.patch.index, "-")
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from tireroad.fem.cavity.column import Column
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.basis import ModalBasis, Projection
@@ -16,6 +17,7 @@ from tireroad.modal.undamped import Modes
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
+from tireroad.runs.stages import cavity
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done, Shared
 from tireroad.runs.stages.turning import damping_of
@@ -60,6 +62,7 @@ class ModesStage(Computed[ModalBasis]):
             "static": self.static.key,
             "modal": asdict(self.job.scene.modal),
             "rotating": self.job.speed != 0,
+            "cavity": cavity.inputs(self.job),
         }
 
     def compute(self, record: Record) -> ModalBasis:
@@ -69,11 +72,15 @@ class ModesStage(Computed[ModalBasis]):
             operators = motions.operators
         with record.timing("eigensolver"):
             modes = solved(operators, count=wanted.count, up_to=wanted.up_to)
+        with record.timing("air"):
+            air = cavity.make_air(self.job, motions, float(modes.frequency[-1]))
         with record.timing("projection"):
-            basis = projected(motions, modes, self.job.speed != 0)
+            basis = projected(motions, modes, self.job.speed != 0, air)
             labels = _labels(motions, modes.vectors)
         _describe(record, modes)
         record.headline["damping"] = (_damping(damping_of(self.job), basis.projection), "-")
+        if air is not None:
+            cavity.describe_air(record, basis.projection.air)
         if labels is not None:
             _say_names(modes.frequency, labels)
         return replace(basis, labels=labels)
@@ -90,7 +97,9 @@ class ModesStage(Computed[ModalBasis]):
         shape = np.hstack([part.reshape(len(part), -1) for part in parts]).T.copy()
         matrices = {name: values[:] for name, values in file["projected"].items()}
         return ModalBasis(
-            frequency=file["frequency"][:], shape=shape, projection=Projection(**matrices)
+            frequency=file["frequency"][:],
+            shape=shape,
+            projection=Projection(**matrices, air=cavity.read(file)),
         )
 
 
@@ -101,13 +110,16 @@ class Fields(Shared[ModalBasis]):
     name: ClassVar[str] = "fields"
     modes: Done[ModalBasis]
     motions: Done[SmallMotions]
+    air: Done[Column | None]
 
     def make(self) -> ModalBasis:
         """Collective."""
         wanted = self.job.scene.modal
-        return with_fields(
-            self.modes.product, self.motions.product, count=wanted.count, up_to=wanted.up_to
-        )
+        given = self.modes.product, self.motions.product
+        if given[0].modes is not None:
+            return given[0]
+        sizes = {"count": wanted.count, "up_to": wanted.up_to}
+        return with_fields(*given, **sizes, air=self.air.product)
 
 
 def _describe(record: Record, modes: Modes) -> None:
@@ -179,5 +191,6 @@ def _fill(file, basis: ModalBasis, points: np.ndarray) -> None:
     for name, unit in _UNITS.items():
         if getattr(basis.projection, name) is not None:
             put(file, f"projected/{name}", getattr(basis.projection, name), unit)
+    cavity.fill(file, basis.projection.air)
     file.attrs["inertia_count"] = modes.inertia_count
     file.attrs["rigid_modes"] = modes.rigid

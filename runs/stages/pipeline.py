@@ -22,10 +22,13 @@ from tireroad.runs.files.folder import Summary
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import peak_memory
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.scene.demand import check_demand, duration
+from tireroad.runs.scene.estimate import estimate
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.road_check import check_road
 from tireroad.runs.scene.tables import Scene
+from tireroad.runs.stages.cavity import AirColumn
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.greens import GreensStage, Responses
 from tireroad.runs.stages.job import Job
@@ -43,6 +46,7 @@ PARTS: tuple[type[Part], ...] = (
     Motions,
     Setup,
     ModesStage,
+    AirColumn,
     Fields,
     FullMatrices,
     RotatingStage,
@@ -113,6 +117,7 @@ def run_scene(
     if scene.road is not None:
         # A road file that cannot be used should be told before hours of solving, not after.
         on_root(comm, lambda: check_road(scene))
+    _say_demand(scene, directory, comm, until)
     reasons = skipped(scene, until)
     if petsc_options:
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
@@ -127,6 +132,18 @@ def run_scene(
     else:
         on_root(comm, lambda: _report(directory, summary))
     return Finished(job, done)
+
+
+def _say_demand(scene: Scene, directory: Path, comm: MPI.Comm, until: str | None) -> None:
+    """What the run will take; InputError where the machine has too little by far. Collective."""
+    wanted = on_root(comm, lambda: estimate(scene, until))  # it may read the road's file
+    for text in on_root(comm, lambda: check_demand(wanted, directory, comm.size)):
+        observe.warn(text)
+    observe.say(
+        f"estimated: {sum(wanted.memory.values()) / 1e9:.2g} GB a process, "
+        f"{sum(wanted.disk.values()) / 1e9:.2g} GB of disk, "
+        f"{duration(sum(wanted.seconds.values()))} of one core"
+    )
 
 
 def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done | None:

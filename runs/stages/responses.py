@@ -37,5 +37,5 @@ def read_responses(file: h5py.File, pulse: bool) -> dict[str, Response]:
             rigid=int(group.attrs["rigid_states"]),
         )
         for name, group in file.items()
-        if "eigenvalue" in group
+        if "output" in group
     }

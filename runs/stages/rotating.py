@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from tireroad.fem.cavity.column import Column
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.parallel import on_root
 from tireroad.greens.coupling import Wheel, wheel_of
@@ -18,6 +19,7 @@ from tireroad.modal.full_states import full_states
 from tireroad.modal.rolling import RollingModes, pencil, rolling_modes
 from tireroad.modal.rotating import StateModes, checks
 from tireroad.runs.files.store import put
+from tireroad.runs.stages import cavity
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done, Shared
@@ -42,13 +44,14 @@ class FullMatrices(Shared[Wheel]):
     name: ClassVar[str] = "wheel"
     motions: Done[SmallMotions]
     modes: Done[ModalBasis]
+    air: Done[Column | None]
 
     def make(self) -> Wheel:
         """Collective."""
         turning, projection = turning_of(self.job), None
         if isinstance(turning.damping, StrainEnergy):
             projection = self.modes.product.projection
-        return wheel_of(self.motions.product, turning, projection=projection)
+        return wheel_of(self.motions.product, turning, self.air.product, projection)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,10 +102,11 @@ class RotatingStage(Computed[RollingModes]):
         wheel, wanted = self.wheel.product, self.job.scene.rotation
         with record.timing("full eigensolver"):
             matrices = wheel.rotating_damping, wheel.rotating_stiffness
-            found, figures = full_states(
+            found, figures, warnings = full_states(
                 wheel.operators, matrices, projected, count=wanted.count, window=wanted.window
             )
         record.indicators |= figures
+        record.warnings += warnings
         return found
 
     def _campbell(self, record: Record) -> Campbell | None:
@@ -147,6 +151,8 @@ def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
         "speed": (rolling.turning.speed, "rad/s"),
         "critical speed": (critical, "rad/s"),
     }
+    if rolling.basis.projection.air is not None:
+        cavity.describe(record, rolling)
     if len(oscillating):
         record.headline["lowest"] = (float(oscillating.imag.min() / (2 * np.pi)), "Hz")
     record.indicators |= {
@@ -167,10 +173,9 @@ def _growth(job: Job, rolling: RollingModes, basis: ModalBasis) -> str:
             return turning.speed  # only the full problem has it
         return onset(basis.projection, *given, turning.speed)
 
-    fastest = max([*states.eigenvalue.real, *np.linalg.eigvals(states.block).real])
     return (
         f"{states.unstable} motion(s) of the rolling tire grow by themselves, the fastest at "
-        f"{fastest:.3g} 1/s; on this static state that begins at {on_root(job.comm, first):.4g} "
+        f"{states.fastest_growth:.3g} 1/s; on this static state that begins at {on_root(job.comm, first):.4g} "
         "rad/s: the wheel turns beyond its critical speed"
     )
 
@@ -183,6 +188,8 @@ def _fill(file, rolling: RollingModes) -> None:
     if rolling.full:
         put(file, "basis/shape", rolling.basis.shape, "kg^-1/2")
         put(file, "basis/momentum", rolling.basis.projection.momentum, "kg^1/2")
+    if rolling.basis.projection.air is not None:
+        put(file, "air_share", cavity.share(rolling), "-")
     if lines is not None:
         put(file, "campbell/speed", lines.speed, "rad/s")
         put(file, "campbell/eigenvalue", lines.eigenvalue, "1/s")

@@ -18,6 +18,7 @@ from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages import cords_file
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed
@@ -42,10 +43,10 @@ class StaticStage(Computed[StaticState]):
     name: ClassVar[str] = "static"
 
     def inputs(self) -> dict:
-        """The tire, the static loads, and the rolling terms where they take part."""
+        """The tire without its air, the static loads, and the rolling terms where they take part."""
         scene = self.job.scene
         return {
-            "tire": asdict(scene.tire),
+            "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
             "static": asdict(scene.static),
             "rolling": asdict(steady_rolling(self.job)),
         }
@@ -115,6 +116,7 @@ class StaticStage(Computed[StaticState]):
             road_height=None if road is None else float(road),
             inflation=float(attributes["inflation"]),
             rolling=steady_rolling(self.job),
+            **cords_file.read(file),
         )
 
 
@@ -166,6 +168,7 @@ def _show(progress) -> None:
 def _describe(record: Record, state: StaticState, loader: Loader) -> None:
     free = 3 * len(state.displacement)
     record.headline["unknowns"] = (free, "-")
+    record.headline |= cords_file.headline(state)
     if state.road_height is not None:
         extent = state.footprint()
         record.headline |= {
@@ -194,6 +197,7 @@ def _fill(file, state: StaticState, tire: TireModel) -> None:
     put(file, "surface/area", state.area, "m2")
     put(file, "surface/half_sizes", state.half_sizes, "m")
     put(file, "surface/ring_rate", state.ring_rate, "m/rad")
+    cords_file.fill(file, state)
     file.attrs["touch_height"] = state.touch_height
     file.attrs["inflation"] = state.inflation
     file.attrs["load"] = state.load

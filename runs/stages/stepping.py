@@ -42,7 +42,7 @@ def integration(job: Job, record: Record, response: Response, shortest: float) -
     `shortest` (s): the shortest period in the excitation.
     """
     wanted = job.scene.time
-    fastest = np.abs(response.eigenvalue).max(initial=0.0)
+    fastest = np.abs(response.every).max(initial=0.0)
     if wanted.step == "auto":
         limits = [wanted.duration / _LEAST_STEPS, shortest / _PER_PERIOD]
         if fastest > 0:
@@ -53,7 +53,7 @@ def integration(job: Job, record: Record, response: Response, shortest: float) -
     step, count = steps.size, steps.count
     scheme = "linear" if wanted.scheme == "auto" else wanted.scheme
     kept = response.resolved(step)
-    moved = len(response.eigenvalue) - len(kept.eigenvalue)
+    moved = len(response.every) - len(kept.every)
     observe.say(
         f"  step {step:.4g} s, {count} steps, scheme {scheme}; fastest mode {fastest:.4g} 1/s, "
         f"{moved} states too fast for the step follow statically"
