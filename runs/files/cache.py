@@ -7,14 +7,16 @@ not copied, where the file system allows it: result files are never written to i
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from tireroad.runs.files import store
-from tireroad.runs.files.disk import replacing
+from tireroad.runs.files.disk import replacing, write_text
 
 VARIABLE = "TIREROAD_CACHE"
 
@@ -31,19 +33,30 @@ class Cache:
         assert self.folder is not None
         return self.folder / f"{stage}-{key}.h5"
 
-    def fetch(self, stage: str, key: str, path: Path) -> bool:
-        """Put the kept file at `path`; whether there is one that is whole and of these inputs."""
+    def fetch(self, stage: str, key: str, path: Path) -> dict[str, Any] | None:
+        """Put the kept file at `path`; the figures kept with it, or None where there is no file that is
+        whole and of these inputs.
+        """
         if self.folder is None or store.why_not(self.place(stage, key), key, stage):
-            return False
+            return None
+        try:
+            figures = json.loads(self._figures(stage, key).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
         _link(self.place(stage, key), path)
-        return True
+        return figures
 
-    def keep(self, stage: str, key: str, path: Path) -> None:
-        """Keep a finished file for others. What cannot be kept is computed again there: no error."""
+    def keep(self, stage: str, key: str, path: Path, figures: Mapping[str, Any]) -> None:
+        """Keep a finished file and its figures for others. What cannot be kept is computed again there."""
         if self.folder is not None:
             with suppress(OSError):
                 self.folder.mkdir(parents=True, exist_ok=True)
+                text = json.dumps(figures, default=store.plain)
+                write_text(self._figures(stage, key), text)
                 _link(path, self.place(stage, key))
+
+    def _figures(self, stage: str, key: str) -> Path:
+        return self.place(stage, key).with_suffix(".json")
 
     @contextmanager
     def claimed(self, stage: str, key: str) -> Iterator[None]:
