@@ -22,7 +22,7 @@ def main() -> tuple[float, float]:
     loads = []
     for model in ("neo-hookean", "gent"):
         rubber = tr.Material(model, 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
-        tire = tr.torus(segments=16, elements_arc=8, material=rubber)
+        tire = tr.torus(segments=16, elements_arc=8, order=2, footprint_size=0.3, material=rubber)
         loads.append(tr.press(tire, inflation=2e5, deflection=0.004).load)
     return loads[0], loads[1]
 

@@ -26,9 +26,8 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.sections.torus import Torus
-from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.loading import Loader
-from tireroad.fem.static.state import StaticState, static_state
+from tireroad.fem.static.press import press as press_tire
+from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
@@ -49,11 +48,11 @@ def torus(
     minor_radius: float = 0.10,
     thickness: float = 0.012,
     half_angle: float = 2 * math.pi / 3,
-    segments: int = 50,
-    elements_arc: int = 16,
+    segments: int = 30,
+    elements_arc: int = 14,
     elements_thickness: int = 1,
-    order: int = 2,
-    footprint_size: float = 0.25,
+    order: int = 3,
+    footprint_size: float = 0.2,
     material: Material | None = None,
     youngs_modulus: float = 4.8e8,
     poisson_ratio: float = 0.45,
@@ -100,24 +99,19 @@ def press(
     `turning`: also the inertia and damping of the steadily rolling shape. ConvergenceError when the
     tire finds no balance.
     """
-    given = {"load": load, "deflection": deflection, "road_height": road_height}
-    if sum(value is not None for value in given.values()) > 1:
-        raise InputError("press: give one of load, deflection and road_height")
     rolling = (
         Rolling(turning.speed, *turning.damping, turning.inertia)
         if turning is not None and turning.speed
         else AT_REST
     )
-    equilibrium = Equilibrium(tire.body, rolling)
-    loader = Loader(equilibrium, lambda progress: None)
-    loader.inflate(inflation)
-    if load is not None:
-        loader.carry(load)
-    elif deflection is not None:
-        loader.deflect(deflection)
-    elif road_height is not None:
-        loader.deflect(road_height - loader.touch)
-    return static_state(equilibrium, loader.touch)
+    return press_tire(
+        tire,
+        inflation=inflation,
+        load=load,
+        deflection=deflection,
+        road_height=road_height,
+        rolling=rolling,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +168,7 @@ class RollingTire:
         basis = self.standing.basis
         return make_response(
             lambda: self.wheel, self.states, outputs, loads, residual, lambda: basis
-        )
+        ).response
 
     def at(self, spots: list[tuple[float, float]], residual: str = "static") -> Response:
         """The response between points of the outer face (angle around, angle along the section; rad),

@@ -54,7 +54,7 @@ def test_load_deflection() -> None:
     import load_deflection
 
     rows = np.array(load_deflection.main())
-    assert rows[:, 1] == pytest.approx([223.7, 565.8, 880.1], rel=1e-3)
+    assert rows[:, 1] == pytest.approx([209.6, 559.3, 888.6], rel=1e-3)
     assert (np.diff(rows[:, 2]) > 0).all()
 
 
@@ -62,17 +62,17 @@ def test_campbell() -> None:
     import campbell
 
     found = campbell.main()
-    assert found[0, :3] == pytest.approx([49.65, 58.31, 58.31], rel=1e-3)
+    assert found[0, :3] == pytest.approx([49.91, 58.55, 58.56], rel=1e-3)
     # The pair of wave number one splits by about n Omega / 2 pi times what Coriolis forces leave.
-    assert found[1, 1:3] == pytest.approx([54.37, 62.24], rel=1e-3)
+    assert found[1, 1:3] == pytest.approx([54.61, 62.49], rel=1e-3)
 
 
 def test_receptance() -> None:
     import receptance
 
     standing, rolling = receptance.main().values()
-    assert 1e6 * standing[4] == pytest.approx(13.214, rel=1e-3)
-    assert 1e6 * rolling[4] == pytest.approx(13.821, rel=1e-3)
+    assert 1e6 * standing[4] == pytest.approx(13.046, rel=1e-3)
+    assert 1e6 * rolling[4] == pytest.approx(13.604, rel=1e-3)
 
 
 def test_rolling() -> None:
@@ -80,8 +80,8 @@ def test_rolling() -> None:
 
     run = rolling.main()
     assert run.total_force[0] == pytest.approx(300.0, rel=0.02)
-    assert run.total_force.mean() == pytest.approx(300.7, rel=1e-3)
-    assert run.total_force.std() == pytest.approx(12.69, rel=1e-2)
+    assert run.total_force.mean() == pytest.approx(302.5, rel=1e-3)
+    assert run.total_force.std() == pytest.approx(10.73, rel=1e-2)
 
 
 def test_own_tread() -> None:
@@ -89,15 +89,15 @@ def test_own_tread() -> None:
 
     mean, deviation = own_tread.main()
     assert mean == pytest.approx(300.5, rel=1e-3)
-    assert deviation == pytest.approx(8.22, rel=1e-2)
+    assert deviation == pytest.approx(8.48, rel=1e-2)
 
 
 def test_own_material_stiffens() -> None:
     import own_material
 
     neo_hookean, gent = own_material.main()
-    assert neo_hookean == pytest.approx(565.8, rel=1e-3)
-    assert gent == pytest.approx(576.1, rel=1e-3) and gent > 1.001 * neo_hookean
+    assert neo_hookean == pytest.approx(559.3, rel=1e-3)
+    assert gent == pytest.approx(569.7, rel=1e-3) and gent > 1.001 * neo_hookean
 
 
 def test_read_results(launch, tmp_path: Path) -> None:
