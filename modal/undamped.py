@@ -58,6 +58,15 @@ class Modes:
         """Natural frequencies (m,), Hz; 0 for rigid modes."""
         return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * np.pi)
 
+    def first(self, count: int) -> Modes:
+        """The `count` lowest of them."""
+        return replace(
+            self,
+            squares=self.squares[:count],
+            vectors=self.vectors[:, :count],
+            residual=self.residual[:count],
+        )
+
     def among(self, wanted: np.ndarray) -> Modes:
         """With the squares and vectors where `wanted` (m,) is true."""
         return replace(self, squares=self.squares[wanted], vectors=self.vectors[:, wanted])

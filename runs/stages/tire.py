@@ -6,15 +6,16 @@ import numpy as np
 from mpi4py import MPI
 
 from tireroad.fem.sections.ring import Ring
-from tireroad.runs.scene.tire_section import patch
+from tireroad.runs.scene.tire_section import make_section, patch
 from tireroad.runs.scene.tire_tables import Region, Tire
 
 
-def make_lattice(section: Ring):
-    """The nodes of the displacement field, without a mesh."""
-    from tireroad.fem.tire.mesh import field_lattice
+def make_tire(comm: MPI.Comm, tire: Tire):
+    """The tire without loads, its finite elements made when they are asked for."""
+    from tireroad.fem.model import TireModel
 
-    return field_lattice(section)
+    section = make_section(tire)
+    return TireModel(section, lambda: make_body(comm, tire, section))
 
 
 def make_body(comm: MPI.Comm, tire: Tire, section: Ring):

@@ -1,5 +1,6 @@
 """Residual options on a small finite-element tire, against its full matrices."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
+from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
@@ -166,3 +168,13 @@ def test_direct_receptance_is_reciprocal_and_damped() -> None:
     H = made.receptance(loads, loads, np.array([30.0, 90.0]))
     assert np.abs(H - H.transpose(0, 2, 1)).max() < 1e-10 * np.abs(H).max()
     assert (np.linalg.eigvalsh(-(H - H.conj().transpose(0, 2, 1)) / 2j) > 0).all()
+
+
+def test_vectors_of_another_solution_are_refused() -> None:
+    """With the projection of one solution and the vectors of another, signs would not fit."""
+    made, basis = wheel(50.0)
+    _, _, modes, _, loads = tire()
+    signs = np.where(np.arange(len(modes.squares)) % 3, 1.0, -1.0)
+    other = replace(modes, vectors=signs * modes.vectors)
+    with pytest.raises(InputError, match="not those that the basis shows"):
+        made.respond(basis, other, loads, loads, "attachment")
