@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
-
 import numpy as np
 
-from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import Construction, CordLine, Layer, Part
 from tireroad.fem.sections.outline import Outline
+from tireroad.fem.sections.tire_size import Size, size
 
-_SIZE = re.compile(r"\s*(\d{3})\s*/\s*(\d{2})\s*Z?R\s*(\d{2})\s*", re.IGNORECASE)
 STEEL, STEEL_AREA, STEEL_SPACING = 190e9, 0.246e-6, 1.25e-3
 BELT_ANGLE = np.radians(24)
 NYLON, NYLON_AREA, NYLON_SPACING = 3e9, 0.33e-6, 1.0e-3
@@ -26,28 +22,6 @@ _COMPOUNDS = {
     "apex": (36e6, 0.49, 1200.0, 1.4, 0.15),
     "liner": (3.0e6, 0.49, 1150.0, 1.4, 0.2),
 }
-
-
-@dataclass(frozen=True)
-class Size:
-    """`width` of the section, `rim` radius and section `height`, all in m."""
-
-    width: float
-    height: float
-    rim: float
-
-
-def size(text: str) -> Size:
-    """205/60 R15: section width in mm, height over width in %, rim diameter in inches."""
-    found = _SIZE.fullmatch(text)
-    if not found:
-        raise InputError(f'tire.size = "{text[:40]}": must be like "205/60 R15"')
-    width, ratio, inches = (int(part) for part in found.groups())
-    if not (125 <= width <= 355 and 25 <= ratio <= 85 and 10 <= inches <= 24):
-        raise InputError(
-            f'tire.size = "{text[:40]}": from 125 to 355 mm wide, 25 to 85 % high, on rims of 10 to 24 inches'
-        )
-    return Size(width / 1e3, width * ratio / 1e5, inches * 0.0254 / 2)
 
 
 def radial(text: str) -> Construction:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +13,12 @@ from tireroad.fem.sections.torus import Torus
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_tables import Region, Tire
 
+if TYPE_CHECKING:
+    from tireroad.fem.sections.construction import Construction
+
 # (segments, elements along the arc) where the scene does not say; by order.
 MESHES = {1: (160, 32), 2: (100, 16), 3: (30, 14)}
+LAYERED = (30, 26)  # a section of several layers, of order 2
 NEAR_ROAD = 0.2  # footprint_size with a road
 
 
@@ -21,12 +26,13 @@ def with_elements(scene: Scene) -> Scene:
     """The scene with its elements chosen where it leaves them open.
 
     Order 3 unless the scene says how many elements there are: then 2, as finer ones are asked for by
-    their number. With a road, elements are smaller at the footprint.
+    their number, and for sections of several layers. With a road, elements are smaller at the footprint.
     """
     tire, static = scene.tire, scene.static
     counted = tire.segments is not None or tire.elements_arc is not None
-    order = tire.order or (2 if counted else 3)
-    segments, along = MESHES[order]
+    layered = tire.section != "torus"
+    order = tire.order or (2 if counted or layered else 3)
+    segments, along = LAYERED if layered else MESHES[order]
     road = (static.load, static.deflection, static.road_height) != (None, None, None)
     chosen = {
         "order": order,
@@ -37,8 +43,21 @@ def with_elements(scene: Scene) -> Scene:
     return replace(scene, tire=replace(tire, **chosen))
 
 
+def built(tire: Tire) -> Construction | None:
+    """What a built-in radial tire is built of; None for a torus."""
+    if tire.section == "torus":
+        return None
+    from tireroad.fem.sections.radial import radial
+
+    return radial(tire.size)
+
+
 def make_section(tire: Tire) -> Ring:
     """The shape of the tire and its elements."""
+    construction = built(tire)
+    if construction is not None:
+        given = tire.segments, tire.elements_arc, tire.order, tire.footprint_size
+        return construction.ring(*given)
     torus, patches, plies = _torus(tire)
     return torus.ring(patches, plies)
 
@@ -63,6 +82,10 @@ def patch(number: int, region: Region) -> Patch:
 
 def free_unknowns(tire: Tire) -> int:
     """Displacement unknowns without the clamped bead faces."""
+    if tire.section != "torus":
+        section = make_section(tire).section
+        held = len(np.unique(section.side(section.rim)))
+        return 3 * tire.segments * tire.order * (len(section.nodes) - held)
     torus, patches, plies = _torus(tire)
     wall, arc = (len(line) - 1 for line in torus.lines(patches, plies))
     free = (tire.order * wall + 1) * (tire.order * arc - 1)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from tireroad.runs.scene.cavity_table import Cavity
 from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
 
+TORUS, RADIAL = ("section", ("torus",)), ("section", ("radial",))
 LINEAR = ("model", ("linear", "neo-hookean"))
 
 
@@ -111,22 +112,31 @@ class Cords:
 # torus: footprint_size 1, 0.5, 0.3, 0.2 on 30 x 14: 0.85, 0.6, -0.1, 0.04 % off 2000 N.
 @dataclass(frozen=True)
 class Tire:
-    section: str = choice("torus", ("torus",), "shape of the section")
-    outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10)
-    minor_radius: float = number(0.10, "m", "of the section, to its outer face", above=0, most=10)
-    thickness: float = number(0.012, "m", "of the wall", above=0, most=5)
-    half_angle: float = number(120.0, "deg", "arc from the crown to each bead", least=10, most=175)
-    segments: int | None = integer(
-        None, "elements around; absent: 30 of order 3", least=8, most=4000
+    section: str = choice("torus", ("torus", "radial"), "shape of the section")
+    size: str = text(
+        "205/60 R15", "of the built-in passenger tire (docs/radial-tire.md)", only_for=RADIAL
     )
+    outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10, only_for=TORUS)
+    minor_radius: float = number(
+        0.10, "m", "of the section, to its outer face", above=0, most=10, only_for=TORUS
+    )
+    thickness: float = number(0.012, "m", "of the wall", above=0, most=5, only_for=TORUS)
+    half_angle: float = number(
+        120.0, "deg", "arc from the crown to each bead", least=10, most=175, only_for=TORUS
+    )
+    segments: int | None = integer(None, "elements around; absent: 30", least=8, most=4000)
     elements_arc: int | None = integer(
-        None, "elements from bead to bead; absent: 14 of order 3", least=2, most=1000
+        None, "elements from bead to bead; absent: 14, radial 26", least=2, most=1000
     )
-    elements_thickness: int = integer(1, "elements through the wall", least=1, most=20)
+    elements_thickness: int = integer(
+        1, "elements through the wall", least=1, most=20, only_for=TORUS
+    )
     order: int | None = integer(
-        None, "of the elements; absent: 3, or 2 where their number is given", least=1, most=3
+        None, "of the elements; absent: 3, or 2 for a radial or a given number", least=1, most=3
     )
-    grading: str = choice("bead", ("bead", "uniform"), "of the elements along the arc")
+    grading: str = choice(
+        "bead", ("bead", "uniform"), "of the elements along the arc", only_for=TORUS
+    )
     footprint_size: float | None = number(
         None,
         "-",

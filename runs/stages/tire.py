@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from tireroad.fem.sections.ring import Ring
-from tireroad.runs.scene.tire_section import make_section, patch
+from tireroad.runs.scene.tire_section import built, make_section, patch
 from tireroad.runs.scene.tire_tables import Region, Tire
 
 
@@ -28,6 +28,17 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
         given = vars(part.material) | {"dynamic": part.dynamic, "loss_factor": part.loss_factor}
         return Material(**given)
 
+    construction = built(tire)
+    if construction is not None:
+        places = {"under", "to"}
+        lines = (
+            {k: v for k, v in vars(line).items() if k not in places} for line in construction.cords
+        )
+        compounds = {
+            name: Material("neo-hookean", **values)
+            for name, values in construction.compounds.items()
+        }
+        return Body(comm, section, compounds, cords=[Cords(**line) for line in lines])
     names = [patch(i, region).name for i, region in enumerate(tire.region)]
     materials = {name: rubber(r) for name, r in zip(names, tire.region, strict=True)}
     placed = {"depth", "arc", "angle"}
