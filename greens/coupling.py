@@ -24,7 +24,7 @@ from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning
-from tireroad.greens.attachment import dynamic, foremost, with_attachments
+from tireroad.greens.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, modal_moments, second_order
@@ -165,13 +165,7 @@ class Wheel:
         for another one: its signs and its vectors of repeated frequencies differ.
         """
         if option in ("static", "dirac"):
-            flexibility = compliance(
-                self.operators, self.rotating_stiffness, outputs, loads, self.air
-            )
-            if self.beyond is not None:
-                pencils = self._pencils(basis.projection)
-                flexibility += regained(basis, *pencils, outputs, loads).compliance
-            return replace(basis.couple(outputs, loads, flexibility), pulse=option == "dirac")
+            return self._with_statics(basis, outputs, loads, pulse=option == "dirac")
         r, k = outputs.shape[0], loads.shape[0]
         same = outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
@@ -187,7 +181,25 @@ class Wheel:
                 moments = moments.plus(regained(basis, *pencils, probes, probes))
                 loss = self.beyond[0], tail_loss(basis.projection)
             whole = second_order(poles, basis.states, basis.seen(probes), carried, moments, loss)
+            whole = self._lacking(whole, moments.momentum)
         return whole if same else whole.between(slice(r), slice(r, r + k))
+
+    def _with_statics(self, basis: Basis, outputs, loads, *, pulse: bool) -> Response:
+        """The states, and the exact static flexibility of what they lack. Collective."""
+        given = self.operators, self.rotating_stiffness, outputs, loads
+        answers = compliance(*given, self.air, moment=True)
+        flexibility, moment = answers[: outputs.shape[0]], answers[outputs.shape[0] :]
+        if self.beyond is not None:
+            lacking = regained(basis, *self._pencils(basis.projection), outputs, loads)
+            flexibility, moment = flexibility + lacking.compliance, moment + lacking.momentum
+        response = replace(basis.couple(outputs, loads, flexibility), pulse=pulse)
+        return self._lacking(response, moment)
+
+    def _lacking(self, response: Response, moment: np.ndarray) -> Response:
+        """The response that knows what its states lack of the static first moment (3, k) kg m/N."""
+        if self.air is not None:  # its own momentum is not in that of the full matrices
+            return response
+        return replace(response, left_out=moment - response.static_moment())
 
     def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
         full = self.rotating_stiffness, self.rotating_damping
@@ -197,15 +209,18 @@ class Wheel:
         """Response of the modes and the attachment modes of all probes. Collective."""
         self._check_same(basis, modes)
         if not self._drifts:
+            weights, loads = fewest(probes)
             full = self.operators, self.rotating_stiffness
-            shapes, flexibility = loaded_shapes(*full, probes, self.air)
+            shapes, flexibility = loaded_shapes(*full, loads, self.air)
+            flexibility = weights @ (weights @ flexibility.T).T
             missing = flexibility - basis.couple(probes, probes).static()
-            columns = shapes @ foremost(missing, np.abs(np.diag(flexibility)))
+            columns = shapes @ (weights.T @ foremost(missing, np.abs(np.diag(flexibility))))
             grown = self._grown(modes, columns, basis.projection, every=False)
             if self.beyond is not None:
                 pencils = self._pencils(grown.projection)
                 flexibility = flexibility + regained(grown, *pencils, probes, probes).compliance
-            return grown.couple(probes, probes, flexibility)
+            moment = self.operators.body.comm.allreduce(self.operators.carried @ shapes)
+            return self._lacking(grown.couple(probes, probes, flexibility), moment)
         return self._standing_attachments(modes, probes).couple(probes, probes)
 
     def _check_same(self, basis: Basis, modes: Modes) -> None:

@@ -11,10 +11,12 @@ from tireroad.fem.errors import InputError
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.response import Response
 from tireroad.greens.state_selection import keep
-from tireroad.greens.truncation import Cutoff, estimate
+from tireroad.greens.truncation import Cutoff, estimate, estimate_axle
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.damping import beyond
 from tireroad.modal.rolling import RollingModes, rolling_modes
+
+Figures = dict[str, tuple[float, str]]
 
 RESIDUALS = ("none", "dirac", "static", "second-order", "attachment")
 CHOICES = ("participation", "frequency")
@@ -51,7 +53,7 @@ class Made:
     """A `response`, and what is to be known of it: `figures` name: (value, unit), `warnings`."""
 
     response: Response
-    figures: dict[str, tuple[float, str]] = field(default_factory=dict)
+    figures: Figures = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
 
@@ -62,14 +64,14 @@ def make_response(
     loads,
     residual: str,
     fields: Callable[[], ModalBasis],
-) -> Response:
+) -> Made:
     """The response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s) with a residual.
 
     `wheel` gives the full matrices, `fields` the modes on all unknowns: each is called where the residual
     needs it. Collective.
     """
     if residual == "none":
-        return Basis.of(rolling).couple(outputs, loads)
+        return _made(Basis.of(rolling).couple(outputs, loads))
     if residual == "attachment":
         found = fields()
         if found is not rolling.basis:  # solved once more: their states, too, are their own
@@ -78,10 +80,25 @@ def make_response(
     else:
         response = wheel().respond(Basis.of(rolling), None, outputs, loads, residual)
     if residual in ("static", "dirac"):
-        return response
+        return _made(response)
     highest = cutoff(rolling)
     limit = _FASTEST * max(highest.circular, highest.rate)
-    return response.keeping_where(lambda s: np.abs(s) <= limit)
+    kept = response.keeping_where(lambda s: np.abs(s) <= limit)
+    static = len(response.every) - len(kept.every)
+    what = f"residual states faster than {_FASTEST:g} times the highest mode, made static"
+    return _made(kept, {what: (static, "-")})
+
+
+def _made(response: Response, figures: Figures | None = None) -> Made:
+    """The response with a warning where its states grow."""
+    count, rate = response.growth
+    warnings = ()
+    if count:
+        warnings = (
+            f"{count} state(s) of the response grow by themselves, the fastest at {rate:.3g} 1/s: lower the "
+            "speed, or take another greens.residual",
+        )
+    return Made(response, figures or {}, warnings)
 
 
 def selected(whole: Response, rolling: RollingModes, wanted: Wanted) -> Response:
@@ -105,9 +122,9 @@ def cutoff(rolling: RollingModes) -> Cutoff:
 
 def judged(
     name: str, whole: Response, response: Response, rolling: RollingModes, wanted: Wanted
-) -> dict[str, tuple[float, str]]:
+) -> Figures:
     """How far off the receptance may be within the band: by the modes left out, by the states."""
-    top, figures = band(rolling, wanted), {}
+    top, figures = band(rolling, wanted), dict[str, tuple[float, str]]()
     some = [slice(None, None, -(-n // _SAMPLE)) for n in whole.residual.shape]
     whole, response = whole.between(*some), response.between(*some)
     frequency = np.linspace(0, top, _FREQUENCIES)[1 if whole.rigid else 0 :]
@@ -119,4 +136,10 @@ def judged(
         lost = np.linalg.norm(response.receptance(frequency) - H, axis=(1, 2))
         lost /= np.linalg.norm(H, axis=(1, 2))
         figures[f"error of the states made static {label}"] = (float(lost.max()), "-")
+    axle = estimate_axle(response, cutoff(rolling), frequency)
+    if axle is not None:
+        figures[f"estimated error of the axle force per N of load {label}"] = (
+            float(axle.max()),
+            "-",
+        )
     return figures

@@ -135,7 +135,7 @@ def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
     rolling = rolling_modes(run.fields.first(count), run.wheel.turning, job.comm)
     points = nodes(given.trial.setup.patch.index, len(run.static.points), 2)
     pair = points, points, residual
-    return make_response(lambda: run.wheel, rolling, *pair, lambda: rolling.basis)
+    return make_response(lambda: run.wheel, rolling, *pair, lambda: rolling.basis).response
 
 
 def modal(given: Prepared, response: Response, step: float) -> History:

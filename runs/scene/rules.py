@@ -12,17 +12,17 @@ from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_rules import check_cords, full_matrices
 from tireroad.runs.scene.tire_section import free_unknowns
-from tireroad.runs.scene.tire_tables import Material
+from tireroad.runs.scene.tire_tables import Material, Tire
 
 Where = Callable[[tuple[str, ...], str], InputError]
 
 # Keys of the public interface that this version does not compute, with the values it does take and
 # what to write instead. A later version takes its lines out.
 LATER: dict[str, tuple[tuple[Any, ...], str]] = {
-    "tire.mesh": ((), 'only section = "torus" is supported in this version'),
+    "tire.mesh": ((), 'is not supported: write section = "file" and file = "…"'),
     "tire.section": (
-        ("torus", "radial"),
-        'only "torus" and "radial" are supported in this version',
+        ("torus", "radial", "file"),
+        'is not supported: "torus", "radial" and "file" are',
     ),
 }
 
@@ -58,16 +58,22 @@ def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
             source.problems.append(((), str(error)))
 
 
+def _radial(tire: Tire, error: Where) -> None:
+    for key, absent in (("material", Material()), ("region", ()), ("cords", ())):
+        if getattr(tire, key) != absent:
+            raise error(("tire", key), "is of a torus: a radial tire has all of it by its size")
+    try:
+        size(tire.size)
+    except InputError as problem:
+        raise error(("tire", "size"), str(problem).removeprefix("tire.size ")) from None
+
+
 def _geometry(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     tire = scene.tire
+    if tire.section == "file":
+        return
     if tire.section == "radial":
-        for key, absent in (("material", Material()), ("region", ()), ("cords", ())):
-            if getattr(tire, key) != absent:
-                raise error(("tire", key), "is of a torus: a radial tire has all of it by its size")
-        try:
-            size(tire.size)
-        except InputError as problem:
-            raise error(("tire", "size"), str(problem).removeprefix("tire.size ")) from None
+        _radial(tire, error)
         return
     if tire.thickness >= tire.minor_radius:
         raise error(
@@ -91,6 +97,11 @@ def _geometry(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             " make it or minor_radius smaller",
         )
     for number, region in enumerate(tire.region):
+        if region.name is not None:
+            raise error(
+                ("tire", "region", str(number), "name"),
+                'is for section = "file": a part of a torus is told by arc, side and depth',
+            )
         for key in ("arc", "depth"):
             low, high = getattr(region, key)
             if low >= high:

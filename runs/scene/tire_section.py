@@ -10,6 +10,7 @@ import numpy as np
 from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
+from tireroad.runs.scene.own_tire import own_free_unknowns, own_ring
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_tables import Region, Tire
 
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 
 # (segments, elements along the arc) where the scene does not say; by order.
 MESHES = {1: (160, 32), 2: (100, 16), 3: (30, 14)}
-LAYERED = (30, 26)  # a section of several layers, of order 2
+OWN_SEGMENTS = 60  # around a tire from a file
+RADIAL = (30, 26)  # segments, elements along the arc of a radial tire
 NEAR_ROAD = 0.2  # footprint_size with a road
 
 
@@ -26,13 +28,13 @@ def with_elements(scene: Scene) -> Scene:
     """The scene with its elements chosen where it leaves them open.
 
     Order 3 unless the scene says how many elements there are: then 2, as finer ones are asked for by
-    their number, and for sections of several layers. With a road, elements are smaller at the footprint.
+    their number; and of a radial tire and a file, which have several layers. With a road, elements are
+    smaller at the footprint.
     """
     tire, static = scene.tire, scene.static
     counted = tire.segments is not None or tire.elements_arc is not None
-    layered = tire.section != "torus"
-    order = tire.order or (2 if counted or layered else 3)
-    segments, along = LAYERED if layered else MESHES[order]
+    order = tire.order or (2 if counted or tire.section != "torus" else 3)
+    segments, along = {"file": (OWN_SEGMENTS, 1), "radial": RADIAL}.get(tire.section, MESHES[order])
     road = (static.load, static.deflection, static.road_height) != (None, None, None)
     chosen = {
         "order": order,
@@ -43,10 +45,8 @@ def with_elements(scene: Scene) -> Scene:
     return replace(scene, tire=replace(tire, **chosen))
 
 
-def built(tire: Tire) -> Construction | None:
-    """What a built-in radial tire is built of; None for a torus."""
-    if tire.section == "torus":
-        return None
+def built(tire: Tire) -> Construction:
+    """What a built-in radial tire is built of."""
     from tireroad.fem.sections.radial import radial
 
     return radial(tire.size)
@@ -54,10 +54,11 @@ def built(tire: Tire) -> Construction | None:
 
 def make_section(tire: Tire) -> Ring:
     """The shape of the tire and its elements."""
-    construction = built(tire)
-    if construction is not None:
+    if tire.section == "file":
+        return own_ring(tire)
+    if tire.section == "radial":
         given = tire.segments, tire.elements_arc, tire.order, tire.footprint_size
-        return construction.ring(*given)
+        return built(tire).ring(*given)
     torus, patches, plies = _torus(tire)
     return torus.ring(patches, plies)
 
@@ -82,7 +83,9 @@ def patch(number: int, region: Region) -> Patch:
 
 def free_unknowns(tire: Tire) -> int:
     """Displacement unknowns without the clamped bead faces."""
-    if tire.section != "torus":
+    if tire.section == "file":
+        return own_free_unknowns(tire)
+    if tire.section == "radial":
         section = make_section(tire).section
         held = len(np.unique(section.side(section.rim)))
         return 3 * tire.segments * tire.order * (len(section.nodes) - held)

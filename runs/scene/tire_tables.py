@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass
 
+from tireroad.fem.parameters import filename, flag, texts
 from tireroad.runs.scene.cavity_table import Cavity
 from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
 
-TORUS, RADIAL = ("section", ("torus",)), ("section", ("radial",))
+TORUS, FILE = ("section", ("torus",)), ("section", ("file",))
+RADIAL, MESHED = ("section", ("radial",)), ("section", ("torus", "radial"))
 LINEAR = ("model", ("linear", "neo-hookean"))
 
 
@@ -73,6 +75,7 @@ def _loss_factor():
 
 @dataclass(frozen=True)
 class Region:
+    name: str | None = text(None, "region of a file that this is; a torus has none of its own")
     arc: tuple[float, float] = vector(
         (0.0, 45.0), "deg", "from, to, measured from the crown", least=0, most=175
     )
@@ -80,7 +83,9 @@ class Region:
     depth: tuple[float, float] = vector(
         (0.0, 1.0), "-", "from, to, through the wall; 0: inner face", least=0, most=1
     )
-    material: Material = table(Material, "what the region is made of")
+    material: Material | None = table(
+        Material, "what the region is made of; absent: as the file says", optional=True
+    )
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()
 
@@ -112,7 +117,7 @@ class Cords:
 # torus: footprint_size 1, 0.5, 0.3, 0.2 on 30 x 14: 0.85, 0.6, -0.1, 0.04 % off 2000 N.
 @dataclass(frozen=True)
 class Tire:
-    section: str = choice("torus", ("torus", "radial"), "shape of the section")
+    section: str = choice("torus", ("torus", "radial", "file"), "shape of the section")
     size: str = text(
         "205/60 R15", "of the built-in passenger tire (docs/radial-tire.md)", only_for=RADIAL
     )
@@ -124,15 +129,24 @@ class Tire:
     half_angle: float = number(
         120.0, "deg", "arc from the crown to each bead", least=10, most=175, only_for=TORUS
     )
-    segments: int | None = integer(None, "elements around; absent: 30", least=8, most=4000)
+    segments: int | None = integer(
+        None, "elements around; absent: 30 of order 3, 60 of a file", least=8, most=4000
+    )
     elements_arc: int | None = integer(
-        None, "elements from bead to bead; absent: 14, radial 26", least=2, most=1000
+        None,
+        "elements from bead to bead; absent: 14 of order 3, 26 of a radial tire",
+        least=2,
+        most=1000,
+        only_for=MESHED,
     )
     elements_thickness: int = integer(
         1, "elements through the wall", least=1, most=20, only_for=TORUS
     )
     order: int | None = integer(
-        None, "of the elements; absent: 3, or 2 for a radial or a given number", least=1, most=3
+        None,
+        "of the elements; absent: 3, or 2 where their number is given, of a radial tire and a file",
+        least=1,
+        most=3,
     )
     grading: str = choice(
         "bead", ("bead", "uniform"), "of the elements along the arc", only_for=TORUS
@@ -148,6 +162,19 @@ class Tire:
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()
     region: tuple[Region, ...] = tables(Region, "a part of the section of another material")
+    file: str | None = filename(
+        "Abaqus deck (.inp) or Gmsh mesh (.msh) of the section or the body", only_for=FILE
+    )
+    inner: str | None = text(None, "surface or node set of the face under pressure", only_for=FILE)
+    tread: str | None = text(None, "surface or node set that can touch the road", only_for=FILE)
+    rim: tuple[str, ...] = texts("surfaces or node sets that the wheel holds", only_for=FILE)
+    length_unit: str = choice(
+        "m",
+        ("m", "mm", "in"),
+        "of the file; mm: with N, MPa and tonnes; in: lbf, psi",
+        only_for=FILE,
+    )
+    mirror: bool = flag(False, "the file has half the section, which ends on z = 0", only_for=FILE)
     cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")
     cavity: Cavity | None = table(
         Cavity, "the air inside; absent: none in a torus, else this table's defaults", optional=True

@@ -24,7 +24,7 @@ from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
 from tireroad.runs.stages.contact_file import ContactFile, ContactHistory
-from tireroad.runs.stages.energy import describe_energy
+from tireroad.runs.stages.energy import Losses, describe_energy
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.record import Record
@@ -74,6 +74,7 @@ class ContactStage(Stage[ContactHistory]):
             driven = self._driven(chosen)
             loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach)
+        losses = Losses(chosen.tire, response, self.rotating.product, chosen.step)
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme}
             file = ContactFile(self.job, key, setup, attributes)
@@ -81,20 +82,20 @@ class ContactStage(Stage[ContactHistory]):
             if kept is not None:
                 loop.restore(kept)
                 totals.set_state(kept)
+                losses.set_state(kept)
                 reached = totals.figures.steps * chosen.step
                 observe.say(f"  goes on from the checkpoint at t = {reached:.6g} s")
             done, began = totals.figures.steps, time.thread_time()
-            self._steps(setup, loop, driven, file, totals, chosen)
+            self._steps(setup, loop, driven, file, totals, losses, chosen)
             # Of this process's own thread: what a step takes where nobody else wants the cores.
             busy = (time.thread_time() - began) / max(chosen.steps - done, 1)
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
         _describe(record, totals.figures, loop.solver, chosen, chosen.steps - done)
         if chosen.scheme != "convolution":
-            prescribed = driven.work if driven else None
-            describe_energy(
-                record, self.rotating.product, response, loop, totals.work, prescribed, chosen.step
-            )
+            work = totals.work.total, driven.work if driven else None
+            given = self.rotating.product, response, loop.tire.snapshot(), work
+            describe_energy(record, *given, losses, chosen.step)
 
     def _shortest_period(self) -> float:
         """Of all that excites the tire, s."""
@@ -129,7 +130,7 @@ class ContactStage(Stage[ContactHistory]):
             tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
         return Loop(tire, solver, friction)
 
-    def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, chosen) -> None:
+    def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, losses, chosen) -> None:
         """Take the steps that are left; stop between two of them when asked to. Collective."""
         done, steps = totals.figures.steps, chosen.steps
         given = setup.patch, setup.drive, chosen.step, steps
@@ -143,16 +144,19 @@ class ContactStage(Stage[ContactHistory]):
             threadpool_limits(1, "blas"),
         ):
             for instant in instants:
+                losses.sample()
                 full = file.add(instant, driven.reading if driven else None)
                 bar.advance()
                 stop, due = watch(deferred.asked)
                 if full or stop or due:
                     file.flush(totals.add)
+                    losses.flush()
                 if stop or due:
-                    file.checkpoint(loop.snapshot() | totals.state())
+                    file.checkpoint(loop.snapshot() | totals.state() | losses.state())
                 if stop:
                     raise Stopped(stop)
             file.flush(totals.add)
+            losses.flush()
 
     def read(self, file) -> ContactHistory:
         """The totals over time, without the points."""

@@ -93,7 +93,7 @@ class GreensStage(Computed[Responses]):
             with record.timing("modes once more"):
                 _ = self.fields.product
         with record.timing("residual flexibility"):
-            return make_response(
+            made = make_response(
                 lambda: self.wheel.product,
                 rolling,
                 points.outputs,
@@ -101,6 +101,9 @@ class GreensStage(Computed[Responses]):
                 residual,
                 lambda: self.fields.product,
             )
+        record.indicators |= made.figures
+        record.warnings += made.warnings
+        return made.response
 
     def _apart(self, name: str, whole: Response) -> dict[str, Response]:
         """The contact's response, the prescribed forces among its inputs (contact.driven), and theirs."""

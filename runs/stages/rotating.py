@@ -16,8 +16,8 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
 from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.full_states import full_states
-from tireroad.modal.rolling import RollingModes, pencil, rolling_modes
-from tireroad.modal.rotating import StateModes, checks
+from tireroad.modal.rolling import RollingModes, rolling_modes
+from tireroad.modal.rotating import StateModes
 from tireroad.runs.files.store import put
 from tireroad.runs.stages import cavity
 from tireroad.runs.stages.job import Job
@@ -85,14 +85,20 @@ class RotatingStage(Computed[RollingModes]):
     def compute(self, record: Record) -> RollingModes:
         """Solve on the root process, share, check. Collective."""
         job, basis = self.job, self.modes.product
-        problem = pencil(basis.projection, turning_of(job))
         with record.timing("eigensolver"):
             rolling = rolling_modes(basis, turning_of(job), job.comm)
-            figures = on_root(job.comm, lambda: checks(rolling.states, *problem))
-        record.indicators |= {f"projected: {n}": (figure, "-") for n, figure in figures.items()}
+        projected = {
+            f"projected: {name}": (figure, "-") for name, figure in rolling.figures.items()
+        }
+        record.indicators |= projected
         if job.scene.rotation.method == "full":
             rolling = self._full(record, rolling)
-        _describe(record, rolling, critical_speed(basis.projection, turning_of(job).inertia))
+        speed = rolling.turning.speed
+        free_at = speed if job.scene.modal.rim == "free" else None
+        critical = critical_speed(basis.projection, rolling.turning.inertia, free_at)
+        _describe(record, rolling, critical)
+        if speed > critical:
+            record.warnings.append(_beyond(speed, critical))
         if rolling.states.unstable:
             record.warnings.append(_growth(job, rolling, basis))
         return replace(rolling, campbell=self._campbell(record))
@@ -141,6 +147,15 @@ class RotatingStage(Computed[RollingModes]):
             basis = replace(basis, shape=own["shape"], projection=projection, modes=None)
         turning = turning_of(self.job)
         return RollingModes(basis=basis, states=states, turning=turning, full=bool(own))
+
+
+def _beyond(speed: float, critical: float) -> str:
+    """What to say of a speed beyond the critical one (rad/s)."""
+    return (
+        f"rotation.speed = {speed:g} rad/s lies beyond the tire's critical speed of {critical:.4g} "
+        "rad/s, at which a wave stands still on the road and grows without end: what follows has "
+        "little meaning; take a lower speed, a higher static.inflation or a stiffer material"
+    )
 
 
 def _describe(record: Record, rolling: RollingModes, critical: float) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.model import TireModel
+from tireroad.fem.static.diagnosis import with_cause
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_error import load_error
 from tireroad.fem.static.loading import Loader
@@ -18,6 +19,7 @@ from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.scene.own_tire import fingerprint
 from tireroad.runs.stages import cords_file
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
@@ -47,6 +49,7 @@ class StaticStage(Computed[StaticState]):
         scene = self.job.scene
         return {
             "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
+            "file": fingerprint(scene.tire),
             "static": asdict(scene.static),
             "rolling": asdict(steady_rolling(self.job)),
         }
@@ -59,10 +62,13 @@ class StaticStage(Computed[StaticState]):
         loader = Loader(equilibrium, _show)
         began = time.perf_counter()
         try:
-            loader.inflate(wanted.inflation)
-            _place(loader, wanted)
+            _press(loader, wanted)
         except ConvergenceError as error:
-            self._keep_last(static_state(equilibrium, loader.lowest()), error)
+            self._keep_last(static_state(equilibrium, loader.lowest()))
+            rolling = steady_rolling(self.job)
+            cause = with_cause(error, loader, rolling, lambda other: _press(other, wanted))
+            last = self.job.path("static_last")
+            raise ConvergenceError(f"{cause} The last state that converged is in {last}.") from None
         record.cost |= equilibrium.cost
         record.cost["other"] = time.perf_counter() - began - sum(equilibrium.cost.values())
         state = static_state(equilibrium, loader.touch)
@@ -74,13 +80,12 @@ class StaticStage(Computed[StaticState]):
         observe.say(f"  {_parts(record.cost)}")
         return state
 
-    def _keep_last(self, state: StaticState, error: ConvergenceError) -> None:
-        """Write the last state that converged, and raise. Collective."""
+    def _keep_last(self, state: StaticState) -> None:
+        """Write the last state that converged. Collective."""
         job, last = self.job, self.job.path("static_last")
         job.write(
             last, job.provenance("static", "unfinished"), lambda file: self.write(file, state)
         )
-        raise ConvergenceError(f"{error} The last state that converged is in {last}.") from None
 
     def _warn_at_rest(self, record: Record) -> None:
         if self.job.speed and not self.job.scene.static.steady_rolling:
@@ -118,6 +123,12 @@ class StaticStage(Computed[StaticState]):
             rolling=steady_rolling(self.job),
             **cords_file.read(file),
         )
+
+
+def _press(loader: Loader, wanted) -> None:
+    """Inflate the tire and press it on the road. Collective."""
+    loader.inflate(wanted.inflation)
+    _place(loader, wanted)
 
 
 def _place(loader, wanted) -> None:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from mpi4py import MPI
 
 from tireroad.fem.sections.ring import Ring
 from tireroad.runs.scene.tire_section import built, make_section, patch
+from tireroad.runs.scene.tire_tables import Material as MaterialTable
 from tireroad.runs.scene.tire_tables import Region, Tire
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 
 def make_tire(comm: MPI.Comm, tire: Tire):
@@ -23,22 +28,20 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
     from tireroad.fem.tire.body import Body
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
+    from tireroad.runs.stages.own_tire import own_cords, own_materials
+
+    if tire.section == "file":
+        return Body(comm, section, own_materials(tire), cords=own_cords(tire))
+    if tire.section == "radial":
+        return _radial_body(comm, tire, section)
 
     def rubber(part: Tire | Region) -> Material:
-        given = vars(part.material) | {"dynamic": part.dynamic, "loss_factor": part.loss_factor}
+        given = vars(part.material or MaterialTable()) | {
+            "dynamic": part.dynamic,
+            "loss_factor": part.loss_factor,
+        }
         return Material(**given)
 
-    construction = built(tire)
-    if construction is not None:
-        places = {"under", "to"}
-        lines = (
-            {k: v for k, v in vars(line).items() if k not in places} for line in construction.cords
-        )
-        compounds = {
-            name: Material("neo-hookean", **values)
-            for name, values in construction.compounds.items()
-        }
-        return Body(comm, section, compounds, cords=[Cords(**line) for line in lines])
     names = [patch(i, region).name for i, region in enumerate(tire.region)]
     materials = {name: rubber(r) for name, r in zip(names, tire.region, strict=True)}
     placed = {"depth", "arc", "angle"}
@@ -50,3 +53,20 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
         for c in tire.cords
     ]
     return Body(comm, section, {"wall": rubber(tire)} | materials, cords=cords)
+
+
+def _radial_body(comm: MPI.Comm, tire: Tire, section: Ring):
+    """The body of a tire built of layers. Collective."""
+    from tireroad.fem.tire.body import Body
+    from tireroad.fem.tire.cords import Cords
+    from tireroad.fem.tire.material import Material
+
+    construction, places = built(tire), {"under", "to"}
+    cords = [
+        Cords(**{key: value for key, value in vars(line).items() if key not in places})
+        for line in construction.cords
+    ]
+    compounds = {
+        name: Material("neo-hookean", **values) for name, values in construction.compounds.items()
+    }
+    return Body(comm, section, compounds, cords=cords)

@@ -114,7 +114,7 @@ class Tires:
             self._rolling[count] = rolling_modes(few, turning_of(self.job), self.job.comm)
         rolling, points = self._rolling[count], self.probes
         given = points.outputs, points.loads, residual
-        return make_response(lambda: self.wheel, rolling, *given, lambda: rolling.basis)
+        return make_response(lambda: self.wheel, rolling, *given, lambda: rolling.basis).response
 
     def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
         """All degrees of freedom between the same points; step; set-up in s."""
