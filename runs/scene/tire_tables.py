@@ -109,6 +109,13 @@ class Cords:
     compression: float = number(
         1.0, "-", "modulus in compression over that in tension", least=0, most=1
     )
+    drum_radius: float | None = number(
+        None,
+        "m",
+        "angle and spacing are those on this building drum; absent: those in the tire",
+        above=0,
+        most=10,
+    )
 
 
 # The mesh's defaults: largest error of the 28 lowest frequencies of the torus without loads, E = 480 MPa, against
