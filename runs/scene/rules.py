@@ -8,6 +8,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import described
 from tireroad.runs.scene.cavity_table import check_cavity
 from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.stiffness_table import check_stiffness
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_rules import check_cords, full_matrices
 from tireroad.runs.scene.tire_tables import Tire
@@ -268,6 +269,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("rotation",), _campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),
+    (("stiffness", "static"), check_stiffness),
     (("tire", "rotation", "modal", "greens"), check_cavity),
     (("time",), _time),
 )

@@ -20,11 +20,21 @@ from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.road_check import check_road
 from tireroad.runs.scene.tables import Scene
-from tireroad.runs.stages import contact, greens, modes, response, rotating, spectra, static
+from tireroad.runs.stages import (
+    contact,
+    greens,
+    modes,
+    response,
+    rotating,
+    spectra,
+    static,
+    stiffness,
+)
 from tireroad.runs.stages.session import Session
 
 _MODULES = {
     "static": static,
+    "stiffness": stiffness,
     "modes": modes,
     "rotating": rotating,
     "greens": greens,
