@@ -140,6 +140,18 @@ def form(expression):
     return form_cache.compiled(comm, lambda folder: fem.form(expression, **_options(folder, **JIT)))
 
 
+@_quietly
+def evaluate(expression, points: np.ndarray, mesh, cells: np.ndarray) -> np.ndarray:
+    """A scalar UFL expression (cells, points) at reference `points` (p, 3) of this process's cells. Collective."""
+    made = form_cache.compiled(
+        mesh.comm, lambda folder: fem.Expression(expression, points, **_options(folder, **JIT))
+    )
+    own = cells.astype(np.int32)
+    asks_mesh = "mesh" in inspect.signature(made.eval).parameters
+    values = made.eval(mesh, own) if asks_mesh else made.eval(own)
+    return np.asarray(values).reshape(len(cells), len(points))
+
+
 def cell_facets(mesh) -> np.ndarray:
     """Facets (cells, 6) of the hexahedra of this process, ghosts included, in the reference element's order."""
     mesh.topology.create_connectivity(3, 2)

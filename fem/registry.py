@@ -46,6 +46,11 @@ class Registry(Generic[T]):
 
         return decorate
 
+    def forget(self, name: str) -> None:
+        """Take a variant out again: for notebooks and tests that register their own."""
+        self._classes.pop(name, None)
+        self._docs.pop(name, None)
+
     def _find(self) -> None:
         if self._found:
             return

@@ -12,6 +12,7 @@ from tireroad.fem.cavity.column import Column
 from tireroad.fem.matrices.compliance import (
     StaticShapes,
     compliance,
+    loaded_shapes,
     on_own_rows,
     rotating_damping,
     rotating_stiffness,
@@ -20,7 +21,7 @@ from tireroad.fem.matrices.compliance import (
 from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
-from tireroad.greens.attachment import with_attachments
+from tireroad.greens.attachment import dynamic, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, modal_moments, second_order
@@ -143,7 +144,7 @@ class Wheel:
         same = outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
-            whole = self._attached(modes, probes, known)
+            whole = self._attached(basis, modes, probes, known)
         else:
             shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
@@ -161,13 +162,15 @@ class Wheel:
         return static_shapes(self.operators, *full, probes, self.air)
 
     def _attached(
-        self, modes: Modes, probes: sparse.csr_matrix, known: Projection | None
+        self, basis: Basis, modes: Modes, probes: sparse.csr_matrix, known: Projection | None
     ) -> Response:
         """Response of the modes and the attachment modes of all probes. Collective."""
         if not self._drifts:
-            shapes = self._static_shapes(probes)
-            grown = self._grown(modes, shapes.columns, known)
-            flexibility = shapes.compliance
+            full = self.operators, self.rotating_stiffness
+            shapes, flexibility = loaded_shapes(*full, probes, self.air)
+            missing = flexibility - basis.couple(probes, probes).static()
+            columns = shapes @ foremost(missing, np.abs(np.diag(flexibility)))
+            grown = self._grown(modes, columns, known, every=False)
             if self.beyond is not None:
                 pencils = self._pencils(grown.projection)
                 flexibility = flexibility + regained(grown, *pencils, probes, probes).compliance
@@ -202,14 +205,20 @@ class Wheel:
         turning = self.speed, self.damping[0] if self.beyond is None else 0.0
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
-    def _grown(self, modes: Modes, columns: np.ndarray, known: Projection | None = None) -> Basis:
-        """The basis with attachment modes; `known` is the projection on the modes. Collective."""
+    def _grown(
+        self, modes: Modes, columns: np.ndarray, known: Projection | None = None, every: bool = True
+    ) -> Basis:
+        """The basis with attachment modes, or those that are more than static; `known` is the projection on
+        the modes. Collective.
+        """
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
         loss = None if self.beyond is None else self._loss
-        projection = self.with_air(
-            project(grown, self.rotation, operators.carried, comm, known, loss), grown
-        )
+        projection = project(grown, self.rotation, operators.carried, comm, known, loss)
+        if not every:
+            stays = dynamic(projection, self.speed, len(modes.squares))
+            projection, grown = projection.among(stays), grown.among(stays)
+        projection = self.with_air(projection, grown)
         shape = operators.trace(grown.vectors)
         return Basis(shape, projection, self.decouple(projection, comm))
 

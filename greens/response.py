@@ -8,6 +8,7 @@ thesis (4.14) with its sum over eigenpairs kept as a product, C = Phi_out R and 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,16 +114,63 @@ class Response:
             residual=self.residual - gone.real,
         )
 
+    @property
+    def every(self) -> np.ndarray:
+        """All eigenvalues but the rigid ones, the block's last: (q + b - rigid,) 1/s."""
+        return np.concatenate([self.eigenvalue, np.linalg.eigvals(self._held_block()[0])])
+
+    def keeping_where(self, wanted: Callable[[np.ndarray], np.ndarray]) -> Response:
+        """The poles and the block's states where `wanted` of all their eigenvalues is true, and rigid states;
+        the others follow the force statically.
+        """
+        values = self.every
+        stays = wanted(values)
+        poles = self.keeping(stays[: len(self.eigenvalue)])
+        return poles._block_keeping(values[len(self.eigenvalue) :], stays[len(self.eigenvalue) :])
+
+    def _block_keeping(self, values: np.ndarray, stays: np.ndarray) -> Response:
+        """The same for the block alone: its Schur form is cut between the two kinds, and Sylvester's
+        equation A X - X B = -C parts them.
+        """
+        if stays.all():
+            return self
+        held, output, push = self._held_block()
+        momentum = self.block_momentum[:, : len(held)]
+
+        def first(re: float, im: float) -> bool:
+            return bool(stays[np.abs(values - complex(re, im)).argmin()])
+
+        schur, turn, p = linalg.schur(held, output="real", sort=first)
+        X = linalg.solve_sylvester(schur[:p, :p], -schur[p:, p:], -schur[:p, p:])
+        unit = np.eye(len(held))
+        left, right = unit.copy(), unit
+        right[:p, p:], left[:p, p:] = X, -X
+        output, momentum, push = (
+            output @ turn @ right,
+            momentum @ turn @ right,
+            left @ turn.T @ push,
+        )
+        gone = output[:, p:] @ np.linalg.solve(schur[p:, p:], push[p:])
+        k = len(held)
+        return replace(
+            self,
+            block=linalg.block_diag(schur[:p, :p], self.block[k:, k:]),
+            block_output=np.hstack([output[:, :p], self.block_output[:, k:]]),
+            block_input=np.vstack([push[:p], self.block_input[k:]]),
+            block_momentum=np.hstack([momentum[:, :p], self.block_momentum[:, k:]]),
+            residual=self.residual - gone,
+        )
+
     def slow(self, step: float, limit: float = RESOLVED) -> np.ndarray:
         """Which poles (q,) `resolved` keeps."""
         return np.abs(self.eigenvalue) * step <= limit
 
     def resolved(self, step: float, limit: float = RESOLVED) -> Response:
-        """Poles with |s| step above the limit leave the dynamics and follow the force statically.
+        """Poles and states of the block with |s| step above the limit follow the force statically.
 
         Over so long a step their turning is not seen, and they can gain energy in contact.
         """
-        return self.keeping(self.slow(step, limit))
+        return self.keeping_where(lambda s: np.abs(s) * step <= limit)
 
     def rate(self) -> Response:
         """The velocities at the outputs: g' for g, i omega H for H.

@@ -18,7 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tireroad.greens.response import Response, couple
-from tireroad.modal.rotating import GROWS, StateModes, rotating
+from tireroad.modal.rotating import rotating
+from tireroad.modal.states import StateModes, growing
 
 # Share of the largest static flexibility below which a direction is the solver's rounding.
 _ROUNDING = 1e-9
@@ -96,9 +97,7 @@ def second_order(
     output = flexibility @ basis
     forces = inverse @ (basis.T @ flexibility)
     extra = couple(states, output, forces.T, missing.momentum @ basis)
-    # Undamped states are on the axis to rounding only, on either side of it.
-    still = GROWS * np.abs(extra.eigenvalue).max(initial=0.0)
-    whole = response.joined(extra.keeping(extra.eigenvalue.real <= still))
+    whole = response.joined(extra.keeping_where(lambda s: ~growing(s)))
     return replace(whole, residual=moments.compliance - whole.static())
 
 

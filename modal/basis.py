@@ -42,6 +42,15 @@ class Projection:
         """Coordinates of the tire itself, m."""
         return len(self.squares)
 
+    def among(self, wanted: np.ndarray) -> Projection:
+        """On the coordinates where `wanted` (m,) is true, before any air joins them."""
+        small = {
+            name: None if value is None else value[np.ix_(*[wanted] * value.ndim)]
+            for name, value in vars(self).items()
+            if name not in ("momentum", "air")
+        }
+        return Projection(momentum=self.momentum[:, wanted], **small)
+
 
 def project(
     modes: Modes, rotation, carried: np.ndarray, comm, known: Projection | None = None, loss=None

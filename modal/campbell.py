@@ -12,7 +12,8 @@ from scipy import linalg, optimize
 
 from tireroad.modal.basis import Projection
 from tireroad.modal.damping import Damping
-from tireroad.modal.rotating import GROWS, StateModes, matrices, overlap, rotating
+from tireroad.modal.rotating import matrices, overlap, rotating
+from tireroad.modal.states import StateModes, growing
 
 
 @dataclass(frozen=True)
@@ -114,5 +115,4 @@ def growth(projection: Projection, speed: float, damping: Damping, inertia: str)
     drag, stiffness = matrices(projection, speed, damping, inertia)
     m = len(drag)
     values = linalg.eigvals(np.block([[np.zeros((m, m)), np.eye(m)], [-stiffness, -drag]]))
-    rate = float(values.real.max())
-    return rate if rate > GROWS * np.abs(values).max() else 0.0
+    return float(values.real.max()) if growing(values).any() else 0.0

@@ -10,51 +10,19 @@ to have usable vectors of their own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy import linalg
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.basis import Projection
 from tireroad.modal.damping import Damping, rates
+from tireroad.modal.states import StateModes
 
 # Above this condition an eigenvector loses ten of sixteen digits; such eigenvalues go to the block.
 DEFECTIVE = 1e6
 SINGULAR = 1e13  # condition of K~ beyond which it has no inverse
 # States slower than this part of the fastest drift, as rigid modes do, unless their vectors are apart.
 _AT_REST, _SKEWED = 1e-5, 1e2
-GROWS = 1e-9  # of the largest |s|: a growth rate below is rounding
-
-
-@dataclass(frozen=True)
-class StateModes:
-    """The decoupled equations of motion for m modal coordinates.
-
-    `eigenvalue` (q,) 1/s, Im >= 0; `right` (m, q) with the weight 2 of a pair already in it; `left`
-    (q, m), transposed and not conjugated, divided by a_q; `block` (k, k), `block_right` (m, k),
-    `block_left` (k, m). `residual`, `left_residual` (q,) relative to the terms of the quadratic
-    problem; `condition` the worst eigenvector condition among those kept as vectors. The last `rigid`
-    states of the block belong to rigid modes: they drift, and have no static answer.
-    """
-
-    eigenvalue: np.ndarray
-    right: np.ndarray
-    left: np.ndarray
-    block: np.ndarray
-    block_right: np.ndarray
-    block_left: np.ndarray
-    residual: np.ndarray
-    left_residual: np.ndarray
-    condition: float
-    rigid: int = 0
-
-    @property
-    def unstable(self) -> int:
-        """Eigenvalues with a growing motion, beyond rounding."""
-        rates = np.concatenate([self.eigenvalue.real, np.linalg.eigvals(self.block).real])
-        fastest = np.abs(self.eigenvalue).max(initial=1.0)
-        return int((rates > GROWS * fastest).sum())
 
 
 def matrices(

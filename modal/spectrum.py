@@ -16,6 +16,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
+from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.shifted import Shifted
 from tireroad.modal.slices import Interval, eigenpairs
 
@@ -59,6 +60,17 @@ class Bottom:
     zero: float
     negative: int
     near: np.ndarray
+
+    def check_stable(self) -> None:
+        """Raise ConvergenceError if an eigenvalue is negative."""
+        if self.negative:
+            growth = np.sqrt(-min(self.near[0], -self.zero))
+            raise ConvergenceError(
+                f"modes: the tangent stiffness has {self.negative} negative eigenvalue(s) (growth rate "
+                f"about {growth:.3g} 1/s): the state is unstable once the road is replaced by its "
+                "forces: the tire buckles, or topples if its rim is free. Lower the load, raise the "
+                "inflation or stiffen the wall; let a free rim stand on no road."
+            )
 
 
 class Spectrum:

@@ -10,7 +10,7 @@ are then measured on A itself.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -57,6 +57,10 @@ class Modes:
     def frequency(self) -> np.ndarray:
         """Natural frequencies (m,), Hz; 0 for rigid modes."""
         return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * np.pi)
+
+    def among(self, wanted: np.ndarray) -> Modes:
+        """With the squares and vectors where `wanted` (m,) is true."""
+        return replace(self, squares=self.squares[wanted], vectors=self.vectors[:, wanted])
 
 
 @dataclass(frozen=True)
@@ -140,7 +144,7 @@ class _Problem:
         """By slices of the parts. Collective."""
         spectrum = Spectrum(self.comm, split.parts)
         bottom = spectrum.bottom()
-        _check_stable(bottom)
+        bottom.check_stable()
         boundaries = spectrum.boundaries(bottom, count, limit)
         proof = _Proof(bottom, boundaries[-1][0], int(boundaries[-1][1].sum()))
         if proof.inertia == 0:
@@ -236,14 +240,3 @@ def _families(parts: list[Part], found: list[Slice]) -> np.ndarray:
         most * one.part + np.arange(len(one.values)) % parts[one.part].copies for one in found
     ]
     return np.concatenate(numbers)
-
-
-def _check_stable(bottom: Bottom) -> None:
-    if bottom.negative:
-        growth = np.sqrt(-min(bottom.near[0], -bottom.zero))
-        raise ConvergenceError(
-            f"modes: the tangent stiffness has {bottom.negative} negative eigenvalue(s) (growth rate "
-            f"about {growth:.3g} 1/s): the state is unstable once the road is replaced by its "
-            "forces: the tire buckles, or topples if its rim is free. Lower the load, raise the "
-            "inflation or stiffen the wall; let a free rim stand on no road."
-        )

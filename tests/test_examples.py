@@ -27,3 +27,18 @@ def test_make_road_writes_what_is_shipped(tmp_path: Path) -> None:
     assert all(np.allclose(made[key], shipped[key], atol=1e-9) for key in "xyz")
     # Valleys deeper than peaks are high.
     assert ((made["z"] / made["z"].std()) ** 3).mean() < -0.5
+
+
+def test_own_road_and_tread(capsys: pytest.CaptureFixture[str]) -> None:
+    """Registered classes serve in a scene as ours do; pinned when it was written."""
+    import own_road
+
+    from tireroad.contact.roads.kind import ROADS
+    from tireroad.contact.tread.law import TREADS
+
+    try:
+        assert own_road.main() == pytest.approx(839.94, rel=1e-3)
+        assert capsys.readouterr().out.endswith("N at most\n")
+    finally:
+        ROADS.forget("humps")
+        TREADS.forget("brush-blocks")

@@ -83,6 +83,20 @@ class StaticShapes:
     momentum: np.ndarray
 
 
+def loaded_shapes(
+    operators: Operators,
+    stiffness: PETSc.Mat,
+    probes: sparse.csr_matrix,
+    air: Column | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Own rows (n, p) of K_Omega^-1 b for the probes b (p, 3 s), and b^T K_Omega^-1 b (p, p) m/N. Collective."""
+    loads = on_own_rows(operators, probes)
+    pushed = loads if air is None else sparse.hstack([loads, air.pushed], format="csc")
+    x = statics(operators, stiffness, pushed)
+    x = x if air is None else air.with_air(x)
+    return x, operators.body.comm.allreduce(loads.T @ x)
+
+
 def static_shapes(
     operators: Operators,
     stiffness: PETSc.Mat,

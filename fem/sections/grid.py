@@ -165,6 +165,10 @@ def _even(numbers: np.ndarray) -> bool:
 
 
 def _shared_out(count: int, weight: np.ndarray) -> np.ndarray:
-    """Elements of each part, near to its share, at least one, mirrored parts alike."""
+    """Elements of each part, near to its share, one and all together `count` at the least, mirrored parts alike."""
     share = count * weight / weight.sum()
-    return np.maximum(1, np.floor(share + 0.5 - 1e-9 * len(weight))).astype(int)
+    numbers = np.maximum(1, np.floor(share + 0.5 - 1e-9 * len(weight))).astype(int)
+    while numbers.sum() < count:
+        coarse = share / numbers
+        numbers[coarse > (1 - 1e-9) * coarse.max()] += 1
+    return numbers

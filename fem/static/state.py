@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
+from tireroad.fem.tire.cord_forces import CordForce, cord_forces
 from tireroad.fem.tire.mesh import Lattice
 
 
@@ -19,7 +21,7 @@ class StaticState:
     `points` (s, 3) m undeformed, `moved` (s, 3) m displacement, `force` (s,) N of the road on the
     tire, `area` (s,) m2 that a uniform pressure is shared out by, `half_sizes` (s, 2) m of the deformed rectangle each node stands for (x and y),
     `ring_rate` (s,) m/rad the derivative of the deformed x by the angle around the axle.
-    `road_height` (m) is None without a road.
+    `road_height` (m) is None without a road. `cords` by name of the ply; `mass` (kg) of wall and cords.
     """
 
     displacement: np.ndarray
@@ -32,6 +34,8 @@ class StaticState:
     shape: tuple[int, int]
     touch_height: float
     road_height: float | None
+    cords: Mapping[str, CordForce] = field(default_factory=dict)
+    mass: float = 0.0
 
     @property
     def load(self) -> float:
@@ -101,6 +105,8 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         *_surface_metric(body.lattice, points + moved),
         touch_height=touch_height,
         road_height=road_height,
+        cords=cord_forces(body),
+        mass=body.comm.allreduce(float(body.nodal_mass()[::3].sum())),
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.files.store import verify
 
 
 class RunResults(Mapping[str, NDArray[Any]]):
@@ -88,6 +89,7 @@ class RunResults(Mapping[str, NDArray[Any]]):
         path = self.directory / f"{stem}.h5"
         if not path.is_file():
             raise KeyError(f"{stem}.h5 is not in {self.directory}")
+        verify(path, foreign=True)
         try:
             return h5py.File(path, "r")
         except OSError as error:

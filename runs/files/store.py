@@ -148,6 +148,14 @@ def writing(path: Path, provenance: Provenance, begin: Path | None = None) -> It
         checksum.seal(part)
 
 
+@contextmanager
+def sealed(path: Path) -> Iterator[h5py.File]:
+    """A new HDF5 file that carries a checksum and no provenance, e.g. one gathered from results."""
+    with h5py.File(path, "w", userblock_size=checksum.BLOCK) as file:
+        yield file
+    checksum.seal(path)
+
+
 def put(file: h5py.Group, name: str, array: Any, unit: str, **attributes: Any) -> h5py.Dataset:
     """A dataset with its unit, groups on the way made as needed."""
     dataset = file.create_dataset(name, data=np.asarray(array))
@@ -214,8 +222,11 @@ def opened(path: Path) -> Iterator[h5py.File]:
         yield file
 
 
-def verify(path: Path) -> None:
-    """Raise InputError where a result file is absent, unreadable or not as it was written."""
+def verify(path: Path, foreign: bool = False) -> None:
+    """Raise InputError where a result file is absent, unreadable or not as it was written.
+
+    `foreign`: an HDF5 file without a checksum, by another program, will do.
+    """
     try:
         if not checksum.is_whole(path):
             raise InputError(f"{path} is damaged: it is not what was written (checksum); {AGAIN}")
@@ -224,6 +235,8 @@ def verify(path: Path) -> None:
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror})") from None
     except checksum.NoChecksum:
+        if foreign:
+            return
         raise InputError(
             f"{path} has no checksum: an earlier version wrote it, or another program; {AGAIN}"
         ) from None

@@ -14,6 +14,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from tireroad.modal.states import growing
+
 COMPONENTS = ("x, forward", "y, along the axle", "z, up")
 COLOURS = ("#2f6db5", "#2e8b6a", "#c8502d")
 MUTED = "#9aa5b1"
@@ -169,7 +171,7 @@ def eigenvalues(eigenvalue: NDArray) -> str:
     figure, axes = canvas(9.5, 3.0)
     here = axes[0, 0]
     shown = eigenvalue[eigenvalue.imag >= 0.0]
-    unstable = shown.real > 0.0
+    unstable = growing(eigenvalue)[eigenvalue.imag >= 0.0]
     for group, colour, label in (
         (shown[~unstable], COLOURS[0], "decaying"),
         (shown[unstable], COLOURS[2], "growing: unstable"),

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.modal.states import growing
 from tireroad.runs.files.read import Results, Section, Table, attributes
 from tireroad.runs.report import cavity, figures, surface_figures
 from tireroad.runs.report.quantities import quantity
@@ -47,7 +48,28 @@ def static(results: Results) -> Section:
         )
     )
     footprint(results, section)
+    cords(results, section)
     return section
+
+
+def cords(results: Results, section: Section) -> None:
+    """Adds a table of the cords' forces, where the tire has any."""
+    rows = []
+    for ply in results.scene.get("tire", {}).get("cords", ()):
+        force, area = (
+            results.optional("static.h5", f"cords/{ply['name']}/{part}")
+            for part in ("force", "area")
+        )
+        if force is None or area is None:
+            continue
+        mean, slack = (force * area).sum() / area.sum(), area[force < 0].sum() / area.sum()
+        forces = (quantity(float(value), "N") for value in (force.max(), mean, force.min()))
+        rows.append((ply["name"], *forces, f"{100 * slack:.3g} %"))
+    if rows:
+        section.notes.append(
+            "Force of one cord, tension positive; compressed: share of the ply's area whose cords are."
+        )
+        section.table = Table(("cords", "largest", "mean", "least", "compressed"), rows)
 
 
 def footprint(results: Results, section: Section) -> None:
@@ -125,13 +147,15 @@ def rotating(results: Results) -> Section:
     name = "rotating.h5"
     section = Section("Modes of the rolling tire", "Eigenvalues s of the rotating, damped tire.")
     value = results.array(name, "eigenvalue")
-    growing = int((value.real > 0).sum())
+    # Those of the near-defective block too.
+    every = np.concatenate([value, np.linalg.eigvals(results.array(name, "block"))])
+    beyond = every[growing(every)]
     section.facts = attributes(results, name, (("speed", "rad/s"), ("basis_condition", "")))
-    section.facts.append(("growing (Re s > 0)", quantity(growing)))
-    if growing:
-        worst = value[value.real.argmax()]
+    section.facts.append(("growing", quantity(len(beyond))))
+    if len(beyond):
+        worst = beyond[beyond.real.argmax()]
         section.warnings.append(
-            f"The rolling tire is unstable: {growing} eigenvalues have Re s > 0, the worst "
+            f"The rolling tire is unstable: {len(beyond)} eigenvalues have Re s > 0, the worst "
             f"{quantity(float(worst.real), '1/s')} at "
             f"{quantity(float(abs(worst.imag) / 2 / np.pi), 'Hz')}."
         )

@@ -51,7 +51,7 @@ def make(session: Session, outputs, loads) -> Response:
         return response
     cutoff = _cutoff(session)
     limit = _FASTEST * max(cutoff.circular, cutoff.rate)
-    return response.keeping(np.abs(response.eigenvalue) <= limit)
+    return response.keeping_where(lambda s: np.abs(s) <= limit)
 
 
 def chosen(session: Session, response: Response) -> Response:

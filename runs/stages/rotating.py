@@ -108,10 +108,9 @@ def _growth(session: Session, projection) -> str:
             return session.speed  # only the full problem has it
         return onset(projection, session.damping, inertia, session.speed)
 
-    fastest = max([*modes.eigenvalue.real, *np.linalg.eigvals(modes.block).real])
     return (
         f"{modes.unstable} motion(s) of the rolling tire grow by themselves, the fastest at "
-        f"{fastest:.3g} 1/s; on this static state that begins at {on_root(session.comm, first):.4g} "
+        f"{modes.fastest_growth:.3g} 1/s; on this static state that begins at {on_root(session.comm, first):.4g} "
         "rad/s: the wheel turns beyond its critical speed"
     )
 

@@ -12,6 +12,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages import cords_file
 from tireroad.runs.stages.session import Session
 
 COARSE = 0.02  # estimated error of the load above which the user is warned
@@ -111,6 +112,7 @@ def _describe(session: Session, loader) -> None:
     record, state = session.record, session.static
     free = 3 * len(state.displacement)
     record.headline["unknowns"] = (free, "-")
+    record.headline |= cords_file.headline(state)
     if state.road_height is not None:
         extent = state.footprint()
         record.headline |= {
@@ -144,6 +146,7 @@ def _fill(file, session: Session, equilibrium) -> None:
     put(file, "surface/area", state.area, "m2")
     put(file, "surface/half_sizes", state.half_sizes, "m")
     put(file, "surface/ring_rate", state.ring_rate, "m/rad")
+    cords_file.fill(file, state)
     file.attrs["touch_height"] = state.touch_height
     file.attrs["inflation"] = float(equilibrium.pressure.value)
     file.attrs["load"] = state.load
@@ -182,6 +185,7 @@ def reuse(session: Session, path: Path) -> None:
             shape=session.lattice.face_shape,
             touch_height=float(file.attrs["touch_height"]),
             road_height=float(file.attrs["road_height"]) if "road_height" in file.attrs else None,
+            **cords_file.read(file),
         )
 
     session.static = session.read(path, pick)

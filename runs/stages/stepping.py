@@ -29,7 +29,7 @@ def integration(session: Session, response: Response, shortest: float):
     `shortest` (s): the shortest period in the excitation.
     """
     wanted = session.scene.time
-    fastest = np.abs(response.eigenvalue).max(initial=0.0)
+    fastest = np.abs(response.every).max(initial=0.0)
     if wanted.step == "auto":
         limits = [wanted.duration / _LEAST_STEPS, shortest / _PER_PERIOD]
         if fastest > 0:
@@ -40,7 +40,7 @@ def integration(session: Session, response: Response, shortest: float):
     step, count = steps.size, steps.count
     scheme = "linear" if wanted.scheme == "auto" else wanted.scheme
     kept = response.resolved(step)
-    moved = len(response.eigenvalue) - len(kept.eigenvalue)
+    moved = len(response.every) - len(kept.every)
     observe.say(
         f"  step {step:.4g} s, {count} steps, scheme {scheme}; fastest mode {fastest:.4g} 1/s, "
         f"{moved} states too fast for the step follow statically"

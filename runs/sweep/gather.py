@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.reader import RunResults
+from tireroad.runs.files.store import sealed
 from tireroad.runs.report.figures import nominal
 from tireroad.runs.sweep.definition import Sweep
 
@@ -94,7 +94,7 @@ def write(table: Gathered, folder: Path) -> None:
             given = [values[k] for values in table.settings.values()]
             shown = ["" if np.isnan(c.values[k]) else c.values[k] for c in table.columns]
             writer.writerow([name, *given, *shown])
-    with replacing(folder / "sweep.h5") as part, h5py.File(part, "w") as file:
+    with replacing(folder / "sweep.h5") as part, sealed(part) as file:
         file["member"] = list(table.names)
         for key, values in table.settings.items():
             numbers = all(isinstance(v, int | float) for v in values)

@@ -9,16 +9,20 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import integrate, optimize
-from shapes import cylinder
+from wheel_shapes import cylinder
 
 from tireroad.fem import compat
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.sections.grid import PlyLine
+from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.cord_forces import cord_forces
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.face_rule import Face
+from tireroad.fem.tire.material import Material
 
 STEEL = {"youngs_modulus": 172.2e9, "area": 2.118e-7, "spacing": 1.16e-3}
 
@@ -299,3 +303,40 @@ def test_any_number_of_processes_has_the_same_cords(belted):
     assert other == pytest.approx(energy, rel=1e-12)
     np.testing.assert_allclose(shared_force, force, atol=1e-12 * np.abs(force).max())
     np.testing.assert_allclose(shared_mass, mass, rtol=1e-12)
+
+
+@pytest.mark.mpi
+def test_forces_of_cords_in_a_wavy_ring():
+    """E A (lambda - 1) of hoop cords in a ring whose radius waves around it, on the grid in its order; and the same
+    on any number of processes."""
+    half = np.radians(30)
+    section = Torus(5.1, 5.0, 0.002, half, 16, 8, 1, 2, "uniform")
+    ring = section.ring((), [PlyLine("hoop", (-half, half), 1.0)])
+    soft = Material("neo-hookean", 1000.0, youngs_modulus=1e3, poisson_ratio=0.45)
+    found = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        body = Body(comm, ring, {"wall": soft}, cords=[cords(0.0, "hoop", spacing=2e-3)])
+        x = body.space.tabulate_dof_coordinates()
+        outwards = x * [1.0, 0.0, 1.0] / np.hypot(x[:, 0], x[:, 2])[:, None]
+        strain = np.sin(3 * np.arctan2(x[:, 0], -x[:, 2])) * 1e-3 + 1e-4 * x[:, 1]
+        radius = np.hypot(x[:, 0], x[:, 2])
+        body.u.x.array[:] = (outwards * (strain * radius)[:, None]).ravel()
+        found.append(cord_forces(body)["hoop"])
+    alone, shared = found
+    np.testing.assert_allclose(shared.force, alone.force, atol=1e-12 * np.abs(alone.force).max())
+    np.testing.assert_array_equal(shared.points, alone.points)
+    np.testing.assert_allclose(shared.area, alone.area, rtol=1e-12)
+    x, y, z = np.moveaxis(alone.points, -1, 0)
+    # lambda = |(r + u_r) e_circ' ...| / r: hoop strain and the turn of a ring of radial waves.
+    angle = np.arctan2(x, -z)
+    strain = np.sin(3 * angle) * 1e-3 + 1e-4 * y
+    turn = 3 * np.cos(3 * angle) * 1e-3
+    exact = np.hypot(1 + strain, turn) - 1
+    stiffness = STEEL["youngs_modulus"] * STEEL["area"]
+    np.testing.assert_allclose(alone.force, stiffness * exact, atol=2e-2 * stiffness * 1e-3)
+    assert alone.area.sum() == pytest.approx(
+        2 * np.pi * 5.0 * (0.1 * 2 * half + 5.0 * 2 * np.sin(half)), rel=1e-3
+    )
+    assert (np.diff(alone.points[0, :, 1]) > 0).all()
+    assert (np.diff(np.unwrap(angle[:, 0])) > 0).all()
+    assert alone.compressed == pytest.approx(0.5, abs=0.05)

@@ -7,6 +7,7 @@ from rings import inextensional_ring, random_tire, wave_ring
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.campbell import critical_speed, growth, onset, sweep
 from tireroad.modal.rotating import checks, matrices, rotating, standing
+from tireroad.modal.states import growing
 
 WAVES = {0: 300.0, 1: 420.0, 2: 500.0, 3: 800.0, 4: 1300.0}
 
@@ -167,3 +168,16 @@ def test_branches_go_straight_through_crossings():
     assert sorted(waves) == [-4, -3, -2, -1, 0, 0, 1, 2, 3, 4]
     order = np.argsort(lines.frequency[-1])
     assert (order != np.arange(10)).any(), "no crossing: the test tests nothing"
+
+
+def test_rounding_is_no_growth():
+    """Undamped states lie on the axis to rounding, on either side: none grows, and one that does is seen."""
+    drag, stiffness = matrices(random_tire(20), 20.0, (0.0, 0.0), "full")
+    found = rotating(drag, stiffness)
+    assert (found.every.real > 0).any()
+    assert found.unstable == 0
+    assert not growing(found.every).any()
+    drag = drag - 1e-3 * np.eye(20)
+    found = rotating(drag, stiffness)
+    assert found.unstable == growing(found.every).sum() > 0
+    assert found.fastest_growth == pytest.approx(5e-4, rel=0.5)

@@ -50,7 +50,7 @@ duration = 0.004
 step = 2e-4
 """
 FORCES = """
-name = "fuzz-forces"
+name = "fuzz"
 [tire]
 segments = 12
 elements_arc = 4

@@ -8,6 +8,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from tireroad.fem import compat
+from tireroad.fem.tire.face_rule import Face
 from tireroad.fem.tire.plies import Laid, Plies
 
 
@@ -33,6 +34,7 @@ def cylinder(cords, laid, *, radius, height, width, counts=(8, 2, 1), sector=2 *
     every = np.arange(len(cells))
     where = [Laid(number, every, 1, side, reverse=not side) for number, side in laid]
     return SimpleNamespace(
+        faces=tuple(Face(mesh, 1, side, order) for side in (0, 1)),
         mesh=mesh,
         space=space,
         u=fem.Function(space),

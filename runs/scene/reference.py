@@ -1,0 +1,75 @@
+"""The key reference of the documentation, made from the scene's schema.
+
+    PYTHONPATH=. python3 -m tireroad.runs.scene.reference docs/keys.md
+
+A test holds the file in the repository to what this makes.
+"""
+
+import sys
+from collections.abc import Iterator
+from dataclasses import Field, fields
+from pathlib import Path
+
+from tireroad.fem.parameters import Key
+from tireroad.runs.scene.resolved import literal
+from tireroad.runs.scene.schema import Variant, key_of, table_of, variant_of
+from tireroad.runs.scene.tables import Scene
+
+HEAD = """\
+# Keys of a scene
+
+Made from the schema by `python3 -m tireroad.runs.scene.reference docs/keys.md`; `tireroad check SCENE.toml`
+prints the same for the keys of one scene, with their values. Times are in s, lengths in m, forces in N,
+stresses in Pa, speeds of rotation in rad/s. A key that is absent has its default; a table that may be
+absent and is, is a stage that does not run. An unknown key is an error.
+"""
+COLUMNS = "| key | default | unit | values | meaning |\n|---|---|---|---|---|\n"
+
+
+def reference() -> str:
+    """The whole page, Markdown."""
+    return HEAD + "".join(_tables(Scene, "", "scene", False))
+
+
+def _tables(of: type, path: str, doc: str, many: bool) -> Iterator[str]:
+    """A table of keys, its variants, then the tables in it."""
+    name = f"`[[{path}]]`" if many else f"`[{path}]`" if path else "At the top"
+    own = [(item, key_of(item)) for item in fields(of) if key_of(item)]
+    yield f"\n## {name}\n\n{doc[0].upper()}{doc[1:]}.\n\n{COLUMNS}"
+    yield from (_row(item, key) for item, key in own)
+    for item in fields(of):
+        part = variant_of(item)
+        if part is not None:
+            yield from _variants(part, path)
+    for item in fields(of):
+        part = table_of(item)
+        if part is not None:
+            inner = f"{path}.{item.name}" if path else item.name
+            about = f"{part.doc}; absent by default" if part.optional else part.doc
+            yield from _tables(part.of, inner, about, part.many)
+
+
+def _variants(part: Variant, path: str) -> Iterator[str]:
+    """The further keys of each kind of a table."""
+    for name in part.registry:
+        own = [(item, key_of(item)) for item in fields(part.registry[name]) if key_of(item)]
+        doc = part.registry.doc(name)
+        yield f'\n### `{path}.{part.selector} = "{name}"`\n\n{doc[0].upper()}{doc[1:]}.\n'
+        if own:
+            yield f"\n{COLUMNS}"
+            yield from (_row(item, key) for item, key in own)
+
+
+def _row(item: Field, key: Key) -> str:
+    default = "absent" if item.default is None else f"`{literal(item.default)}`"
+    only = ""
+    if key.only_for:
+        selector, kinds = key.only_for
+        only = f" (`{selector}` = {' or '.join(kinds)})"
+    unit = "" if key.unit == "-" else key.unit
+    cells = f"`{item.name}`", default, unit, key.allowed, f"{key.doc}{only}"
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |\n"
+
+
+if __name__ == "__main__":
+    Path(sys.argv[1]).write_text(reference(), encoding="utf-8")

@@ -1,0 +1,76 @@
+"""Attachment modes of many points: those that are left out cost no more than the stated tolerance."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy import sparse
+
+from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.mesh import Torus
+from tireroad.greens import attachment
+from tireroad.greens.coupling import Basis, Wheel
+from tireroad.modal import undamped
+from tireroad.modal.basis import project
+
+COMM = MPI.COMM_WORLD
+SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
+
+
+@pytest.fixture(scope="module")
+def tire():
+    """7,200 unknowns, 40 modes, vertical probes at 15 x 9 points 8 mm apart (closer than the nodes)."""
+    section = Torus(0.32, 0.10, 0.012, np.radians(120), 24, 9, 1, 2, footprint_size=0.4)
+    body = Body(COMM, section, Material(**SOFT))
+    Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
+    operators = Operators(body, 2e5)
+    modes = undamped.solve(operators.stiffness, operators.mass, 40)
+    spots = [
+        probe.directed(probe.spot(body.lattice, angle, arc), (0, 0, 1.0))
+        for angle in np.linspace(-0.175, 0.175, 15)
+        for arc in np.linspace(-0.32, 0.32, 9)
+    ]
+    return operators, modes, sparse.csr_matrix(np.stack(spots))
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("speed", [0.0, 30.0, 90.0])
+def test_what_is_left_out_is_within_the_tolerance(tire, speed, monkeypatch):
+    """Receptance up to half the highest mode against that of all attachment modes: 0.15 % (directions
+    and pseudo-modes), none at 0 Hz; and far fewer states.
+    """
+    operators, modes, probes = tire
+    wheel = Wheel(operators, operators.rotation() if speed else None, speed, (100.0, 0.0), "full")
+    projection = project(modes, wheel.rotation, operators.carried, COMM)
+    shape = operators.trace(modes.vectors)
+    basis = Basis(shape, projection, wheel.decouple(projection, COMM))
+    monkeypatch.setattr(attachment, "FEW", 0)
+    reduced = wheel.respond(basis, modes, probes, probes, "attachment")
+    monkeypatch.setattr(attachment, "TOLERANCE", 0.0)
+    monkeypatch.setattr(attachment, "FASTEST", np.inf)
+    every = wheel.respond(basis, modes, probes, probes, "attachment")
+    frequency = np.linspace(0.0, modes.frequency[-1] / 2, 8)
+    exact = every.receptance(frequency)
+    error = np.linalg.norm(reduced.receptance(frequency) - exact, axis=(1, 2))
+    error /= np.linalg.norm(exact, axis=(1, 2))
+    assert error[0] < 1e-9
+    assert error.max() < 1.5e-3
+    assert len(reduced.eigenvalue) < 0.75 * len(every.eigenvalue)
+
+
+def test_directions_that_are_left_out_add_up_to_less_than_the_tolerance():
+    """Against the flexibility itself, entry by entry."""
+    random = np.random.default_rng(6)
+    turn = np.linalg.qr(random.standard_normal((40, 40)))[0]
+    missing = turn @ np.diag(np.logspace(0, -9, 40)) @ turn.T
+    own = 3.0 * np.diag(missing)
+    kept = attachment.foremost(missing, own)
+    assert 5 < kept.shape[1] < 30
+    lost = missing - kept @ (kept.T @ missing @ kept) @ kept.T
+    assert (np.abs(lost) <= attachment.TOLERANCE * np.sqrt(np.outer(own, own))).all()
+    assert attachment.foremost(missing, 1e-30 * own).shape[1] == 40
+    assert attachment.foremost(missing, 1e6 * own).shape[1] == 0

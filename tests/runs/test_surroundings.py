@@ -1,0 +1,182 @@
+"""Streams, paths, folders and limits that are not as a program would like them."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from started import ROOT, environment
+
+from tireroad.runs.files.disk import part_of, remove_leftovers
+
+PROGRAM = [sys.executable, "-P", "-m", "runs"]
+LONG = 600
+
+SCENE = """
+name = "odd"
+[tire]
+segments = 12
+elements_arc = 4
+[tire.material]
+youngs_modulus = 48e6
+[static]
+deflection = 0.002
+error_estimate = false
+[modal]
+count = 4
+"""
+ROLLING = """
+[rotation]
+speed = 30.0
+[contact]
+youngs_modulus = 2e7
+[road]
+kind = "flat"
+[time]
+duration = 60.0
+step = 1e-5
+checkpoint = 0.2
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def shell(line: str, *arguments: object, **options) -> subprocess.CompletedProcess:
+    """A line of sh in which "$@" is `python3 -m runs` and the arguments."""
+    command = ["sh", "-c", line, "sh", *PROGRAM, *map(os.fspath, arguments)]
+    options.setdefault("env", environment())
+    return subprocess.run(command, capture_output=True, timeout=LONG, **options)
+
+
+@pytest.mark.parametrize("closed", ["<&- >&- 2>&-", ">/dev/full 2>/dev/full"])
+def test_a_run_goes_on_without_its_streams(scene: Path, closed: str) -> None:
+    out = scene.parent / "out"
+    done = shell(f'"$@" {closed}', "run", scene, "--out", out)
+    assert done.returncode == 0
+    log = (out / "log.txt").read_text()
+    assert "static    done" in log and "modes     done" in log and "report    done" in log
+
+
+def test_a_run_goes_on_when_its_reader_has_gone(scene: Path) -> None:
+    out = scene.parent / "out"
+    line = '{ "$@"; echo $? > status; } | head -n 1'
+    done = shell(line, "run", scene, "--out", out, "--until", "static", cwd=scene.parent)
+    assert (scene.parent / "status").read_text() == "0\n", done.stderr
+    assert "static    done" in (out / "log.txt").read_text()
+    assert b"Traceback" not in done.stderr and b"BrokenPipe" not in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["check", "scene.toml"]])
+def test_short_commands_end_quietly_in_a_pipe(scene: Path, arguments: list[str]) -> None:
+    line = '{ "$@"; echo $? > status; } | true'
+    done = shell(line, *arguments, cwd=scene.parent)
+    assert (scene.parent / "status").read_text() == "0\n"
+    assert done.stderr == b""
+
+
+def test_output_that_is_lost_is_an_error_where_it_is_all_there_is(scene: Path) -> None:
+    done = shell('"$@" >/dev/full', "check", scene)
+    assert done.returncode == 2 and b"standard output cannot be written" in done.stderr
+
+
+@pytest.mark.parametrize("locale", [{}, {"LC_ALL": "C", "PYTHONUTF8": "0"}])
+def test_paths_that_are_not_text(scene: Path, locale: dict[str, str]) -> None:
+    out = os.fsencode(scene.parent) + b"/o\xff\xfe \xc3\xa4"
+    command = [*PROGRAM, "run", scene, "--out", out, "--until", "modes"]
+    env = environment(**locale)
+    for words in (b"static    done", b"modes     reused"):
+        done = subprocess.run(command, capture_output=True, env=env, timeout=LONG)
+        assert done.returncode == 0, done.stderr
+        assert words in done.stdout
+    for line in (["resume", out], ["info", out + b"/static.h5"], ["export", out], ["report", out]):
+        done = subprocess.run([*PROGRAM, *line], capture_output=True, env=env, timeout=LONG)
+        assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_result_folder_removed_under_a_run(scene: Path, processes: int) -> None:
+    scene.write_text(SCENE + ROLLING)
+    out = scene.parent / "out"
+    command = [ROOT / "tireroad", "run", scene, "--out", out, "-n", str(processes)]
+    with subprocess.Popen(command, env=environment(), stderr=subprocess.PIPE, text=True) as process:
+        while not (out / "checkpoint.h5").exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        shutil.rmtree(out, ignore_errors=True)
+        _, error = process.communicate(timeout=LONG)
+    assert process.returncode == 3, error
+    assert "was removed during the run" in error and "Traceback" not in error
+
+
+def test_working_folder_that_is_gone(scene: Path) -> None:
+    gone = scene.parent / "gone"
+    gone.mkdir()
+    done = shell('rmdir "$PWD"; "$@"', "run", scene, "--out", scene.parent / "out", cwd=gone)
+    assert done.returncode == 2 and b"working folder was removed" in done.stderr
+
+
+def test_working_folder_is_no_place_for_results(scene: Path) -> None:
+    mine = scene.rename(scene.with_name("mine.toml"))
+    for out, words in (("", b"is empty"), (".", b"folder of their own")):
+        done = shell('"$@"', "run", mine, "--out", out, cwd=scene.parent)
+        assert done.returncode == 2 and words in done.stderr
+    assert [path.name for path in scene.parent.iterdir()] == ["mine.toml"]
+
+
+def test_a_link_in_place_of_the_log_is_not_followed(scene: Path) -> None:
+    out, other = scene.parent / "out", scene.parent / "other.txt"
+    out.mkdir()
+    other.write_text("mine")
+    (out / "log.txt").symlink_to(other)
+    done = shell('"$@"', "run", scene, "--out", out, "--until", "static")
+    assert done.returncode == 0, done.stderr
+    assert other.read_text() == "mine" and "static    done" in (out / "log.txt").read_text()
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('ulimit -v 600000; "$@"', b"ulimit -v"),
+        ('ulimit -f 100; "$@"', b"ulimit -f"),
+    ],
+)
+def test_tight_limits_are_named(scene: Path, line: str, words: bytes) -> None:
+    done = shell(line, "run", scene, "--out", scene.parent / "out")
+    assert done.returncode == 2 and words in done.stderr, done.stderr
+
+
+def test_leftovers_of_the_dead_are_removed(tmp_path: Path) -> None:
+    """Of a process of this machine that has ended; not of one that lives, nor of another machine."""
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    own = part_of(tmp_path / "contact.h5")
+    gone = own.with_name(own.name.replace(f".{os.getpid()}.", f".{dead.pid}."))
+    alive = own.with_name(own.name.replace(f".{os.getpid()}.", f".{os.getppid()}."))
+    elsewhere = tmp_path / f".contact.h5.elsewhere.{dead.pid}.part"
+    for path in (gone, alive, elsewhere):
+        path.write_text("")
+    remove_leftovers(tmp_path)
+    assert sorted(tmp_path.iterdir()) == sorted([alive, elsewhere])
+
+
+@pytest.mark.parametrize("package", ["numpy", "mpi4py", "dolfinx"])
+def test_a_missing_package_is_one_line(scene: Path, package: str) -> None:
+    code = f"""
+import sys
+sys.modules[{package!r}] = None
+sys.argv = ["tireroad", "run", {str(scene)!r}, "--out", {str(scene.parent / "out")!r}]
+from tireroad.runs.start import program
+program()
+"""
+    command = [sys.executable, "-P", "-c", code]
+    done = subprocess.run(command, capture_output=True, env=environment(), timeout=LONG, text=True)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert f"the Python package {package} is missing" in done.stderr

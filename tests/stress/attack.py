@@ -1,0 +1,135 @@
+"""What the attacks by hand share: a small rolling scene, the program started, results compared."""
+
+import hashlib
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+from started import ROOT, environment
+
+LONG = 1200  # s that a run may take on a busy machine
+
+SCENE = """
+name = "attacked"
+[tire]
+segments = 12
+elements_arc = 4
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 300.0
+error_estimate = false
+[modal]
+count = 8
+[rotation]
+speed = 30.0
+[[force]]
+angle = 90.0
+frequency = 20.0
+[contact]
+youngs_modulus = 2e7
+brush_stiffness = 2e5
+[road]
+kind = "sine"
+amplitude = 1e-4
+[time]
+duration = 0.04
+step = 1e-5
+checkpoint = 0.2
+"""
+
+
+def write_scene(folder: Path) -> Path:
+    """The scene's file in a folder."""
+    path = folder / "attacked.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def command(*arguments: object, processes: int = 1) -> list[str]:
+    """The launcher's command line."""
+    line = [str(ROOT / "tireroad"), *map(str, arguments)]
+    return line if processes == 1 else [*line, "-n", str(processes)]
+
+
+def started(line: list[str], **extra: str) -> subprocess.Popen:
+    """The program in a process group of its own, so that all of it can be killed."""
+    return subprocess.Popen(
+        line,
+        env=environment(**extra),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        process_group=0,
+    )
+
+
+def finished(line: list[str], **extra: str) -> tuple[int, str]:
+    """Exit status and everything printed."""
+    with started(line, **extra) as process:
+        text, _ = process.communicate(timeout=LONG)
+    return process.returncode, text
+
+
+def content(folder: Path) -> dict[str, np.ndarray]:
+    """Every dataset of every result file: what may not depend on how often the run was stopped."""
+    found = {}
+    for path in sorted(folder.glob("*.h5")):
+        with h5py.File(path) as file:
+
+            def keep(name: str, item: object, stem: str = path.stem) -> None:
+                if isinstance(item, h5py.Dataset):
+                    found[f"{stem}:{name}"] = item[()]
+
+            file.visititems(keep)
+    return found
+
+
+def differences(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> list[str]:
+    """Names of datasets that are not the same bits."""
+    names = set(one) ^ set(other)
+    for name in set(one) & set(other):
+        if _digest(one[name]) != _digest(other[name]):
+            names.add(name)
+    return sorted(names)
+
+
+def _digest(values: np.ndarray) -> str:
+    array = np.ascontiguousarray(values)
+    return hashlib.sha256(f"{array.shape}{array.dtype}".encode() + array.tobytes()).hexdigest()
+
+
+def processes_with(text: str) -> list[int]:
+    """Processes whose command line has the text in it."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if os.fsencode(text) in entry.read_bytes():
+                found.append(int(entry.parent.name))
+        except OSError:
+            pass
+    return found
+
+
+def gone(text: str) -> bool:
+    """Whether all processes with the text have ended, given some time."""
+    deadline = time.monotonic() + 120
+    while processes_with(text):
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.1)
+    return True
+
+
+def told(failures: list[str], number: int, what: str) -> int:
+    """Print the outcome of an attack; the exit status."""
+    for failure in failures:
+        print(f"FAILED: {failure}")
+    print(f"{number} {what}, {len(failures)} failures", file=sys.stderr)
+    return 1 if failures else 0

@@ -1,0 +1,132 @@
+"""Kill runs at random moments and let them go on: the results must be those of an unbroken run.
+
+    PYTHONPATH=.:tests:tests/stress python3 tests/stress/kills.py --kills 100 --seed 1 [--processes 2] [--compile]
+
+Signals: SIGKILL to the launcher's process, to one of the program's, or to all of them, SIGTERM, SIGHUP,
+SIGINT. With --compile every run begins without compiled forms. On several processes the stages
+before the loop are copied from the unbroken run, whose round-off a fresh one does not repeat.
+"""
+
+import argparse
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from attack import (
+    command,
+    content,
+    differences,
+    finished,
+    gone,
+    processes_with,
+    started,
+    told,
+    write_scene,
+)
+
+BEFORE_THE_LOOP = (
+    "static.h5",
+    "modes.h5",
+    "rotating.h5",
+    "greens.h5",
+    "summary.json",
+    "scene.toml",
+)
+
+
+def attack(
+    folder: Path, kills: int, seed: int, processes: int = 1, fresh_forms: bool = False
+) -> list[str]:
+    """Kill until `kills` is reached, a few times each run; what went wrong, one line each."""
+    dice, failures, done = random.Random(seed), [], 0
+    scene, whole = write_scene(folder), folder / "whole"
+    began = time.monotonic()
+    status, text = finished(command("run", scene, "--out", whole, processes=processes))
+    if status:
+        return [f"the unbroken run ended with {status}: {text}"]
+    length = time.monotonic() - began
+    wanted = content(whole)
+    trial = 0
+    while done < kills:
+        trial += 1
+        out = folder / f"broken{trial}"
+        if processes > 1:
+            out.mkdir()
+            for name in BEFORE_THE_LOOP:
+                shutil.copy(whole / name, out / name)
+        extra = {"XDG_CACHE_HOME": str(folder / f"cache{trial}")} if fresh_forms else {}
+        for _ in range(min(dice.randint(1, 5), kills - done)):
+            wait = dice.uniform(0, length) * (4 if fresh_forms else 1)
+            line = command("run", scene, "--out", out, processes=processes)
+            done += _killed(line, out, wait, dice, failures, extra)
+        failures += _recovered(scene, out, processes, wanted, extra)
+        print(f"{done} kills, {len(failures)} failures", flush=True)
+        shutil.rmtree(out, ignore_errors=True)
+    return failures
+
+
+def _killed(
+    line: list[str], out: Path, wait: float, dice: random.Random, failures: list[str], extra: dict
+) -> int:
+    """One run, killed after a while; 1, or 0 where it had ended before."""
+    how = dice.choice(["launcher", "one", "all", "all", "SIGTERM", "SIGHUP", "SIGINT"])
+    with started(line, **extra) as process:
+        try:
+            text, _ = process.communicate(timeout=wait)
+            if process.returncode != 0:
+                failures.append(f"ended with {process.returncode} unasked: {text}")
+            return 0
+        except subprocess.TimeoutExpired:
+            _strike(process, out, how, dice)
+        text, _ = process.communicate(timeout=600)
+    if "Traceback" in text:
+        failures.append(f"{how} after {wait:.2f} s: {text}")
+    if how.startswith("SIG") and process.returncode not in (0, 4):
+        failures.append(f"{how} after {wait:.2f} s ended with {process.returncode}: {text}")
+    if not gone(str(out)):
+        failures.append(f"{how} after {wait:.2f} s left processes behind")
+    return 1
+
+
+def _strike(process: subprocess.Popen, out: Path, how: str, dice: random.Random) -> None:
+    if how.startswith("SIG"):
+        process.send_signal(signal.Signals[how])
+        return
+    own = [*processes_with(str(out)), process.pid]
+    targets = {"launcher": [process.pid], "one": [dice.choice(own)], "all": own}[how]
+    for target in targets:
+        with suppress(ProcessLookupError):
+            os.kill(target, signal.SIGKILL)
+
+
+def _recovered(
+    scene: Path, out: Path, processes: int, wanted: dict, extra: dict[str, str]
+) -> list[str]:
+    """Let the run go on to its end; what is not as in the unbroken one."""
+    status, text = finished(command("run", scene, "--out", out, processes=processes), **extra)
+    if status or "Traceback" in text:
+        return [f"{out.name} did not recover, status {status}: {text}"]
+    found = [f"{out.name} differs: {name}" for name in differences(wanted, content(out))]
+    found += [f"left behind: {path}" for path in out.glob(".*.part")]
+    for cache in extra.values():
+        found += [f"left behind: {path}" for path in Path(cache).glob("tireroad/*/run-*")]
+    return found
+
+
+if __name__ == "__main__":
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--kills", type=int, default=100)
+    options.add_argument("--seed", type=int, default=0)
+    options.add_argument("--processes", type=int, default=1)
+    options.add_argument("--compile", action="store_true")
+    given = options.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        found = attack(Path(name), given.kills, given.seed, given.processes, given.compile)
+    sys.exit(told(found, given.kills, "kills"))

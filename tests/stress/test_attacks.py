@@ -1,0 +1,14 @@
+"""Short forms of the attacks; the scripts themselves take counts and seeds, by hand."""
+
+from pathlib import Path
+
+import damaged_files
+import kills
+
+
+def test_killed_runs_recover(tmp_path: Path) -> None:
+    assert kills.attack(tmp_path, kills=3, seed=7) == []
+
+
+def test_damage_is_never_used(tmp_path: Path) -> None:
+    assert damaged_files.attack(tmp_path, files=5, seed=7) == []
