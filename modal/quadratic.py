@@ -22,12 +22,14 @@ from tireroad.modal.fields import multiply
 RESIDUAL_TOLERANCE = 1e-8
 _EXTRA = 10  # states beyond the wanted ones, to end in a gap and never inside a cluster
 _SAME = 1e-6  # relative distance of the right and left eigenvalue of one state
+DEFECTIVE = 1e6  # as in modal.rotating: vectors lose more than ten of sixteen digits
 
 
 @dataclass(frozen=True)
 class FullModes:
     """States by |s|, Im s >= 0. `eigenvalue` (q,) 1/s; `right`, `left` this process's rows (n, q) of u, kg^-1/2,
-    and of w / a; residuals relative to the terms' norms; `condition` of the biorthogonalisation.
+    and of w / a; residuals relative to the terms' norms; `condition` of the biorthogonalisation, of vectors of
+    unit momentum.
     """
 
     eigenvalue: np.ndarray
@@ -100,6 +102,7 @@ def solve(mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -
         )
     w, left_residual = w[:, columns], left_residual[columns]
     turn = _pairing(comm, mass, drag, s, u, w)
+    condition = _condition(comm, mass, s, u, w, turn)
     left = np.linalg.solve(turn, w.T).T
     upper = s.imag >= 0
     return FullModes(
@@ -108,8 +111,28 @@ def solve(mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -
         left[:, upper],
         residual[upper],
         left_residual[upper],
-        float(np.linalg.cond(turn)),
+        condition,
     )
+
+
+def _condition(comm, mass, s, u, w, turn) -> float:
+    """Of the pairing between vectors of unit momentum: about the worst of an eigenvalue. Raises ConvergenceError
+    where states are next to defective, for which no vectors of their own serve.
+    """
+    columns, rows = (
+        np.sqrt(np.abs(s)) * comm.allreduce((mass[:, None] * np.abs(v) ** 2).sum(axis=0)) ** 0.5
+        for v in (u, w)
+    )
+    scaled = turn / (rows[:, None] * columns)
+    condition = float(np.linalg.cond(scaled))
+    if not condition <= DEFECTIVE:
+        worst = s[int(np.abs(np.linalg.svd(scaled)[2][-1]).argmax())]
+        raise ConvergenceError(
+            f"rotating: states next to defective (condition {condition:.1e}, near {worst:.4g} 1/s): two of them "
+            'share one vector, as at critical damping. rotation.method = "projected" keeps such states '
+            "together; or change the damping or the speed a little."
+        )
+    return condition
 
 
 def _pairing(comm, mass, drag, s, u, w) -> np.ndarray:
@@ -218,12 +241,3 @@ def _residuals(mass, drag, stiffness, s, vectors) -> np.ndarray:
         return np.sqrt(comm.allreduce((np.abs(field) ** 2).sum(axis=0)))
 
     return norm(sum(terms)) / sum(norm(term) for term in terms)
-
-
-def truncation(full: np.ndarray, projected: np.ndarray) -> np.ndarray:
-    """Relative error (q,) of the projected eigenvalue nearest to each of the full problem."""
-    distance = np.abs(full[:, None] - projected)
-    rows, columns = optimize.linear_sum_assignment(distance)
-    error = np.full(len(full), np.inf)  # a state that the basis does not know
-    error[rows] = distance[rows, columns]
-    return error / np.abs(full)

@@ -152,7 +152,7 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
     companion = np.block([[np.zeros((m, m)), scale * np.eye(m)], [-stiffness / scale, -drag]])
     values, vectors = linalg.eig(companion)
     upper = values.imag >= 0
-    values, vectors = values[upper], vectors[:, upper] / np.linalg.norm(vectors[:, upper], axis=0)
+    values, vectors = _in_order(values[upper], vectors[:, upper])
     block, block_vectors = np.zeros((0, 0)), np.zeros((2 * m, 0))
     inverse, _ = _inverse(values, vectors, block_vectors)
     condition = np.linalg.norm(inverse, axis=1)
@@ -175,6 +175,18 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
         _quadratic_residual(drag.T, stiffness.T, values, left.T),
         float(condition[good].max(initial=1.0)),
     )
+
+
+def _in_order(values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ascending in Im s, then from fast to slow decay; vectors of length 1, whose largest component, or the
+    first of those within a thousandth, is real and positive.
+    """
+    order = np.lexsort((values.real, values.imag))
+    values, vectors = values[order], vectors[:, order]
+    size = np.abs(vectors)
+    first = (size >= 0.999 * size.max(axis=0)).argmax(axis=0)
+    turn = np.exp(-1j * np.angle(vectors[first, np.arange(len(values))]))
+    return values, vectors * turn / np.linalg.norm(vectors, axis=0)
 
 
 def _inverse(values, vectors, block_vectors) -> tuple[np.ndarray, np.ndarray]:

@@ -162,6 +162,7 @@ def _alone(function: Callable[[], None]) -> int:
 
 def main(argv: list[str]) -> int:
     """The exit status of a command line."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # its remarks about a home are not ours
     if argv[:1] == ["test"] and argv[1:] not in (["-h"], ["--help"]):
         from tireroad.runs.process.testing import run_tests
 

@@ -157,6 +157,9 @@ def _from_root(argument: str) -> str:
 
 def run_tests(arguments: list[str]) -> int:
     """The whole suite; prints `N passed, N failed, N skipped` over all runs. Exit status 0 or 1."""
+    if not (ROOT / "tests").is_dir():
+        print("error: the tests are not installed: run them in a checkout", file=sys.stderr)
+        return 2
     arguments = [_from_root(argument) for argument in arguments]
     if not sys.stdout.isatty():  # mpirun gives its processes a terminal of their own
         arguments.insert(0, "--color=no")

@@ -29,6 +29,7 @@ from tireroad.runs.scene.schema import (
 )
 from tireroad.runs.scene.source import Source, shortened
 from tireroad.runs.scene.tables import Damping, Scene
+from tireroad.runs.scene.tire_section import with_elements
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 LARGEST = 1_000_000
@@ -56,7 +57,7 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-    scene = filled(_with_damping(scene))
+    scene = with_elements(filled(_with_damping(scene)))
     rules.check(scene, raw, source)
     source.refuse()
     return scene

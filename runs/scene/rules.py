@@ -11,7 +11,7 @@ from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.stiffness_table import check_stiffness
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_rules import check_cords, full_matrices
-from tireroad.runs.scene.tire_tables import Tire
+from tireroad.runs.scene.tire_section import free_unknowns
 
 Where = Callable[[tuple[str, ...], str], InputError]
 
@@ -36,14 +36,6 @@ def refuse_later(raw: dict[str, Any], source: Source) -> None:
         if value is not None and value not in supported:
             source.add((table, key), f"= {described(value)}: {message}")
             del here[key]
-
-
-def free_unknowns(tire: Tire) -> int:
-    """Displacement unknowns of the torus without the clamped bead faces."""
-    around = tire.segments * tire.order
-    inner_arc = tire.elements_arc * tire.order - 1
-    through = tire.elements_thickness * tire.order + 1
-    return 3 * around * inner_arc * through
 
 
 def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:

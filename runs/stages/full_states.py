@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from tireroad.modal import quadratic
+from tireroad.modal.agreement import missing, truncation
 from tireroad.modal.fields import gram
-from tireroad.modal.quadratic import FullModes, truncation
+from tireroad.modal.quadratic import FullModes
 from tireroad.modal.rotating import StateModes
 from tireroad.runs.stages.session import Session
 
@@ -36,7 +37,10 @@ def _solve(session: Session, pencil, projected: np.ndarray) -> FullModes:
     """As many pairs as the scene wants, or all in its window. Collective."""
     wanted, (mass, stiffness) = session.scene.rotation, session.damping
     if not any(wanted.window):
-        return quadratic.solve(*pencil, wanted.count)
+        found = quadratic.solve(*pencil, wanted.count)
+        sizes = np.abs(found.eigenvalue), np.abs(projected)
+        _warn_of_missing(session, missing(*sizes, 0.0, float(sizes[0].max())))
+        return found
     low, high = (2 * np.pi * f for f in wanted.window)
     rate = mass + stiffness * high**2
     below = int((np.abs(projected) <= np.hypot(high, rate / 2)).sum())
@@ -46,7 +50,16 @@ def _solve(session: Session, pencil, projected: np.ndarray) -> FullModes:
         "states in the window": (len(found.eigenvalue), "-"),
         "projected states in the window": (inside, "-"),
     }
+    _warn_of_missing(session, missing(found.eigenvalue.imag, projected.imag, low, high))
     return found
+
+
+def _warn_of_missing(session: Session, count: int) -> None:
+    if count:
+        session.record.warnings.append(
+            f'rotation.method = "full" found {count} state(s) fewer than the projected problem has in the same '
+            "range: some may be missing. Ask for more by rotation.count or a wider rotation.window."
+        )
 
 
 def _orthonormal(session: Session, found: FullModes) -> tuple[np.ndarray, np.ndarray]:

@@ -17,7 +17,8 @@ from tireroad.runs.files import store
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables import Scene
-from tireroad.runs.stages.tire import make_body, make_lattice, make_section
+from tireroad.runs.scene.tire_section import make_section
+from tireroad.runs.stages.tire import make_body, make_lattice
 
 
 @dataclass

@@ -2,34 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
-from tireroad.fem.sections.torus import Torus
+from tireroad.runs.scene.tire_section import patch
 from tireroad.runs.scene.tire_tables import Region, Tire
-
-
-def make_section(tire: Tire) -> Ring:
-    """The shape of the tire and its elements."""
-    names = {f.name for f in fields(Torus)} - {"half_angle"}
-    given = {name: getattr(tire, name) for name in names}
-    torus = Torus(half_angle=np.radians(tire.half_angle), **given)
-    patches = [_patch(i, region) for i, region in enumerate(tire.region)]
-    plies = [
-        PlyLine(c.name, tuple(np.radians(c.arc)), 1 - c.depth / tire.thickness) for c in tire.cords
-    ]
-    return torus.ring(patches, plies)
-
-
-def _patch(number: int, region: Region) -> Patch:
-    low, high = np.radians(region.arc)
-    sides = {"left": ((-high, -low),), "right": ((low, high),)}
-    arcs = sides.get(region.side, sides["left"] + sides["right"])
-    return Patch(f"tire.region {number}", arcs, region.depth)
 
 
 def make_lattice(section: Ring):
@@ -49,7 +27,7 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
         given = vars(part.material) | {"dynamic": part.dynamic, "loss_factor": part.loss_factor}
         return Material(**given)
 
-    names = [_patch(i, region).name for i, region in enumerate(tire.region)]
+    names = [patch(i, region).name for i, region in enumerate(tire.region)]
     materials = {name: rubber(r) for name, r in zip(names, tire.region, strict=True)}
     placed = {"depth", "arc", "angle"}
     cords = [

@@ -7,8 +7,10 @@ from mpi4py import MPI
 from rings import random_tire, wave_ring
 from scipy import sparse
 
+from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.agreement import missing, truncation
 from tireroad.modal.fields import multiply
-from tireroad.modal.quadratic import solve, truncation
+from tireroad.modal.quadratic import solve
 from tireroad.modal.rotating import matrices, rotating
 
 COMM = MPI.COMM_WORLD
@@ -62,3 +64,28 @@ def test_truncation_falls_with_the_basis():
     assert errors[0] > 2 * errors[1] > 0
     assert errors[2] < 1e-8
     assert truncation(full.eigenvalue, full.eigenvalue[:3]).max() == np.inf
+
+
+@pytest.mark.mpi
+def test_states_next_to_defective_are_refused():
+    """The lowest mode critically damped: one vector for two states. Damped by a tenth more, two of them."""
+    squares = np.linspace(300.0, 900.0, 40) ** 2
+    for damping, allowed in ((2 * 300.0, False), (2.2 * 300.0, True)):
+        drag = sparse.identity(40, format="csr") * damping
+        low, high = own_rows(40)
+        matrices_ = distributed(drag), distributed(sparse.diags(squares, format="csr"))
+        ones = np.ones(high - low)
+        if allowed:
+            assert solve(ones, *matrices_, 5).condition < 100.0
+        else:
+            with pytest.raises(ConvergenceError, match="next to defective.*critical damping"):
+                solve(ones, *matrices_, 5)
+
+
+def test_states_that_are_missing_are_counted():
+    """Against the projected count; a state that the truncated basis shifts across a limit is none."""
+    full, projected = np.array([10.0, 20.0, 30.0]), np.array([10.1, 20.1, 25.0, 30.1, 40.0])
+    assert missing(full, projected, 5.0, 35.0) == 1
+    assert missing(np.append(full, 25.0), projected, 5.0, 35.0) == 0
+    assert missing(full[:2], projected, 5.0, 30.3) == 1
+    assert missing(full[:2], projected, 5.0, 25.2) == 0

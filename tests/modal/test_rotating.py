@@ -181,3 +181,17 @@ def test_rounding_is_no_growth():
     found = rotating(drag, stiffness)
     assert found.unstable == growing(found.every).sum() > 0
     assert found.fastest_growth == pytest.approx(5e-4, rel=0.5)
+
+
+def test_states_come_in_one_order_and_phase():
+    """The same pencil in coordinates of other order: the same eigenvalues in place, the same vectors."""
+    drag, stiffness = matrices(random_tire(20), 20.0, (30.0, 0.0), "full")
+    plain = rotating(drag, stiffness)
+    assert (np.diff(plain.eigenvalue.imag) >= 0).all()
+    mixed = np.random.default_rng(2).permutation(20)
+    other = rotating(drag[np.ix_(mixed, mixed)], stiffness[np.ix_(mixed, mixed)])
+    np.testing.assert_allclose(other.eigenvalue, plain.eigenvalue, rtol=1e-10)
+    right, left = np.empty_like(plain.right), np.empty_like(plain.left)
+    right[mixed], left[:, mixed] = other.right, other.left
+    np.testing.assert_allclose(right, plain.right, atol=1e-9)
+    np.testing.assert_allclose(left, plain.left, atol=1e-9 * np.abs(left).max())

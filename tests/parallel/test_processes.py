@@ -54,6 +54,7 @@ def values(folder, file, name):
         ("static.h5", "displacement", 1e-8),
         ("static.h5", "contact/force", 1e-8),
         ("modes.h5", "frequency", 1e-8),
+        ("modes.h5", "surface/shape", 1e-6),  # signs and order too
         ("rotating.h5", "eigenvalue", 1e-6),
         ("greens.h5", "contact/static_flexibility", 1e-6),
         ("contact.h5", "normal_force", 1e-6),

@@ -39,10 +39,12 @@ def attack(folder: Path, files: int, seed: int) -> list[str]:
         victim = dice.choice(sorted([*out.glob("*.h5"), *out.glob("*.h5"), *out.glob("s*.[jt]*")]))
         what = _damage(victim, dice)
         use = dice.choice(USES)
-        failures += [
+        found = [
             f"{number}: {victim.name} {what}, {use}: {failure}"
             for failure in _used(scene, out, victim, use, wanted, csv)
         ]
+        print(*found, sep="\n", end="\n" if found else "", flush=True)
+        failures += found
         if number % 10 == 9:
             print(f"{number + 1} files, {len(failures)} failures", flush=True)
     return failures
@@ -114,7 +116,8 @@ def _used(
     if status == 0 and use == "export":
         made = {path.name: path.read_bytes() for path in (out / "export").glob("*.csv")}
         return [f"{name} differs" for name in made if made[name] != csv[name]]
-    if status == 0 and use == "report" and not same and victim.name not in _page(out):
+    shown = not same and victim.name not in ("greens.h5", "checkpoint.h5")
+    if status == 0 and use == "report" and shown and victim.name not in _page(out):
         return ["the page does not name the damaged file"]
     return []
 

@@ -67,6 +67,7 @@ def attack(
             line = command("run", scene, "--out", out, processes=processes)
             done += _killed(line, out, wait, dice, failures, extra)
         failures += _recovered(scene, out, processes, wanted, extra)
+        print(*failures[-3:], sep="\n", end="\n" if failures else "")
         print(f"{done} kills, {len(failures)} failures", flush=True)
         shutil.rmtree(out, ignore_errors=True)
     return failures

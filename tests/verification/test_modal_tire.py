@@ -13,6 +13,7 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
 from tireroad.modal import quadratic, undamped
+from tireroad.modal.agreement import truncation
 from tireroad.modal.basis import project
 from tireroad.modal.rotating import checks, matrices, rotating
 from tireroad.runs.stages.modes import sites
@@ -91,7 +92,7 @@ def test_full_quadratic_problem_agrees_with_many_projected_modes(pressed, inerti
     projection = project(modes, rotation, pressed.carried, COMM)
     pencil = matrices(projection, speed, damping, inertia)
     errors = [
-        quadratic.truncation(
+        truncation(
             full.eigenvalue, rotating(*(matrix[:m, :m] for matrix in pencil)).eigenvalue
         ).max()
         for m in (40, 400)

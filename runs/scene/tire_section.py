@@ -1,0 +1,69 @@
+"""The tire of a scene as a section and its ring of elements, and the elements it has by default."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+
+from tireroad.fem.sections.grid import Patch, PlyLine
+from tireroad.fem.sections.ring import Ring
+from tireroad.fem.sections.torus import Torus
+from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tire_tables import Region, Tire
+
+# (segments, elements along the arc) where the scene does not say; by order.
+MESHES = {1: (160, 32), 2: (100, 16), 3: (30, 14)}
+NEAR_ROAD = 0.2  # footprint_size with a road
+
+
+def with_elements(scene: Scene) -> Scene:
+    """The scene with its elements chosen where it leaves them open.
+
+    Order 3 unless the scene says how many elements there are: then 2, as finer ones are asked for by
+    their number. With a road, elements are smaller at the footprint.
+    """
+    tire, static = scene.tire, scene.static
+    counted = tire.segments is not None or tire.elements_arc is not None
+    order = tire.order or (2 if counted else 3)
+    segments, along = MESHES[order]
+    road = (static.load, static.deflection, static.road_height) != (None, None, None)
+    chosen = {
+        "order": order,
+        "segments": tire.segments or segments,
+        "elements_arc": tire.elements_arc or along,
+        "footprint_size": tire.footprint_size or (NEAR_ROAD if road else 1.0),
+    }
+    return replace(scene, tire=replace(tire, **chosen))
+
+
+def make_section(tire: Tire) -> Ring:
+    """The shape of the tire and its elements."""
+    torus, patches, plies = _torus(tire)
+    return torus.ring(patches, plies)
+
+
+def _torus(tire: Tire) -> tuple[Torus, list[Patch], list[PlyLine]]:
+    names = {f.name for f in fields(Torus)} - {"half_angle"}
+    given = {name: getattr(tire, name) for name in names}
+    patches = [patch(i, region) for i, region in enumerate(tire.region)]
+    plies = [
+        PlyLine(c.name, tuple(np.radians(c.arc)), 1 - c.depth / tire.thickness) for c in tire.cords
+    ]
+    return Torus(half_angle=np.radians(tire.half_angle), **given), patches, plies
+
+
+def patch(number: int, region: Region) -> Patch:
+    """The part of a torus's section that a region is."""
+    low, high = np.radians(region.arc)
+    sides = {"left": ((-high, -low),), "right": ((low, high),)}
+    arcs = sides.get(region.side, sides["left"] + sides["right"])
+    return Patch(f"tire.region {number}", arcs, region.depth)
+
+
+def free_unknowns(tire: Tire) -> int:
+    """Displacement unknowns without the clamped bead faces."""
+    torus, patches, plies = _torus(tire)
+    wall, arc = (len(line) - 1 for line in torus.lines(patches, plies))
+    free = (tire.order * wall + 1) * (tire.order * arc - 1)
+    return 3 * tire.segments * tire.order * free
