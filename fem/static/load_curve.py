@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from scipy.interpolate import CubicSpline
+
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.state import static_state
@@ -12,14 +15,14 @@ from tireroad.fem.static.state import static_state
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """The tire at one `deflection` (m): `load` N, `stiffness` N/m the tangent there, with the same points
-    touching (at the edge of the contact the force is zero, so others change nothing of first order);
+    """The tire at one `deflection` (m): `load` N, `tangent` N/m there while the same nodes touch: between two nodes
+    that come into contact it lags behind the slope of the curve, the less the finer the mesh;
     `footprint`, `points` in contact, effective `rolling_radius` m.
     """
 
     deflection: float
     load: float
-    stiffness: float
+    tangent: float
     footprint: Footprint
     points: int
     rolling_radius: float
@@ -37,6 +40,14 @@ def load_curve(loader: Loader, deflections: Sequence[float]) -> list[CurvePoint]
     converge by halved steps either.
     """
     return [_point(loader, deflection) for deflection in loader.visit(deflections)]
+
+
+def slopes(deflection: np.ndarray, load: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """dF/d(deflection), N/m, `at` deflections (k,) m, of a smooth curve from 0 through the points (n,)."""
+    x, y = np.concatenate([[0.0], deflection]), np.concatenate([[0.0], load])
+    if len(x) < 4:
+        return np.interp(at, x, np.gradient(y, x))
+    return CubicSpline(x, y)(at, 1)
 
 
 def _point(loader: Loader, deflection: float) -> CurvePoint:

@@ -11,7 +11,7 @@ from tireroad.runs.report.quantities import quantity
 
 _FILE = "stiffness.h5"
 _FACTS = (
-    ("vertical", "vertical stiffness, tangent", "N/m"),
+    ("vertical", "vertical stiffness, slope of the curve", "N/m"),
     ("longitudinal", "longitudinal stiffness", "N/m"),
     ("lateral", "lateral stiffness", "N/m"),
     ("torsional", "torsional stiffness about the vertical", "N m/rad"),
@@ -19,7 +19,7 @@ _FACTS = (
 _COLUMNS = (
     ("deflection", 1e3, "deflection, mm"),
     ("load", 1.0, "load, N"),
-    ("stiffness", 1e-3, "tangent, N/mm"),
+    ("stiffness", 1e-3, "slope, N/mm"),
     ("footprint_length", 1e3, "length, mm"),
     ("footprint_width", 1e3, "width, mm"),
     ("footprint_area", 1e4, "area, cm²"),

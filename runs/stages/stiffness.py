@@ -16,7 +16,7 @@ from tireroad.runs.stages.session import Session
 _CURVE = {
     "deflection": "m",
     "load": "N",
-    "stiffness": "N/m",
+    "tangent": "N/m",
     "points": "-",
     "rolling_radius": "m",
     "pressure": "Pa",
@@ -103,26 +103,39 @@ def _curve(session: Session):
     record.indicators["Newton steps"] = (loader.newton_steps, "-")
     for point in curve:
         observe.say(
-            f"  {1e3 * point.deflection:.4g} mm: {point.load:.5g} N, {1e-3 * point.stiffness:.4g} N/mm, "
-            f"footprint {1e3 * point.footprint.length:.3g} x {1e3 * point.footprint.width:.3g} mm"
+            f"  {1e3 * point.deflection:.4g} mm: {point.load:.5g} N, footprint "
+            f" {1e3 * point.footprint.length:.3g} x {1e3 * point.footprint.width:.3g} mm"
         )
     return curve, equilibrium.contact_force()
 
 
-def _vertical(session: Session, curve, matrix) -> tuple[float, float]:
-    """(load, tangent stiffness) at the scene's own state, or at the curve's last."""
-    if matrix is not None and _sticks(session):
-        return session.static.load, matrix.frictionless
-    if session.static.road_height is None:
-        return curve[-1].load, curve[-1].stiffness
-    loads = np.array([0.0, *(point.load for point in curve)])
-    slopes = np.array([0.0, *(point.stiffness for point in curve)])
-    return session.static.load, float(np.interp(session.static.load, loads, slopes))
+def _slopes(curve) -> np.ndarray:
+    """Slope of the curve at its points (k,), N/m."""
+    from tireroad.fem.static.load_curve import slopes
+
+    deflection = np.array([point.deflection for point in curve])
+    return slopes(deflection, np.array([point.load for point in curve]), deflection)
+
+
+def _vertical(session: Session, curve) -> tuple[float, float]:
+    """(load, slope) at the scene's own state, a point of the curve too, or at the curve's last."""
+    from tireroad.fem.static.load_curve import slopes
+
+    state = session.static
+    if state.road_height is None:
+        return curve[-1].load, float(_slopes(curve)[-1])
+    own = state.road_height - state.touch_height
+    known = {point.deflection: point.load for point in curve} | {own: state.load}
+    # Points closer than the curve's own steps would make waves of rounding.
+    least = 0.05 * own
+    apart = [d for d in sorted(known) if d == own or abs(d - own) > least]
+    load = np.array([known[d] for d in apart])
+    return state.load, float(slopes(np.array(apart), load, np.array([own]))[0])
 
 
 def _describe(session: Session, curve, matrix) -> None:
     record = session.record
-    load, vertical = _vertical(session, curve, matrix)
+    load, vertical = _vertical(session, curve)
     record.headline |= {
         "deflections": (len(curve), "-"),
         "up to": (curve[-1].deflection, "m"),
@@ -148,10 +161,11 @@ def _describe(session: Session, curve, matrix) -> None:
 def _fill(file, session: Session, curve, matrix) -> None:
     for name, unit in _CURVE.items():
         put(file, f"curve/{name}", np.array([getattr(point, name) for point in curve]), unit)
+    put(file, "curve/stiffness", _slopes(curve), "N/m")
     for name, unit in (("length", "m"), ("width", "m"), ("area", "m2")):
         values = np.array([getattr(point.footprint, name) for point in curve])
         put(file, f"curve/footprint_{name}", values, unit)
-    load, vertical = _vertical(session, curve, matrix)
+    load, vertical = _vertical(session, curve)
     put(file, "load", np.array(load), "N")
     put(file, "vertical", np.array(vertical), "N/m")
     if matrix is None:
@@ -159,6 +173,7 @@ def _fill(file, session: Session, curve, matrix) -> None:
     put(file, "longitudinal", np.array(matrix.longitudinal), "N/m")
     put(file, "lateral", np.array(matrix.lateral), "N/m")
     put(file, "torsional", np.array(matrix.torsional), "N m/rad")
+    put(file, "vertical_tangent", np.array(matrix.frictionless), "N/m")
     put(file, "vertical_stuck", np.array(matrix.matrix[2, 2]), "N/m")
     put(file, "matrix", matrix.matrix, "N/m, N/rad, N m/m, N m/rad")
 

@@ -47,9 +47,11 @@ def test_curve_and_stiffness_of_a_loaded_tire(run):
         assert curve["deflection"][-1] == pytest.approx(1.5 * static.attrs["deflection"])
         between = np.interp(static.attrs["deflection"], curve["deflection"], curve["load"])
         assert between == pytest.approx(900.0, rel=0.03)
-        tangent = np.interp(900.0, curve["load"], curve["stiffness"])
-        assert file["vertical"][()] == pytest.approx(tangent, rel=0.1)
-        assert file["vertical_stuck"][()] > file["vertical"][()]
+        slope = np.interp(900.0, curve["load"], curve["stiffness"])
+        assert file["vertical"][()] == pytest.approx(slope, rel=0.1)
+        assert file["vertical_stuck"][()] > file["vertical_tangent"][()]
+        # Nodes come into contact one by one: on a coarse mesh the tangent lags behind the slope.
+        assert file["vertical_tangent"][()] == pytest.approx(slope, rel=0.3)
         assert file["lateral"].attrs["unit"] == "N/m"
         assert all(item.attrs["unit"] for item in file["curve"].values())
         assert min(file[n][()] for n in ("longitudinal", "lateral", "torsional")) > 0
