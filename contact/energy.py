@@ -40,6 +40,45 @@ class Work:
         self._force, self._moved = kept["work_force"], kept["work_moved"]
 
 
+class Dissipation:
+    """What the material of a rolling tire loses, and what the drive brings in, J, summed over the steps.
+
+    With r = q' + Omega P q the body rate of the coordinates q, D the damping of the modes:
+
+        lost = int r . D r dt >= 0,   drive = int (Omega P q) . D r dt,
+
+    so that work of the forces + drive = change of the energy of `stored` + lost. By the trapezoid rule.
+    """
+
+    def __init__(self, damping: np.ndarray, turning: np.ndarray, step: float) -> None:
+        """`damping` (m,) 1/s; `turning` Omega P (m, m) 1/s; `step` s."""
+        self._damping, self._turning, self._step = damping[:, None], turning, step
+        self.lost = self.drive = 0.0
+        self._last = np.zeros(2)
+
+    def add(self, coordinates: np.ndarray, rates: np.ndarray) -> None:
+        """Count n steps: coordinates and rates (m, n) at their ends."""
+        turned = self._turning @ coordinates
+        body = rates + turned
+        braked = self._damping * body
+        power = np.stack([(body * braked).sum(axis=0), (turned * braked).sum(axis=0)])
+        power = np.column_stack([self._last, power])
+        # One step after the other: the sums do not depend on how the steps are blocked.
+        for lost, drive in (self._step * (power[:, 1:] + power[:, :-1]) / 2).T.tolist():
+            self.lost += lost
+            self.drive += drive
+        self._last = power[:, -1]
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What a checkpoint keeps."""
+        return {"dissipation": np.array([self.lost, self.drive]), "dissipation_last": self._last}
+
+    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on from `state`."""
+        self.lost, self.drive = kept["dissipation"].tolist()
+        self._last = kept["dissipation_last"]
+
+
 def stored(coordinates: np.ndarray, rates: np.ndarray, stiffness: np.ndarray) -> float:
     """Energy (J) of modal coordinates (m,) and rates (m,): kinetic, and of `stiffness` (m, m) 1/s2.
 

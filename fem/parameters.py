@@ -244,11 +244,25 @@ def text(default: str | None, doc: str, *, only_for: OnlyFor = None) -> Any:
     return parameter(key, default)
 
 
-def filename(doc: str) -> Any:
+def texts(doc: str, *, only_for: OnlyFor = None) -> Any:
+    """A list of texts, or one alone; empty by default."""
+
+    def read(value: Any) -> tuple[str, ...]:
+        if isinstance(value, str):
+            value = (value,)
+        if not isinstance(value, list | tuple):
+            raise ValueError(f"must be a text or a list of texts, not {described(value)}")
+        return tuple(_read_text(part) for part in value)
+
+    return parameter(Key(read=read, doc=doc, values="texts", only_for=only_for), ())
+
+
+def filename(doc: str, *, only_for: OnlyFor = None) -> Any:
     """The name of a file; in a scene relative to it. Absent by default."""
-    return parameter(
-        Key(read=_read_file, doc=doc, values="file", optional=True, is_file=True), None
+    key = Key(
+        read=_read_file, doc=doc, values="file", optional=True, is_file=True, only_for=only_for
     )
+    return parameter(key, None)
 
 
 def _read_text(value: Any) -> str:

@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy import sparse
 
 from tireroad.modal.basis import Projection
 from tireroad.modal.fields import gram, multiply
@@ -62,6 +63,17 @@ def with_attachments(
         squares=np.concatenate([modes.squares, squares]),
         vectors=np.hstack([modes.vectors, shapes @ turn]),
     )
+
+
+def fewest(probes: sparse.csr_matrix) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    """(weights (p, t), loads (t, s)) with probes = weights loads: unit loads on what the probes (p, s) touch where
+    that is fewer than they are, as for points closer than nodes; else the probes themselves.
+    """
+    touched = np.unique(probes.tocoo().col)
+    if len(touched) >= probes.shape[0]:
+        return sparse.identity(probes.shape[0], format="csr"), probes
+    unit = sparse.identity(probes.shape[1], format="csr")[touched]
+    return probes[:, touched].tocsr(), unit
 
 
 def foremost(missing: np.ndarray, flexibility: np.ndarray) -> np.ndarray:

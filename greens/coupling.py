@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.fem.cavity.column import Column
+from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
     StaticShapes,
     compliance,
@@ -21,16 +22,19 @@ from tireroad.fem.matrices.compliance import (
 from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
-from tireroad.greens.attachment import dynamic, foremost, with_attachments
+from tireroad.fem.model import SmallMotions
+from tireroad.fem.turning import Turning
+from tireroad.greens.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, modal_moments, second_order
-from tireroad.modal.air import Air
-from tireroad.modal.basis import Projection, project
-from tireroad.modal.damping import Damping, tail_loss
-from tireroad.modal.rotating import StateModes, matrices, rotating, standing
+from tireroad.modal.basis import Projection, project, with_air
+from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_loss
+from tireroad.modal.rolling import RollingModes, decouple
+from tireroad.modal.rotating import StateModes, matrices
 from tireroad.modal.undamped import Modes
-from tireroad.runs.process.mpi import on_root
+
+_SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by their sign at least
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,11 @@ class Basis:
     shape: np.ndarray
     projection: Projection
     states: StateModes
+
+    @staticmethod
+    def of(rolling: RollingModes) -> Basis:
+        """The states of a rolling tire, as probes see them."""
+        return Basis(rolling.basis.shape, rolling.basis.projection, rolling.states)
 
     def couple(self, outputs, loads, flexibility: np.ndarray | None = None) -> Response:
         """Response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s), or 3 s + 6 wide."""
@@ -72,6 +81,28 @@ def regained(
     ]
     one, other = (modal_moments(*pencil, *seen, carried) for pencil in parts)
     return one.minus(other)
+
+
+def wheel_of(
+    motions: SmallMotions,
+    turning: Turning,
+    air: Column | None = None,
+    projection: Projection | None = None,
+) -> Wheel:
+    """The full matrices of a tire at its static state as the wheel turns, with the `air` in it.
+
+    `projection` on the modes: for damping by strain energy only, which has no full matrices. Collective.
+    """
+    tail = None
+    if isinstance(turning.damping, StrainEnergy):
+        if projection is None:
+            raise InputError(
+                "damping by strain energy is known by the modes: give their projection"
+            )
+        tail = beyond(turning.damping, projection)
+    rotation = motions.rotation if turning.speed else None
+    given = turning.speed, turning.damping, turning.inertia
+    return Wheel(motions.operators, rotation, *given, air, tail)
 
 
 @dataclass(frozen=True)
@@ -127,24 +158,19 @@ class Wheel:
         outputs: sparse.csr_matrix,
         loads: sparse.csr_matrix,
         option: str,
-        known: Projection | None = None,
     ) -> Response:
-        """Response with the residual `option`; `modes` (all rows) for "attachment" only, with `known`,
-        the projection on these very vectors where there is one: another solution of the same problem
-        has other signs, and other vectors of repeated frequencies. Collective."""
+        """Response with the residual `option`. Collective.
+
+        For "attachment" only: `modes` on all unknowns, the very solution that `basis` projects. InputError
+        for another one: its signs and its vectors of repeated frequencies differ.
+        """
         if option in ("static", "dirac"):
-            flexibility = compliance(
-                self.operators, self.rotating_stiffness, outputs, loads, self.air
-            )
-            if self.beyond is not None:
-                pencils = self._pencils(basis.projection)
-                flexibility += regained(basis, *pencils, outputs, loads).compliance
-            return replace(basis.couple(outputs, loads, flexibility), pulse=option == "dirac")
+            return self._with_statics(basis, outputs, loads, pulse=option == "dirac")
         r, k = outputs.shape[0], loads.shape[0]
         same = outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
-            whole = self._attached(basis, modes, probes, known)
+            whole = self._attached(basis, modes, probes)
         else:
             shapes = self._static_shapes(probes)
             moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
@@ -155,27 +181,57 @@ class Wheel:
                 moments = moments.plus(regained(basis, *pencils, probes, probes))
                 loss = self.beyond[0], tail_loss(basis.projection)
             whole = second_order(poles, basis.states, basis.seen(probes), carried, moments, loss)
+            whole = self._lacking(whole, moments.momentum)
         return whole if same else whole.between(slice(r), slice(r, r + k))
+
+    def _with_statics(self, basis: Basis, outputs, loads, *, pulse: bool) -> Response:
+        """The states, and the exact static flexibility of what they lack. Collective."""
+        given = self.operators, self.rotating_stiffness, outputs, loads
+        answers = compliance(*given, self.air, moment=True)
+        flexibility, moment = answers[: outputs.shape[0]], answers[outputs.shape[0] :]
+        if self.beyond is not None:
+            lacking = regained(basis, *self._pencils(basis.projection), outputs, loads)
+            flexibility, moment = flexibility + lacking.compliance, moment + lacking.momentum
+        response = replace(basis.couple(outputs, loads, flexibility), pulse=pulse)
+        return self._lacking(response, moment)
+
+    def _lacking(self, response: Response, moment: np.ndarray) -> Response:
+        """The response that knows what its states lack of the static first moment (3, k) kg m/N."""
+        if self.air is not None:  # its own momentum is not in that of the full matrices
+            return response
+        return replace(response, left_out=moment - response.static_moment())
 
     def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
         full = self.rotating_stiffness, self.rotating_damping
         return static_shapes(self.operators, *full, probes, self.air)
 
-    def _attached(
-        self, basis: Basis, modes: Modes, probes: sparse.csr_matrix, known: Projection | None
-    ) -> Response:
+    def _attached(self, basis: Basis, modes: Modes, probes: sparse.csr_matrix) -> Response:
         """Response of the modes and the attachment modes of all probes. Collective."""
+        self._check_same(basis, modes)
         if not self._drifts:
+            weights, loads = fewest(probes)
             full = self.operators, self.rotating_stiffness
-            shapes, flexibility = loaded_shapes(*full, probes, self.air)
+            shapes, flexibility = loaded_shapes(*full, loads, self.air)
+            flexibility = weights @ (weights @ flexibility.T).T
             missing = flexibility - basis.couple(probes, probes).static()
-            columns = shapes @ foremost(missing, np.abs(np.diag(flexibility)))
-            grown = self._grown(modes, columns, known, every=False)
+            columns = shapes @ (weights.T @ foremost(missing, np.abs(np.diag(flexibility))))
+            grown = self._grown(modes, columns, basis.projection, every=False)
             if self.beyond is not None:
                 pencils = self._pencils(grown.projection)
                 flexibility = flexibility + regained(grown, *pencils, probes, probes).compliance
-            return grown.couple(probes, probes, flexibility)
+            moment = self.operators.body.comm.allreduce(self.operators.carried @ shapes)
+            return self._lacking(grown.couple(probes, probes, flexibility), moment)
         return self._standing_attachments(modes, probes).couple(probes, probes)
+
+    def _check_same(self, basis: Basis, modes: Modes) -> None:
+        """InputError where these modes are not those of the basis. Collective."""
+        found, known = self.operators.trace(modes.vectors), basis.shape
+        alike = np.shape(found) == np.shape(known)
+        if not alike or np.abs(found - known).max(initial=0.0) > _SAME * np.abs(known).max():
+            raise InputError(
+                "attachment modes: the modes on all unknowns are not those that the basis shows; take "
+                "both from one solution (modal.standing.with_fields)"
+            )
 
     @property
     def _drifts(self) -> bool:
@@ -222,20 +278,18 @@ class Wheel:
         shape = operators.trace(grown.vectors)
         return Basis(shape, projection, self.decouple(projection, comm))
 
+    @property
+    def turning(self) -> Turning:
+        """How the wheel turns."""
+        return Turning(speed=self.speed, damping=self.damping, inertia=self.inertia)
+
     def with_air(self, projection: Projection, modes: Modes) -> Projection:
         """The projection on the modes (all rows), joined by the air where there is any. Collective."""
-        if self.air is None:
-            return projection
-        air = Air(self.air.duct, self.air.coupling(modes.vectors))
-        return replace(projection, air=air)
+        return with_air(projection, modes, self.air)
 
     def decouple(self, projection: Projection, comm) -> StateModes:
         """The second eigenproblem, or the closed formula of a tire without air that stands. Collective."""
-        if self.speed == 0 and projection.air is None:
-            return standing(projection, self.damping)
-        pencil = matrices(projection, self.speed, self.damping, self.inertia)
-        # One process solves: LAPACK on another could order repeated eigenvalues differently.
-        return on_root(comm, lambda: rotating(*pencil))
+        return decouple(projection, self.turning, comm)
 
     def receptance(
         self, outputs: sparse.csr_matrix, loads: sparse.csr_matrix, frequency: np.ndarray

@@ -105,6 +105,21 @@ class Recursion:
         if self._block:
             self._block.advance(force)
 
+    def sample(self) -> tuple[np.ndarray, np.ndarray]:
+        """This process's states and pushes (mine,), after `advance`."""
+        return self.state, self._push
+
+    def everywhere(self, samples: list[np.ndarray]) -> np.ndarray:
+        """Samples of n steps as (n, q), all states in the order of the response. Collective."""
+        own = np.array(samples)
+        if self.comm.size == 1:
+            return own
+        parts = self.comm.allgather(own)
+        out = np.empty((len(own), sum(part.shape[1] for part in parts)), complex)
+        for rank, part in enumerate(parts):
+            out[:, rank :: self.comm.size] = part
+        return out
+
     def snapshot(self) -> dict[str, np.ndarray]:
         """All states in the order of the response, the same for any number of processes. Collective."""
         kept = {"state": self._gathered(self.state), "push": self._gathered(self._push)}

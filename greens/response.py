@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg
 
-from tireroad.modal.rotating import StateModes
+from tireroad.modal.states import StateModes, growing
 
 # Radians a state may turn in a step and stay dynamic. Undamped and bouncing on a stiff tread, up to 3
 # gained no energy and 5 blew up: from pi on a turn is not seen any more. Rolling on a rough road in
@@ -31,7 +31,8 @@ class Response:
     `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries. The last `rigid`
     states of the block drift under a constant force: static figures leave them out. With `pulse` the
     residual answers not at once but with a pulse 1/step high and one step long in place of its
-    delta(t) (thesis (C.4)).
+    delta(t) (thesis (C.4)). `left_out` (3, k) kg m/N, where it is known: the static first moment int rho u of
+    all motions that no state has; the axle force lacks its second rate.
     """
 
     eigenvalue: np.ndarray
@@ -45,6 +46,7 @@ class Response:
     block_momentum: np.ndarray
     pulse: bool = False
     rigid: int = 0
+    left_out: np.ndarray | None = None
 
     def impulse(self, times: np.ndarray) -> np.ndarray:
         """Green's functions g (t, r, k), m/(N s), without the residual's delta at t = 0."""
@@ -87,6 +89,18 @@ class Response:
             static -= output @ np.linalg.solve(block, push)
         return static
 
+    def static_moment(self) -> np.ndarray:
+        """First moment (3, k) kg m of all states per constant force, N."""
+        moving = replace(self, output=self.momentum, block_output=self.block_momentum)
+        return moving.static()
+
+    @property
+    def growth(self) -> tuple[int, float]:
+        """How many states grow, beyond rounding, and how fast the fastest does, 1/s."""
+        values = self.every
+        grows = growing(values)
+        return int(grows.sum()), float(values.real[grows].max(initial=0.0))
+
     def _held_block(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The block with its output and input without rigid states, which are last and apart."""
         k = len(self.block) - self.rigid
@@ -104,9 +118,13 @@ class Response:
         """The poles where `keep` (q,) is true; the others follow the force statically."""
         if keep.all():
             return self
-        gone = (self.output[:, ~keep] / self.eigenvalue[~keep]) @ self.input[~keep]
+        following = self.input[~keep] / self.eigenvalue[~keep, None]
+        gone, left_out = self.output[:, ~keep] @ following, self.left_out
+        if left_out is not None:
+            left_out = left_out - (self.momentum[:, ~keep] @ following).real
         return replace(
             self,
+            left_out=left_out,
             eigenvalue=self.eigenvalue[keep],
             output=self.output[:, keep],
             input=self.input[keep],
@@ -150,7 +168,10 @@ class Response:
             momentum @ turn @ right,
             left @ turn.T @ push,
         )
-        gone = output[:, p:] @ np.linalg.solve(schur[p:, p:], push[p:])
+        following = np.linalg.solve(schur[p:, p:], push[p:])
+        gone, left_out = output[:, p:] @ following, self.left_out
+        if left_out is not None:
+            left_out = left_out - momentum[:, p:] @ following
         k = len(held)
         return replace(
             self,
@@ -159,6 +180,7 @@ class Response:
             block_input=np.vstack([push[:p], self.block_input[k:]]),
             block_momentum=np.hstack([momentum[:, :p], self.block_momentum[:, k:]]),
             residual=self.residual - gone,
+            left_out=left_out,
         )
 
     def slow(self, step: float, limit: float = RESOLVED) -> np.ndarray:
@@ -187,7 +209,7 @@ class Response:
         )
 
     def between(self, outputs: slice, forces: slice) -> Response:
-        """The same for some of the outputs and forces."""
+        """The same for some of the outputs and forces (slices)."""
         return replace(
             self,
             output=self.output[outputs],
@@ -195,6 +217,7 @@ class Response:
             block_output=self.block_output[outputs],
             block_input=self.block_input[:, forces],
             residual=self.residual[outputs, forces],
+            left_out=None if self.left_out is None else self.left_out[:, forces],
         )
 
     def joined(self, other: Response) -> Response:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tireroad.greens.response import Response, couple
-from tireroad.modal.rotating import rotating
+from tireroad.modal.rotating import checks, rotating
 from tireroad.modal.states import StateModes, growing
 
 # Share of the largest static flexibility below which a direction is the solver's rounding.
@@ -94,6 +94,7 @@ def second_order(
     if loss is not None:
         drag = drag + _by_loss_factor(stiffness, *loss)
     states = rotating(drag, stiffness)
+    checks(states, drag, stiffness)
     output = flexibility @ basis
     forces = inverse @ (basis.T @ flexibility)
     extra = couple(states, output, forces.T, missing.momentum @ basis)

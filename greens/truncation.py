@@ -7,7 +7,8 @@ differs from its true one by at most the share  b(w) = |w^2 - i w d| / |w_c^2 - 
     dirac, static |G_res| b / |H|         a bound for a wheel that stands
     attachment, second-order: |H_x(w) - H_x(0)| b / |H|  with H_x the states beyond w_c,
 
-Frobenius norms over all outputs and forces.
+Frobenius norms over all outputs and forces. The axle force, sum of the loads less the second rate of the
+first moment, lacks  w^2 |m_r| (1 + b)  per unit load, m_r the static moment of what no state has.
 """
 
 from __future__ import annotations
@@ -48,6 +49,16 @@ def estimate(response: Response, option: str, cutoff: Cutoff, frequency: np.ndar
         lagging = H - response.keeping(~beyond).receptance(frequency)
         off = (_size(lagging) + _size(response.residual)) * share
     return off / _size(H)
+
+
+def estimate_axle(response: Response, cutoff: Cutoff, frequency: np.ndarray) -> np.ndarray | None:
+    """Estimated error (f,) of the axle force per unit load, root mean square over the loads; None where the
+    moment left out is not known. At 0 Hz a load reaches the axle whole."""
+    if response.left_out is None:
+        return None
+    lacking = np.linalg.norm(response.left_out) / np.sqrt(response.left_out.shape[1])
+    share = np.where(frequency > 0, cutoff.share(frequency), 0.0)
+    return (2 * np.pi * frequency) ** 2 * lacking * (1 + share)
 
 
 def _size(matrices: np.ndarray) -> np.ndarray:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from tireroad.fem.cavity.column import Column
 from tireroad.modal.air import Air
 from tireroad.modal.fields import CHUNK, gram, multiply
 from tireroad.modal.undamped import Modes
+from tireroad.modal.waves import Labels
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,17 @@ class Projection:
         """Coordinates of the tire itself, m."""
         return len(self.squares)
 
+    def first(self, count: int) -> Projection:
+        """On the first `count` modes alone."""
+        cut = {"squares": self.squares[:count], "momentum": self.momentum[:, :count]}
+        for item in fields(self):
+            values = getattr(self, item.name)
+            if item.name not in cut and isinstance(values, np.ndarray):
+                cut[item.name] = np.ascontiguousarray(values[(slice(count),) * values.ndim])
+        if self.air is not None:
+            cut["air"] = replace(self.air, coupling=self.air.coupling[:, :count])
+        return replace(self, **cut)
+
     def among(self, wanted: np.ndarray) -> Projection:
         """On the coordinates where `wanted` (m,) is true, before any air joins them."""
         small = {
@@ -50,6 +63,36 @@ class Projection:
             if name not in ("momentum", "air")
         }
         return Projection(momentum=self.momentum[:, wanted], **small)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModalBasis:
+    """The standing modes as all later steps take them: m fields, M-orthonormal.
+
+    `frequency` (m,) Hz; `shape` kg^-1/2 of the outer face (3 s, m), of a free rim after it (+ 6);
+    `projection` the small matrices on these very fields. `modes`: the fields on all unknowns, where
+    this process solved for them and they are not read from a file; `labels` of a round tire;
+    `column`: the air that joined them, where this process made it. Signs of eigenvectors, and vectors
+    of repeated frequencies, are of one solution only: never combine two bases' parts.
+    """
+
+    frequency: np.ndarray
+    shape: np.ndarray
+    projection: Projection
+    modes: Modes | None = None
+    labels: Labels | None = None
+    column: Column | None = None
+
+    def first(self, count: int) -> ModalBasis:
+        """The first `count` modes."""
+        return ModalBasis(
+            frequency=self.frequency[:count],
+            shape=self.shape[:, :count],
+            projection=self.projection.first(count),
+            modes=self.modes and self.modes.first(count),
+            labels=self.labels and self.labels.first(count),
+            column=self.column,
+        )
 
 
 def project(
@@ -78,6 +121,13 @@ def project(
         reduced("body_convective", 1),
         losing,
     )
+
+
+def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projection:
+    """The projection on the modes (all rows), joined by the air where there is any. Collective."""
+    if air is None:
+        return projection
+    return replace(projection, air=Air(air.duct, air.coupling(modes.vectors)))
 
 
 def _loss_factors(modes: Modes, loss, comm, known: Projection | None) -> np.ndarray:

@@ -15,6 +15,9 @@ from tireroad.modal.damping import Damping
 from tireroad.modal.rotating import matrices, overlap, rotating
 from tireroad.modal.states import StateModes, growing
 
+# Stiffness of a rigid motion of a free wheel over Omega^2: 0 but for what the modes leave out.
+RIGID = 1e-3
+
 
 @dataclass(frozen=True)
 class Campbell:
@@ -80,17 +83,25 @@ def _continued(before: StateModes, now: StateModes, held: np.ndarray, drag: np.n
     return out, similarity
 
 
-def critical_speed(projection: Projection, inertia: str) -> float:
+def critical_speed(projection: Projection, inertia: str, free_at: float | None = None) -> float:
     """The least Omega (rad/s) at which a wave stands still in the non-rotating frame; inf if none does.
 
     Undamped, K~ = Lambda + Omega^2 S is singular there: Omega^-2 is the largest eigenvalue of
-    Lambda^-1/2 (-S) Lambda^-1/2, rigid modes left out. A road that stands still to the axle excites such a wave without end.
+    Lambda^-1/2 (-S) Lambda^-1/2, rigid modes left out. A road that stands still to the axle excites such
+    a wave without end. `free_at` (rad/s): the speed of a wheel that nothing holds; moved as a rigid body
+    it stands still by itself, K~ is singular at that very speed, and those motions are left out too.
     """
     convective = projection.convective if inertia == "full" else projection.body_convective
     flexible = projection.squares > 0
-    root = 1 / np.sqrt(projection.squares[flexible])
-    scaled = -convective[np.ix_(flexible, flexible)] * np.outer(root, root)
-    largest = linalg.eigvalsh(scaled, subset_by_index=[len(root) - 1] * 2)[0]
+    squares = np.diag(projection.squares[flexible])
+    convective = convective[np.ix_(flexible, flexible)]
+    if free_at is not None:
+        values, motions = linalg.eigh(squares + free_at**2 * convective)
+        held = motions[:, np.abs(values) > RIGID * free_at**2]
+        squares, convective = held.T @ squares @ held, held.T @ convective @ held
+    if not len(squares):
+        return np.inf
+    largest = linalg.eigh(-convective, squares, eigvals_only=True)[-1]
     return float(1 / np.sqrt(largest)) if largest > 0 else np.inf
 
 

@@ -30,7 +30,7 @@ ORTHONORMALITY_TOLERANCE = 1e-10
 _SAME = 1e-10  # relative distance of equal eigenvalues, where rounding is not more
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Modes:
     """The lowest m modes. `squares` omega^2 (m,) 1/s2 ascending; `vectors` this process's rows (n, m)
     of the mass-normalised shapes, kg^-1/2, signs and bases of repeated frequencies by rule
@@ -58,8 +58,17 @@ class Modes:
         """Natural frequencies (m,), Hz; 0 for rigid modes."""
         return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * np.pi)
 
+    def first(self, count: int) -> Modes:
+        """The `count` lowest of them."""
+        return replace(
+            self,
+            squares=self.squares[:count],
+            vectors=self.vectors[:, :count],
+            residual=self.residual[:count],
+        )
+
     def among(self, wanted: np.ndarray) -> Modes:
-        """With the squares and vectors where `wanted` (m,) is true."""
+        """With the squares and vectors of those `wanted`, an index or a mask."""
         return replace(self, squares=self.squares[wanted], vectors=self.vectors[:, wanted])
 
 
@@ -158,8 +167,7 @@ class _Problem:
         """The lowest `count` modes of all slices, orthonormal and by rule, with residuals. Collective."""
         parts, bottom = split.parts, proof.bottom
         values = np.concatenate([one.values for one in found])
-        rigid = values <= bottom.zero
-        values[rigid] = 0.0
+        values[values <= bottom.zero] = 0.0
         order, group = ordered(values, _families(parts, found), self._same(values))
         # A group is turned as a whole, also where the last mode cuts it.
         end = int(np.searchsorted(group, group[count - 1], side="right"))
@@ -173,11 +181,11 @@ class _Problem:
         return Modes(
             squares=squares,
             vectors=vectors,
-            residual=self._residuals(squares, vectors, bottom.zero),
+            residual=self._residuals(squares, vectors, values[values > 0].min(initial=proof.top)),
             orthonormality=defect,
             inertia_count=proof.inertia,
             counted_below=proof.top,
-            rigid=int(rigid.sum()),
+            rigid=int((squares == 0).sum()),
             sectors=tuple(part.matrix.shape[0] * part.copies for part in parts),
             slices=len(found),
             segments=split.segments,
@@ -218,8 +226,8 @@ class _Problem:
             )
         return modes
 
-    def _residuals(self, squares: np.ndarray, vectors: np.ndarray, zero: float) -> np.ndarray:
-        """(m,) relative; a rigid mode is measured by the first flexible one. Collective."""
+    def _residuals(self, squares: np.ndarray, vectors: np.ndarray, least: float) -> np.ndarray:
+        """(m,) relative; a rigid mode's by the first flexible one's eigenvalue `least`. Collective."""
         defects = np.empty(len(squares))
         root = np.sqrt(self.mass)[:, None]
         for start in range(0, len(squares), CHUNK):
@@ -228,8 +236,6 @@ class _Problem:
             defects[some] = ((multiply(self.scaled, shapes) - shapes * squares[some]) ** 2).sum(
                 axis=0
             )
-        flexible = squares[squares > 0]
-        least = max(flexible[0] if len(flexible) else 0.0, zero)
         return np.sqrt(self.comm.allreduce(defects)) / np.maximum(squares, least)
 
 

@@ -25,6 +25,10 @@ class Labels:
     section: np.ndarray
     share: np.ndarray
 
+    def first(self, count: int) -> Labels:
+        """Of the first `count` modes."""
+        return Labels(self.wave[:count], self.section[:count], self.share[:count])
+
 
 def label(
     comm: MPI.Comm, points: np.ndarray, ring: np.ndarray, mass: np.ndarray, vectors: np.ndarray

@@ -87,10 +87,13 @@ def _resumed(args: argparse.Namespace) -> argparse.Namespace:
 
 
 def _check(args: argparse.Namespace) -> None:
+    from tireroad.runs.report.section_picture import write_section
     from tireroad.runs.scene.check import explain
     from tireroad.runs.scene.load import load
 
-    print(explain(load(args.scene, args.set)))
+    scene = load(args.scene, args.set)
+    print(explain(scene))
+    print(write_section(scene, Path("results") / scene.name))
 
 
 def _report(args: argparse.Namespace) -> None:

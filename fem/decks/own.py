@@ -183,6 +183,7 @@ def _cords(deck: Deck, quads: Quads, laid: dict[str, Laid], units) -> list[Ply]:
             raise layer.place.error(f"there is no material {layer.material}; there are: {known}")
         material = cord(deck.materials[layer.material], units)
         made += plies(quads, laid[layer.elements], layer, material, units.length)
+    made = [replace(ply, name=ply.name.replace("/", "-")) for ply in made]
     names = [ply.name for ply in made]
     return [
         replace(ply, name=f"{ply.name} [{n + 1}]") if names.count(ply.name) > 1 else ply

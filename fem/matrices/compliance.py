@@ -149,13 +149,17 @@ def compliance(
     outputs: sparse.csr_matrix,
     loads: sparse.csr_matrix,
     air: Column | None = None,
+    moment: bool = False,
 ) -> np.ndarray:
     """Displacement at the outputs per unit load, (r, k) m/N, with the air's, on every process. Collective.
 
-    `outputs` (r, 3 s) and `loads` (k, 3 s) weigh the nodes of the outer face, three dofs a node.
+    `outputs` (r, 3 s) and `loads` (k, 3 s) weigh the nodes of the outer face, three dofs a node. With
+    `moment` three rows more: the first moment int rho u of the tire, kg m/N.
     Raises ConvergenceError when a solve leaves a relative residual above 1e-8.
     """
     rows, columns = on_own_rows(operators, outputs).T.tocsr(), on_own_rows(operators, loads)
+    if moment:
+        rows = sparse.vstack([rows, sparse.csr_matrix(operators.carried)], format="csr")
     if air is not None:
         rows = sparse.vstack([rows, air.pushed.T], format="csr")
         columns = sparse.hstack([columns, air.pushed], format="csc")

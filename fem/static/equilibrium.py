@@ -52,7 +52,7 @@ class Equilibrium:
     """
 
     def __init__(self, body: Body, rolling: Rolling = AT_REST):
-        self.body = body
+        self.body, self.rolling = body, rolling
         self.cost = Timing()
         self.road_height: float | None = None
         self.pressure = fem.Constant(body.mesh, 0.0)

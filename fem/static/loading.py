@@ -43,6 +43,17 @@ class _Known:
     displacement: np.ndarray
 
 
+class LoadingStopped(ConvergenceError):
+    """Load steps that became too small; `fact` is where, without advice."""
+
+    def __init__(self, fact: str) -> None:
+        super().__init__(
+            f"{fact}. The tire may fold or buckle here: lower the load or raise the inflation, stiffen "
+            "the material or refine the mesh around the footprint."
+        )
+        self.fact = fact
+
+
 class Loader:
     """Brings the body of one equilibrium problem to the wanted state. All methods are collective."""
 
@@ -189,11 +200,9 @@ class Loader:
                 continue
             size = 0.5 * min(size, abs(target - done))
             if size < _SMALLEST * first:
-                raise ConvergenceError(
+                raise LoadingStopped(
                     f"static: {what} stops at {done * scale:.6g} {unit} of {end * scale:.6g} {unit}; "
-                    f"a further step of {size * scale:.2g} {unit} does not converge "
-                    f"({step.reason}). The tire may fold or buckle here: lower the load or raise "
-                    "the inflation, stiffen the material or refine the mesh around the footprint."
+                    f"a further step of {size * scale:.2g} {unit} does not converge ({step.reason})"
                 )
 
     def _report(self, what: str, value: float, unit: str, step: Step) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cord_forces import CordForce, cord_forces
 from tireroad.fem.tire.mesh import Lattice
 
@@ -21,7 +22,8 @@ class StaticState:
     `points` (s, 3) m undeformed, `moved` (s, 3) m displacement, `force` (s,) N of the road on the
     tire, `area` (s,) m2 that a uniform pressure is shared out by, `half_sizes` (s, 2) m of the deformed rectangle each node stands for (x and y),
     `ring_rate` (s,) m/rad the derivative of the deformed x by the angle around the axle.
-    `road_height` (m) is None without a road. `cords` by name of the ply; `mass` (kg) of wall and cords.
+    `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are what it was
+    computed for, and travel with it. `cords` by name of the ply; `mass` (kg) of wall and cords.
     """
 
     displacement: np.ndarray
@@ -34,6 +36,8 @@ class StaticState:
     shape: tuple[int, int]
     touch_height: float
     road_height: float | None
+    inflation: float = 0.0
+    rolling: Rolling = AT_REST
     cords: Mapping[str, CordForce] = field(default_factory=dict)
     mass: float = 0.0
 
@@ -105,6 +109,8 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         *_surface_metric(body.lattice, points + moved),
         touch_height=touch_height,
         road_height=road_height,
+        inflation=float(equilibrium.pressure.value),
+        rolling=equilibrium.rolling,
         cords=cord_forces(body),
         mass=body.comm.allreduce(float(body.nodal_mass()[::3].sum())),
     )

@@ -48,13 +48,13 @@ def run() -> list[Table]:
     """One table: a row a number of modes."""
     with tempfile.TemporaryDirectory() as folder:
         tires = Tires(SCENE, Path(folder))
-        every = len(tires.session.modes.squares)
-        exact = _moved(follow(tires.session, *tires.modal(Choice(every, "static", STEP))))
-        full = _moved(follow(tires.session, *tires.full(STEP)))
+        every = len(tires.modes.frequency)
+        exact = _moved(follow(tires.trial, *tires.modal(Choice(every, "static", STEP))))
+        full = _moved(follow(tires.trial, *tires.full(STEP)))
         rows = [_row(tires, count, exact) for count in TRIAL]
     columns = [("modes", "-"), *((option, "%") for option in OPTIONS),
                ("none, trial", "%"), ("static, trial", "%")]  # fmt: skip
-    points = len(tires.session.patch.points)
+    points = len(tires.trial.setup.patch.points)
     notes = [
         f"Torus of 48 MPa, {tires.unknowns} unknowns, damping 5000 1/s, deflected by 10 mm, {points} contact "
         "points, the road moved 1 mm at 50 Hz for two periods. Error of the points' displacement: L2 "
@@ -67,7 +67,7 @@ def run() -> list[Table]:
 
 def _row(tires: Tires, count: int, exact: np.ndarray) -> list:
     found = [
-        _off(_moved(follow(tires.session, *tires.modal(Choice(count, option, STEP)))), exact)
+        _off(_moved(follow(tires.trial, *tires.modal(Choice(count, option, STEP)))), exact)
         for option in OPTIONS
     ]
     return [count, *found, *TRIAL[count]]

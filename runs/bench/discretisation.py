@@ -109,7 +109,7 @@ def _answer(section, consistent: bool = False) -> Answer:
 
 def _frequencies(operators, count: int = COUNT) -> np.ndarray:
     from tireroad.modal import undamped
-    from tireroad.runs.stages.modes import sites
+    from tireroad.modal.standing import sites
 
     where = sites(operators)
     return undamped.solve(operators.stiffness, operators.mass, count, sites=where).frequency

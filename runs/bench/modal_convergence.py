@@ -7,8 +7,8 @@ import time
 import numpy as np
 from mpi4py import MPI
 
+from tireroad.modal.standing import sites
 from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.stages.modes import sites
 
 ABOUT = "error of the modes over mesh and order; round tires by wave number against the general way"
 MESHES = ((12, 4), (16, 6), (24, 9), (32, 12), (48, 18))  # elements around, along

@@ -90,7 +90,7 @@ def _timed(comm: MPI.Comm, work: Callable):
 
 def _standing(comm: MPI.Comm, operators):
     from tireroad.modal import undamped
-    from tireroad.runs.stages.modes import sites
+    from tireroad.modal.standing import sites
 
     rows, modes = [], None
     for count in COUNTS:

@@ -13,6 +13,7 @@ from tireroad.runs.bench.rough_road import (
     BAND,
     SPEED,
     Mesh,
+    Prepared,
     errors,
     fewer_modes,
     modal,
@@ -20,7 +21,6 @@ from tireroad.runs.bench.rough_road import (
 )
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
-from tireroad.runs.stages.session import Session
 from tireroad.runs.validation.histories import History, follow
 
 ABOUT = "modes x residual x step x mesh against a far finer run: the Pareto front of rolling"
@@ -70,36 +70,36 @@ def run() -> list[Table]:
 
 def tables(folder: Path, meshes: tuple[Mesh, Mesh], counts, most, full_steps) -> list[Table]:
     """`meshes`: coarse and fine; `counts` of modes, and `most`, the reference's."""
-    session, exact = _reference(folder, meshes[0], most)
-    found = _choices(session, exact, str(meshes[0]), counts, RESIDUALS, STEPS)
-    full = [_full(session, exact, str(meshes[0]), step) for step in full_steps]
+    given, exact = _reference(folder, meshes[0], most)
+    found = _choices(given, exact, str(meshes[0]), counts, RESIDUALS, STEPS)
+    full = [_full(given, exact, str(meshes[0]), step) for step in full_steps]
     fine, finer = _reference(folder, meshes[1], most)
     best = ("static", "attachment")
     on_fine = _choices(fine, finer, str(meshes[1]), counts[1:], best, STEPS[1:])
     apart = errors(finer, exact, DURATION)
     return [
-        _front(found, full, session),
-        _meshes(found, on_fine, apart, session, fine),
+        _front(found, full, given),
+        _meshes(found, on_fine, apart, given, fine),
         _all(found + full + on_fine),
     ]
 
 
-def _reference(folder: Path, mesh: Mesh, modes: int) -> tuple[Session, History]:
+def _reference(folder: Path, mesh: Mesh, modes: int) -> tuple[Prepared, History]:
     observe.say(f"  {mesh} elements: modes and reference ...")
     keys = {"modes": modes, "residual": "attachment", "duration": DURATION, "step": FINEST}
-    session = prepared(folder / str(mesh), mesh, **keys)
-    return session, modal(session, session.contact_response, FINEST)
+    given = prepared(folder / str(mesh), mesh, **keys)
+    return given, modal(given, given.run.greens.contact, FINEST)
 
 
-def _choices(session: Session, exact: History, mesh: str, counts, residuals, steps) -> list[Choice]:
+def _choices(given: Prepared, exact: History, mesh: str, counts, residuals, steps) -> list[Choice]:
     out = []
     for count in counts:
         for residual in residuals:
-            response = fewer_modes(session, count, residual)
+            response = fewer_modes(given, count, residual)
             states = len(response.eigenvalue) + len(response.block)
             for step in steps:
                 try:
-                    found = modal(session, response, step)
+                    found = modal(given, response, step)
                 except (ConvergenceError, InputError) as refused:
                     observe.say(f"  {count} modes, {residual}, {step:g} s: {refused}")
                     continue
@@ -108,25 +108,19 @@ def _choices(session: Session, exact: History, mesh: str, counts, residuals, ste
     return out
 
 
-def _full(session: Session, exact: History, mesh: str, step: float) -> Choice:
+def _full(given: Prepared, exact: History, mesh: str, step: float) -> Choice:
     """Every degree of freedom of the same mesh in time."""
     from tireroad.fem.matrices.probe import nodes
     from tireroad.fem.transient.linear import FullTire
 
     observe.say(f"  full finite elements, {step:g} s ...")
-    points = nodes(session.patch.index, len(session.static.points))
-    tire = FullTire(
-        session.operators,
-        session.rotation_matrices,
-        session.speed,
-        session.damping,
-        step,
-        points,
-        points,
-    )
+    wheel = given.run.wheel
+    points = nodes(given.trial.setup.patch.index, len(given.run.static.points))
+    turning = wheel.rotation, wheel.speed, wheel.damping
+    tire = FullTire(wheel.operators, *turning, step, points, points)
     with threadpool_limits(1, "blas"):
-        found = follow(session, tire, step, 0.0)
-    size = session.operators.stiffness.getSize()[0]
+        found = follow(given.trial, tire, step, 0.0)
+    size = given.run.motions.unknowns
     off = errors(exact, found, DURATION)
     return Choice(mesh, size, FULL, 2 * size, step, found.seconds / DURATION, *off)
 
@@ -158,15 +152,15 @@ def _row(choice: Choice) -> list:
     return [*vars(choice).values(), choice.worst]
 
 
-def _front(found: list[Choice], full: list[Choice], session: Session) -> Table:
+def _front(found: list[Choice], full: list[Choice], given: Prepared) -> Table:
     best = front(found)
     named = [[_letter(k), *_row(choice)] for k, choice in enumerate(best)]
     beside = [["", *_row(choice)] for choice in full]
     notes = [
         f"Rolling at {SPEED:g} rad/s on a rough road (0.2 mm rms, waves of 30 to 200 mm) under 500 N: "
-        f"{3 * session.lattice.size} unknowns, {len(session.patch.points)} points that can touch. Error: "
+        f"{3 * given.run.motions.lattice.size} unknowns, {len(given.trial.setup.patch.points)} points that can touch. Error: "
         "the larger one of contact and axle force, relative L2 of what varies from 0 to "
-        f"{BAND:g} Hz (Hann window), against {session.scene.modal.count} modes with attachment modes at "
+        f"{BAND:g} Hz (Hann window), against {given.run.job.scene.modal.count} modes with attachment modes at "
         f"a step of {FINEST:g} s. Run time: of the loop alone, on one core.",
         *(_named(target, best, full) for target in TARGETS),
     ]
@@ -213,11 +207,14 @@ def _named(target: float, best: list[Choice], full: list[Choice]) -> str:
     )
 
 
-def _meshes(found, on_fine, apart, coarse: Session, fine: Session) -> Table:
+def _meshes(found, on_fine, apart, coarse: Prepared, fine: Prepared) -> Table:
     """Fronts of the two meshes, each against its own reference, and how far those are apart."""
     rows = [_row(choice) for part in (found, on_fine) for choice in front(part)]
-    sizes = [f"{s.scene.tire.segments} x {s.scene.tire.elements_arc}" for s in (coarse, fine)]
-    unknowns = [3 * s.lattice.size for s in (coarse, fine)]
+    sizes = [
+        f"{s.run.job.scene.tire.segments} x {s.run.job.scene.tire.elements_arc}"
+        for s in (coarse, fine)
+    ]
+    unknowns = [3 * s.run.motions.lattice.size for s in (coarse, fine)]
     notes = [
         f"Each mesh against its own reference. The references of {sizes[0]} ({unknowns[0]} unknowns) and "
         f"{sizes[1]} ({unknowns[1]}) differ by {apart[0]:.2g} % in the contact force and {apart[1]:.2g} % "

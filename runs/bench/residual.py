@@ -9,21 +9,22 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.matrices import probe
-from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
-from tireroad.greens.coupling import Basis, Wheel
+from tireroad.fem.turning import Turning
+from tireroad.greens.coupling import Basis, Wheel, wheel_of
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.state_selection import keep
 from tireroad.greens.truncation import Cutoff, estimate
-from tireroad.modal import undamped
-from tireroad.modal.basis import project
-from tireroad.modal.undamped import Modes
+from tireroad.modal.basis import ModalBasis
+from tireroad.modal.rolling import RollingModes, rolling_modes
+from tireroad.modal.standing import standing_modes
 from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.stages.modes import sites
 
 ABOUT = "receptance of few modes with each residual against the full matrices; set-up times"
 
@@ -42,16 +43,15 @@ PATCH = [(ring, arc) for ring in (-0.1, 0.0, 0.1) for arc in (-0.15, 0.0, 0.15)]
 def run() -> list[Table]:
     """Error tables standing and rolling, the receptance itself, the choice of modes, and times."""
     comm = MPI.COMM_WORLD
-    operators = _tire(comm, 20, 7)
-    modes = undamped.solve(operators.stiffness, operators.mass, max(COUNTS))
-    lattice = operators.body.lattice
+    motions = _tire(comm, 20, 7)
+    modes = standing_modes(motions, count=max(COUNTS))
+    lattice = motions.lattice
     spots = [
         probe.directed(probe.spot(lattice, *spot), np.array([0.0, 0.0, 1.0])) for spot in PATCH
     ]
     probes = sparse.csr_matrix(np.stack(spots))
-    rotation = operators.rotation()
-    standing_wheel = Wheel(operators, None, 0.0, DAMPING, "full")
-    rolling_wheel = Wheel(operators, rotation, SPEED, DAMPING, "full")
+    standing_wheel = wheel_of(motions, Turning(damping=DAMPING))
+    rolling_wheel = wheel_of(motions, Turning(speed=SPEED, damping=DAMPING))
     return [
         _errors(standing_wheel, modes, probes),
         _errors(rolling_wheel, modes, probes),
@@ -61,32 +61,27 @@ def run() -> list[Table]:
     ]
 
 
-def _tire(comm: MPI.Comm, segments: int, elements_arc: int) -> Operators:
+def _tire(comm: MPI.Comm, segments: int, elements_arc: int) -> SmallMotions:
     """An inflated torus of 48 MPa. Collective."""
     section = Torus(0.32, 0.10, 0.012, np.radians(120), segments, elements_arc, 1, 2)
     rubber = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
-    body = Body(comm, section, rubber)
-    Loader(Equilibrium(body), lambda progress: None).inflate(INFLATION)
-    return Operators(body, INFLATION)
+    tire = TireModel(section, lambda: Body(comm, section, rubber))
+    loader = Loader(Equilibrium(tire.body), lambda progress: None)
+    loader.inflate(INFLATION)
+    return SmallMotions(tire, static_state(loader.equilibrium, loader.touch))
 
 
-def _basis(wheel: Wheel, modes: Modes, count: int) -> tuple[Basis, Modes]:
-    """The first `count` modes. Collective."""
-    few = Modes(
-        **{**vars(modes), "squares": modes.squares[:count], "vectors": modes.vectors[:, :count]}
-    )
-    operators = wheel.operators
-    comm = operators.body.comm
-    projection = project(few, wheel.rotation, operators.carried, comm)
-    shape = operators.trace(few.vectors)
-    return Basis(shape, projection, wheel.decouple(projection, comm)), few
-
-
-def _respond(wheel: Wheel, modes: Modes, probes, count: int, option: str):
-    basis, few = _basis(wheel, modes, count)
+def _respond(wheel: Wheel, modes: ModalBasis, probes, count: int, option: str):
+    """The response of the first `count` modes, without a limit on the residual's states. Collective."""
+    rolling = _rolling(wheel, modes.first(count))
+    basis = Basis.of(rolling)
     if option == "none":
         return basis.couple(probes, probes)
-    return wheel.respond(basis, few, probes, probes, option)
+    return wheel.respond(basis, rolling.basis.modes, probes, probes, option)
+
+
+def _rolling(wheel: Wheel, modes: ModalBasis) -> RollingModes:
+    return rolling_modes(modes, wheel.turning, wheel.operators.body.comm)
 
 
 def _off(found: np.ndarray, exact: np.ndarray) -> float:
@@ -95,7 +90,7 @@ def _off(found: np.ndarray, exact: np.ndarray) -> float:
     return float(error.max())
 
 
-def _errors(wheel: Wheel, modes: Modes, probes) -> Table:
+def _errors(wheel: Wheel, modes: ModalBasis, probes) -> Table:
     """Thesis figure 6.2 as numbers: every option for every number of modes. Collective."""
     rows = []
     for count in COUNTS:
@@ -126,7 +121,7 @@ def _errors(wheel: Wheel, modes: Modes, probes) -> Table:
     )
 
 
-def _figure(wheel: Wheel, modes: Modes, probes) -> Table:
+def _figure(wheel: Wheel, modes: ModalBasis, probes) -> Table:
     """Thesis figure 6.2: ten modes and the full matrices, driving point in the middle. Collective."""
     frequency = np.linspace(0, 2 * modes.frequency[9], 25)
     middle = len(PATCH) // 2
@@ -145,7 +140,7 @@ def _figure(wheel: Wheel, modes: Modes, probes) -> Table:
     )
 
 
-def _choice(wheel: Wheel, modes: Modes, probes) -> Table:
+def _choice(wheel: Wheel, modes: ModalBasis, probes) -> Table:
     """States kept dynamic by participation or by frequency, the others static. Collective."""
     band = float(modes.frequency[99] / 2)
     whole = _respond(wheel, modes, probes, max(COUNTS), "static")
@@ -169,11 +164,11 @@ def _choice(wheel: Wheel, modes: Modes, probes) -> Table:
 
 def _times(comm: MPI.Comm) -> Table:
     """Set-up of the residual and of the recursion at full size. Collective."""
-    operators = _tire(comm, 80, 16)
-    body = operators.body
+    motions = _tire(comm, 80, 16)
+    body, operators = motions.body, motions.operators
     nearest = np.argsort(body.lattice.points(body.surface.ids)[:, 2], kind="stable")
     places = probe.nodes(nearest[:FORCES], len(nearest))
-    modes = undamped.solve(operators.stiffness, operators.mass, MODES, sites=sites(operators))
+    modes = standing_modes(motions, count=MODES)
     rows = []
 
     def clock(name: str, target, work):
@@ -184,15 +179,15 @@ def _times(comm: MPI.Comm) -> Table:
         rows.append([name, time.perf_counter() - began, target])
         return done
 
-    for rotation, speed in ((None, 0.0), (operators.rotation(), SPEED)):
-        wheel = Wheel(operators, rotation, speed, DAMPING, "full")
+    for speed in (0.0, SPEED):
+        wheel = wheel_of(motions, Turning(speed=speed, damping=DAMPING))
         _ = wheel.rotating_stiffness, wheel.rotating_damping
-        basis, _ = _basis(wheel, modes, MODES)
+        basis = Basis.of(_rolling(wheel, modes))
         for option in OPTIONS[2:]:
             response = clock(
                 f"residual {option}, {speed:g} rad/s",
                 30.0,
-                lambda w=wheel, o=option, b=basis: w.respond(b, modes, places, places, o),
+                lambda w=wheel, o=option, b=basis: w.respond(b, modes.modes, places, places, o),
             )
     states = len(response.eigenvalue)
     clock(

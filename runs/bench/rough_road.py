@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import copy
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.grid_patch import settle
-from tireroad.contact.model import step_solver
+from tireroad.fem.matrices.probe import nodes
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
+from tireroad.greens.responses import make_response
+from tireroad.modal.rolling import rolling_modes
 from tireroad.runs.files.store import opened
 from tireroad.runs.process import observe
-from tireroad.runs.stages.session import Session
-from tireroad.runs.validation.histories import History, distance, follow
+from tireroad.runs.stages.pipeline import Finished, run_scene
+from tireroad.runs.validation.histories import History, Trial, distance, follow
 
 BAND = 500.0  # Hz, up to which errors are told
 SPEED = 100.0  # rad/s
@@ -75,19 +75,26 @@ def write_scene(file: Path, mesh: Mesh, **keys: object) -> Path:
     return file
 
 
-def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Session:
+@dataclass(frozen=True)
+class Prepared:
+    """A `run` up to its Green's functions, and the `trial` of its road, its points settled."""
+
+    run: Finished
+    trial: Trial
+
+
+def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Prepared:
     """A run up to its Green's functions, its points settled; `sets` as of --set. Collective."""
     from tireroad.runs.scene.load import load
-    from tireroad.runs.stages.pipeline import run_scene
 
     folder.mkdir(parents=True, exist_ok=True)
     scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
     with observe.quiet():
-        session = run_scene(
+        run = run_scene(
             scene, folder, MPI.COMM_WORLD, until="greens", fresh=False, petsc_options=[]
         )
-    settle_on_points(session)
-    return session
+    setup, _ = run.setup.settled(run.greens.contact, run.static.force, scene.contact)
+    return Prepared(run, Trial(scene.contact, setup, scene.time.duration))
 
 
 @dataclass(frozen=True)
@@ -111,7 +118,6 @@ class Rolled:
 def rolled(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Rolled:
     """A run up to its contact forces; stages that the folder holds are reused. Collective."""
     from tireroad.runs.scene.load import load
-    from tireroad.runs.stages.pipeline import run_scene
 
     folder.mkdir(parents=True, exist_ok=True)
     scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
@@ -123,50 +129,20 @@ def rolled(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Rolled:
     return Rolled(stages, forces)
 
 
-def settle_on_points(session: Session) -> None:
-    """The static state on the session's grid of points, by its exact static flexibility."""
-    response, patch = session.contact_response, session.patch
-    p = len(patch.index)
-    flexibility = (response.static() + response.residual)[:p, :p]
-    solver = step_solver(session.scene.contact, patch, flexibility)
-    nodal = session.static.force[patch.index]
-    session.patch, _ = settle(patch, solver, flexibility, nodal)
+def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
+    """The response that the run would have with its first modes and another residual. Collective."""
+    run, job = given.run, given.run.job
+    rolling = rolling_modes(run.fields.first(count), run.wheel.turning, job.comm)
+    points = nodes(given.trial.setup.patch.index, len(run.static.points), 2)
+    pair = points, points, residual
+    return make_response(lambda: run.wheel, rolling, *pair, lambda: rolling.basis).response
 
 
-def fewer_modes(session: Session, count: int, residual: str) -> Response:
-    """The response that the session would have with its first modes and another residual. Collective."""
-    from tireroad.fem.matrices.probe import nodes
-    from tireroad.modal.undamped import Modes
-    from tireroad.runs.stages.modes import ModalBasis
-    from tireroad.runs.stages.responses import make
-
-    few, modes, basis = copy.copy(session), session.modes, session.modal
-    greens = replace(session.scene.greens, residual=residual)
-    few.scene = replace(session.scene, greens=greens)
-    first = {"squares": modes.squares[:count], "vectors": modes.vectors[:, :count]}
-    few.modes = Modes(**vars(modes) | first)
-    square = {
-        name: matrix if matrix is None else matrix[:count, :count]
-        for name, matrix in vars(basis.projection).items()
-        if name not in ("squares", "momentum")
-    }
-    projection = replace(
-        basis.projection,
-        squares=basis.projection.squares[:count],
-        momentum=basis.projection.momentum[:, :count],
-        **square,
-    )
-    few.modal = ModalBasis(basis.frequency[:count], basis.shape[:, :count], projection)
-    few.state_modes = session.wheel.decouple(projection, session.comm)
-    points = nodes(session.patch.index, len(session.static.points), 2)
-    return make(few, points, points)
-
-
-def modal(session: Session, response: Response, step: float) -> History:
+def modal(given: Prepared, response: Response, step: float) -> History:
     """The loop on the states that the step resolves."""
     tire = Recursion(response.resolved(step), step, "linear", MPI.COMM_SELF)
     with threadpool_limits(1, "blas"):
-        return follow(session, tire, step, 0.0)
+        return follow(given.trial, tire, step, 0.0)
 
 
 def errors(reference: History, found: History, duration: float) -> tuple[float, float]:

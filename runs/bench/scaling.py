@@ -91,15 +91,15 @@ def unknowns(folder: Path, meshes: tuple[Mesh, ...], modes: int) -> Table:
 def _size(folder: Path, mesh: Mesh, modes: int) -> list:
     from tireroad.fem.matrices.direct import factorise, solve_columns
 
-    session = prepared(folder, mesh, modes=modes)
+    operators = prepared(folder, mesh, modes=modes).run.motions.operators
     stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
-    stiffness = session.operators.stiffness
+    stiffness = operators.stiffness
     size = stiffness.getSize()[0]
     began = time.perf_counter()
     pc = factorise(stiffness)
     factorisation = time.perf_counter() - began
     flops = pc.getFactorMatrix().getMumpsRinfog(3)
-    columns = np.random.default_rng(0).normal(size=(len(session.operators.mass), 32))
+    columns = np.random.default_rng(0).normal(size=(len(operators.mass), 32))
     solve = fastest(lambda: solve_columns(pc, stiffness, columns), 2) / 32
     pc.destroy()
     seconds = {name: entry["seconds"] for name, entry in stages.items()}

@@ -87,14 +87,14 @@ def _seconds(run: Rolled, stages: tuple[str, ...]) -> float:
 def _mirrors(folder: Path, mesh: Mesh, keys: dict) -> list:
     """The modes of a tire whose mirror plane is used, and is not."""
     from tireroad.modal import undamped
-    from tireroad.runs.stages.modes import solve
+    from tireroad.modal.standing import solved
 
-    session = prepared(folder / "rolling", mesh, **keys)
-    operators, count = session.operators, keys["modes"]
+    operators = prepared(folder / "rolling", mesh, **keys).run.motions.operators
+    count = keys["modes"]
     times, found = [], []
     for work in (
         lambda: undamped.solve(operators.stiffness, operators.mass, count),
-        lambda: solve(session),
+        lambda: solved(operators, count=count),
     ):
         began = time.perf_counter()
         found.append(work())

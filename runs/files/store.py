@@ -6,7 +6,6 @@ and a checksum that `opened` verifies before the file is read.
 """
 
 import hashlib
-import io
 import json
 import shutil
 import sys
@@ -22,6 +21,7 @@ import numpy as np
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import checksum
 from tireroad.runs.files.disk import replacing
+from tireroad.runs.files.hdf5_disk import Disk
 from tireroad.runs.files.identity import Identity, identity
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
@@ -63,64 +63,6 @@ class Provenance:
         }
 
 
-class _Disk(io.RawIOBase):
-    """The file under HDF5. The first refused write is raised; later ones are taken and dropped.
-
-    HDF5's own file driver cannot close a file on a full disk: it tries again until the process ends
-    with a segmentation fault (seen with 1.10.8). Dropped writes let it close; the file is removed.
-    """
-
-    def __init__(self, file: io.FileIO) -> None:
-        self._file = file
-        self.error: OSError | None = None
-
-    def readable(self) -> bool:
-        return True
-
-    def writable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        return self._file.tell()
-
-    def readinto(self, buffer: Any) -> int:
-        view = memoryview(buffer).cast("B")
-        count = self._file.readinto(view)
-        view[count:] = bytes(len(view) - count)
-        return len(view)
-
-    def write(self, data: Any) -> int:
-        view = memoryview(data).cast("B")
-        written = 0
-        while written < len(view):
-            written += self._attempt(self._file.write, view[written:]) or len(view)
-        return len(view)
-
-    def truncate(self, size: int | None = None) -> int:
-        self._attempt(self._file.truncate, size)
-        return self._file.seek(0, io.SEEK_END) if size is None else size
-
-    def _attempt(self, call: Any, argument: Any) -> int | None:
-        """What `call` returns; None once the disk has refused."""
-        if self.error is not None:
-            return None
-        try:
-            return call(argument)
-        except OSError as error:
-            self.error = error
-            raise
-
-    def close(self) -> None:
-        self._file.close()
-        super().close()
-
-
 @contextmanager
 def writing(path: Path, provenance: Provenance, begin: Path | None = None) -> Iterator[h5py.File]:
     """An HDF5 file open for writing; it appears as `path`, whole, when the block ends well.
@@ -131,7 +73,7 @@ def writing(path: Path, provenance: Provenance, begin: Path | None = None) -> It
     with replacing(path) as part:
         if begin is not None:
             shutil.copyfile(begin, part)
-        disk = _Disk(part.open("r+b" if begin else "w+b", buffering=0))
+        disk = Disk(part.open("r+b" if begin else "w+b", buffering=0))
         try:
             block = {} if begin else {"userblock_size": checksum.BLOCK}
             file = h5py.File(disk, "r+" if begin else "w", **block)

@@ -5,20 +5,20 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
+from tireroad.fem import parallel
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.parallel import ToldByRoot
 from tireroad.runs.files.disk import Removed, explained
 from tireroad.runs.process.packages import missing
 from tireroad.runs.process.signals import STOP_SIGNALS, Stopped
 from tireroad.runs.process.statuses import BUG, DONE, GAVE_UP, INPUT, STOPPED
 
+T = TypeVar("T")
+
 TOGETHER = 3.0
 """Seconds a failing process waits for the others to fail likewise before it ends them all."""
-
-
-class ToldByRoot(RuntimeError):
-    """The root process failed unexpectedly and says so; the others end without a word."""
 
 
 def start_petsc(options: list[str]) -> None:
@@ -32,26 +32,9 @@ def start_petsc(options: list[str]) -> None:
     petsc4py.init(["tireroad", "-no_signal_handler", *options])
 
 
-def on_root(comm: Any, function: Callable[[], Any]) -> Any:
-    """Run `function` on the root process; its value on every process.
-
-    Where it fails, every process raises: the same InputError, ConvergenceError or Removed, on the others
-    ToldByRoot for an error that is a bug. Collective.
-    """
-    value, error = None, None
-    if comm.rank == 0:
-        try:
-            value = function()
-        except Exception as raised:
-            error = raised
-    if comm.size > 1:
-        clear = isinstance(error, InputError | ConvergenceError | Removed)
-        told = comm.bcast(error if clear or error is None else ToldByRoot())
-        value = comm.bcast(value if error is None else None)
-        error = error or told
-    if error is not None:
-        raise error
-    return value
+def on_root(comm: Any, function: Callable[[], T]) -> T:
+    """As fem.parallel.on_root; a result folder that was removed is told on every process too. Collective."""
+    return parallel.on_root(comm, function, (InputError, ConvergenceError, Removed))
 
 
 def judged(function: Callable[[], None]) -> tuple[int, str]:

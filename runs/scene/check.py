@@ -5,6 +5,7 @@ from typing import Any
 
 from tireroad.runs.scene.demand import check_demand, duration
 from tireroad.runs.scene.estimate import estimate
+from tireroad.runs.scene.own_tire import described
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.road_check import check_road
@@ -61,6 +62,8 @@ def explain(scene: Scene) -> str:
         lines.append(
             f"  {stage:10}" + (f"skipped: {reasons[stage]}" if stage in reasons else "runs")
         )
+    if scene.tire.section == "file":
+        lines += ["", *described(scene.tire)]
     return "\n".join([*lines, *_demand(scene)])
 
 

@@ -17,6 +17,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described
 from tireroad.runs.scene import locate, rules
 from tireroad.runs.scene.cavity_table import filled
+from tireroad.runs.scene.own_tire import file_has_losses, with_own_section
 from tireroad.runs.scene.schema import (
     Table,
     applies,
@@ -57,7 +58,10 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-    scene = with_elements(filled(_with_damping(scene)))
+    scene = with_elements(filled(scene))
+    if "tire" not in source.broken():
+        scene = with_own_section(scene, source)
+    scene = _with_damping(scene)
     rules.check(scene, raw, source)
     source.refuse()
     return scene
@@ -66,7 +70,7 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
 def _with_damping(scene: Scene) -> Scene:
     """The default damping in proportion, where neither it nor the loss factor of a compound is given."""
     tire = scene.tire
-    loses = any(part.loss_factor for part in (tire, *tire.region))
+    loses = any(part.loss_factor for part in (tire, *tire.region)) or file_has_losses(tire)
     return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
 
 

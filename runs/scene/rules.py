@@ -18,8 +18,8 @@ Where = Callable[[tuple[str, ...], str], InputError]
 # Keys of the public interface that this version does not compute, with the values it does take and
 # what to write instead. A later version takes its lines out.
 LATER: dict[str, tuple[tuple[Any, ...], str]] = {
-    "tire.mesh": ((), 'only section = "torus" is supported in this version'),
-    "tire.section": (("torus",), 'only "torus" is supported in this version'),
+    "tire.mesh": ((), 'is not supported: write section = "file" and file = "…"'),
+    "tire.section": (("torus", "file"), 'only "torus" and "file" are supported in this version'),
 }
 
 
@@ -56,6 +56,8 @@ def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
 
 def _geometry(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     tire = scene.tire
+    if tire.section == "file":
+        return
     if tire.thickness >= tire.minor_radius:
         raise error(
             ("tire", "thickness"),
@@ -78,6 +80,11 @@ def _geometry(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             " make it or minor_radius smaller",
         )
     for number, region in enumerate(tire.region):
+        if region.name is not None:
+            raise error(
+                ("tire", "region", str(number), "name"),
+                'is for section = "file": a part of a torus is told by arc, side and depth',
+            )
         for key in ("arc", "depth"):
             low, high = getattr(region, key)
             if low >= high:

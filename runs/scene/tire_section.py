@@ -9,11 +9,13 @@ import numpy as np
 from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
+from tireroad.runs.scene.own_tire import own_free_unknowns, own_ring
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_tables import Region, Tire
 
 # (segments, elements along the arc) where the scene does not say; by order.
 MESHES = {1: (160, 32), 2: (100, 16), 3: (30, 14)}
+OWN_SEGMENTS = 60  # around a tire from a file
 NEAR_ROAD = 0.2  # footprint_size with a road
 
 
@@ -21,12 +23,13 @@ def with_elements(scene: Scene) -> Scene:
     """The scene with its elements chosen where it leaves them open.
 
     Order 3 unless the scene says how many elements there are: then 2, as finer ones are asked for by
-    their number. With a road, elements are smaller at the footprint.
+    their number; and of a file, which has its own along the section. With a road, elements are smaller at the footprint.
     """
     tire, static = scene.tire, scene.static
+    own = tire.section == "file"
     counted = tire.segments is not None or tire.elements_arc is not None
-    order = tire.order or (2 if counted else 3)
-    segments, along = MESHES[order]
+    order = tire.order or (2 if counted or own else 3)
+    segments, along = MESHES[order] if not own else (OWN_SEGMENTS, 1)
     road = (static.load, static.deflection, static.road_height) != (None, None, None)
     chosen = {
         "order": order,
@@ -39,6 +42,8 @@ def with_elements(scene: Scene) -> Scene:
 
 def make_section(tire: Tire) -> Ring:
     """The shape of the tire and its elements."""
+    if tire.section == "file":
+        return own_ring(tire)
     torus, patches, plies = _torus(tire)
     return torus.ring(patches, plies)
 
@@ -63,6 +68,8 @@ def patch(number: int, region: Region) -> Patch:
 
 def free_unknowns(tire: Tire) -> int:
     """Displacement unknowns without the clamped bead faces."""
+    if tire.section == "file":
+        return own_free_unknowns(tire)
     torus, patches, plies = _torus(tire)
     wall, arc = (len(line) - 1 for line in torus.lines(patches, plies))
     free = (tire.order * wall + 1) * (tire.order * arc - 1)

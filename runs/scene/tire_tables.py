@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
+from tireroad.fem.parameters import filename, flag, texts
 from tireroad.runs.scene.cavity_table import Cavity
 from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
 
+TORUS, FILE = ("section", ("torus",)), ("section", ("file",))
 LINEAR = ("model", ("linear", "neo-hookean"))
 
 
@@ -72,6 +74,7 @@ def _loss_factor():
 
 @dataclass(frozen=True)
 class Region:
+    name: str | None = text(None, "region of a file that this is; a torus has none of its own")
     arc: tuple[float, float] = vector(
         (0.0, 45.0), "deg", "from, to, measured from the crown", least=0, most=175
     )
@@ -79,7 +82,9 @@ class Region:
     depth: tuple[float, float] = vector(
         (0.0, 1.0), "-", "from, to, through the wall; 0: inner face", least=0, most=1
     )
-    material: Material = table(Material, "what the region is made of")
+    material: Material | None = table(
+        Material, "what the region is made of; absent: as the file says", optional=True
+    )
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()
 
@@ -111,22 +116,37 @@ class Cords:
 # torus: footprint_size 1, 0.5, 0.3, 0.2 on 30 x 14: 0.85, 0.6, -0.1, 0.04 % off 2000 N.
 @dataclass(frozen=True)
 class Tire:
-    section: str = choice("torus", ("torus",), "shape of the section")
-    outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10)
-    minor_radius: float = number(0.10, "m", "of the section, to its outer face", above=0, most=10)
-    thickness: float = number(0.012, "m", "of the wall", above=0, most=5)
-    half_angle: float = number(120.0, "deg", "arc from the crown to each bead", least=10, most=175)
+    section: str = choice("torus", ("torus", "file"), "shape of the section")
+    outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10, only_for=TORUS)
+    minor_radius: float = number(
+        0.10, "m", "of the section, to its outer face", above=0, most=10, only_for=TORUS
+    )
+    thickness: float = number(0.012, "m", "of the wall", above=0, most=5, only_for=TORUS)
+    half_angle: float = number(
+        120.0, "deg", "arc from the crown to each bead", least=10, most=175, only_for=TORUS
+    )
     segments: int | None = integer(
-        None, "elements around; absent: 30 of order 3", least=8, most=4000
+        None, "elements around; absent: 30 of order 3, 60 of a file", least=8, most=4000
     )
     elements_arc: int | None = integer(
-        None, "elements from bead to bead; absent: 14 of order 3", least=2, most=1000
+        None,
+        "elements from bead to bead; absent: 14 of order 3",
+        least=2,
+        most=1000,
+        only_for=TORUS,
     )
-    elements_thickness: int = integer(1, "elements through the wall", least=1, most=20)
+    elements_thickness: int = integer(
+        1, "elements through the wall", least=1, most=20, only_for=TORUS
+    )
     order: int | None = integer(
-        None, "of the elements; absent: 3, or 2 where their number is given", least=1, most=3
+        None,
+        "of the elements; absent: 3, or 2 where their number is given and of a file",
+        least=1,
+        most=3,
     )
-    grading: str = choice("bead", ("bead", "uniform"), "of the elements along the arc")
+    grading: str = choice(
+        "bead", ("bead", "uniform"), "of the elements along the arc", only_for=TORUS
+    )
     footprint_size: float | None = number(
         None,
         "-",
@@ -138,6 +158,19 @@ class Tire:
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()
     region: tuple[Region, ...] = tables(Region, "a part of the section of another material")
+    file: str | None = filename(
+        "Abaqus deck (.inp) or Gmsh mesh (.msh) of the section or the body", only_for=FILE
+    )
+    inner: str | None = text(None, "surface or node set of the face under pressure", only_for=FILE)
+    tread: str | None = text(None, "surface or node set that can touch the road", only_for=FILE)
+    rim: tuple[str, ...] = texts("surfaces or node sets that the wheel holds", only_for=FILE)
+    length_unit: str = choice(
+        "m",
+        ("m", "mm", "in"),
+        "of the file; mm: with N, MPa and tonnes; in: lbf, psi",
+        only_for=FILE,
+    )
+    mirror: bool = flag(False, "the file has half the section, which ends on z = 0", only_for=FILE)
     cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")
     cavity: Cavity | None = table(
         Cavity, "the air inside; absent: none in a torus, else this table's defaults", optional=True

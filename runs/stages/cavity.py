@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, ClassVar
 
 import h5py
 import numpy as np
 
 from tireroad.fem.cavity.duct import Duct
+from tireroad.fem.model import SmallMotions
 from tireroad.modal.air import Air
-from tireroad.modal.rotating import StateModes
+from tireroad.modal.basis import ModalBasis
+from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.cavity_table import has_air
-from tireroad.runs.stages.session import Session
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Done, Shared
+
+if TYPE_CHECKING:
+    from tireroad.fem.cavity.column import Column
 
 LIMIT = 1000.0  # Hz: beyond it the section is half a wavelength wide, and the duct no line
 _SHOWN = 4
@@ -37,43 +45,52 @@ _STATES = {
 }
 
 
-def inputs(session: Session) -> dict | None:
+def inputs(job: Job) -> dict | None:
     """What the air depends on besides the static state; None without it."""
-    return asdict(session.scene.tire.cavity) if has_air(session.scene) else None
+    return asdict(job.scene.tire.cavity) if has_air(job.scene) else None
 
 
-def make(session: Session):
-    """The air at the wall of the static state (fem.cavity.column), or None. Collective."""
-    if not has_air(session.scene):
+def make_air(job: Job, motions: SmallMotions, highest: float) -> Column | None:
+    """The air at the wall of the static state, or None; `highest` (Hz) of the modes. Collective."""
+    if not has_air(job.scene):
         return None
     from tireroad.fem.cavity.column import make_column
 
-    wanted, operators = session.scene.tire.cavity, session.operators
-    up_to = wanted.up_to or min(float(session.modal.frequency[-1]), LIMIT)
-    with session.record.timing("air"):
-        return make_column(
-            session.body,
-            operators.unknowns,
-            session.scene.static.inflation,
-            wanted.temperature,
-            session.speed,
-            up_to,
-            wanted.loss_factor,
-        )
+    wanted, static = job.scene.tire.cavity, motions.static
+    return make_column(
+        motions.body,
+        motions.operators.unknowns,
+        static.inflation,
+        wanted.temperature,
+        job.speed,
+        wanted.up_to or min(highest, LIMIT),
+        wanted.loss_factor,
+    )
 
 
-def join(session: Session, modes) -> None:
-    """Let the air join `session.modal`, the modes (all rows) of the tire, where there is any. Collective."""
-    if not has_air(session.scene):
-        return
-    projection = session.wheel.with_air(session.modal.projection, modes)
-    session.modal = replace(session.modal, projection=projection)
-    duct = projection.air.duct
-    session.record.headline |= {
-        "air, rigid walls": (_listed(duct.frequency[:_SHOWN]), "Hz"),
-        "volume of air": (1e3 * duct.volume, "l"),
+@dataclass(frozen=True, kw_only=True)
+class AirColumn(Shared["Column | None"]):
+    """The air at the wall, as the modes were made with it, or once more where they are reused."""
+
+    name: ClassVar[str] = "air"
+    modes: Done[ModalBasis]
+    motions: Done[SmallMotions]
+
+    def make(self) -> Column | None:
+        """Collective."""
+        basis = self.modes.product
+        if basis.column is not None:
+            return basis.column
+        return make_air(self.job, self.motions.product, float(basis.frequency[-1]))
+
+
+def describe_air(record: Record, air: Air) -> None:
+    """The modes of the air that joins those of the tire."""
+    record.headline |= {
+        "air, rigid walls": (_listed(air.duct.frequency[:_SHOWN]), "Hz"),
+        "volume of air": (1e3 * air.duct.volume, "l"),
     }
-    session.record.indicators["modes of the air"] = (len(duct.circular), "-")
+    record.indicators["modes of the air"] = (len(air.duct.circular), "-")
 
 
 def _listed(values: np.ndarray) -> str:
@@ -102,39 +119,29 @@ def read(file: h5py.File) -> Air | None:
     return Air(Duct(**arrays, **scalars), group["coupling"][:])
 
 
-def fill_states(file: h5py.File, session: Session) -> None:
+def fill_states(file: h5py.File, rolling: RollingModes) -> None:
     """Write the states of a tire with air that stands, which no stage before had to find."""
-    modes = session.state_modes
+    states = rolling.states
     for name, unit in _STATES.items():
-        put(file, f"states/{name}", getattr(modes, name), unit)
-    put(file, "states/frequency", modes.eigenvalue.imag / (2 * np.pi), "Hz")
-    put(file, "states/air_share", share(session), "-")
-    file["states"].attrs["basis_condition"] = modes.condition
-    file["states"].attrs["rigid_states"] = modes.rigid
+        put(file, f"states/{name}", getattr(states, name), unit)
+    put(file, "states/frequency", states.eigenvalue.imag / (2 * np.pi), "Hz")
+    put(file, "states/air_share", share(rolling), "-")
+    file["states"].attrs["basis_condition"] = states.condition
+    file["states"].attrs["rigid_states"] = states.rigid
 
 
-def read_states(file: h5py.File) -> StateModes:
-    """The states `fill_states` wrote."""
-    group = file["states"]
-    return StateModes(
-        condition=float(group.attrs["basis_condition"]),
-        rigid=int(group.attrs["rigid_states"]),
-        **{name: group[name][:] for name in _STATES},
-    )
-
-
-def share(session: Session) -> np.ndarray:
+def share(rolling: RollingModes) -> np.ndarray:
     """Part (q,) of each state's kinetic energy that is the air's."""
-    return session.modal.projection.air.share(session.state_modes.right)
+    return rolling.basis.projection.air.share(rolling.states.right)
 
 
-def describe(session: Session) -> None:
+def describe(record: Record, rolling: RollingModes) -> None:
     """Tell the states that are the air's more than any others: the cavity's resonances."""
-    modes, part = session.state_modes, share(session)
-    first = np.argsort(-part * (modes.eigenvalue.imag > 0))[:_SHOWN]
+    frequency, part = rolling.states.eigenvalue.imag, share(rolling)
+    first = np.argsort(-part * (frequency > 0))[:_SHOWN]
     first = first[part[first] >= min(_MOSTLY, part[first[0]])]
-    first = first[np.argsort(modes.eigenvalue.imag[first])]
-    session.record.headline |= {
-        "states mostly of air": (_listed(modes.eigenvalue.imag[first] / (2 * np.pi)), "Hz"),
+    first = first[np.argsort(frequency[first])]
+    record.headline |= {
+        "states mostly of air": (_listed(frequency[first] / (2 * np.pi)), "Hz"),
         "their share of air": (_listed(part[first]), "-"),
     }

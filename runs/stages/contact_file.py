@@ -5,18 +5,20 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from tireroad.contact.rolling import Instant
+from tireroad.contact.setup import ContactSetup
 from tireroad.runs.files import packed, store
 from tireroad.runs.files.checksum import seal
 from tireroad.runs.files.disk import part_of, replacing
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.session import Session
+from tireroad.runs.stages.job import Job
 
 BLOCK = 512  # steps kept in memory between two writes
 CHECKPOINT = "checkpoint.h5"
@@ -36,22 +38,48 @@ _LAYOUT: dict[str, tuple[tuple, str]] = {
 DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, where a scene has them
 
 
+@dataclass(frozen=True, kw_only=True)
+class ContactHistory:
+    """What the road did to the tire, n steps of `step` s at the times `time` (n,): `total_force` (n, 3) N,
+    `axle_force` (n, 3) N where it is kept, displacement (n, k, 3) m at `driven` points, where there are any.
+    """
+
+    step: float
+    scheme: str
+    time: np.ndarray
+    total_force: np.ndarray
+    axle_force: np.ndarray | None = None
+    driven: np.ndarray | None = None
+
+    @staticmethod
+    def of(file: h5py.File) -> ContactHistory:
+        """The history in contact.h5; not its points, which may be many."""
+        kept = {"axle_force": "axle_force", "driven": DRIVEN}
+        return ContactHistory(
+            step=float(file.attrs["step"]),
+            scheme=str(file.attrs["scheme"]),
+            time=file["time"][:],
+            total_force=file["total_force"][:],
+            **{name: file[stored][:] for name, stored in kept.items() if stored in file},
+        )
+
+
 class ContactFile:
     """Blocks of steps, compressed, on the root process; a checkpoint is a copy with the loop's state."""
 
-    def __init__(self, session: Session, attributes: dict):
-        self._session = session
+    def __init__(self, job: Job, key: str, setup: ContactSetup, attributes: dict):
+        self._job, self._key, self._patch = job, key, setup.patch
         self._attributes = attributes | {
-            "road": session.scene.road.kind,
-            "speed": session.speed,
-            "road_speed": session.road_speed,
+            "road": job.scene.road.kind,
+            "speed": job.speed,
+            "road_speed": setup.rolled.speed,
         }
-        self._checkpoint = session.directory / CHECKPOINT
+        self._checkpoint = job.directory / CHECKPOINT
         self._stack: list = []
         self._readings: list[np.ndarray] = []
-        self._rubs = session.scene.contact.brush_stiffness is not None
+        self._rubs = job.scene.contact.brush_stiffness is not None
         self._layout = dict(_LAYOUT)
-        if not session.scene.output.axle_force:
+        if not job.scene.output.axle_force:
             del self._layout["axle_force"]
         self._done = 0
 
@@ -59,14 +87,14 @@ class ContactFile:
         """Begin the temporary file; the stack puts it in place at its end, or removes it after an
         error. The state of a checkpoint of the same inputs to go on from, else None. Collective.
         """
-        self._done, state = on_root(self._session.comm, lambda: self._open(stack, path))
+        self._done, state = on_root(self._job.comm, lambda: self._open(stack, path))
         return state
 
     def _open(self, stack: ExitStack, path: Path) -> tuple[int, dict[str, np.ndarray] | None]:
         self._path, self._packer = path, packed.Packer()
         stack.callback(self._packer.close)
-        provenance = self._session.provenance("contact")
-        going_on = not self._session.fresh and self._usable(provenance.input_hash)
+        provenance = self._job.provenance("contact", self._key)
+        going_on = not self._job.fresh and self._usable(provenance.input_hash)
         begin = self._checkpoint if going_on else None
         self._file = stack.enter_context(store.writing(path, provenance, begin))
         if not going_on:
@@ -84,11 +112,11 @@ class ContactFile:
         return not reason
 
     def _lay_out(self) -> None:
-        patch = self._session.patch
+        patch = self._patch
         c = len(patch.points)
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
-        forces = len(self._session.scene.force)
+        forces = len(self._job.scene.force)
         driven = {DRIVEN: ((forces, 3), "m")} if forces else {}
         # A chunk of many points would be many megabytes: 4 MB at most is read at once.
         rows = 2 ** int(np.log2(np.clip(500_000 // max(c, 1), 1, BLOCK)))
@@ -116,7 +144,7 @@ class ContactFile:
             return
         steps = _columns(self._stack)
         count(steps)
-        on_root(self._session.comm, lambda: self._write(steps))
+        on_root(self._job.comm, lambda: self._write(steps))
         self._done += len(self._stack)
         self._stack.clear()
         self._readings.clear()
@@ -136,7 +164,7 @@ class ContactFile:
 
     def checkpoint(self, state: dict[str, np.ndarray]) -> None:
         """Keep the steps flushed so far and the loop's state, whole or not at all. Collective."""
-        on_root(self._session.comm, lambda: self._save(state))
+        on_root(self._job.comm, lambda: self._save(state))
 
     def _save(self, state: dict[str, np.ndarray]) -> None:
         self._packer.wait()
@@ -149,8 +177,8 @@ class ContactFile:
             seal(part)
 
     def finish(self) -> None:
-        """All steps are flushed: the checkpoint has had its day. Collective."""
-        on_root(self._session.comm, self._finish)
+        """All steps are flushed: delete the checkpoint. Collective."""
+        on_root(self._job.comm, self._finish)
 
     def _finish(self) -> None:
         self._packer.wait()

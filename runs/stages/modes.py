@@ -2,66 +2,132 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
-from tireroad.modal.damping import StrainEnergy
-from tireroad.modal.symmetry import Sites
+from tireroad.fem.cavity.column import Column
+from tireroad.fem.model import SmallMotions
+from tireroad.fem.static.state import StaticState
+from tireroad.modal.basis import ModalBasis, Projection
+from tireroad.modal.damping import Damping, StrainEnergy
+from tireroad.modal.standing import projected, solved, with_fields
+from tireroad.modal.undamped import Modes
+from tireroad.modal.waves import Labels, label
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.stages import cavity
-from tireroad.runs.stages.session import Session
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Done, Shared
+from tireroad.runs.stages.turning import damping_of
 
 _NAMED = 8  # modes of a round tire shown by name
 
-
-@dataclass(frozen=True)
-class ModalBasis:
-    """`frequency` (m,) Hz, `shape` kg^-1/2 of the outer face (3 s, m), of a free rim after it (+ 6),
-    and the small matrices.
-    """
-
-    frequency: np.ndarray
-    shape: np.ndarray
-    projection: object
-
-
-def inputs(session: Session) -> dict:
-    """The static state and the modal table; rotation matrices only when the wheel turns."""
-    return {
-        "static": session.hashes["static"],
-        "modal": asdict(session.scene.modal),
-        "rotating": session.speed != 0,
-        "cavity": cavity.inputs(session),
-    }
+_UNITS = {
+    "squares": "1/s2",
+    "gyroscopic": "1/rad",
+    "convective": "1/rad2",
+    "body": "1/rad",
+    "body_convective": "1/rad2",
+    "momentum": "kg^1/2",
+    "loss_factor": "-",
+}
 
 
-def compute(session: Session, path: Path) -> None:
-    """Solve, project and store. Collective."""
-    from tireroad.modal.basis import project
+@dataclass(frozen=True, kw_only=True)
+class Motions(Shared[SmallMotions]):
+    """The finite elements at the static state, for whoever needs their matrices."""
 
-    record, operators = session.record, session.operators
-    with record.timing("eigensolver"):
-        modes = solve(session)
-    rotation = session.rotation_matrices if session.speed else None
-    with record.timing("projection"):
-        loss = operators.loss_stiffness()
-        projection = project(modes, rotation, operators.carried, session.comm, loss=loss)
-        if loss is not None:
-            loss.destroy()
-        shape = operators.trace(modes.vectors)
-        labels = _labels(session, modes.vectors)
-    session.modes = modes
-    session.modal = ModalBasis(modes.frequency, shape, projection)
-    cavity.join(session, modes)
+    name: ClassVar[str] = "motions"
+    static: Done[StaticState]
+
+    def make(self) -> SmallMotions:
+        """Nothing yet: matrices are made when they are asked for."""
+        modal = self.job.scene.modal
+        return SmallMotions(self.job.tire, self.static.product, rim=modal.rim, road=modal.road)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModesStage(Computed[ModalBasis]):
+    """The standing modes."""
+
+    name: ClassVar[str] = "modes"
+    static: Done[StaticState]
+    motions: Done[SmallMotions]
+
+    def inputs(self) -> dict:
+        """The static state and the modal table; rotation matrices only when the wheel turns."""
+        return {
+            "static": self.static.key,
+            "modal": asdict(self.job.scene.modal),
+            "rotating": self.job.speed != 0,
+            "cavity": cavity.inputs(self.job),
+        }
+
+    def compute(self, record: Record) -> ModalBasis:
+        """Solve and project. Collective."""
+        motions, wanted = self.motions.product, self.job.scene.modal
+        with record.timing("matrices"):
+            operators = motions.operators
+        with record.timing("eigensolver"):
+            modes = solved(operators, count=wanted.count, up_to=wanted.up_to)
+        with record.timing("air"):
+            air = cavity.make_air(self.job, motions, float(modes.frequency[-1]))
+        with record.timing("projection"):
+            basis = projected(motions, modes, self.job.speed != 0, air)
+            labels = _labels(motions, modes.vectors)
+        _describe(record, modes)
+        record.headline["damping"] = (_damping(damping_of(self.job), basis.projection), "-")
+        if air is not None:
+            cavity.describe_air(record, basis.projection.air)
+        if labels is not None:
+            _say_names(modes.frequency, labels)
+        return replace(basis, labels=labels)
+
+    def write(self, file, product: ModalBasis) -> None:
+        """Frequencies, traces, the small matrices; not the fields on all unknowns."""
+        _fill(file, product, self.static.product.points)
+
+    def read(self, file) -> ModalBasis:
+        """The basis without its fields on all unknowns."""
+        parts = [file["surface/shape"][:]]
+        if "rim" in file:
+            parts += [file["rim/translation"][:], file["rim/rotation"][:]]
+        shape = np.hstack([part.reshape(len(part), -1) for part in parts]).T.copy()
+        matrices = {name: values[:] for name, values in file["projected"].items()}
+        return ModalBasis(
+            frequency=file["frequency"][:],
+            shape=shape,
+            projection=Projection(**matrices, air=cavity.read(file)),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fields(Shared[ModalBasis]):
+    """The modes with their fields on all unknowns: as this run solved them, or once more."""
+
+    name: ClassVar[str] = "fields"
+    modes: Done[ModalBasis]
+    motions: Done[SmallMotions]
+    air: Done[Column | None]
+
+    def make(self) -> ModalBasis:
+        """Collective."""
+        wanted = self.job.scene.modal
+        given = self.modes.product, self.motions.product
+        if given[0].modes is not None:
+            return given[0]
+        sizes = {"count": wanted.count, "up_to": wanted.up_to}
+        return with_fields(*given, **sizes, air=self.air.product)
+
+
+def _describe(record: Record, modes: Modes) -> None:
     record.headline |= {
         "modes": (len(modes.squares), "-"),
         "lowest": (float(modes.frequency[0]), "Hz"),
         "highest": (float(modes.frequency[-1]), "Hz"),
     }
-    record.headline["damping"] = (_damping(session, projection), "-")
     if modes.segments > 1:
         record.headline["equal segments, solved by wave number"] = (modes.segments, "-")
     else:
@@ -75,14 +141,10 @@ def compute(session: Session, path: Path) -> None:
         "slices": (modes.slices, "-"),
         "rigid modes": (modes.rigid, "-"),
     }
-    if labels is not None:
-        _say_names(modes.frequency, labels)
-    session.write(path, "modes", lambda file: _fill(file, session, modes, labels))
 
 
-def _damping(session: Session, projection) -> str:
+def _damping(given: Damping, projection: Projection) -> str:
     """Which damping acts, in words."""
-    given = session.damping
     if not isinstance(given, StrainEnergy):
         unused = "" if projection.loss_factor is None else "; the loss factors do not act"
         return f"γ1 = {given.mass:g} 1/s, γ2 = {given.stiffness:g} s{unused}"
@@ -99,47 +161,25 @@ def _say_names(frequency: np.ndarray, labels) -> None:
     observe.say(f"  (wave number, section mode) in Hz: {shown}")
 
 
-def solve(session: Session):
-    """The modes the scene wants, on all unknowns. Collective."""
-    from tireroad.modal import undamped
-
-    operators, wanted = session.operators, session.scene.modal
-    return undamped.solve(
-        operators.stiffness,
-        operators.mass,
-        None if wanted.up_to else wanted.count,
-        up_to=wanted.up_to or np.inf,
-        sites=sites(operators),
-    )
-
-
-def sites(operators) -> Sites:
-    """Where this process's unknowns are: there mirrors and repeated segments are looked for."""
-    return Sites(operators.unknowns.place, operators.unknowns.component)
-
-
-def _labels(session: Session, vectors: np.ndarray):
+def _labels(motions: SmallMotions, vectors: np.ndarray) -> Labels | None:
     """Wave and section numbers of the modes without a road; None with one. Collective."""
-    from tireroad.modal.waves import label
-
-    if session.static.road_height is not None:
+    if motions.static.road_height is not None:
         return None
-    body = session.body
+    body = motions.body
     circles = body.lattice.circles(body.ids)
-    nodal = session.operators.spread(vectors).reshape(-1, vectors.shape[1])
+    nodal = motions.operators.spread(vectors).reshape(-1, vectors.shape[1])
     points = body.lattice.points(body.ids)
-    return label(session.comm, points, circles, body.nodal_mass(), nodal)
+    return label(body.comm, points, circles, body.nodal_mass(), nodal)
 
 
-def _fill(file, session: Session, modes, labels) -> None:
-    basis = session.modal
-    m = len(basis.frequency)
+def _fill(file, basis: ModalBasis, points: np.ndarray) -> None:
+    m, modes, labels = len(basis.frequency), basis.modes, basis.labels
     put(file, "frequency", basis.frequency, "Hz")
     put(file, "residual", modes.residual, "-")
     if basis.projection.loss_factor is not None:
         put(file, "loss_factor", basis.projection.loss_factor, "-")
-    put(file, "surface/points", session.static.points, "m")
-    face = 3 * len(session.static.points)
+    put(file, "surface/points", points, "m")
+    face = 3 * len(points)
     put(file, "surface/shape", basis.shape[:face].T.reshape(m, -1, 3), "kg^-1/2")
     if len(basis.shape) > face:
         put(file, "rim/translation", basis.shape[face : face + 3].T, "kg^-1/2")
@@ -154,30 +194,3 @@ def _fill(file, session: Session, modes, labels) -> None:
     cavity.fill(file, basis.projection.air)
     file.attrs["inertia_count"] = modes.inertia_count
     file.attrs["rigid_modes"] = modes.rigid
-
-
-_UNITS = {
-    "squares": "1/s2",
-    "gyroscopic": "1/rad",
-    "convective": "1/rad2",
-    "body": "1/rad",
-    "body_convective": "1/rad2",
-    "momentum": "kg^1/2",
-    "loss_factor": "-",
-}
-
-
-def reuse(session: Session, path: Path) -> None:
-    """Read the basis back. Collective."""
-    from tireroad.modal.basis import Projection
-
-    def pick(file):
-        parts = [file["surface/shape"][:]]
-        if "rim" in file:
-            parts += [file["rim/translation"][:], file["rim/rotation"][:]]
-        shape = np.hstack([part.reshape(len(part), -1) for part in parts]).T.copy()
-        matrices = {name: values[:] for name, values in file["projected"].items()}
-        projection = Projection(**matrices, air=cavity.read(file))
-        return ModalBasis(file["frequency"][:], shape, projection)
-
-    session.modal = session.read(path, pick)

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from mpi4py import MPI
 
+from tireroad.contact.setup import ContactSetup
+from tireroad.fem.model import SmallMotions
+from tireroad.fem.static.state import StaticState
+from tireroad.greens.coupling import Wheel
+from tireroad.modal.basis import ModalBasis
+from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
@@ -16,32 +24,83 @@ from tireroad.runs.process.memory import peak_memory
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.demand import check_demand, duration
 from tireroad.runs.scene.estimate import estimate
-from tireroad.runs.scene.plan import STAGES, skipped
+from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.road_check import check_road
 from tireroad.runs.scene.tables import Scene
-from tireroad.runs.stages import (
-    contact,
-    greens,
-    modes,
-    response,
-    rotating,
-    spectra,
-    static,
-    stiffness,
-)
-from tireroad.runs.stages.session import Session
+from tireroad.runs.stages.cavity import AirColumn
+from tireroad.runs.stages.contact import ContactStage
+from tireroad.runs.stages.greens import GreensStage, Responses
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.modes import Fields, ModesStage, Motions
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.response import ResponseStage
+from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
+from tireroad.runs.stages.setup import Setup
+from tireroad.runs.stages.spectra import SpectraStage
+from tireroad.runs.stages.stage import Done, Part, Shared, Stage
+from tireroad.runs.stages.static import StaticStage
+from tireroad.runs.stages.stiffness import StiffnessStage
 
-_MODULES = {
-    "static": static,
-    "stiffness": stiffness,
-    "modes": modes,
-    "rotating": rotating,
-    "greens": greens,
-    "contact": contact,
-    "response": response,
-    "spectra": spectra,
-}
+PARTS: tuple[type[Part], ...] = (
+    StaticStage,
+    StiffnessStage,
+    Motions,
+    Setup,
+    ModesStage,
+    AirColumn,
+    Fields,
+    FullMatrices,
+    RotatingStage,
+    GreensStage,
+    ContactStage,
+    ResponseStage,
+    SpectraStage,
+)
+"""In their order: each takes, by name, what stands before it."""
+
+
+@dataclass(frozen=True)
+class Finished:
+    """What a run leaves in memory: its `job`, and what is `done` by the names of the parts."""
+
+    job: Job
+    done: Mapping[str, Done]
+
+    @property
+    def static(self) -> StaticState:
+        """The static state."""
+        return self.done["static"].product
+
+    @property
+    def motions(self) -> SmallMotions:
+        """The matrices at the static state."""
+        return self.done["motions"].product
+
+    @property
+    def wheel(self) -> Wheel:
+        """The full matrices as the wheel turns."""
+        return self.done["wheel"].product
+
+    @property
+    def setup(self) -> ContactSetup:
+        """The patch and the road under it."""
+        return self.done["setup"].product
+
+    @property
+    def fields(self) -> ModalBasis:
+        """The standing modes, on all unknowns too."""
+        return self.done["fields"].product
+
+    @property
+    def rolling(self) -> RollingModes:
+        """The states of the tire as it turns."""
+        return self.done["rotating"].product
+
+    @property
+    def greens(self) -> Responses:
+        """Its responses between the points of the scene."""
+        return self.done["greens"].product
 
 
 def run_scene(
@@ -52,9 +111,9 @@ def run_scene(
     until: str | None,
     fresh: bool,
     petsc_options: list[str],
-) -> Session:
+) -> Finished:
     """Run the stages a scene needs into the directory; what they left in memory. Collective."""
-    session = Session(scene, directory, comm, fresh)
+    job = Job(scene, directory, comm, fresh)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
     if scene.road is not None:
@@ -64,18 +123,17 @@ def run_scene(
     reasons = skipped(scene, until)
     if petsc_options:
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
-    for stage in STAGES[:-1]:
-        if stage in reasons:
-            observe.say(f"{stage:9s} skipped: {reasons[stage]}")
-            on_root(comm, lambda s=stage: summary.record(s, "skipped", reason=reasons[s]))
-        else:
-            _run_stage(session, stage, summary, fresh)
+    done: dict[str, Done] = {}
+    for kind in PARTS:
+        found = _done(job, kind, done, reasons, summary)
+        if found is not None:
+            done[kind.name] = found
     _check_options(petsc_options)
     if "report" in reasons:
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))
     else:
         on_root(comm, lambda: _report(directory, summary))
-    return session
+    return Finished(job, done)
 
 
 def _say_demand(scene: Scene, directory: Path, comm: MPI.Comm, until: str | None) -> None:
@@ -90,40 +148,41 @@ def _say_demand(scene: Scene, directory: Path, comm: MPI.Comm, until: str | None
     )
 
 
-def _run_stage(session: Session, stage: str, summary: Summary, fresh: bool) -> None:
+def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done | None:
+    """What a part of the pipeline adds to what is done; None where it adds nothing. Collective."""
+    if issubclass(kind, Stage) and kind.name in reasons:
+        reason = reasons[kind.name]
+        observe.say(f"{kind.name:9s} skipped: {reason}")
+        on_root(job.comm, lambda: summary.record(kind.name, "skipped", reason=reason))
+        return kind.instead(job, done)
+    part = kind.taken(job, done)
+    if isinstance(part, Shared):
+        return Done("", part.make)
+    return None if part is None else _run(part, summary)
+
+
+def _run(stage: Stage, summary: Summary) -> Done:
     """Reuse the stage's file or compute it, and enter it in the summary. Collective."""
-    module, comm = _MODULES[stage], session.comm
+    job, name = stage.job, stage.name
     began = time.perf_counter()
-    wanted = store.wanted_hash(stage, module.inputs(session))
-    session.hashes[stage] = wanted
-    path = session.directory / f"{stage}.h5"
-    reason = on_root(comm, lambda: "absent" if fresh else store.why_not(path, wanted, stage))
+    key, path = store.wanted_hash(name, stage.inputs()), job.path(name)
+    reason = on_root(job.comm, lambda: "absent" if job.fresh else store.why_not(path, key, name))
     if not reason:
-        module.reuse(session, path)
-        observe.say(f"{stage:9s} reused: computed from the same inputs before")
-        on_root(comm, lambda: summary.record(stage, "reused", reason="same inputs"))
-        return
+        observe.say(f"{name:9s} reused: computed from the same inputs before")
+        on_root(job.comm, lambda: summary.record(name, "reused", reason="same inputs"))
+        return Done(key, stage.stored)
     if reason != "absent":
-        observe.say(f"{stage:9s} computed anew: {path.name} is there, but {reason}")
-    with session.recording(stage) as record:
-        module.compute(session, path)
-        record.indicators["largest memory of a process so far"] = (_peak(comm), "GB")
+        observe.say(f"{name:9s} computed anew: {path.name} is there, but {reason}")
+    record = Record()
+    product = stage.produce(key, record)
+    record.indicators["largest memory of a process so far"] = (_peak(job.comm), "GB")
     seconds = time.perf_counter() - began
     for text in record.warnings:
-        observe.warn(f"{stage}: {text}")
-    observe.say(f"{stage:9s} done in {seconds:.1f} s: {record.line()}")
-    on_root(
-        comm,
-        lambda: summary.record(
-            stage,
-            "computed",
-            seconds=seconds,
-            headline=record.headline,
-            indicators=record.indicators,
-            warnings=record.warnings,
-            cost=record.cost,
-        ),
-    )
+        observe.warn(f"{name}: {text}")
+    observe.say(f"{name:9s} done in {seconds:.1f} s: {record.line()}")
+    figures = vars(record) | {"seconds": seconds}
+    on_root(job.comm, lambda: summary.record(name, "computed", **figures))
+    return Done(key, lambda: product)
 
 
 def _peak(comm: MPI.Comm) -> float:

@@ -1,18 +1,29 @@
-"""rotating: the second eigenproblem, on the modal basis."""
+"""rotating: the second eigenproblem, on the modal basis or on the finite elements."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
+from tireroad.fem.cavity.column import Column
+from tireroad.fem.model import SmallMotions
+from tireroad.fem.parallel import on_root
+from tireroad.greens.coupling import Wheel, wheel_of
+from tireroad.modal.basis import ModalBasis
 from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
-from tireroad.modal.rotating import StateModes, checks, matrices, rotating
+from tireroad.modal.damping import StrainEnergy
+from tireroad.modal.full_states import full_states
+from tireroad.modal.rolling import RollingModes, rolling_modes
+from tireroad.modal.rotating import StateModes
 from tireroad.runs.files.store import put
-from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages import cavity, full_states
-from tireroad.runs.stages.session import Session
+from tireroad.runs.stages import cavity
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Done, Shared
+from tireroad.runs.stages.turning import turning_of
 
 _UNITS = {
     "eigenvalue": "1/s",
@@ -26,125 +37,179 @@ _UNITS = {
 }
 
 
-def inputs(session: Session) -> dict:
-    """The modes, the damping, the speed and the inertia; how many states only where it counts."""
-    wanted = session.scene.rotation
-    return {
-        "modes": session.hashes["modes"],
-        "damping": repr(session.damping),
-        "speed": session.speed,
-        "inertia": wanted.inertia,
-        "campbell": asdict(wanted.campbell) if wanted.campbell else None,
-        "full": (wanted.count, wanted.window) if wanted.method == "full" else None,
-    }
+@dataclass(frozen=True, kw_only=True)
+class FullMatrices(Shared[Wheel]):
+    """The full matrices of the tire as the wheel turns."""
+
+    name: ClassVar[str] = "wheel"
+    motions: Done[SmallMotions]
+    modes: Done[ModalBasis]
+    air: Done[Column | None]
+
+    def make(self) -> Wheel:
+        """Collective."""
+        turning, projection = turning_of(self.job), None
+        if isinstance(turning.damping, StrainEnergy):
+            projection = self.modes.product.projection
+        return wheel_of(self.motions.product, turning, self.air.product, projection)
 
 
-def compute(session: Session, path: Path) -> None:
-    """Solve on the root process, share, store. Collective."""
-    inertia = session.scene.rotation.inertia
-    projection = session.modal.projection
-    pencil = matrices(projection, session.speed, session.damping, inertia)
-    record = session.record
-    with record.timing("eigensolver"):
-        # One process solves: LAPACK on another could order repeated eigenvalues differently.
-        modes = on_root(session.comm, lambda: rotating(*pencil))
-        figures = on_root(session.comm, lambda: checks(modes, *pencil))
-    record.indicators |= {f"projected: {name}": (figure, "-") for name, figure in figures.items()}
-    if session.scene.rotation.method == "full":
-        modes = full_states.compute(session, modes)
-    session.state_modes = modes
-    _describe(session, critical_speed(projection, inertia))
-    if modes.unstable:
-        record.warnings.append(_growth(session, projection))
-    lines = _campbell(session, projection)
-    session.write(path, "rotating", lambda file: _fill(file, session, lines))
+@dataclass(frozen=True, kw_only=True)
+class RotatingStage(Computed[RollingModes]):
+    """The states of the rolling tire; of a wheel that stands they are the modes' own."""
+
+    name: ClassVar[str] = "rotating"
+    modes: Done[ModalBasis]
+    wheel: Done[Wheel]
+
+    @classmethod
+    def instead(cls, job: Job, done: Mapping[str, Done]) -> Done[RollingModes] | None:
+        """The wheel stands: the states follow from the modes by a closed formula."""
+        if "modes" not in done or job.speed:
+            return None
+        modes = done["modes"]
+        return Done(modes.key, lambda: rolling_modes(modes.product, turning_of(job), job.comm))
+
+    def inputs(self) -> dict:
+        """The modes, the damping, the speed and the inertia; how many states only where it counts."""
+        wanted, turning = self.job.scene.rotation, turning_of(self.job)
+        return {
+            "modes": self.modes.key,
+            "damping": repr(turning.damping),
+            "speed": turning.speed,
+            "inertia": turning.inertia,
+            "campbell": asdict(wanted.campbell) if wanted.campbell else None,
+            "full": (wanted.count, wanted.window) if wanted.method == "full" else None,
+        }
+
+    def compute(self, record: Record) -> RollingModes:
+        """Solve on the root process, share, check. Collective."""
+        job, basis = self.job, self.modes.product
+        with record.timing("eigensolver"):
+            rolling = rolling_modes(basis, turning_of(job), job.comm)
+        projected = {
+            f"projected: {name}": (figure, "-") for name, figure in rolling.figures.items()
+        }
+        record.indicators |= projected
+        if job.scene.rotation.method == "full":
+            rolling = self._full(record, rolling)
+        speed = rolling.turning.speed
+        free_at = speed if job.scene.modal.rim == "free" else None
+        critical = critical_speed(basis.projection, rolling.turning.inertia, free_at)
+        _describe(record, rolling, critical)
+        if speed > critical:
+            record.warnings.append(_beyond(speed, critical))
+        if rolling.states.unstable:
+            record.warnings.append(_growth(job, rolling, basis))
+        return replace(rolling, campbell=self._campbell(record))
+
+    def _full(self, record: Record, projected: RollingModes) -> RollingModes:
+        """The states of the finite elements, in the place of the projected ones. Collective."""
+        wheel, wanted = self.wheel.product, self.job.scene.rotation
+        with record.timing("full eigensolver"):
+            matrices = wheel.rotating_damping, wheel.rotating_stiffness
+            found, figures, warnings = full_states(
+                wheel.operators, matrices, projected, count=wanted.count, window=wanted.window
+            )
+        record.indicators |= figures
+        record.warnings += warnings
+        return found
+
+    def _campbell(self, record: Record) -> Campbell | None:
+        """Branches of eigenvalues over speed, where the scene asks for them. Collective."""
+        wanted, turning = self.job.scene.rotation.campbell, turning_of(self.job)
+        if wanted is None:
+            return None
+        speeds = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
+        given = self.modes.product.projection, turning.damping, turning.inertia
+        with record.timing("campbell"):
+            lines = on_root(self.job.comm, lambda: sweep(*given, speeds, wanted.branches))
+        least = float(np.nanmin(lines.similarity))
+        record.indicators["least similarity along a branch"] = (least, "-")
+        return lines
+
+    def write(self, file, product: RollingModes) -> None:
+        """The states, the fields of full ones, the branches over speed."""
+        _fill(file, product)
+
+    def read(self, file) -> tuple[StateModes, dict]:
+        """The states, and fields of their own, shape and momentum, where they have them."""
+        values = {name: file[name][:] for name in _UNITS}
+        states = StateModes(condition=float(file.attrs["basis_condition"]), **values)
+        own = file.get("basis", {})
+        return states, {name: own[name][:] for name in own}
+
+    def restored(self, held: tuple[StateModes, dict]) -> RollingModes:
+        """The states on the modes, or on fields of their own."""
+        (states, own), basis = held, self.modes.product
+        if own:
+            projection = replace(basis.projection, momentum=own["momentum"])
+            basis = replace(basis, shape=own["shape"], projection=projection, modes=None)
+        turning = turning_of(self.job)
+        return RollingModes(basis=basis, states=states, turning=turning, full=bool(own))
 
 
-def _campbell(session: Session, projection) -> Campbell | None:
-    """Branches of eigenvalues over speed, where the scene asks for them. Collective."""
-    wanted = session.scene.rotation.campbell
-    if wanted is None:
-        return None
-    speeds = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
-    inertia = session.scene.rotation.inertia
-    with session.record.timing("campbell"):
-        lines = on_root(
-            session.comm,
-            lambda: sweep(projection, session.damping, inertia, speeds, wanted.branches),
-        )
-    session.record.indicators["least similarity along a branch"] = (
-        float(np.nanmin(lines.similarity)),
-        "-",
+def _beyond(speed: float, critical: float) -> str:
+    """What to say of a speed beyond the critical one (rad/s)."""
+    return (
+        f"rotation.speed = {speed:g} rad/s lies beyond the tire's critical speed of {critical:.4g} "
+        "rad/s, at which a wave stands still on the road and grows without end: what follows has "
+        "little meaning; take a lower speed, a higher static.inflation or a stiffer material"
     )
-    return lines
 
 
-def _describe(session: Session, critical: float) -> None:
-    record, modes = session.record, session.state_modes
-    oscillating = modes.eigenvalue[modes.eigenvalue.imag > 0]
+def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
+    states = rolling.states
+    oscillating = states.eigenvalue[states.eigenvalue.imag > 0]
     record.headline |= {
         "pairs": (len(oscillating), "-"),
-        "speed": (session.speed, "rad/s"),
+        "speed": (rolling.turning.speed, "rad/s"),
         "critical speed": (critical, "rad/s"),
     }
-    if session.modal.projection.air is not None:
-        cavity.describe(session)
+    if rolling.basis.projection.air is not None:
+        cavity.describe(record, rolling)
     if len(oscillating):
         record.headline["lowest"] = (float(oscillating.imag.min() / (2 * np.pi)), "Hz")
     record.indicators |= {
-        "worst residual": (float(modes.residual.max(initial=0.0)), "-"),
-        "worst left residual": (float(modes.left_residual.max(initial=0.0)), "-"),
-        "basis condition": (modes.condition, "-"),
-        "states in the near-defective block": (len(modes.block), "-"),
+        "worst residual": (float(states.residual.max(initial=0.0)), "-"),
+        "worst left residual": (float(states.left_residual.max(initial=0.0)), "-"),
+        "basis condition": (states.condition, "-"),
+        "states in the near-defective block": (len(states.block), "-"),
     }
 
 
-def _growth(session: Session, projection) -> str:
+def _growth(job: Job, rolling: RollingModes, basis: ModalBasis) -> str:
     """What to say of a tire whose motion grows. Collective."""
-    modes, inertia = session.state_modes, session.scene.rotation.inertia
+    states, turning = rolling.states, rolling.turning
+    given = turning.damping, turning.inertia
 
     def first() -> float:
-        if not growth(projection, session.speed, session.damping, inertia):
-            return session.speed  # only the full problem has it
-        return onset(projection, session.damping, inertia, session.speed)
+        if not growth(basis.projection, turning.speed, *given):
+            return turning.speed  # only the full problem has it
+        return onset(basis.projection, *given, turning.speed)
 
     return (
-        f"{modes.unstable} motion(s) of the rolling tire grow by themselves, the fastest at "
-        f"{modes.fastest_growth:.3g} 1/s; on this static state that begins at {on_root(session.comm, first):.4g} "
+        f"{states.unstable} motion(s) of the rolling tire grow by themselves, the fastest at "
+        f"{states.fastest_growth:.3g} 1/s; on this static state that begins at {on_root(job.comm, first):.4g} "
         "rad/s: the wheel turns beyond its critical speed"
     )
 
 
-def _fill(file, session: Session, lines: Campbell | None) -> None:
-    modes = session.state_modes
+def _fill(file, rolling: RollingModes) -> None:
+    states, lines = rolling.states, rolling.campbell
     for name, unit in _UNITS.items():
-        put(file, name, getattr(modes, name), unit)
-    put(file, "frequency", modes.eigenvalue.imag / (2 * np.pi), "Hz")
-    if session.scene.rotation.method == "full":
-        put(file, "basis/shape", session.modal.shape, "kg^-1/2")
-        put(file, "basis/momentum", session.modal.projection.momentum, "kg^1/2")
-    if session.modal.projection.air is not None:
-        put(file, "air_share", cavity.share(session), "-")
+        put(file, name, getattr(states, name), unit)
+    put(file, "frequency", states.eigenvalue.imag / (2 * np.pi), "Hz")
+    if rolling.full:
+        put(file, "basis/shape", rolling.basis.shape, "kg^-1/2")
+        put(file, "basis/momentum", rolling.basis.projection.momentum, "kg^1/2")
+    if rolling.basis.projection.air is not None:
+        put(file, "air_share", cavity.share(rolling), "-")
     if lines is not None:
         put(file, "campbell/speed", lines.speed, "rad/s")
         put(file, "campbell/eigenvalue", lines.eigenvalue, "1/s")
         put(file, "campbell/frequency", lines.frequency, "Hz")
         put(file, "campbell/similarity", lines.similarity, "-")
-    file.attrs["speed"] = session.speed
-    file.attrs["basis_condition"] = modes.condition
-    file.attrs["first_unstable"] = modes.unstable
-
-
-def reuse(session: Session, path: Path) -> None:
-    """Read the state modes back. Collective."""
-
-    def pick(file):
-        values = {name: file[name][:] for name in _UNITS}
-        states = StateModes(condition=float(file.attrs["basis_condition"]), **values)
-        if "basis" not in file:
-            return states, None
-        return states, (file["basis/shape"][:], file["basis/momentum"][:])
-
-    session.state_modes, basis = session.read(path, pick)
-    if basis is not None:
-        full_states.replace_basis(session, *basis)
+    file.attrs["speed"] = rolling.turning.speed
+    file.attrs["basis_condition"] = states.condition
+    file.attrs["first_unstable"] = states.unstable

@@ -2,57 +2,110 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
+from tireroad.contact.setup import ContactSetup
 from tireroad.contact.spectra import amplitudes, third_octaves
 from tireroad.runs.files.store import put
-from tireroad.runs.stages.session import Record, Session
+from tireroad.runs.stages.contact_file import ContactHistory
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Done
 
 _FEWEST = 32  # steps of which a spectrum says anything
 
 
-def inputs(session: Session) -> dict:
-    """The contact forces: the length of road that is left out as run-in is in them."""
-    return {"contact": session.hashes["contact"]}
+@dataclass(frozen=True, kw_only=True)
+class Spectra:
+    """Complex amplitudes over `frequency` (f,) Hz of the `contact_force` and, where it is kept, of the
+    `axle_force`, (f, 3) N; its third octaves: band `centre` (b,) Hz and `level` (b, 3) dB re 1 N. The
+    first `left_out` s of the run, its run-in, are not in them.
+    """
+
+    frequency: np.ndarray
+    contact_force: np.ndarray
+    left_out: float
+    axle_force: np.ndarray | None = None
+    centre: np.ndarray | None = None
+    level: np.ndarray | None = None
 
 
-def compute(session: Session, path: Path) -> None:
-    """From the stored time series, after the run-in. Collective."""
-    contact = session.directory / "contact.h5"
+_UNITS = {
+    "frequency": ("frequency", "Hz"),
+    "contact_force": ("contact_force", "N"),
+    "axle_force": ("axle_force", "N"),
+    "centre": ("third_octave/centre", "Hz"),
+    "level": ("third_octave/level", "dB re 1 N"),
+}
 
-    def pick(file):
-        start = _after_run_in(session, file["time"][:])
-        names = [name for name in ("axle_force", "total_force") if name in file]
-        return float(file.attrs["step"]), start, {name: file[name][start:] for name in names}
 
-    step, start, forces = session.read(contact, pick)
-    record = session.record
-    count = len(forces["total_force"])
-    if count < _FEWEST:
+@dataclass(frozen=True, kw_only=True)
+class SpectraStage(Computed[Spectra]):
+    """From the history of the contact, after the run-in."""
+
+    name: ClassVar[str] = "spectra"
+    contact: Done[ContactHistory]
+    setup: Done[ContactSetup]
+
+    def inputs(self) -> dict:
+        """The contact forces: the length of road that is left out as run-in is in them."""
+        return {"contact": self.contact.key}
+
+    def compute(self, record: Record) -> Spectra:
+        """Not collective."""
+        history = self.contact.product
+        start, step = self._after_run_in(record, history.time), history.step
+        total = history.total_force[start:]
+        if len(total) < _FEWEST:
+            record.warnings.append(
+                f"the spectra are of {len(total)} steps: lengthen time.duration to have any use of them"
+            )
+        frequency, contact = amplitudes(total, step)
+        record.headline["resolution"] = (1 / (len(total) * step), "Hz")
+        axle = {}
+        if history.axle_force is not None:
+            _, amplitude = amplitudes(history.axle_force[start:], step)
+            centre, level = third_octaves(history.axle_force[start:], step)
+            axle = {"axle_force": amplitude, "centre": centre, "level": level}
+            _largest(record, frequency, amplitude)
+        if start:
+            record.headline["left out as run-in"] = (start * step, "s")
+        return Spectra(frequency=frequency, contact_force=contact, left_out=start * step, **axle)
+
+    def _after_run_in(self, record: Record, time: np.ndarray) -> int:
+        """First step with the whole patch beyond the run-in.
+
+        0, and a warning, when that takes half the run or more: what is left would resolve too little.
+        """
+        setup, road = self.setup.product, self.job.scene.road
+        speed = setup.rolled.speed
+        if speed == 0 or road.kind == "flat":
+            return 0
+        x0, x1, _, _ = setup.patch.extent
+        run_in = (road.run_in + x1 - x0) / speed
+        start = int(np.searchsorted(time, run_in))
+        if start < len(time) // 2:
+            return start
         record.warnings.append(
-            f"the spectra are of {count} steps: lengthen time.duration to have any use of them"
+            f"the spectra hold the run-in: with the patch it takes {run_in:.3g} s of the run's "
+            f"{time[-1]:.3g} s, and half or more cannot be left out; take time.duration above "
+            f"{2 * run_in:.2g} s, or a shorter road.run_in"
         )
-    spectra = {name: amplitudes(values, step) for name, values in forces.items()}
-    frequency, _ = spectra["total_force"]
-    record.headline["resolution"] = (1 / (count * step), "Hz")
-    if "axle_force" in spectra:
-        _largest(record, *spectra["axle_force"])
-    if start:
-        record.headline["left out as run-in"] = (start * step, "s")
+        return 0
 
-    def fill(file) -> None:
-        put(file, "frequency", frequency, "Hz")
-        put(file, "contact_force", spectra["total_force"][1], "N")
-        if "axle_force" in spectra:
-            centre, level = third_octaves(forces["axle_force"], step)
-            put(file, "axle_force", spectra["axle_force"][1], "N")
-            put(file, "third_octave/centre", centre, "Hz")
-            put(file, "third_octave/level", level, "dB re 1 N")
-        file.attrs["left_out"] = start * step
+    def write(self, file, product: Spectra) -> None:
+        """All there is."""
+        for name, (stored, unit) in _UNITS.items():
+            if getattr(product, name) is not None:
+                put(file, stored, getattr(product, name), unit)
+        file.attrs["left_out"] = product.left_out
 
-    session.write(path, "spectra", fill)
+    def read(self, file) -> Spectra:
+        """The same."""
+        kept = {name: file[stored][:] for name, (stored, _) in _UNITS.items() if stored in file}
+        return Spectra(left_out=float(file.attrs["left_out"]), **kept)
 
 
 def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
@@ -62,28 +115,3 @@ def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
         peak = band[np.abs(axle[band, 2]).argmax()]
         record.headline["largest vertical axle force"] = (float(np.abs(axle[peak, 2])), "N")
         record.headline["at"] = (float(frequency[peak]), "Hz")
-
-
-def _after_run_in(session: Session, time: np.ndarray) -> int:
-    """First step with the whole patch beyond the run-in.
-
-    0, and a warning, when that takes half the run or more: what is left would resolve too little.
-    """
-    speed, kind = session.road_speed, session.scene.road.kind
-    if speed == 0 or kind == "flat":
-        return 0
-    x0, x1, _, _ = session.patch.extent
-    run_in = (session.scene.road.run_in + x1 - x0) / speed
-    start = int(np.searchsorted(time, run_in))
-    if start < len(time) // 2:
-        return start
-    session.record.warnings.append(
-        f"the spectra hold the run-in: with the patch it takes {run_in:.3g} s of the run's "
-        f"{time[-1]:.3g} s, and half or more cannot be left out; take time.duration above "
-        f"{2 * run_in:.2g} s, or a shorter road.run_in"
-    )
-    return 0
-
-
-def reuse(session: Session, path: Path) -> None:
-    """Nothing later needs it."""

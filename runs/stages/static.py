@@ -3,61 +3,132 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict
-from pathlib import Path
+from dataclasses import asdict, dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.model import TireModel
+from tireroad.fem.static.diagnosis import with_cause
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.load_error import load_error
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.state import StaticState, static_state
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.scene.own_tire import fingerprint
 from tireroad.runs.stages import cords_file
-from tireroad.runs.stages.session import Session
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed
 
 COARSE = 0.02  # estimated error of the load above which the user is warned
 
 
-def inputs(session: Session) -> dict:
-    """The tire without its air, the static loads, and the rolling terms where they take part."""
-    scene = session.scene
-    return {
-        "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
-        "static": asdict(scene.static),
-        "rolling": session.rolling,
-    }
+def steady_rolling(job: Job) -> Rolling:
+    """The steady rolling that the static state is computed for; at rest where the scene wants that."""
+    scene = job.scene
+    if not scene.static.steady_rolling or job.speed == 0:
+        return AT_REST
+    # By strain energy there is no damping before there are modes: the shape has inertia alone.
+    damping = (scene.damping.mass, scene.damping.stiffness) if scene.damping else (0.0, 0.0)
+    return Rolling(job.speed, *damping, scene.rotation.inertia)
 
 
-def compute(session: Session, path: Path) -> None:
-    """Solve and store. Collective."""
-    from tireroad.fem.static.equilibrium import Equilibrium
-    from tireroad.fem.static.loading import Loader
-    from tireroad.fem.static.state import static_state
-    from tireroad.fem.static.virtual_work import Rolling
+@dataclass(frozen=True, kw_only=True)
+class StaticStage(Computed[StaticState]):
+    """The tire inflated, and pressed on the road where the scene has one."""
 
-    record, wanted = session.record, session.scene.static
-    with record.timing("mesh and forms"):
-        equilibrium = Equilibrium(session.body, Rolling(*session.rolling))
-    loader = Loader(equilibrium, _show)
-    began = time.perf_counter()
-    last = path.with_name("static_last.h5")
-    try:
-        loader.inflate(wanted.inflation)
-        _place(loader, wanted)
-    except ConvergenceError as error:
-        session.static = static_state(equilibrium, loader.lowest())
-        session.write(last, "static", lambda file: _fill(file, session, equilibrium))
-        raise ConvergenceError(f"{error} The last state that converged is in {last}.") from None
-    record.cost |= equilibrium.cost
-    record.cost["other"] = time.perf_counter() - began - sum(equilibrium.cost.values())
-    session.static = static_state(equilibrium, loader.touch)
-    _describe(session, loader)
-    if wanted.error_estimate and session.static.load:
-        with record.timing("error estimate"):
-            _estimate(session, loader)
-    observe.say(f"  {_parts(record.cost)}")
-    session.write(path, "static", lambda file: _fill(file, session, equilibrium))
-    on_root(session.comm, lambda: last.unlink(missing_ok=True))
+    name: ClassVar[str] = "static"
+
+    def inputs(self) -> dict:
+        """The tire without its air, the static loads, and the rolling terms where they take part."""
+        scene = self.job.scene
+        return {
+            "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
+            "file": fingerprint(scene.tire),
+            "static": asdict(scene.static),
+            "rolling": asdict(steady_rolling(self.job)),
+        }
+
+    def compute(self, record: Record) -> StaticState:
+        """Load steps up to the scene's state, and the error of its load. Collective."""
+        wanted = self.job.scene.static
+        with record.timing("mesh and forms"):
+            equilibrium = Equilibrium(self.job.tire.body, steady_rolling(self.job))
+        loader = Loader(equilibrium, _show)
+        began = time.perf_counter()
+        try:
+            _press(loader, wanted)
+        except ConvergenceError as error:
+            self._keep_last(static_state(equilibrium, loader.lowest()))
+            rolling = steady_rolling(self.job)
+            cause = with_cause(error, loader, rolling, lambda other: _press(other, wanted))
+            last = self.job.path("static_last")
+            raise ConvergenceError(f"{cause} The last state that converged is in {last}.") from None
+        record.cost |= equilibrium.cost
+        record.cost["other"] = time.perf_counter() - began - sum(equilibrium.cost.values())
+        state = static_state(equilibrium, loader.touch)
+        _describe(record, state, loader)
+        self._warn_at_rest(record)
+        if wanted.error_estimate and state.load:
+            with record.timing("error estimate"):
+                _estimate(record, state, loader)
+        observe.say(f"  {_parts(record.cost)}")
+        return state
+
+    def _keep_last(self, state: StaticState) -> None:
+        """Write the last state that converged. Collective."""
+        job, last = self.job, self.job.path("static_last")
+        job.write(
+            last, job.provenance("static", "unfinished"), lambda file: self.write(file, state)
+        )
+
+    def _warn_at_rest(self, record: Record) -> None:
+        if self.job.speed and not self.job.scene.static.steady_rolling:
+            record.warnings.append(
+                "the tire rolls on its state at rest (static.steady_rolling = false): centrifugal and "
+                "damping forces of the rolling shape are left out of it"
+            )
+
+    def produce(self, key: str, record: Record) -> StaticState:
+        """As any stage; the last state of a run that failed is of no use then. Collective."""
+        product = super().produce(key, record)
+        on_root(self.job.comm, lambda: self.job.path("static_last").unlink(missing_ok=True))
+        return product
+
+    def write(self, file, product: StaticState) -> None:
+        """Mesh, displacement, the outer face, the footprint."""
+        _fill(file, product, self.job.tire)
+
+    def read(self, file) -> StaticState:
+        """The state, with what it was computed for."""
+        surface, attributes = file["surface"], file.attrs
+        road = attributes.get("road_height")
+        return StaticState(
+            file["displacement"][:],
+            surface["points"][:],
+            surface["displacement"][:],
+            surface["force"][:],
+            surface["area"][:],
+            surface["half_sizes"][:],
+            surface["ring_rate"][:],
+            shape=self.job.tire.lattice.face_shape,
+            touch_height=float(attributes["touch_height"]),
+            road_height=None if road is None else float(road),
+            inflation=float(attributes["inflation"]),
+            rolling=steady_rolling(self.job),
+            **cords_file.read(file),
+        )
+
+
+def _press(loader: Loader, wanted) -> None:
+    """Inflate the tire and press it on the road. Collective."""
+    loader.inflate(wanted.inflation)
+    _place(loader, wanted)
 
 
 def _place(loader, wanted) -> None:
@@ -70,24 +141,21 @@ def _place(loader, wanted) -> None:
         loader.deflect(wanted.road_height - loader.touch)
 
 
-def _estimate(session: Session, loader) -> None:
+def _estimate(record: Record, state: StaticState, loader: Loader) -> None:
     """Print and keep how far the load is from that of finer elements. Collective."""
-    from tireroad.fem.static.load_error import load_error
-    from tireroad.fem.static.virtual_work import Rolling
-
-    found = load_error(loader, Rolling(*session.rolling))
+    found = load_error(loader, state.rolling)
     if isinstance(found, str):
         observe.say(f"  error of the load not estimated: {found}")
         return
-    load = session.static.load
-    session.record.indicators["estimated error of the load"] = (100 * found.relative, "%")
+    load = state.load
+    record.indicators["estimated error of the load"] = (100 * found.relative, "%")
     observe.say(
         f"  estimated error of the load at this deflection: {100 * found.relative:.2g} %, from "
         f"{found.load:.6g} N on elements of twice the size ({found.unknowns} unknowns) against "
         f"{load:.6g} N"
     )
     if found.relative > COARSE:
-        session.record.warnings.append(
+        record.warnings.append(
             f"the load may be off by {100 * found.relative:.2g} %: take smaller elements "
             "(tire.segments, tire.elements_arc, tire.footprint_size)"
         )
@@ -108,8 +176,7 @@ def _show(progress) -> None:
     )
 
 
-def _describe(session: Session, loader) -> None:
-    record, state = session.record, session.static
+def _describe(record: Record, state: StaticState, loader: Loader) -> None:
     free = 3 * len(state.displacement)
     record.headline["unknowns"] = (free, "-")
     record.headline |= cords_file.headline(state)
@@ -127,15 +194,10 @@ def _describe(session: Session, loader) -> None:
         record.indicators["largest penetration"] = (state.penetration, "m")
     record.headline["rolling radius"] = (state.rolling_radius(), "m")
     record.indicators["Newton steps"] = (loader.newton_steps, "-")
-    if session.speed and not session.scene.static.steady_rolling:
-        record.warnings.append(
-            "the tire rolls on its state at rest (static.steady_rolling = false): centrifugal and "
-            "damping forces of the rolling shape are left out of it"
-        )
 
 
-def _fill(file, session: Session, equilibrium) -> None:
-    state, lattice = session.static, session.body.lattice
+def _fill(file, state: StaticState, tire: TireModel) -> None:
+    lattice = tire.lattice
     put(file, "mesh/points", lattice.points(np.arange(lattice.size)), "m")
     put(file, "mesh/cells", lattice.cells(), "-")
     put(file, "displacement", state.displacement, "m")
@@ -148,12 +210,14 @@ def _fill(file, session: Session, equilibrium) -> None:
     put(file, "surface/ring_rate", state.ring_rate, "m/rad")
     cords_file.fill(file, state)
     file.attrs["touch_height"] = state.touch_height
-    file.attrs["inflation"] = float(equilibrium.pressure.value)
+    file.attrs["inflation"] = state.inflation
     file.attrs["load"] = state.load
+    file.attrs["rolling_speed"] = state.rolling.speed
+    file.attrs["rolling_inertia"] = state.rolling.inertia
     file.attrs["rolling_radius"] = state.rolling_radius()
     if state.road_height is None:
         return
-    near = np.flatnonzero(state.gap < session.section.thickness)
+    near = np.flatnonzero(state.gap < tire.section.thickness)
     force = np.zeros((len(near), 3))
     force[:, 2] = state.force[near]
     put(file, "contact/index", near, "-")
@@ -166,26 +230,3 @@ def _fill(file, session: Session, equilibrium) -> None:
     file.attrs["deflection"] = state.road_height - state.touch_height
     for name, value in asdict(state.footprint()).items():
         file.attrs[f"footprint_{name}"] = value
-
-
-def reuse(session: Session, path: Path) -> None:
-    """Read the state back. Collective."""
-    from tireroad.fem.static.state import StaticState
-
-    def pick(file):
-        surface = file["surface"]
-        return StaticState(
-            file["displacement"][:],
-            surface["points"][:],
-            surface["displacement"][:],
-            surface["force"][:],
-            surface["area"][:],
-            surface["half_sizes"][:],
-            surface["ring_rate"][:],
-            shape=session.lattice.face_shape,
-            touch_height=float(file.attrs["touch_height"]),
-            road_height=float(file.attrs["road_height"]) if "road_height" in file.attrs else None,
-            **cords_file.read(file),
-        )
-
-    session.static = session.read(path, pick)

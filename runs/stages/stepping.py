@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tireroad.contact.steps import equal_steps, steps_of
@@ -10,7 +12,8 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables import Road, Time
-from tireroad.runs.stages.session import Session
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.record import Record
 
 # Radians a kept mode may turn in one automatic step: 0.3 leaves less than a percent in its phase.
 _TURN = 0.3
@@ -23,12 +26,22 @@ def run_time(time: Time) -> float:
     return time.duration if time.step == "auto" else steps_of(time.duration, time.step).duration
 
 
-def integration(session: Session, response: Response, shortest: float):
-    """(tire, step, steps, scheme) for the scene's time table; what was chosen is shown. Collective.
+@dataclass(frozen=True)
+class Integration:
+    """The `tire` in time, taken over `steps` steps of `step` s by a `scheme`."""
+
+    tire: Recursion | Convolution
+    step: float
+    steps: int
+    scheme: str
+
+
+def integration(job: Job, record: Record, response: Response, shortest: float) -> Integration:
+    """For the scene's time table; what was chosen is shown. Collective.
 
     `shortest` (s): the shortest period in the excitation.
     """
-    wanted = session.scene.time
+    wanted = job.scene.time
     fastest = np.abs(response.every).max(initial=0.0)
     if wanted.step == "auto":
         limits = [wanted.duration / _LEAST_STEPS, shortest / _PER_PERIOD]
@@ -49,10 +62,10 @@ def integration(session: Session, response: Response, shortest: float):
         observe.say(
             f"  the run ends at {steps.duration:.6g} s: {wanted.duration:.6g} s is no multiple of the step"
         )
-    session.record.indicators["states moved to the residual"] = (moved, "-")
+    record.indicators["states moved to the residual"] = (moved, "-")
     if scheme == "convolution":
-        return Convolution(kept, step, count), step, count, scheme
-    return Recursion(kept, step, scheme, session.comm), step, count, scheme
+        return Integration(Convolution(kept, step, count), step, count, scheme)
+    return Integration(Recursion(kept, step, scheme, job.comm), step, count, scheme)
 
 
 def passing_period(road: Road, spacing: float, speed: float) -> float:

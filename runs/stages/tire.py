@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from mpi4py import MPI
 
 from tireroad.fem.sections.ring import Ring
-from tireroad.runs.scene.tire_section import patch
+from tireroad.runs.scene.tire_section import make_section, patch
+from tireroad.runs.scene.tire_tables import Material as MaterialTable
 from tireroad.runs.scene.tire_tables import Region, Tire
 
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
-def make_lattice(section: Ring):
-    """The nodes of the displacement field, without a mesh."""
-    from tireroad.fem.tire.mesh import field_lattice
 
-    return field_lattice(section)
+def make_tire(comm: MPI.Comm, tire: Tire):
+    """The tire without loads, its finite elements made when they are asked for."""
+    from tireroad.fem.model import TireModel
+
+    section = make_section(tire)
+    return TireModel(section, lambda: make_body(comm, tire, section))
 
 
 def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
@@ -22,9 +28,16 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
     from tireroad.fem.tire.body import Body
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
+    from tireroad.runs.stages.own_tire import own_cords, own_materials
+
+    if tire.section == "file":
+        return Body(comm, section, own_materials(tire), cords=own_cords(tire))
 
     def rubber(part: Tire | Region) -> Material:
-        given = vars(part.material) | {"dynamic": part.dynamic, "loss_factor": part.loss_factor}
+        given = vars(part.material or MaterialTable()) | {
+            "dynamic": part.dynamic,
+            "loss_factor": part.loss_factor,
+        }
         return Material(**given)
 
     names = [patch(i, region).name for i, region in enumerate(tire.region)]

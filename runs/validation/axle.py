@@ -11,16 +11,12 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.receptance import receptance
-from tireroad.fem.matrices.support import Support
-from tireroad.fem.static.virtual_work import Rolling
-from tireroad.greens.coupling import Wheel
+from tireroad.fem.model import SmallMotions
+from tireroad.greens.coupling import wheel_of
 from tireroad.greens.response import Response
-from tireroad.modal import undamped
+from tireroad.modal.standing import solved
 from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.stages import greens
-from tireroad.runs.stages.modes import sites
 from tireroad.runs.validation.tires import Tires
 
 ABOUT = "axle force per force on the tread: by momentum, by the free rim's modes, by full finite elements"
@@ -127,18 +123,17 @@ def _from_moment(loads: sparse.csr_matrix, moment: np.ndarray) -> np.ndarray:
 
 
 def _full(tires: Tires) -> Found:
-    session = tires.session
-    _, _, loads = greens.probes(session)
+    loads = tires.probes.loads
     began = time.perf_counter()
-    wheel, none = session.wheel, sparse.csr_matrix((0, loads.shape[1]))
+    wheel, none = tires.wheel, sparse.csr_matrix((0, loads.shape[1]))
     full = wheel.rotating_stiffness, wheel.rotating_damping
-    moment = receptance(session.operators, *full, none, loads, FREQUENCY, moment=True)
+    moment = receptance(wheel.operators, *full, none, loads, FREQUENCY, moment=True)
     return Found("full FE", "all", _from_moment(loads, moment), time.perf_counter() - began)
 
 
 def _momentum(tires: Tires, count: int) -> Found:
     """The program's own way: its response, with the momentum of each state for an output."""
-    _, _, loads = greens.probes(tires.session)
+    loads = tires.probes.loads
     began = time.perf_counter()
     response = tires.response(count, "attachment")
     moment: Response = replace(
@@ -153,15 +148,10 @@ def _momentum(tires: Tires, count: int) -> Found:
 
 def _free_rim(tires: Tires) -> Iterator[Found]:
     """Modes of the same static state with its rim let go."""
-    session = tires.session
-    _, _, loads = greens.probes(session)
-    shape = Rolling(*session.rolling)
-    operators = Operators(session.body, session.scene.static.inflation, Support("free"), shape)
-    rotation = operators.rotation() if session.speed else None
-    wheel = Wheel(operators, rotation, session.speed, session.damping, "full")
-    modes = undamped.solve(operators.stiffness, operators.mass, max(COUNTS), sites=sites(operators))
+    loads, motions = tires.probes.loads, tires.motions
+    free = SmallMotions(motions.tire, motions.static, rim="free")
+    wheel, modes = wheel_of(free, tires.wheel.turning), solved(free.operators, count=max(COUNTS))
     for count in COUNTS:
-        few = replace(modes, squares=modes.squares[:count], vectors=modes.vectors[:, :count])
         began = time.perf_counter()
-        transfer = wheel.axle(few, loads, FREQUENCY)
+        transfer = wheel.axle(modes.first(count), loads, FREQUENCY)
         yield Found("free rim", count, transfer, time.perf_counter() - began)

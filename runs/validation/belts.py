@@ -44,7 +44,7 @@ depth = 0.003
 angle = -20.0
 density = 7850.0
 [static]
-load = 2000.0
+load = 1000.0
 error_estimate = false
 [rotation]
 speed = 80.0
@@ -55,7 +55,7 @@ youngs_modulus = 1e7
 [road]
 {road}
 [time]
-duration = 0.1
+duration = 0.06
 step = 1e-4
 """
 ROADS = {
@@ -69,10 +69,10 @@ CHOICES = (
     Choice(100, "none", 1e-4),
     Choice(100, "static", 1e-4),
     Choice(100, "attachment", 1e-4),
-    Choice(300, "static", 1e-4),
-    Choice(300, "second-order", 1e-4),
-    Choice(300, "attachment", 1e-4),
-    Choice(300, "attachment", 5e-5),
+    Choice(200, "static", 1e-4),
+    Choice(200, "second-order", 1e-4),
+    Choice(200, "attachment", 1e-4),
+    Choice(200, "attachment", 5e-5),
 )
 TARGETS = ((0.01, 30.0),)  # error, ratio of run times
 MESH = {"segments": 20, "elements_arc": 10}

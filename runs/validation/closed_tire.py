@@ -98,7 +98,17 @@ def _soft_modes(operators: Operators) -> Modes:
     stiffness = sparse.csr_matrix(operators.stiffness.getValuesCSR()[::-1], shape=size)
     mass = sparse.diags(operators.mass).tocsc()
     squares, vectors = eigsh(stiffness.tocsc(), 60, mass, sigma=-1e3)
-    return Modes(squares, vectors, np.zeros(60), 0.0, 60, np.inf, 6, (size[0],), 1)
+    return Modes(
+        squares=squares,
+        vectors=vectors,
+        residual=np.zeros(60),
+        orthonormality=0.0,
+        inertia_count=60,
+        counted_below=np.inf,
+        rigid=6,
+        sectors=(size[0],),
+        slices=1,
+    )
 
 
 def _oscillator() -> Iterator[tuple]:

@@ -117,10 +117,10 @@ def compare(
     tires: Tires, steps: Sequence[float], choices: Sequence[Choice], counts: tuple[str, ...]
 ) -> Comparison:
     """Full finite elements at the steps (s), and the choices, over the road the tires have at present."""
-    session = tires.session
-    found = Comparison([follow(session, *tires.full(step)) for step in steps], counts)
+    trial = tires.trial
+    found = Comparison([follow(trial, *tires.full(step)) for step in steps], counts)
     for choice in choices:
-        alike = (follow(session, *tires.modal(choice)) for _ in range(TIMES))
+        alike = (follow(trial, *tires.modal(choice)) for _ in range(TIMES))
         found.add(choice, min(alike, key=lambda history: history.seconds))
     return found
 

@@ -9,9 +9,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.model import step_solver
-from tireroad.contact.rolling import Drive, roll
-from tireroad.runs.stages.session import Session
+from tireroad.contact.model import Spec, step_solver
+from tireroad.contact.rolling import roll
+from tireroad.contact.setup import ContactSetup
 
 BAND = 300.0  # Hz, up to which errors are measured
 
@@ -28,17 +28,25 @@ class History:
     setup: float
 
 
-def follow(session: Session, tire, step: float, setup: float) -> History:
-    """Take the tire over the session's road: same points, tread, solver and road for any tire.
+@dataclass(frozen=True)
+class Trial:
+    """What any tire is taken over: the table [contact], patch and road, for `duration` s."""
+
+    spec: Spec
+    setup: ContactSetup
+    duration: float
+
+
+def follow(trial: Trial, tire, step: float, setup: float) -> History:
+    """Take the tire over the trial's road: same points, tread, solver and road for any tire.
 
     Contact and axle force (n, 3) N, displacement of the contact points (n, c) m.
     """
-    patch = session.patch
-    solver = step_solver(session.scene.contact, patch, tire.same_step)
+    patch, drive = trial.setup.patch, trial.setup.drive
+    solver = step_solver(trial.spec, patch, tire.same_step)
     if patch.weights is not None:
         tire = OnPoints(tire, patch.weights)
-    drive = Drive(session.road.height, session.motion, session.road_speed)
-    steps = round(session.scene.time.duration / step)
+    steps = round(trial.duration / step)
     contact, axle = np.zeros((2, steps, 3))
     moved = np.zeros((steps, len(patch.points)))
     with threadpool_limits(1, "blas"):

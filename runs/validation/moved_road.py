@@ -93,14 +93,14 @@ def _linearised() -> Table:
 
 def _against_large_motions(tires: Tires) -> Iterator[list]:
     """Rows of the linear full finite elements and of the modes."""
-    session, step = tires.session, LINEARISED.step
-    exact = follow(session, *tires.nonlinear(step))
+    trial, step = tires.trial, LINEARISED.step
+    exact = follow(trial, *tires.nonlinear(step))
     load = exact.values["contact force"][:, 2]
     for name, tire in (
         ("full FE, linear", tires.full(step)),
         ("modes", tires.modal(LINEARISED)),
     ):
-        found = follow(session, *tire)
+        found = follow(trial, *tire)
         errors = []
         for quantity in QUANTITIES:
             pair = exact.values[quantity], found.values[quantity]

@@ -96,7 +96,7 @@ def _run(mesh: dict[str, int], steps: Sequence[float], roads: dict[str, str]) ->
         for name, scene in scenes.items():
             tires.change(scene)
             found = compare(tires, steps, CHOICES, ("contact force", "axle force"))
-            points = len(tires.session.patch.points)
+            points = len(tires.trial.setup.patch.points)
             tables.append(found.table(f"{name}: {points} contact points, {tires.setting}"))
             tables[-1].notes.append(_beyond(found))
             rows += [found.verdict(name, *target, tires.modes_seconds) for target in TARGETS]

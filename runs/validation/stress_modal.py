@@ -16,7 +16,7 @@ from tireroad.modal import undamped
 from tireroad.modal.basis import Projection, project
 from tireroad.modal.campbell import critical_speed, growth, onset
 from tireroad.modal.rotating import checks, matrices, rotating
-from tireroad.runs.stages.modes import sites
+from tireroad.modal.standing import sites
 
 COUNT = 120
 DAMPING = (0.0, 500.0, 5e3, 1e5)  # gamma1, 1/s

@@ -4,28 +4,26 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from mpi4py import MPI
 
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.modal_damping import ModalDamping
 from tireroad.fem.transient.nonlinear import NonlinearTire
+from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
-from tireroad.modal.basis import Projection
+from tireroad.greens.responses import make_response
 from tireroad.modal.damping import StrainEnergy, beyond, rates
-from tireroad.modal.rotating import StateModes
-from tireroad.modal.undamped import Modes
+from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages import greens
-from tireroad.runs.stages.modes import ModalBasis
-from tireroad.runs.stages.pipeline import run_scene
-from tireroad.runs.stages.responses import make
-from tireroad.runs.stages.session import Session
+from tireroad.runs.stages.pipeline import Finished, run_scene
+from tireroad.runs.stages.setup import probes, scene_setup
+from tireroad.runs.stages.turning import turning_of
+from tireroad.runs.validation.histories import Trial
 
 # Of the full finite elements' scheme. Axle force on a cleat at steps of 1e-4 s with 0, 0.5 and 0.8: 5.4, 2.8
 # and 2.1 % off; contact force on cobblestones at 2.5e-5 s: 0 and 0.5 are 0.08 % apart, 0.8 is 0.2 % off.
@@ -51,7 +49,7 @@ class Tires:
         self._file = folder / "scene.toml"
         self._file.write_text(scene)
         with observe.quiet():
-            self.session: Session = run_scene(
+            self.run: Finished = run_scene(
                 load(self._file),
                 folder,
                 MPI.COMM_SELF,
@@ -63,30 +61,39 @@ class Tires:
         self.static_seconds, self.modes_seconds = (
             stages[name]["seconds"] for name in ("static", "modes")
         )
-        self._modes, self._modal = self.session.modes, self.session.modal
-        self._states: dict[int, StateModes] = {}
+        self.motions, self.modes = self.run.motions, self.run.fields
+        self._rolling: dict[int, RollingModes] = {}
         self.change(scene)
 
     @property
     def unknowns(self) -> int:
         """Free degrees of freedom of the finite elements."""
-        return self.session.operators.stiffness.getSize()[0]
+        return self.motions.unknowns
 
     @property
     def setting(self) -> str:
         """Size, and what was spent before any road, for a title."""
-        top = self._modal.frequency[-1]
+        top = self.modes.frequency[-1]
         return (
             f"{self.unknowns} unknowns; static state {self.static_seconds:.1f} s, "
-            f"{len(self._modal.frequency)} modes to {top:.0f} Hz {self.modes_seconds:.1f} s"
+            f"{len(self.modes.frequency)} modes to {top:.0f} Hz {self.modes_seconds:.1f} s"
         )
 
     def change(self, scene: str) -> None:
         """Take a scene that differs after its modes only: road, forces, contact, time."""
         self._file.write_text(scene)
-        self.session.scene = load(self._file)
+        self.job = replace(self.run.job, scene=load(self._file))
         self._responses: dict[tuple[int, str], tuple[Response, float]] = {}
-        greens.prepare(self.session)
+        static, contact = self.run.static, self.job.scene.contact
+        setup = scene_setup(self.job, static) if contact else None
+        self.probes = probes(self.job, static, setup)
+        if setup:
+            self.trial = Trial(contact, setup, self.job.scene.time.duration)
+
+    @property
+    def wheel(self) -> Wheel:
+        """The full matrices as the wheel turns."""
+        return self.run.wheel
 
     def modal(self, choice: Choice) -> tuple[Recursion, float, float]:
         """The lowest modes with their residual between the points of the scene; step; set-up in s."""
@@ -97,66 +104,44 @@ class Tires:
         response, seconds = self._responses[key]
         began = time.perf_counter()
         kept = response.resolved(choice.step)
-        tire = Recursion(kept, choice.step, "linear", self.session.comm)
+        tire = Recursion(kept, choice.step, "linear", self.job.comm)
         return tire, choice.step, seconds + time.perf_counter() - began
 
     def response(self, count: int, residual: str) -> Response:
         """The response of the lowest modes, as the program's own stages make it."""
-        session = self.session
-        session.modes, session.modal = self._lowest(count)
-        if count not in self._states:
-            self._states[count] = session.wheel.decouple(session.modal.projection, session.comm)
-        session.state_modes = self._states[count]
-        wanted = replace(session.scene.greens, residual=residual)
-        session.scene = replace(session.scene, greens=wanted)
-        _, outputs, loads = greens.probes(session)
-        return make(session, outputs, loads)
-
-    def _lowest(self, count: int) -> tuple[Modes, ModalBasis]:
-        """The first modes of those there are."""
-        modes, modal = self._modes, self._modal
-        parts = {f.name: getattr(modal.projection, f.name) for f in fields(Projection)}
-        cut = {
-            name: values if values is None else values[..., :count]
-            for name, values in parts.items()
-        }
-        for name in ("gyroscopic", "convective", "body", "body_convective"):
-            if cut[name] is not None:
-                cut[name] = np.ascontiguousarray(cut[name][:count])
-        few = replace(modes, squares=modes.squares[:count], vectors=modes.vectors[:, :count])
-        shape = modal.shape[:, :count]
-        return few, ModalBasis(modal.frequency[:count], shape, Projection(**cut))
+        if count not in self._rolling:
+            few = self.modes.first(count)
+            self._rolling[count] = rolling_modes(few, turning_of(self.job), self.job.comm)
+        rolling, points = self._rolling[count], self.probes
+        given = points.outputs, points.loads, residual
+        return make_response(lambda: self.wheel, rolling, *given, lambda: rolling.basis).response
 
     def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
         """All degrees of freedom between the same points; step; set-up in s."""
-        session = self.session
-        rotation = session.rotation_matrices if session.speed else None
-        _, outputs, loads = greens.probes(session)
+        wheel, points = self.wheel, self.probes
         began = time.perf_counter()
         damping, modal = self._damping()
-        given = session.operators, rotation, session.speed, damping, step, outputs, loads
+        given = wheel.operators, wheel.rotation, wheel.speed, damping, step
+        given = *given, points.outputs, points.loads, wheel.inertia
         tire = FullTire(*given, spectral_radius=radius, modal=modal)
         return tire, step, time.perf_counter() - began
 
     def _damping(self) -> tuple[tuple[float, float], ModalDamping | None]:
         """What damps the full matrices uniformly, and mode by mode beside it. Collective."""
-        session = self.session
-        if not isinstance(session.damping, StrainEnergy):
-            return session.damping, None
-        projection = self._modal.projection
-        uniform = beyond(session.damping, projection)
-        excess = rates(session.damping, projection) - uniform.mass
-        turning = (session.rotation_matrices.body, session.speed) if session.speed else ()
-        modal = ModalDamping(session.operators, self._modes.vectors, excess, *turning)
-        return uniform, modal
+        wheel, modes = self.wheel, self.modes
+        if not isinstance(wheel.damping, StrainEnergy):
+            return wheel.damping, None
+        uniform = beyond(wheel.damping, modes.projection)
+        excess = rates(wheel.damping, modes.projection) - uniform.mass
+        turning = (wheel.rotation.body, wheel.speed) if wheel.speed else ()
+        return uniform, ModalDamping(wheel.operators, modes.modes.vectors, excess, *turning)
 
     def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
         """The full finite elements with large motions, standing; step; set-up in s."""
-        session = self.session
-        _, outputs, loads = greens.probes(session)
+        points, static = self.probes, self.run.static
         began = time.perf_counter()
-        inflation = session.scene.static.inflation
         damping, modal = self._damping()
-        given = session.operators, inflation, damping, step, outputs, loads
+        given = self.motions.operators, static.inflation, damping, step
+        given = *given, points.outputs, points.loads
         tire = NonlinearTire(*given, spectral_radius=RADIUS, modal=modal)
         return tire, step, time.perf_counter() - began

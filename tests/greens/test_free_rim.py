@@ -21,7 +21,7 @@ from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.response import couple
 from tireroad.modal import undamped
 from tireroad.modal.basis import project
-from tireroad.runs.stages.modes import sites
+from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
 RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)

@@ -1,5 +1,6 @@
 """Residual options on a small finite-element tire, against its full matrices."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -7,15 +8,17 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
+from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
 from tireroad.greens.coupling import Basis, Wheel
-from tireroad.greens.truncation import Cutoff, estimate
+from tireroad.greens.truncation import Cutoff, estimate, estimate_axle
 from tireroad.modal import undamped
 from tireroad.modal.basis import project
 from tireroad.modal.fields import gram, multiply
@@ -166,3 +169,39 @@ def test_direct_receptance_is_reciprocal_and_damped() -> None:
     H = made.receptance(loads, loads, np.array([30.0, 90.0]))
     assert np.abs(H - H.transpose(0, 2, 1)).max() < 1e-10 * np.abs(H).max()
     assert (np.linalg.eigvalsh(-(H - H.conj().transpose(0, 2, 1)) / 2j) > 0).all()
+
+
+def test_vectors_of_another_solution_are_refused() -> None:
+    """With the projection of one solution and the vectors of another, signs would not fit."""
+    made, basis = wheel(50.0)
+    _, _, modes, _, loads = tire()
+    signs = np.where(np.arange(len(modes.squares)) % 3, 1.0, -1.0)
+    other = replace(modes, vectors=signs * modes.vectors)
+    with pytest.raises(InputError, match="not those that the basis shows"):
+        made.respond(basis, other, loads, loads, "attachment")
+
+
+@pytest.mark.parametrize("speed", [0.0, 50.0])
+@pytest.mark.parametrize("option", ["static", "second-order", "attachment"])
+def test_the_error_of_the_axle_force_is_about_what_is_estimated(speed, option) -> None:
+    """Loads less the rate of momentum, against the first moment of the full matrices; up to half the
+    highest mode. The static residual leaves out momentum, the others little of it."""
+    made, basis = wheel(speed)
+    operators, _, modes, _, loads = tire()
+    found = made.respond(basis, modes, loads, loads, option)
+    frequency = np.array([0.25, 0.5]) * modes.frequency[-1]
+    full = made.rotating_stiffness, made.rotating_damping
+    exact = receptance(operators, *full, loads, loads, frequency, moment=True)[:, -3:]
+    moving = replace(
+        found, output=found.momentum, block_output=found.block_momentum, residual=0 * exact[0].real
+    )
+    lacking = (2 * np.pi * frequency[:, None, None]) ** 2 * (moving.receptance(frequency) - exact)
+    error = np.linalg.norm(lacking, axis=(1, 2)) / np.sqrt(loads.shape[0])
+    cutoff = Cutoff(2 * np.pi * modes.frequency[-1], DAMPING[0])
+    guess = estimate_axle(found, cutoff, frequency)
+    if option == "static":
+        assert error[0] > 5e-3
+        assert np.all((guess > error / 2) & (guess < 3 * error))
+    else:
+        assert error[0] < 0.02
+        assert np.all(guess < 0.02)

@@ -5,6 +5,7 @@ import pytest
 from rings import inextensional_ring, random_tire, wave_ring
 
 from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.basis import Projection
 from tireroad.modal.campbell import critical_speed, growth, onset, sweep
 from tireroad.modal.rotating import checks, matrices, rotating, standing
 from tireroad.modal.states import growing
@@ -181,6 +182,21 @@ def test_rounding_is_no_growth():
     found = rotating(drag, stiffness)
     assert found.unstable == growing(found.every).sum() > 0
     assert found.fastest_growth == pytest.approx(5e-4, rel=0.5)
+
+
+def test_critical_speed_of_a_free_ring() -> None:
+    """Of a ring that nothing holds, n = 0, 1 (rigid: 2 translations) and n >= 2, k_n = w_n²/n² per wave
+    number: at speed V the translations' stiffness is V² (centrifugal terms of the static state) and
+    they stand still at V, whatever V is; the waves do at min w_n/n."""
+    waves = np.repeat(np.arange(1, 5), 2)
+    frequency = {1: 0.0, 2: 90.0, 3: 200.0, 4: 350.0}
+    for speed in (10.0, 40.0):
+        squares = np.array([frequency[n] ** 2 if n > 1 else speed**2 for n in waves])
+        zero = np.zeros((len(waves), len(waves)))
+        convective = -np.diag(waves.astype(float) ** 2)
+        free = Projection(squares, zero[:3], zero, convective, zero, convective)
+        assert critical_speed(free, "full") == pytest.approx(speed)
+        assert critical_speed(free, "full", speed) == pytest.approx(45.0)
 
 
 def test_states_come_in_one_order_and_phase():

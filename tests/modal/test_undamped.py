@@ -84,6 +84,14 @@ def test_ring_has_a_rigid_mode_and_exact_pairs():
     checked(matrix, mass, modes)
 
 
+def test_fewer_modes_than_rigid_ones():
+    stiffness, _ = ring(40)
+    three = sparse.kron(sparse.identity(3), stiffness, format="csr")
+    modes = undamped.solve(distributed(three), np.ones(120), 2)
+    assert modes.rigid == len(modes.squares) == 2
+    assert modes.inertia_count >= 3
+
+
 @pytest.mark.parametrize("copies", [3, 12, 20])
 def test_multiplicity_beyond_the_block(copies):
     """More equal eigenvalues than a block has columns: none may be missed."""

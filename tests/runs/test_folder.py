@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.folder import Summary, check_owner, claimed
+from tireroad.runs.files.checksum import signed
+from tireroad.runs.files.folder import Summary, check_kept_scene, check_owner, claimed
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
 
@@ -68,6 +69,25 @@ def test_stopped_run_goes_on(tmp_path: Path) -> None:
     assert entered
     with pytest.raises(InputError, match='scene "mine", not of "yours"'):
         check_owner(tmp_path, "yours")
+
+
+def test_a_changed_scene_is_not_resumed(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no run to resume"):
+        check_kept_scene(tmp_path)
+    path = tmp_path / "scene.toml"
+    path.write_text(signed("load = 300.0\n"))
+    check_kept_scene(tmp_path)
+    path.write_text(path.read_text().replace("300", "700"))
+    with pytest.raises(InputError, match="has changed since the run wrote it"):
+        check_kept_scene(tmp_path)
+
+
+def test_a_changed_summary_is_not_believed(tmp_path: Path) -> None:
+    Summary(tmp_path, "mine", 1).record("static", "computed", headline={"load": (300.0, "N")})
+    path = tmp_path / "summary.json"
+    path.write_text(path.read_text().replace("300", "700"))
+    with pytest.raises(InputError, match="is damaged"), claimed(tmp_path, "mine"):
+        pass
 
 
 def test_a_file_is_no_folder(tmp_path: Path) -> None:

@@ -56,6 +56,15 @@ def test_a_foreign_file_is_described_too(tmp_path: Path) -> None:
     assert "no datasets" in describe(tmp_path / "bare.h5")
 
 
+def test_control_characters_are_shown_and_not_obeyed(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file.attrs["title"] = "\x1b[31mred\x07\u202e"
+        file["a\x1b[2J"] = 1.0
+    text = describe(tmp_path / "other.h5")
+    assert "\\x1b[31mred\\x07\\u202e" in text and "a\\x1b[2J" in text
+    assert all(line.isprintable() for line in text.splitlines())
+
+
 @pytest.mark.parametrize("kept", [0, 1, 7, 100, 5000])
 def test_a_truncated_file_is_an_input_error(results: Path, tmp_path: Path, kept: int) -> None:
     (tmp_path / "cut.h5").write_bytes((results / "static.h5").read_bytes()[:kept])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tireroad.contact.model import step_solver
-from tireroad.contact.rolling import Drive, Loop, roll
+from tireroad.contact.rolling import Loop, roll
 from tireroad.runs.measure.tabulate import modules
 from tireroad.runs.validation import rolling
 from tireroad.runs.validation.comparison import Comparison
@@ -75,13 +75,12 @@ def tires(tmp_path_factory) -> Tires:
 
 
 def test_full_elements_in_contact_go_on_from_a_checkpoint_with_the_same_bits(tires) -> None:
-    session, step = tires.session, 2e-4
-    patch = session.patch
-    drive = Drive(session.road.height, session.motion, 0.0)
+    trial, step = tires.trial, 2e-4
+    patch, drive = trial.setup.patch, trial.setup.drive
 
     def loop() -> Loop:
         tire, *_ = tires.full(step)
-        return Loop(tire, step_solver(session.scene.contact, patch, tire.same_step))
+        return Loop(tire, step_solver(trial.spec, patch, tire.same_step))
 
     def forces(of: Loop, steps: int, done: int = 0) -> np.ndarray:
         instants = roll(of.tire, of.solver, patch, drive, step, steps, None, done)
@@ -96,12 +95,12 @@ def test_full_elements_in_contact_go_on_from_a_checkpoint_with_the_same_bits(tir
 
 
 def test_modes_linear_and_large_motions_agree_where_all_should(tires) -> None:
-    session, step = tires.session, 2e-4
-    linear = follow(session, *tires.full(step)).values["contact force"]
-    large = follow(session, *tires.nonlinear(step)).values["contact force"]
-    modal = follow(session, *tires.modal(Choice(120, "attachment", step))).values["contact force"]
+    trial, step = tires.trial, 2e-4
+    linear = follow(trial, *tires.full(step)).values["contact force"]
+    large = follow(trial, *tires.nonlinear(step)).values["contact force"]
+    modal = follow(trial, *tires.modal(Choice(120, "attachment", step))).values["contact force"]
     assert np.ptp(linear[:, 2]) > 1.0
     assert distance(large, linear, 0.02).worst < 2e-3
     assert distance(linear, modal, 0.02).worst < 5e-3
-    few = follow(session, *tires.modal(Choice(10, "none", step))).values["contact force"]
+    few = follow(trial, *tires.modal(Choice(10, "none", step))).values["contact force"]
     assert distance(linear, few, 0.02).worst > 0.05

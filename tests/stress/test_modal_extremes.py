@@ -16,7 +16,7 @@ from tireroad.modal import undamped
 from tireroad.modal.basis import project
 from tireroad.modal.campbell import critical_speed, growth, onset
 from tireroad.modal.rotating import checks, matrices, rotating
-from tireroad.runs.stages.modes import sites
+from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
 SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}

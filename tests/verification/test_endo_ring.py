@@ -65,7 +65,17 @@ def lowest(operators: Operators, count: int) -> Modes:
     squares, vectors = eigsh(stiffness, count, mass, sigma=-1.0)
     order = np.argsort(squares)
     nothing = np.zeros(count)
-    return Modes(squares[order], vectors[:, order], nothing, 0.0, count, 0.0, 0, (), 0)
+    return Modes(
+        squares=squares[order],
+        vectors=vectors[:, order],
+        residual=nothing,
+        orthonormality=0.0,
+        inertia_count=count,
+        counted_below=0.0,
+        rigid=0,
+        sectors=(),
+        slices=0,
+    )
 
 
 def in_plane(operators: Operators, count: int = 28) -> tuple[Modes, np.ndarray]:
@@ -76,10 +86,7 @@ def in_plane(operators: Operators, count: int = 28) -> tuple[Modes, np.ndarray]:
     wave = label(body.comm, points, circles, operators.mass, modes.vectors).wave
     axial = (operators.mass[:, None] * modes.vectors**2)[1::3].sum(axis=0)
     chosen = np.flatnonzero((axial < 0.5) & np.isin(wave, WAVES))
-    kept = Modes(
-        **{**vars(modes), "squares": modes.squares[chosen], "vectors": modes.vectors[:, chosen]}
-    )
-    return kept, wave[chosen]
+    return modes.among(chosen), wave[chosen]
 
 
 def endo(speed: float) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from tireroad.modal import quadratic, undamped
 from tireroad.modal.agreement import truncation
 from tireroad.modal.basis import project
 from tireroad.modal.rotating import checks, matrices, rotating
-from tireroad.runs.stages.modes import sites
+from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
 INFLATION = 2e5

@@ -16,7 +16,7 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
 from tireroad.modal import undamped
-from tireroad.runs.stages.modes import sites
+from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
 RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)

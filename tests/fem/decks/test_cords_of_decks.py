@@ -56,6 +56,19 @@ def test_ends_inside_elements_and_two_in_a_row(own):
     assert len(found.mesh.cells) == 3 * (12 + 4)
 
 
+@pytest.mark.parametrize("off", [-0.04, 0.04, 0.06])
+def test_ends_near_a_side(own, off):
+    """A belt that ends within a twentieth of an element of a side ends on it: no sliver is cut."""
+    element = np.radians(15)
+    width = 3 * element + off * element
+    text = plain(Torus(arcs=16, wall=1)) + CORDS
+    found = own(text + membranes("B", 0.006, np.linspace(-width, width, 31), 9001, 9001, True))
+    cut = abs(off) > 0.05
+    assert len(found.mesh.cells) == (36 if cut else 32)
+    end = width if cut else 3 * element
+    assert depths(found, "B")[1][[0, -1]] == pytest.approx([-end, end], abs=1e-6)
+
+
 def test_on_sides_of_elements(own):
     """Membranes that share the solids' nodes: no cell is added."""
     torus = Torus(arcs=12, wall=2)

@@ -1,0 +1,122 @@
+"""What a tire meets: the points that may touch, the strip of road they drive over, and its motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from tireroad.contact.grid_patch import make_grid_patch, settle
+from tireroad.contact.model import Spec, step_solver
+from tireroad.contact.patch import Patch, make_patch
+from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
+from tireroad.contact.rolling import Drive
+from tireroad.greens.response import Response
+
+# What the tire may give way beyond the road's own height, m: the smallest reach of the patch.
+_MARGIN = 5e-3
+
+
+class OuterFace(Protocol):
+    """The outer face of a static state (fem.static.state.StaticState)."""
+
+    positions: np.ndarray
+    half_sizes: np.ndarray
+    force: np.ndarray
+    gap: np.ndarray
+    shape: tuple[int, int]
+    road_height: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rolled:
+    """How the tire rolls: `speed` m/s over the road, `duration` s of the run, and the road's vertical
+    `motion` m over time s, by at most `lift` m."""
+
+    speed: float
+    duration: float
+    motion: Callable[[float], float]
+    lift: float = 0.0
+
+    @property
+    def travel(self) -> float:
+        """Length of road that passes, m."""
+        return self.speed * self.duration
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactSetup:
+    """The `patch` of points whose static gap is within `reach` (m), and the strip of `road` under it."""
+
+    patch: Patch
+    reach: float
+    road: PreparedRoad
+    rolled: Rolled
+
+    @property
+    def drive(self) -> Drive:
+        """The road as the time loop asks for it."""
+        return Drive(self.road.height, self.rolled.motion, self.rolled.speed)
+
+    def settled(self, response: Response, nodal_force: np.ndarray, spec: Spec) -> tuple:
+        """(setup, rise in m): a grid of points takes up the static load that the finite elements gave to
+        nodes, `nodal_force` (s,) N of the outer face; points at the nodes have it already."""
+        patch = self.patch
+        if patch.weights is None:
+            return self, 0.0
+        p = len(patch.index)
+        flexibility = (response.static() + response.residual)[:p, :p]
+        solver = step_solver(spec, patch, flexibility)
+        settled, rise = settle(patch, solver, flexibility, nodal_force[patch.index])
+        return replace(self, patch=settled), rise
+
+
+def contact_setup(
+    face: OuterFace,
+    lattice,
+    road: RoadUnderTire,
+    rolled: Rolled,
+    *,
+    spacing: tuple[float, float] | None = None,
+    reach: float | None = None,
+) -> ContactSetup:
+    """Patch and road of a run: points at the nodes, or on a grid of the `spacing` (m).
+
+    `lattice` of the finite elements' nodes, for a grid only. `reach` (m) by default from the road.
+    """
+    if reach is None:
+        reach = _reach(face, road, rolled)
+    patch = _nodes(face, reach)
+    if spacing is not None:
+        from tireroad.fem.static.tread_surface import TreadSurface
+
+        surface = TreadSurface(lattice, face.positions)
+        patch = make_grid_patch(surface, face.road_height, patch, spacing, reach)
+    return ContactSetup(patch=patch, reach=reach, road=_under(road, patch, rolled), rolled=rolled)
+
+
+def _nodes(face: OuterFace, reach: float) -> Patch:
+    return make_patch(face.positions, face.half_sizes, face.force, face.gap, face.shape, reach)
+
+
+def _under(road: RoadUnderTire, patch: Patch, rolled: Rolled) -> PreparedRoad:
+    """The strip of road that the patch drives over in this run."""
+    _, x1, y0, y1 = patch.extent
+    return road.prepare(x1, x1 + rolled.travel, y0, y1)
+
+
+def _reach(face: OuterFace, road: RoadUnderTire, rolled: Rolled) -> float:
+    """Static gap up to which a point can touch: the road's highest spot, its motion, a margin.
+
+    The highest spot depends on the strip, the strip on the patch: two rounds settle it.
+    """
+    reach = rolled.lift + _MARGIN
+    for _ in range(2):
+        patch = _nodes(face, reach)
+        strip = _under(road, patch, rolled)
+        x0, x1, y0, y1 = patch.extent
+        highest = max(strip.highest(x0, x1 + rolled.travel, y0, y1), 0.0)
+        reach = 1.5 * (highest + rolled.lift) + _MARGIN
+    return reach

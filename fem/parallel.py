@@ -1,0 +1,42 @@
+"""One process does it, all of them have it: for what is not shared out over processes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from mpi4py import MPI
+
+from tireroad.fem.errors import ConvergenceError, InputError
+
+T = TypeVar("T")
+
+
+class ToldByRoot(RuntimeError):
+    """The root process failed unexpectedly and says so; the others end without a word."""
+
+
+def on_root(
+    comm: MPI.Comm,
+    function: Callable[[], T],
+    clear: tuple[type[Exception], ...] = (InputError, ConvergenceError),
+) -> T:
+    """Run `function` on the root process; its value on every process.
+
+    Where it fails, every process raises: the same error where it is one of `clear`, or on the others
+    ToldByRoot for an error that is a bug. Collective.
+    """
+    value, error = None, None
+    if comm.rank == 0:
+        try:
+            value = function()
+        except Exception as raised:
+            error = raised
+    if comm.size > 1:
+        known = error is None or isinstance(error, clear)
+        told = comm.bcast(error if known else ToldByRoot())
+        value = comm.bcast(value if error is None else None)
+        error = error or told
+    if error is not None:
+        raise error
+    return value

@@ -1,0 +1,145 @@
+"""Responses between probes of a tire as they are wanted: residual, dynamic states, and what they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tireroad.fem.errors import InputError
+from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.response import Response
+from tireroad.greens.state_selection import keep
+from tireroad.greens.truncation import Cutoff, estimate, estimate_axle
+from tireroad.modal.basis import ModalBasis
+from tireroad.modal.damping import beyond
+from tireroad.modal.rolling import RollingModes, rolling_modes
+
+Figures = dict[str, tuple[float, str]]
+
+RESIDUALS = ("none", "dirac", "static", "second-order", "attachment")
+CHOICES = ("participation", "frequency")
+# Points and frequencies at which the truncation is estimated: enough for its size.
+_SAMPLE = 40
+_FREQUENCIES = 25
+# Residual states faster than this many times the highest mode follow statically: they would set the
+# automatic step and change the receptance up to half the highest mode by 0.001 at most (measured).
+_FASTEST = 3.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What a response should hold: `residual` flexibility of what the modes leave out, how many states
+    stay `dynamic` (None: all), their `choice`, and the `band` (Hz) of interest (None: up to half the
+    highest mode).
+    """
+
+    residual: str = "static"
+    dynamic: int | None = None
+    choice: str = "participation"
+    band: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, known in (("residual", RESIDUALS), ("choice", CHOICES)):
+            if getattr(self, name) not in known:
+                raise InputError(
+                    f'greens.{name} = "{getattr(self, name)}" is unknown: take {", ".join(known)}'
+                )
+
+
+@dataclass(frozen=True)
+class Made:
+    """A `response`, and what is to be known of it: `figures` name: (value, unit), `warnings`."""
+
+    response: Response
+    figures: Figures = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+def make_response(
+    wheel: Callable[[], Wheel],
+    rolling: RollingModes,
+    outputs,
+    loads,
+    residual: str,
+    fields: Callable[[], ModalBasis],
+) -> Made:
+    """The response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s) with a residual.
+
+    `wheel` gives the full matrices, `fields` the modes on all unknowns: each is called where the residual
+    needs it. Collective.
+    """
+    if residual == "none":
+        return _made(Basis.of(rolling).couple(outputs, loads))
+    if residual == "attachment":
+        found = fields()
+        if found is not rolling.basis:  # solved once more: their states, too, are their own
+            rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)
+        response = wheel().respond(Basis.of(rolling), found.modes, outputs, loads, residual)
+    else:
+        response = wheel().respond(Basis.of(rolling), None, outputs, loads, residual)
+    if residual in ("static", "dirac"):
+        return _made(response)
+    highest = cutoff(rolling)
+    limit = _FASTEST * max(highest.circular, highest.rate)
+    kept = response.keeping_where(lambda s: np.abs(s) <= limit)
+    static = len(response.every) - len(kept.every)
+    what = f"residual states faster than {_FASTEST:g} times the highest mode, made static"
+    return _made(kept, {what: (static, "-")})
+
+
+def _made(response: Response, figures: Figures | None = None) -> Made:
+    """The response with a warning where its states grow."""
+    count, rate = response.growth
+    warnings = ()
+    if count:
+        warnings = (
+            f"{count} state(s) of the response grow by themselves, the fastest at {rate:.3g} 1/s: lower the "
+            "speed, or take another greens.residual",
+        )
+    return Made(response, figures or {}, warnings)
+
+
+def selected(whole: Response, rolling: RollingModes, wanted: Wanted) -> Response:
+    """The states that stay dynamic; without a residual the others are gone altogether."""
+    if wanted.dynamic is None:
+        return whole
+    kept = keep(whole, wanted.dynamic, band(rolling, wanted), wanted.choice)
+    return replace(kept, residual=whole.residual) if wanted.residual == "none" else kept
+
+
+def band(rolling: RollingModes, wanted: Wanted) -> float:
+    """Frequencies of interest, Hz: as given, or up to half the highest mode."""
+    return wanted.band or cutoff(rolling).circular / (4 * np.pi)
+
+
+def cutoff(rolling: RollingModes) -> Cutoff:
+    """The highest mode, or state of the full problem, and the damping of those beyond it."""
+    mass, stiffness = beyond(rolling.turning.damping, rolling.basis.projection)
+    return Cutoff(rolling.highest, mass + stiffness * rolling.highest**2)
+
+
+def judged(
+    name: str, whole: Response, response: Response, rolling: RollingModes, wanted: Wanted
+) -> Figures:
+    """How far off the receptance may be within the band: by the modes left out, by the states."""
+    top, figures = band(rolling, wanted), dict[str, tuple[float, str]]()
+    some = [slice(None, None, -(-n // _SAMPLE)) for n in whole.residual.shape]
+    whole, response = whole.between(*some), response.between(*some)
+    frequency = np.linspace(0, top, _FREQUENCIES)[1 if whole.rigid else 0 :]
+    off = estimate(whole, wanted.residual, cutoff(rolling), frequency)
+    label = f"up to {top:.4g} Hz, {name}"
+    figures[f"estimated truncation error {label}"] = (float(off.max()), "-")
+    if wanted.dynamic is not None:
+        H = whole.receptance(frequency)
+        lost = np.linalg.norm(response.receptance(frequency) - H, axis=(1, 2))
+        lost /= np.linalg.norm(H, axis=(1, 2))
+        figures[f"error of the states made static {label}"] = (float(lost.max()), "-")
+    axle = estimate_axle(response, cutoff(rolling), frequency)
+    if axle is not None:
+        figures[f"estimated error of the axle force per N of load {label}"] = (
+            float(axle.max()),
+            "-",
+        )
+    return figures

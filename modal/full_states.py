@@ -1,0 +1,120 @@
+"""States of the rolling tire from the full finite-element matrices, in the place of the projected ones.
+
+Their fields take the place of the modes too: the basis is M-orthonormal, as that of the modes is, and
+spans [Re U, Im U, Re W, Im W], with U the right and W the left vectors (n, q).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from petsc4py import PETSc
+
+from tireroad.fem.matrices.operators import Operators
+from tireroad.modal import quadratic
+from tireroad.modal.agreement import missing, truncation
+from tireroad.modal.damping import beyond
+from tireroad.modal.fields import gram
+from tireroad.modal.quadratic import FullModes
+from tireroad.modal.rolling import RollingModes
+from tireroad.modal.rotating import StateModes
+
+_ROUNDING = 1e-14  # of the largest squared length: directions below are the fields' rounding
+
+Figures = dict[str, tuple[float, str]]
+
+
+def full_states(
+    operators: Operators,
+    pencil: tuple[PETSc.Mat, PETSc.Mat],
+    projected: RollingModes,
+    *,
+    count: int,
+    window: tuple[float, float] = (0.0, 0.0),
+) -> tuple[RollingModes, Figures, list[str]]:
+    """`count` pairs nearest to zero, or all in the `window` (Hz), how far the projected states are off them,
+    and warnings. `pencil`: D + 2 Omega G and K_Omega as in fem.matrices.compliance. Collective.
+    """
+    found, figures, lacking = _solve(operators, pencil, projected, count, window)
+    fields, coordinates = _orthonormal(operators, found)
+    comm, old = operators.body.comm, projected.basis
+    momenta = comm.allreduce(operators.carried @ fields)
+    basis = replace(
+        old,
+        shape=operators.trace(fields),
+        projection=replace(old.projection, momentum=momenta),
+        modes=None,
+    )
+    states = _states(found, coordinates)
+    full = RollingModes(basis=basis, states=states, turning=projected.turning, full=True)
+    warnings = (
+        []
+        if not lacking
+        else [
+            f'rotation.method = "full" found {lacking} state(s) fewer than the projected problem has in the same '
+            "range: some may be missing. Ask for more by rotation.count or a wider rotation.window."
+        ]
+    )
+    return full, figures | _compared(found, projected.states), warnings
+
+
+def _solve(operators, pencil, projected: RollingModes, count: int, window) -> tuple:
+    """As many pairs as wanted, or all in the window. Collective."""
+    whole, s = (operators.mass, *pencil), projected.states.eigenvalue
+    if not any(window):
+        found = quadratic.solve(*whole, count)
+        sizes = np.abs(found.eigenvalue), np.abs(s)
+        return found, {}, missing(*sizes, 0.0, float(sizes[0].max()))
+    mass, stiffness = beyond(projected.turning.damping, projected.basis.projection)
+    low, high = (2 * np.pi * f for f in window)
+    rate = mass + stiffness * high**2
+    below = int((np.abs(s) <= np.hypot(high, rate / 2)).sum())
+    found = quadratic.window(*whole, (low, high), rate, below)
+    inside = int(((s.imag >= low) & (s.imag <= high)).sum())
+    figures = {
+        "states in the window": (len(found.eigenvalue), "-"),
+        "projected states in the window": (inside, "-"),
+    }
+    return found, figures, missing(found.eigenvalue.imag, s.imag, low, high)
+
+
+def _orthonormal(operators: Operators, found: FullModes) -> tuple[np.ndarray, np.ndarray]:
+    """An M-orthonormal basis (own rows n, p) of all fields, and their coordinates (p, 4 q). Collective."""
+    comm, mass = operators.body.comm, operators.mass[:, None]
+    fields = np.hstack([found.right.real, found.right.imag, found.left.real, found.left.imag])
+    lengths = np.sqrt(comm.allreduce((mass * fields**2).sum(axis=0)))
+    lengths[lengths == 0] = 1.0  # the imaginary part of a real state
+    products = gram(comm, fields / lengths, mass * fields / lengths)
+    sizes, directions = np.linalg.eigh(products)
+    kept = sizes > _ROUNDING * sizes.max()
+    turn = directions[:, kept] / np.sqrt(sizes[kept])
+    coordinates = (directions[:, kept] * np.sqrt(sizes[kept])).T * lengths
+    return fields / lengths @ turn, coordinates
+
+
+def _states(found: FullModes, coordinates: np.ndarray) -> StateModes:
+    s, size = found.eigenvalue, len(coordinates)
+    real, imaginary, left_real, left_imaginary = np.split(coordinates, 4, axis=1)
+    weight = np.where(s.imag > 0, 2.0, 1.0)
+    return StateModes(
+        s,
+        (real + 1j * imaginary) * weight,
+        (left_real + 1j * left_imaginary).T,
+        np.zeros((0, 0)),
+        np.zeros((size, 0)),
+        np.zeros((0, size)),
+        found.residual,
+        found.left_residual,
+        found.condition,
+    )
+
+
+def _compared(found: FullModes, projected: StateModes) -> Figures:
+    """Truncation error of the projected eigenvalues: how many modes are enough."""
+    error = truncation(found.eigenvalue, projected.eigenvalue)
+    half = error[: max(len(error) // 2, 1)]
+    return {
+        "truncation error of the projected eigenvalues, lower half": (float(half.max()), "-"),
+        "truncation error of the projected eigenvalues": (float(error.max()), "-"),
+    }

@@ -1,0 +1,75 @@
+"""The states of a rolling tire: what its modes become as the wheel turns, and what they were made for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.parallel import on_root
+from tireroad.fem.turning import Turning
+from tireroad.modal.basis import ModalBasis, Projection
+from tireroad.modal.campbell import Campbell
+from tireroad.modal.rotating import StateModes, checks, matrices, rotating, standing
+
+
+def pencil(projection: Projection, turning: Turning) -> tuple[np.ndarray, np.ndarray]:
+    """D~ (1/s) and K~ (1/s2) of the projected problem."""
+    return matrices(projection, turning.speed, turning.damping, turning.inertia)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RollingModes:
+    """The decoupled `states` on the fields of `basis`, for a wheel that moves as `turning` says.
+
+    `full`: they are states of the full finite-element matrices, and the basis is of their own fields.
+    `campbell`: eigenvalues over speed, where they were asked for; `figures`: how far
+    the states are from the problem they came from (modal.rotating.checks).
+    """
+
+    basis: ModalBasis
+    states: StateModes
+    turning: Turning
+    full: bool = False
+    campbell: Campbell | None = None
+    figures: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def highest(self) -> float:
+        """Circular frequency of the highest mode, or full state, rad/s: what is left out lies beyond."""
+        if self.full:
+            return float(np.abs(self.states.eigenvalue.imag).max())
+        return 2 * np.pi * float(self.basis.frequency[-1])
+
+
+def rolling_modes(basis: ModalBasis, turning: Turning, comm) -> RollingModes:
+    """The second eigenproblem on the modal basis; of a tire without air that stands, the closed
+    formula. Collective.
+    """
+    states, figures = _decoupled(basis.projection, turning, comm)
+    return RollingModes(basis=basis, states=states, turning=turning, figures=figures)
+
+
+def decouple(projection: Projection, turning: Turning, comm) -> StateModes:
+    """The states of the projected problem, on every process, their identities checked. Collective."""
+    return _decoupled(projection, turning, comm)[0]
+
+
+def _decoupled(projection: Projection, turning: Turning, comm) -> tuple[StateModes, dict]:
+    """The states and the figures of modal.rotating.checks. Collective."""
+    if turning.speed == 0 and projection.air is None:
+        return standing(projection, turning.damping), {}
+    if turning.speed and projection.gyroscopic is None:
+        raise InputError(
+            "these modes were projected for a wheel that stands: project the rotation too"
+        )
+    given = pencil(projection, turning)
+
+    def solve() -> tuple[StateModes, dict]:
+        states = rotating(*given)
+        return states, checks(states, *given)
+
+    # One process solves: LAPACK on another could order repeated eigenvalues differently.
+    return on_root(comm, solve)

@@ -1,0 +1,96 @@
+"""The standing modes of a tire at its static state, as a basis for all that moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tireroad.fem.cavity.column import Column
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.model import SmallMotions
+from tireroad.modal import undamped
+from tireroad.modal.basis import ModalBasis, project, with_air
+from tireroad.modal.symmetry import Sites
+
+_SAME = 1e-6  # relative distance of the frequencies of one mode in two solutions
+
+
+def standing_modes(
+    motions: SmallMotions,
+    *,
+    count: int | None = None,
+    up_to: float | None = None,
+    rotation: bool = True,
+    air: Column | None = None,
+) -> ModalBasis:
+    """The `count` lowest modes, or all below `up_to` (Hz), with their fields on all unknowns.
+
+    `rotation`: also project the matrices of the rotating frame; without them the wheel can only stand.
+    `air`: what is in the cavity joins the projected problem.
+    ConvergenceError when one is missing, inaccurate or unstable. Collective.
+    """
+    return projected(motions, solved(motions.operators, count=count, up_to=up_to), rotation, air)
+
+
+def solved(
+    operators: Operators, *, count: int | None = None, up_to: float | None = None
+) -> undamped.Modes:
+    """The modes alone. Collective."""
+    if count is None and up_to is None:
+        raise InputError("modes: give count, how many of the lowest, or up_to, a frequency in Hz")
+    return undamped.solve(
+        operators.stiffness,
+        operators.mass,
+        None if up_to else count,
+        up_to=up_to or np.inf,
+        sites=sites(operators),
+    )
+
+
+def projected(
+    motions: SmallMotions, modes: undamped.Modes, rotation: bool, air: Column | None = None
+) -> ModalBasis:
+    """The basis of these modes: what they project and show. Collective."""
+    operators = motions.operators
+    matrices = motions.rotation if rotation else None
+    comm, loss = operators.body.comm, operators.loss_stiffness()
+    projection = project(modes, matrices, operators.carried, comm, loss=loss)
+    if loss is not None:
+        loss.destroy()
+    return ModalBasis(
+        frequency=modes.frequency,
+        shape=operators.trace(modes.vectors),
+        projection=with_air(projection, modes, air),
+        modes=modes,
+        column=air,
+    )
+
+
+def with_fields(
+    basis: ModalBasis,
+    motions: SmallMotions,
+    *,
+    count: int | None,
+    up_to: float | None,
+    air: Column | None = None,
+) -> ModalBasis:
+    """The basis with its fields on all unknowns: itself, or, of one read from a file, the modes solved
+    and projected once more, in place of all its parts. Collective.
+    """
+    if basis.modes is not None:
+        return basis
+    rotation = basis.projection.gyroscopic is not None
+    again = standing_modes(motions, count=count, up_to=up_to, rotation=rotation, air=air)
+    top = max(float(basis.frequency.max(initial=0.0)), 1e-300)
+    alike = len(again.frequency) == len(basis.frequency)
+    if not alike or np.abs(again.frequency - basis.frequency).max(initial=0.0) > _SAME * top:
+        raise ConvergenceError(
+            "modes: solved once more they are not those of modes.h5; run with --fresh, which "
+            "computes all of it anew"
+        )
+    return again
+
+
+def sites(operators: Operators) -> Sites:
+    """Where this process's unknowns are: there mirrors and repeated segments are looked for."""
+    return Sites(operators.unknowns.place, operators.unknowns.component)

@@ -1,0 +1,126 @@
+"""The energy balance of the contact stage: what is counted as the loop goes, and what is said of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tireroad.contact.balance import Motion, energy_left, own_states, springs
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
+from tireroad.modal.rolling import RollingModes
+from tireroad.runs.process import observe
+from tireroad.runs.stages.record import Record
+
+_UNBALANCED = (
+    0.05  # of the energy that moved: beyond it the steps are too long, or something is wrong
+)
+_LEAST = 1e-9  # J: below, rounding
+
+
+class Losses:
+    """Samples of a rolling tire's states, and their losses; nothing of one whose losses are not known."""
+
+    def __init__(self, tire, response: Response, rolling: RollingModes, step: float) -> None:
+        self._tire = tire
+        self._motion: Motion | None = None
+        if isinstance(tire, Recursion) and Motion.known(rolling, response):
+            self._motion = Motion(rolling, response.slow(step), step)
+        self._samples: list[tuple[np.ndarray, np.ndarray]] = []
+
+    @property
+    def found(self) -> tuple[float, float] | None:
+        """Energy lost in the material, and work of the drive, J; None where they are not known."""
+        if self._motion is None:
+            return None
+        return self._motion.losses.lost, self._motion.losses.drive
+
+    def sample(self) -> None:
+        """Keep the states at the end of a step."""
+        if self._motion is not None:
+            self._samples.append(self._tire.sample())
+
+    def flush(self) -> None:
+        """Count what was kept. Collective."""
+        if not self._samples:
+            return
+        states, pushes = zip(*self._samples, strict=True)
+        self._motion.add(self._tire.everywhere(states), self._tire.everywhere(pushes))
+        self._samples.clear()
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What a checkpoint keeps."""
+        return self._motion.losses.state() if self._motion else {}
+
+    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on from `state`."""
+        if self._motion is not None:
+            self._motion.losses.set_state(kept)
+
+
+def describe_energy(
+    record: Record,
+    rolling: RollingModes,
+    response: Response,
+    kept: dict[str, np.ndarray],
+    work: tuple[float, float | None],
+    losses: Losses,
+    step: float,
+) -> None:
+    """Work of the forces and of the drive, energy in the tire, energy lost, and what does not add up.
+
+    `kept`: the tire's snapshot; `work` (J) of the contact's changes and of the prescribed forces, if any.
+    """
+    contact, driven = work
+    total = contact + (driven or 0.0)
+    record.indicators["work of contact on the tire"] = (contact, "J")
+    if driven is not None:
+        record.indicators["work of the prescribed forces"] = (driven, "J")
+    own = own_states(response, rolling) and len(kept["block_state"]) == len(rolling.states.block)
+    if not own:
+        observe.say(f"  energy: contact and forces put {total:.4g} J into the tire")
+        return
+    left = energy_left(rolling, kept, response.slow(step))
+    elastic = springs(response.resolved(step), kept["push_force"])
+    record.indicators |= {
+        "energy left in the modes": (left, "J"),
+        "energy left in the residual flexibility": (elastic, "J"),
+    }
+    if losses.found is None:
+        _standing(record, rolling, total, left + elastic)
+    else:
+        _rolling(record, total, left + elastic, *losses.found)
+
+
+def _standing(record: Record, rolling: RollingModes, work: float, left: float) -> None:
+    """What was lost is what is missing: it must not be negative when the wheel stands."""
+    turns = rolling.turning.speed > 0
+    record.indicators["lost, less the work of the drive" if turns else "lost"] = (work - left, "J")
+    observe.say(
+        f"  energy: {work:.4g} J came into the tire, {left:.4g} J are left in it, "
+        f"{work - left:.4g} J were lost{' less what the drive put in' if turns else ''}"
+    )
+    if not turns and left > work + 1e-3 * abs(work) + _LEAST:
+        record.warnings.append(
+            "the standing tire holds more energy than was put in: take a smaller time.step, or "
+            'time.scheme = "constant"'
+        )
+
+
+def _rolling(record: Record, work: float, left: float, lost: float, drive: float) -> None:
+    """Every term is known: what does not add up is the error of the steps."""
+    off = work + drive - left - lost
+    moved = max(abs(work), abs(drive), abs(left), abs(lost))
+    record.indicators |= {
+        "work of the drive against the damping": (drive, "J"),
+        "energy lost in the material": (lost, "J"),
+        "energy that does not add up": (off, "J"),
+    }
+    observe.say(
+        f"  energy: contact {work:.4g} J + drive {drive:.4g} J = in the tire {left:.4g} J + lost "
+        f"{lost:.4g} J, but for {off:.2g} J"
+    )
+    if abs(off) > _UNBALANCED * moved + _LEAST:
+        record.warnings.append(
+            f"the energy of the rolling tire does not add up by {100 * abs(off) / moved:.2g} %: take a "
+            "smaller time.step"
+        )

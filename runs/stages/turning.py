@@ -1,0 +1,19 @@
+"""How the wheel of a scene turns, and what damps its tire."""
+
+from __future__ import annotations
+
+from tireroad.fem.turning import Turning
+from tireroad.modal.damping import Damping, Proportional, StrainEnergy
+from tireroad.runs.stages.job import Job
+
+
+def damping_of(job: Job) -> Damping:
+    """In proportion where the scene says so, else by the loss factors of the compounds."""
+    given = job.scene.damping
+    return StrainEnergy() if given is None else Proportional(given.mass, given.stiffness)
+
+
+def turning_of(job: Job) -> Turning:
+    """The scene's speed, damping and inertia."""
+    inertia = job.scene.rotation.inertia if job.speed else "full"
+    return Turning(speed=job.speed, damping=damping_of(job), inertia=inertia)

@@ -1,0 +1,75 @@
+"""The energy balance of a run: every term counted, standing and rolling."""
+
+import json
+
+import pytest
+
+SCENE = """
+name = "energy"
+[tire]
+segments = 16
+elements_arc = 6
+order = 2
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 300.0
+error_estimate = false
+[modal]
+count = 25
+[contact]
+youngs_modulus = 2e7
+[road]
+kind = "flat"
+[road.motion]
+kind = "sine"
+amplitude = 2e-4
+frequency = 60.0
+[time]
+duration = 0.05
+step = 5e-5
+[output]
+spectra = false
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, launch):
+    """The indicators and warnings of the contact stage, with more of a scene."""
+    folder = tmp_path_factory.mktemp("energy")
+
+    def started(name: str, more: str) -> tuple[dict[str, float], list[str]]:
+        scene = folder / f"{name}.toml"
+        scene.write_text(SCENE + more)
+        done = launch("-m", "runs", "run", scene, "--out", folder / name, "--until", "contact")
+        assert done.returncode == 0, done.stderr + done.stdout
+        entry = json.loads((folder / name / "summary.json").read_text())["stages"]["contact"]
+        return {k: v["value"] for k, v in entry["indicators"].items()}, entry["warnings"]
+
+    return started
+
+
+def test_an_undamped_standing_tire_keeps_what_it_takes(run) -> None:
+    """Also what the residual flexibility holds, which counted as lost before."""
+    found, warnings = run("standing", "[damping]\nmass = 0.0\n")
+    work, springs = (
+        found["work of contact on the tire"],
+        found["energy left in the residual flexibility"],
+    )
+    assert springs > 0.01 * abs(work)
+    assert abs(found["lost"]) < 5e-3 * max(abs(work), found["energy left in the modes"])
+    assert not warnings
+
+
+def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run) -> None:
+    found, warnings = run("rolling", "[damping]\nmass = 400.0\n[rotation]\nspeed = 50.0\n")
+    lost, drive = (
+        found["energy lost in the material"],
+        found["work of the drive against the damping"],
+    )
+    work, off = found["work of contact on the tire"], found["energy that does not add up"]
+    left = found["energy left in the modes"] + found["energy left in the residual flexibility"]
+    assert work + drive - left - lost == pytest.approx(off, abs=1e-12)
+    assert lost > 0.1 * abs(work)
+    assert abs(off) < 0.02 * lost
+    assert not any("add up" in text for text in warnings)
