@@ -13,8 +13,10 @@ from tireroad.modal.rolling import RollingModes, pencil
 
 
 def own_states(response: Response, rolling: RollingModes) -> bool:
-    """Whether the response moves in the modes' own states: of residual dynamics and attachment modes the
-    coordinates are not known here."""
+    """Whether the response moves in the modes' own states: of residual dynamics, attachment modes and the
+    states of the full matrices the coordinates in the modes are not known here."""
+    if rolling.full:
+        return False
     states = rolling.states
     return np.array_equal(response.eigenvalue, states.eigenvalue) and len(response.block) == len(
         states.block

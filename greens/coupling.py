@@ -93,7 +93,12 @@ def wheel_of(
 
     `projection` on the modes: for damping by strain energy only, which has no full matrices. Collective.
     """
-    tail = None
+    shape, tail = motions.static.rolling, None
+    if shape.speed and (shape.speed, shape.inertia) != (turning.speed, turning.inertia):
+        raise InputError(
+            f"the static state rolls at {shape.speed:g} rad/s with {shape.inertia} inertia, its small motions at "
+            f"{turning.speed:g} rad/s with {turning.inertia}: take one and the same, or a state at rest"
+        )
     if isinstance(turning.damping, StrainEnergy):
         if projection is None:
             raise InputError(

@@ -46,9 +46,12 @@ def label(
     for circle in range(circles):
         on = np.flatnonzero(ring == circle)
         root = np.sqrt(mass[3 * on])
-        field = _along_ring(angle[on], vectors.reshape(len(angle), 3, -1)[on]) * root[:, None, None]
+        field = (
+            _along_ring(angle[on], vectors.reshape(len(angle), 3, vectors.shape[1])[on])
+            * root[:, None, None]
+        )
         waves = root * np.exp(-1j * number[:, None] * angle[on])
-        amplitude = comm.allreduce(waves @ field.reshape(len(on), -1))
+        amplitude = comm.allreduce(waves @ field.reshape(len(on), 3 * vectors.shape[1]))
         square = (np.abs(amplitude) ** 2).reshape(len(number), 3, -1).sum(axis=1)
         shares += square / comm.allreduce(float((root**2).sum()))
     shares[1:] *= 2

@@ -14,6 +14,7 @@ from tireroad.fem.static.diagnosis import with_cause
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_error import load_error
 from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.press import place
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.runs.files.store import put
@@ -128,17 +129,7 @@ class StaticStage(Computed[StaticState]):
 def _press(loader: Loader, wanted) -> None:
     """Inflate the tire and press it on the road. Collective."""
     loader.inflate(wanted.inflation)
-    _place(loader, wanted)
-
-
-def _place(loader, wanted) -> None:
-    """Press the tire on the road. Collective."""
-    if wanted.load is not None:
-        loader.carry(wanted.load)
-    elif wanted.deflection is not None:
-        loader.deflect(wanted.deflection)
-    elif wanted.road_height is not None:
-        loader.deflect(wanted.road_height - loader.touch)
+    place(loader, wanted.load, wanted.deflection, wanted.road_height)
 
 
 def _estimate(record: Record, state: StaticState, loader: Loader) -> None:

@@ -20,8 +20,11 @@ def field(angle: np.ndarray, n: int, phase: float, kind: str) -> np.ndarray:
 
 
 @pytest.mark.mpi
-def test_waves_are_named():
-    """Two circles of 24 unit masses, spread over the processes: n, pairs, section numbers, a mixture."""
+@pytest.mark.parametrize("spread", [True, False])
+def test_waves_are_named(spread):
+    """Two circles of 24 unit masses, spread over the processes or each on one of them (a third has none): n,
+    pairs, section numbers, a mixture.
+    """
     angle = np.tile(np.arange(24) * np.pi / 12, 2)
     ring = np.repeat([0, 1], 24)
     points = np.stack([np.sin(angle), ring + 0.0, -np.cos(angle)], axis=1)
@@ -37,6 +40,8 @@ def test_waves_are_named():
     vectors = np.stack([wave.ravel() for wave in waves], axis=1)
     vectors /= np.linalg.norm(vectors, axis=0)
     mine = np.arange(COMM.rank, 48, COMM.size)
+    if not spread and COMM.size > 1:
+        mine = np.flatnonzero(ring == COMM.rank)
     own = (3 * mine[:, None] + np.arange(3)).ravel()
     names = label(COMM, points[mine], ring[mine], np.ones(len(own)), vectors[own])
     assert names.wave.tolist() == [2, 2, 0, 2, 2, 5, -1]

@@ -36,6 +36,13 @@ def test_a_road_up_to_the_flanks_is_named(launch, tmp_path: Path) -> None:
     assert again.returncode == 2 and "contact.points" in again.stderr
 
 
+def test_states_of_the_full_matrices_carry_a_contact(launch, tmp_path: Path) -> None:
+    """Their coordinates are not the modes': the energy balance tells the work alone (it crashed)."""
+    done = _run(launch, tmp_path, "rotation.method=full", "road.kind=flat")
+    assert done.returncode == 0, done.stderr
+    assert "J into the tire" in done.stdout
+
+
 def test_beyond_the_critical_speed_is_said(launch, tmp_path: Path) -> None:
     """On the shape at rest modes exist beyond it; what is computed has little meaning."""
     still = ("static.steady_rolling=false", "rotation.speed=600", "damping.mass=0")

@@ -1,0 +1,57 @@
+"""The static state of a tire in one call: inflate it, press it on the road."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.model import TireModel
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader, Progress
+from tireroad.fem.static.state import StaticState, static_state
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
+
+
+def press(
+    tire: TireModel,
+    *,
+    inflation: float,
+    load: float | None = None,
+    deflection: float | None = None,
+    road_height: float | None = None,
+    rolling: Rolling = AT_REST,
+    report: Callable[[Progress], None] = lambda progress: None,
+) -> StaticState:
+    """The tire inflated to `inflation` (Pa) and, with one of the others, on a flat frictionless road.
+
+    `load` N on the road, or `deflection` m of the road from first touch, or `road_height` m, z of its
+    plane; none of them: no road. `rolling`: inertia and damping of the steadily rolling shape. `report`
+    hears of every load step. The state knows its inflation and its rolling. InputError for values out
+    of range, ConvergenceError where no state is found. Collective.
+    """
+    if not (math.isfinite(inflation) and inflation >= 0.0):
+        raise InputError(f"inflation = {inflation:g} Pa must be 0 or more, and finite")
+    loader = Loader(Equilibrium(tire.body, rolling), report)
+    loader.inflate(inflation)
+    place(loader, load, deflection, road_height)
+    return static_state(loader.equilibrium, loader.touch)
+
+
+def place(
+    loader: Loader, load: float | None, deflection: float | None, road_height: float | None
+) -> None:
+    """Press the inflated tire on the road, as `press` says. Collective."""
+    given = {"load": load, "deflection": deflection, "road_height": road_height}
+    named = [name for name, value in given.items() if value is not None]
+    if len(named) > 1:
+        raise InputError(f"{' and '.join(named)} place the road each: give one of them")
+    for name, value in given.items():
+        if value is not None and not math.isfinite(value):
+            raise InputError(f"{name} = {value:g} must be finite")
+    if load is not None:
+        loader.carry(load)
+    elif deflection is not None:
+        loader.deflect(deflection)
+    elif road_height is not None:
+        loader.deflect(road_height - loader.touch)
