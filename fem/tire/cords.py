@@ -23,7 +23,8 @@ class Cords:
 
     `angle` rad from the circumference (90 degrees: radial); `youngs_modulus` Pa, `area` m2 of one cord,
     `spacing` m between cords, `density` kg/m3 of the cord, `compression` modulus in compression over that
-    in tension.
+    in tension. `drum_radius` m: angle and spacing are those on the building drum, from where the ply was
+    lifted; None: they are those in the tire, everywhere.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Cords:
     spacing: float
     density: float = 0.0
     compression: float = 1.0
+    drum_radius: float | None = None
 
     def __post_init__(self):
         for key in ("youngs_modulus", "area", "spacing"):
@@ -43,20 +45,43 @@ class Cords:
 
     @property
     def stiffness(self) -> float:
-        """k = E A_c / s, N/m."""
+        """k = E A_c / s of the spacing given, N/m."""
         return self.youngs_modulus * self.area / self.spacing
 
-    @property
-    def mass(self) -> float:
-        """rho_c A_c / s, kg/m2."""
-        return self.density * self.area / self.spacing
+    def at(self, radius: np.ndarray) -> Woven:
+        """The ply where it lies at a radius (n,) m from the axle.
 
-    @property
-    def direction(self) -> tuple[float, float]:
-        """Components of the cord along e_circ and e_arc; exactly 0 where the angle is 0 or 90 degrees."""
+        Lifted from the drum, cos alpha = (r / r_0) cos alpha_0 and s = s_0 (r / r_0) sin alpha / sin alpha_0:
+        cords keep their length, and each its share of the circumference. Raises InputError where they
+        cannot reach.
+        """
         exact = np.array([np.cos(self.angle), np.sin(self.angle)])
-        exact[np.abs(exact) < np.finfo(float).eps] = 0.0
-        return float(exact[0]), float(exact[1])
+        exact[np.abs(exact) < np.finfo(float).eps] = 0.0  # at 90 and 0 degrees
+        cosine, sine = (np.full(len(radius), value) for value in exact)
+        spacing = np.full(len(radius), self.spacing)
+        if self.drum_radius is not None:
+            cosine = radius / self.drum_radius * exact[0]
+            if (np.abs(cosine) >= 1).any() or not exact[1]:
+                raise InputError(
+                    f"cords {self.name!r}: cords of {np.degrees(self.angle):g} deg on a drum of "
+                    f"{self.drum_radius:g} m cannot be lifted to {radius.max():.4g} m"
+                )
+            sine = np.sign(exact[1]) * np.sqrt(1 - cosine**2)
+            spacing = self.spacing * radius / self.drum_radius * sine / exact[1]
+        section = self.area / spacing
+        return Woven(self.youngs_modulus * section, self.density * section, cosine, sine)
+
+
+@dataclass(frozen=True)
+class Woven:
+    """A ply at n places: `stiffness` k = E A_c / s (n,) N/m, `mass` rho_c A_c / s (n,) kg/m2, and the cord's
+    components `cosine` and `sine` (n,) along e_circ and e_arc, exactly 0 at 90 and 0 degrees.
+    """
+
+    stiffness: np.ndarray
+    mass: np.ndarray
+    cosine: np.ndarray
+    sine: np.ndarray
 
 
 def tension(stretch, stiffness, slack):

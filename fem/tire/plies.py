@@ -30,7 +30,8 @@ class Laid:
     the reference coordinate `axis` is `side`, 0 or 1. The normal that leaves the cell there is
     e_arc x e_circ of the ply, or its opposite where `reverse`.
 
-    Of the two cells at a face one is named, by any rule that is the same on all processes.
+    Of the two cells at a face one is named, by any rule that is the same on all processes. `radius` (k,)
+    m of each face from the axle: of use for lifted plies alone.
     """
 
     number: int
@@ -38,31 +39,38 @@ class Laid:
     axis: int
     side: int
     reverse: bool = False
+    radius: np.ndarray | None = None
 
 
 class Sheet:
     """One face of every cell with the cords on it, as fields that are constant in a cell.
 
-    `owner` (cells,) is the number of the ply, or -1; `turn` 1 or -1 as the cords' e_arc is e_circ x n or
-    its opposite, n the normal that leaves the cell.
+    `owner` (cells,) is the number of the ply, or -1; no two of `laid` have a cell in common.
     """
 
-    def __init__(self, face: Face, owner: np.ndarray, turn: np.ndarray, cords: Sequence[Cords]):
-        self.face, self.owner = face, owner
-        self._space = compat.cell_space(face.mesh)
-        self.stiffness = self._field([c.stiffness for c in cords])
-        self.slack = self._field([c.compression for c in cords])
-        self.mass = self._field([c.mass for c in cords])
+    def __init__(self, face: Face, count: int, laid: Sequence[Laid], cords: Sequence[Cords]):
+        self.face, self.owner = face, np.full(count, -1)
+        # Where there is no ply: nothing, along a unit vector.
+        values = dict.fromkeys(("stiffness", "mass", "slack", "sine"), 0.0) | {"cosine": 1.0}
+        by_cell = {name: np.full(count, value) for name, value in values.items()}
+        for one in laid:
+            given, cells = cords[one.number], one.cells
+            woven = given.at(np.ones(len(cells)) if one.radius is None else one.radius)
+            self.owner[cells] = one.number
+            by_cell["slack"][cells] = given.compression
+            for name, part in vars(woven).items():
+                by_cell[name][cells] = part
+            # e_arc is e_circ x n or its opposite, n the normal that leaves the cell.
+            by_cell["sine"][cells] *= -1.0 if one.reverse else 1.0
+        space = compat.cell_space(face.mesh)
+        fields = {name: fem.Function(space) for name in by_cell}
+        for name, field in fields.items():
+            field.x.array[:] = by_cell[name]
+        self.stiffness, self.mass, self.slack = (
+            fields[name] for name in ("stiffness", "mass", "slack")
+        )
         around, across = face.tangents()
-        cosine = self._field([c.direction[0] for c in cords], 1.0)  # a unit vector on no ply too
-        sine = self._field([c.direction[1] for c in cords], 0.0, turn)
-        self.direction = cosine * around + sine * across
-
-    def _field(self, values: Sequence[float], without: float = 0.0, times=1.0) -> fem.Function:
-        """The value of each ply by cell, and `without` where the face is on none."""
-        field = fem.Function(self._space)
-        field.x.array[:] = np.append(values, without)[self.owner] * times
-        return field
+        self.direction = fields["cosine"] * around + fields["sine"] * across
 
 
 class Plies:
@@ -116,7 +124,7 @@ class Plies:
 
     def inertia(self, integrand, kind: str = "full"):
         """int (mass per area) integrand over all plies that have mass, in UFL."""
-        if not any(one.mass for one in self.cords):
+        if not any(one.density for one in self.cords):
             return 0
         return _sum(sheet.face.integral(sheet.mass * integrand, kind) for sheet in self.sheets)
 
@@ -131,20 +139,20 @@ def _sum(forms):
 
 def _sheets(mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]) -> list[Sheet]:
     """As few sheets as hold all plies: one a face of the cells, and more where plies lie on each other."""
-    count = mesh.topology.index_map(3)
-    blank = np.full(count.size_local + count.num_ghosts, -1)
-    filled: dict[tuple[int, int, int], tuple[np.ndarray, np.ndarray]] = {}
+    cells = mesh.topology.index_map(3)
+    count = cells.size_local + cells.num_ghosts
+    taken: dict[tuple[int, int, int], np.ndarray] = {}
+    parts: dict[tuple[int, int, int], list[Laid]] = {}
     for one in laid:
         for slot in itertools.count():
             key = one.axis, one.side, slot
-            owner, turn = filled.setdefault(key, (blank.copy(), np.ones(len(blank))))
-            taken = bool((owner[one.cells] >= 0).any())
-            if not mesh.comm.allreduce(taken, op=MPI.LOR):
+            used = taken.setdefault(key, np.zeros(count, bool))
+            if not mesh.comm.allreduce(bool(used[one.cells].any()), op=MPI.LOR):
                 break
-        owner[one.cells] = one.number
-        turn[one.cells] = -1.0 if one.reverse else 1.0
-    faces = {key[:2]: Face(mesh, *key[:2], order) for key in filled}
-    return [Sheet(faces[key[:2]], *filled[key], cords) for key in sorted(filled)]
+        used[one.cells] = True
+        parts.setdefault(key, []).append(one)
+    faces = {key[:2]: Face(mesh, *key[:2], order) for key in parts}
+    return [Sheet(faces[key[:2]], count, parts[key], cords) for key in sorted(parts)]
 
 
 def laid_on(tire: TireMesh, cords: Sequence[Cords]) -> list[Laid]:
@@ -162,12 +170,15 @@ def laid_on(tire: TireMesh, cords: Sequence[Cords]) -> list[Laid]:
             raise InputError(f"cords {name!r}: the section has no ply of that name")
         chain = section.plies[name]
         reverse = _turned(section, chain)
+        radius = np.zeros((len(section.cells), 4))
+        radius[chain[:, 0], chain[:, 1]] = section.nodes[section.side(chain), 0].mean(axis=1)
         for side, other in itertools.product(range(4), (False, True)):
             marked = np.zeros(len(section.cells), bool)
             marked[chain[(chain[:, 1] == side) & (reverse == other), 0]] = True
             if marked.any():
                 cells = np.flatnonzero(marked[tire.section_cell])
-                out.append(Laid(number, cells, 1 + side // 2, side % 2, other))
+                here = radius[tire.section_cell[cells], side]
+                out.append(Laid(number, cells, 1 + side // 2, side % 2, other, here))
     return out
 
 

@@ -340,3 +340,25 @@ def test_forces_of_cords_in_a_wavy_ring():
     assert (np.diff(alone.points[0, :, 1]) > 0).all()
     assert (np.diff(np.unwrap(angle[:, 0])) > 0).all()
     assert alone.compressed == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_lifted_ply_keeps_its_cords(make_body):
+    """Energy of a tire that grows by one part in a thousand, against the integral over the section's arc with
+    cos alpha = r cos alpha_0 / r_0 and s = s_0 (r / r_0) sin alpha / sin alpha_0."""
+    half, drum, steep = np.radians(120), 0.25, np.radians(70)
+    one = cords(70.0, "ply", drum_radius=drum)
+    body = make_body(segments=16, arc=24, cords=[one], plies=[PlyLine("ply", (-half, half), 1.0)])
+    strain = 1e-3
+    body.u.interpolate(lambda x: strain * np.array([x[0], 0 * x[1], x[2]]))
+    arc = np.linspace(-half, half, 4001)
+    radius = 0.22 + 0.1 * np.cos(arc)
+    cosine = radius / drum * np.cos(steep)
+    sine = np.sqrt(1 - cosine**2)
+    spacing = one.spacing * radius / drum * sine / np.sin(steep)
+    # e_arc turns by sin(arc) e_r: what grows is the radius alone.
+    stretch = np.sqrt((cosine * (1 + strain)) ** 2 + sine**2 * (1 + strain * np.sin(arc) ** 2) ** 2)
+    density = one.youngs_modulus * one.area / spacing / 2 * (stretch - 1) ** 2
+    exact = integrate.trapezoid(density * 2 * np.pi * radius * 0.1, arc)
+    assert stored(body) == pytest.approx(exact, rel=3e-3)
+    with pytest.raises(InputError, match="cannot be lifted"):
+        cords(20.0, drum_radius=0.25).at(np.array([0.32]))

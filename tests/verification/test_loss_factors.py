@@ -24,7 +24,7 @@ from tireroad.modal.rotating import matrices, standing
 INFLATION = 1.0e5
 
 
-def tire(crown: dict, side: dict, segments=8, arc=6, plies=True) -> Body:
+def tire(crown: dict, side: dict, segments=8, arc=6, plies=True, comm=MPI.COMM_SELF) -> Body:
     """A small inflated torus of two compounds with a radial ply."""
     rubber = {"density": 1200.0, "youngs_modulus": 48e6, "poisson_ratio": 0.45}
     section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, 1, 2)
@@ -35,7 +35,7 @@ def tire(crown: dict, side: dict, segments=8, arc=6, plies=True) -> Body:
     ]
     ring = section.ring([regions[0].patch(0)], lines)
     wall = Material("neo-hookean", **rubber, **side)
-    body = Body(MPI.COMM_SELF, ring, compounds(wall, regions), cords=cords)
+    body = Body(comm, ring, compounds(wall, regions), cords=cords)
     equilibrium = Equilibrium(body)
     equilibrium.pressure.value = INFLATION
     assert equilibrium.solve().converged
@@ -152,3 +152,19 @@ def test_damping_beyond_the_modes():
     np.testing.assert_allclose(
         rates((3.0, 1e-4), projection), 3.0 + 1e-4 * projection.squares, rtol=1e-15
     )
+
+
+@pytest.mark.mpi
+def test_any_number_of_processes_has_the_same_loss_factors():
+    """Modes and losses of a tire shared by all processes, against this process alone."""
+    found = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        body = tire({"loss_factor": 0.3, "dynamic": 1.2}, {"loss_factor": 0.1}, comm=comm)
+        operators = Operators(body, INFLATION)
+        modes = undamped.solve(operators.stiffness, operators.mass, 8)
+        loss = operators.loss_stiffness()
+        found.append(project(modes, None, operators.carried, comm, loss=loss))
+    alone, shared = found
+    np.testing.assert_allclose(shared.squares, alone.squares, rtol=1e-8)
+    # Of a pair the sum: which two of its vectors are found is open.
+    np.testing.assert_allclose(shared.loss_factor.sum(), alone.loss_factor.sum(), rtol=1e-6)
