@@ -9,6 +9,7 @@ from tireroad.fem.parameters import described
 from tireroad.fem.sections.tire_size import size
 from tireroad.runs.scene.cavity_table import check_cavity
 from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.stiffness_table import check_stiffness
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_rules import check_cords, full_matrices
 from tireroad.runs.scene.tire_section import free_unknowns
@@ -285,6 +286,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("rotation",), _campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),
+    (("stiffness", "static"), check_stiffness),
     (("tire", "rotation", "modal", "greens"), check_cavity),
     (("time",), _time),
 )

@@ -40,9 +40,11 @@ from tireroad.runs.stages.setup import Setup
 from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
+from tireroad.runs.stages.stiffness import StiffnessStage
 
 PARTS: tuple[type[Part], ...] = (
     StaticStage,
+    StiffnessStage,
     Motions,
     Setup,
     ModesStage,
