@@ -170,7 +170,8 @@ class Tire:
     loss_factor: float = _loss_factor()
     region: tuple[Region, ...] = tables(Region, "a part of the section of another material")
     file: str | None = filename(
-        "Abaqus deck (.inp) or Gmsh mesh (.msh) of the section or the body", only_for=FILE
+        "Abaqus deck (.inp), Gmsh mesh (.msh) or section file (.toml, docs/section-file.md)",
+        only_for=FILE,
     )
     inner: str | None = text(None, "surface or node set of the face under pressure", only_for=FILE)
     tread: str | None = text(None, "surface or node set that can touch the road", only_for=FILE)

@@ -58,3 +58,42 @@ def test_unknowns_are_those_of_the_section(tmp_path, given):
 def test_a_radial_tire_says_what_it_does_not_take(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
         scene(tmp_path, f"[tire]\n{text}\n")
+
+
+def test_a_section_file_is_a_tire(tmp_path):
+    """Compounds and cords by name, of the order asked for; the hash changes with the drawing."""
+    from tireroad.fem.sections.ring import wall_thickness
+    from tireroad.runs.scene.own_tire import fingerprint
+    from tireroad.runs.stages.own_tire import own_cords, own_materials
+
+    drawing = tmp_path / "section.toml"
+    drawing.write_text(DRAWING)
+    tire = scene(tmp_path, '[tire]\nsection = "file"\nfile = "section.toml"\norder = 3\n').tire
+    ring = make_section(tire)
+    assert ring.order == 3
+    assert wall_thickness(ring.section) == pytest.approx(0.009, rel=0.02)
+    assert own_materials(tire)["rubber"].youngs_modulus == 5e6
+    assert [(c.name, c.area) for c in own_cords(tire)] == [("ply", 4e-7)]
+    before = fingerprint(tire)
+    drawing.write_text(DRAWING.replace("thickness = 6", "thickness = 7"))
+    assert fingerprint(tire) != before
+    drawing.write_text(DRAWING.replace("rubber", "ruber", 1))
+    with pytest.raises(InputError, match=r"section\.toml.*no compound 'ruber'"):
+        scene(tmp_path, '[tire]\nsection = "file"\nfile = "section.toml"\n')
+
+
+DRAWING = """
+unit = "mm"
+tread = 60.0
+outline.arcs = [[320, 0], [290.71067811865476, 70.71067811865476], [220, 100], [183, 92.88], [170, 86.6]]
+layer = [
+    { name = "outer", compound = "rubber", thickness = 6 },
+    { name = "inner", compound = "rubber", thickness = 3 },
+]
+cords = [
+    { name = "ply", under = "outer", to = 500, angle = 90, youngs_modulus = 1e10, area = 4e-7, spacing = 1e-3 },
+]
+[compound.rubber]
+youngs_modulus = 5e6
+density = 1100
+"""
