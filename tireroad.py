@@ -14,6 +14,14 @@ __path__ = [str(Path(__file__).resolve().parent)]
 # Where each public name lives; imported when it is first asked for, so that `import tireroad` costs
 # nothing and reading results needs no finite elements.
 _HOMES = {
+    "torus": "tireroad.runs.library",
+    "press": "tireroad.runs.library",
+    "modes": "tireroad.runs.library",
+    "roll": "tireroad.runs.library",
+    "drive": "tireroad.runs.drive",
+    "make_road": "tireroad.contact.roads.road",
+    "Material": "tireroad.fem.tire.material",
+    "Turning": "tireroad.fem.turning",
     "load": "tireroad.runs.files.reader",
     "RunResults": "tireroad.runs.files.reader",
     "InputError": "tireroad.fem.errors",

@@ -24,10 +24,13 @@ def own_states(response: Response, rolling: RollingModes) -> bool:
 
 
 def springs(response: Response, force: np.ndarray) -> float:
-    """Elastic energy (J) in the residual flexibility under a force (k,) N, that of states made static in it."""
+    """Elastic energy (J) in the residual flexibility under forces (k,) N, that of states made static in it.
+
+    The first k outputs are the forces' own displacements; readings may follow them (contact.driven).
+    """
     if response.pulse:
         return 0.0
-    return float(0.5 * force @ response.residual @ force)
+    return float(0.5 * force @ response.residual[: len(force)] @ force)
 
 
 class Motion:

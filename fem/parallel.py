@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
-
-from mpi4py import MPI
+from typing import TYPE_CHECKING, TypeVar
 
 from tireroad.fem.errors import ConvergenceError, InputError
+
+if TYPE_CHECKING:  # the command line needs this module, and starts without MPI
+    from mpi4py import MPI
 
 T = TypeVar("T")
 

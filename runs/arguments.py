@@ -74,6 +74,14 @@ def parser() -> argparse.ArgumentParser:
         ("export", "XDMF for ParaView and CSV for spreadsheets from a result folder"),
     ):
         command(name, text).add_argument("directory", type=Path, metavar="DIR")
+    sweep = command("sweep", "a family of runs that share what they can, in one table")
+    sweep.add_argument("sweep", type=Path, metavar="SWEEP.toml")
+    sweep.add_argument("--local", type=int, default=1, metavar="K", help="K members at a time")
+    sweep.add_argument("--slurm", action="store_true", help="write job scripts and submit them")
+    sweep.add_argument("--gather", action="store_true", help="only gather what is there")
+    sweep.add_argument(
+        "--out", type=Path, metavar="DIR", help="results/<name of the sweep> by default"
+    )
     compare = command("compare", "two to twelve runs in one page and one table")
     compare.add_argument("directories", type=Path, nargs="+", metavar="DIR")
     compare.add_argument("--out", type=Path, metavar="DIR", default=Path("results/compare"))

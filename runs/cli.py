@@ -141,11 +141,18 @@ def _compare(args: argparse.Namespace) -> None:
     print(compare(args.directories, args.out))
 
 
+def _sweep(args: argparse.Namespace) -> None:
+    from tireroad.runs.sweep.command import sweep
+
+    sweep(args.sweep, args.out, at_once=args.local, queue=args.slurm, only_gather=args.gather)
+
+
 ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
     "check": _check,
     "report": _report,
     "export": _export,
     "compare": _compare,
+    "sweep": _sweep,
     "info": _info,
     "bench": _bench,
     "validate": _validate,

@@ -9,6 +9,7 @@ import numpy as np
 
 from tireroad.fem.decks.compounds import Rubber, cord, rubber
 from tireroad.fem.decks.deck import SCOPE, Deck
+from tireroad.fem.decks.drawn import drawn
 from tireroad.fem.decks.files import abaqus, gmsh
 from tireroad.fem.decks.named import named_edges
 from tireroad.fem.decks.regions import Regions, regions
@@ -59,14 +60,22 @@ class OwnSection:
 
 
 def read(path: Path | str, wishes: Wishes | None = None) -> OwnSection:
-    """The section of an Abaqus deck (.inp) or a Gmsh mesh (.msh). Not collective; reads files.
+    """The section of an Abaqus deck (.inp), a Gmsh mesh (.msh) or a section file (.toml). Not collective; reads files.
 
     Raises InputError, with file and line, for all that keeps the file from being a tire's section.
     """
     path, wishes = Path(path), wishes or Wishes()
+    if path.suffix.lower() == ".toml":
+        mesh, rubbers, plies = drawn(path)
+        read_all = (f"all of {path.name}",)
+        return OwnSection(
+            mesh=mesh, rubbers=rubbers, plies=plies, used=read_all, unused=(), notes=()
+        )
     readers = {".inp": abaqus.read, ".msh": gmsh.read}
     if path.suffix.lower() not in readers:
-        raise InputError(f"{path}: a section is read from .inp (Abaqus) or .msh (Gmsh)")
+        raise InputError(
+            f"{path}: a section is read from .inp (Abaqus), .msh (Gmsh) or .toml (section file)"
+        )
     deck = readers[path.suffix.lower()](path)
     try:
         return _section(*revolved.reduced(deck), wishes)

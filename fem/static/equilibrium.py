@@ -185,6 +185,15 @@ class Equilibrium:
         field.scatter_forward()
         return ""
 
+    def road_stiffness(self) -> float:
+        """Force (N) the road gains per metre it rises with the points that touch it now. Collective."""
+        self._before.x.array[:] = self.body.u.x.array
+        if not self._take_tangent():
+            return float("nan")
+        nothing = np.zeros(len(self._work.array_r))
+        _, force = self._system.solve(nothing, self._system.raising)
+        return self.body.comm.allreduce(float(force.sum()))
+
     def contact_force(self) -> np.ndarray:
         """Vertical force of the road on the owned nodes (nodes,), N; not negative. Not collective."""
         force = np.zeros(self.body.nodes)

@@ -6,7 +6,7 @@ small enough is an error that names the last good state.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,6 +83,13 @@ class Loader:
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
         self._raise_road(0.0, deflection, [])
+
+    def visit(self, deflections: Sequence[float]) -> Iterator[float]:
+        """Raise the road to ascending deflections (m) in turn, from a line through the last two states."""
+        known = [_Known(0.0, 0.0, self.body.u.x.array.copy())]
+        for deflection in deflections:
+            self._try_deflection(deflection, known)
+            yield deflection
 
     def carry(self, load: float) -> float:
         """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket."""

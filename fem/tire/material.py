@@ -39,18 +39,31 @@ class Material:
     def __post_init__(self):
         if self.model not in LAWS:
             raise InputError(f"material model {self.model!r}: known are {', '.join(LAWS)}")
+        if not self.density > 0:
+            raise InputError(f"material: density = {self.density:g} kg/m3 must be above 0")
+        if not -1 < self.poisson_ratio < 0.5:
+            raise InputError(
+                f"material: poisson_ratio = {self.poisson_ratio:g} must lie between -1 and 0.5; 0.4995 is "
+                "nearly incompressible"
+            )
+        for name in ("shear", "bulk"):
+            if not getattr(self, name) > 0:
+                raise InputError(
+                    f"material {self.model!r}: its {name} modulus is {getattr(self, name):g} Pa: give "
+                    "youngs_modulus and poisson_ratio, or c10 and bulk_modulus, as the law takes them"
+                )
 
     @property
     def shear(self) -> float:
         """Shear modulus at zero strain, Pa."""
-        if self.model in ("linear", "neo-hookean"):
+        if "shear" in LAWS[self.model].coefficients:
             return self.youngs_modulus / (2 * (1 + self.poisson_ratio))
         return 2 * (self.c10 + self.c01)
 
     @property
     def bulk(self) -> float:
         """Bulk modulus at zero strain, Pa."""
-        if self.model in ("linear", "neo-hookean"):
+        if "shear" in LAWS[self.model].coefficients:
             return self.youngs_modulus / (3 * (1 - 2 * self.poisson_ratio))
         return self.bulk_modulus
 

@@ -12,7 +12,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.read import Absent, Results, Section
-from tireroad.runs.report import force_sections, tire_sections
+from tireroad.runs.report import force_sections, stiffness, tire_sections
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.report.verdicts import verdicts
 from tireroad.runs.scene.plan import STAGES
@@ -22,6 +22,7 @@ from tireroad.runs.version import PROGRAM
 
 SECTIONS: Mapping[str, Callable[[Results], Section]] = {
     "static.h5": tire_sections.static,
+    "stiffness.h5": stiffness.section,
     "modes.h5": tire_sections.modes,
     "rotating.h5": tire_sections.rotating,
     "response.h5": force_sections.response,

@@ -148,7 +148,8 @@ def rotating(results: Results) -> Section:
     section = Section("Modes of the rolling tire", "Eigenvalues s of the rotating, damped tire.")
     value = results.array(name, "eigenvalue")
     # Those of the near-defective block too.
-    every = np.concatenate([value, np.linalg.eigvals(results.array(name, "block"))])
+    block = results.optional(name, "block")
+    every = value if block is None else np.concatenate([value, np.linalg.eigvals(block)])
     beyond = every[growing(every)]
     section.facts = attributes(results, name, (("speed", "rad/s"), ("basis_condition", "")))
     section.facts.append(("growing", quantity(len(beyond))))

@@ -4,6 +4,7 @@ from tireroad.runs.scene.tables import Scene
 
 STAGES = (
     "static",
+    "stiffness",
     "modes",
     "rotating",
     "greens",
@@ -17,6 +18,8 @@ STAGES = (
 def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
     """The stages that will not run, each with its reason."""
     reasons: dict[str, str] = {}
+    if scene.stiffness is None:
+        reasons["stiffness"] = "no [stiffness]"
     if scene.rotation is None:
         reasons["rotating"] = "no [rotation]: the wheel stands"
     elif scene.rotation.speed == 0:

@@ -6,11 +6,14 @@ from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import described
+from tireroad.fem.sections.tire_size import size
 from tireroad.runs.scene.cavity_table import check_cavity
 from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.stiffness_table import check_stiffness
 from tireroad.runs.scene.tables import Scene
 from tireroad.runs.scene.tire_rules import check_cords, full_matrices
 from tireroad.runs.scene.tire_section import free_unknowns
+from tireroad.runs.scene.tire_tables import Material, Tire
 
 Where = Callable[[tuple[str, ...], str], InputError]
 
@@ -18,7 +21,10 @@ Where = Callable[[tuple[str, ...], str], InputError]
 # what to write instead. A later version takes its lines out.
 LATER: dict[str, tuple[tuple[Any, ...], str]] = {
     "tire.mesh": ((), 'is not supported: write section = "file" and file = "…"'),
-    "tire.section": (("torus", "file"), 'only "torus" and "file" are supported in this version'),
+    "tire.section": (
+        ("torus", "radial", "file"),
+        'is not supported: "torus", "radial" and "file" are',
+    ),
 }
 
 
@@ -53,9 +59,22 @@ def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
             source.problems.append(((), str(error)))
 
 
+def _radial(tire: Tire, error: Where) -> None:
+    for key, absent in (("material", Material()), ("region", ()), ("cords", ())):
+        if getattr(tire, key) != absent:
+            raise error(("tire", key), "is of a torus: a radial tire has all of it by its size")
+    try:
+        size(tire.size)
+    except InputError as problem:
+        raise error(("tire", "size"), str(problem).removeprefix("tire.size ")) from None
+
+
 def _geometry(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     tire = scene.tire
     if tire.section == "file":
+        return
+    if tire.section == "radial":
+        _radial(tire, error)
         return
     if tire.thickness >= tire.minor_radius:
         raise error(
@@ -267,6 +286,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("rotation",), _campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),
+    (("stiffness", "static"), check_stiffness),
     (("tire", "rotation", "modal", "greens"), check_cavity),
     (("time",), _time),
 )

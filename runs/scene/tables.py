@@ -15,6 +15,7 @@ from tireroad.runs.scene.schema import (
     tables,
     variant,
 )
+from tireroad.runs.scene.stiffness_table import Stiffness
 from tireroad.runs.scene.tire_tables import Tire
 
 
@@ -260,6 +261,9 @@ class Scene:
     name: str = text("scene", "name of the scene and its result folder")
     tire: Tire = table(Tire, "geometry, mesh and materials of the tire")
     static: Static = table(Static, "inflation and load of the static state")
+    stiffness: Stiffness | None = table(
+        Stiffness, "load over deflection, and the stiffness of the standing tire", optional=True
+    )
     modal: Modal = table(Modal, "modes at the static state")
     damping: Damping | None = table(
         Damping,

@@ -7,6 +7,7 @@ from tireroad.runs.scene.cavity_table import Cavity
 from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
 
 TORUS, FILE = ("section", ("torus",)), ("section", ("file",))
+RADIAL, MESHED = ("section", ("radial",)), ("section", ("torus", "radial"))
 LINEAR = ("model", ("linear", "neo-hookean"))
 
 
@@ -123,7 +124,10 @@ class Cords:
 # torus: footprint_size 1, 0.5, 0.3, 0.2 on 30 x 14: 0.85, 0.6, -0.1, 0.04 % off 2000 N.
 @dataclass(frozen=True)
 class Tire:
-    section: str = choice("torus", ("torus", "file"), "shape of the section")
+    section: str = choice("torus", ("torus", "radial", "file"), "shape of the section")
+    size: str = text(
+        "205/60 R15", "of the built-in passenger tire (docs/radial-tire.md)", only_for=RADIAL
+    )
     outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10, only_for=TORUS)
     minor_radius: float = number(
         0.10, "m", "of the section, to its outer face", above=0, most=10, only_for=TORUS
@@ -137,17 +141,17 @@ class Tire:
     )
     elements_arc: int | None = integer(
         None,
-        "elements from bead to bead; absent: 14 of order 3",
+        "elements from bead to bead; absent: 14 of order 3, 26 of a radial tire",
         least=2,
         most=1000,
-        only_for=TORUS,
+        only_for=MESHED,
     )
     elements_thickness: int = integer(
         1, "elements through the wall", least=1, most=20, only_for=TORUS
     )
     order: int | None = integer(
         None,
-        "of the elements; absent: 3, or 2 where their number is given and of a file",
+        "of the elements; absent: 3, or 2 where their number is given, of a radial tire and a file",
         least=1,
         most=3,
     )
@@ -166,7 +170,8 @@ class Tire:
     loss_factor: float = _loss_factor()
     region: tuple[Region, ...] = tables(Region, "a part of the section of another material")
     file: str | None = filename(
-        "Abaqus deck (.inp) or Gmsh mesh (.msh) of the section or the body", only_for=FILE
+        "Abaqus deck (.inp), Gmsh mesh (.msh) or section file (.toml, docs/section-file.md)",
+        only_for=FILE,
     )
     inner: str | None = text(None, "surface or node set of the face under pressure", only_for=FILE)
     tread: str | None = text(None, "surface or node set that can touch the road", only_for=FILE)

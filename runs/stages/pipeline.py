@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 
@@ -16,6 +18,7 @@ from tireroad.greens.coupling import Wheel
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
+from tireroad.runs.files.cache import Cache
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.folder import Summary
@@ -40,9 +43,11 @@ from tireroad.runs.stages.setup import Setup
 from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
+from tireroad.runs.stages.stiffness import StiffnessStage
 
 PARTS: tuple[type[Part], ...] = (
     StaticStage,
+    StiffnessStage,
     Motions,
     Setup,
     ModesStage,
@@ -160,27 +165,49 @@ def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done |
 
 
 def _run(stage: Stage, summary: Summary) -> Done:
-    """Reuse the stage's file or compute it, and enter it in the summary. Collective."""
+    """Reuse the stage's file, of this folder or of the shared cache, or compute it. Collective."""
     job, name = stage.job, stage.name
     began = time.perf_counter()
     key, path = store.wanted_hash(name, stage.inputs()), job.path(name)
-    reason = on_root(job.comm, lambda: "absent" if job.fresh else store.why_not(path, key, name))
-    if not reason:
-        observe.say(f"{name:9s} reused: computed from the same inputs before")
-        on_root(job.comm, lambda: summary.record(name, "reused", reason="same inputs"))
-        return Done(key, stage.stored)
-    if reason != "absent":
-        observe.say(f"{name:9s} computed anew: {path.name} is there, but {reason}")
-    record = Record()
-    product = stage.produce(key, record)
+    with ExitStack() as claim:
+        reason, source, known = on_root(job.comm, lambda: _looked_up(job, name, key, claim))
+        if not reason:
+            observe.say(f"{name:9s} reused: computed from the same inputs {source}")
+            on_root(job.comm, lambda: summary.record(name, "reused", reason="same inputs", **known))
+            return Done(key, stage.stored)
+        if reason != "absent":
+            observe.say(f"{name:9s} computed anew: {path.name} is there, but {reason}")
+        record = Record()
+        product = stage.produce(key, record)
+        figures = vars(record)
+        on_root(job.comm, lambda: Cache().keep(name, key, path, figures))
     record.indicators["largest memory of a process so far"] = (_peak(job.comm), "GB")
     seconds = time.perf_counter() - began
     for text in record.warnings:
         observe.warn(f"{name}: {text}")
     observe.say(f"{name:9s} done in {seconds:.1f} s: {record.line()}")
-    figures = vars(record) | {"seconds": seconds}
-    on_root(job.comm, lambda: summary.record(name, "computed", **figures))
+    on_root(job.comm, lambda: summary.record(name, "computed", seconds=seconds, **figures))
     return Done(key, lambda: product)
+
+
+def _looked_up(job: Job, name: str, key: str, claim: ExitStack) -> tuple[str, str, dict[str, Any]]:
+    """(why the stage has to be computed, "" when not; by which run it was; figures that this folder's
+    summary lacks). Root process only.
+
+    What has to be computed is claimed: another run that wants the same waits until it is in the cache.
+    """
+    if job.fresh:
+        return "absent", "", {}
+    path = job.path(name)
+    reason = store.why_not(path, key, name)
+    if not reason:
+        return "", "before", {}
+    cache = Cache()
+    claim.enter_context(cache.claimed(name, key))
+    figures = cache.fetch(name, key, path)
+    if figures is None:
+        return reason, "", {}
+    return "", "by another run", figures
 
 
 def _peak(comm: MPI.Comm) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tireroad.fem.sections.ring import Ring
-from tireroad.runs.scene.tire_section import make_section, patch
+from tireroad.runs.scene.tire_section import built, make_section, patch
 from tireroad.runs.scene.tire_tables import Material as MaterialTable
 from tireroad.runs.scene.tire_tables import Region, Tire
 
@@ -32,6 +32,8 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
 
     if tire.section == "file":
         return Body(comm, section, own_materials(tire), cords=own_cords(tire))
+    if tire.section == "radial":
+        return _radial_body(comm, tire, section)
 
     def rubber(part: Tire | Region) -> Material:
         given = vars(part.material or MaterialTable()) | {
@@ -51,3 +53,20 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
         for c in tire.cords
     ]
     return Body(comm, section, {"wall": rubber(tire)} | materials, cords=cords)
+
+
+def _radial_body(comm: MPI.Comm, tire: Tire, section: Ring):
+    """The body of a tire built of layers. Collective."""
+    from tireroad.fem.tire.body import Body
+    from tireroad.fem.tire.cords import Cords
+    from tireroad.fem.tire.material import Material
+
+    construction, places = built(tire), {"under", "to"}
+    cords = [
+        Cords(**{key: value for key, value in vars(line).items() if key not in places})
+        for line in construction.cords
+    ]
+    compounds = {
+        name: Material("neo-hookean", **values) for name, values in construction.compounds.items()
+    }
+    return Body(comm, section, compounds, cords=cords)

@@ -100,3 +100,13 @@ def test_the_same_on_any_number_of_processes() -> None:
     tire = rolling()
     alone, shared = terms(tire, 200), terms(tire, 200, MPI.COMM_WORLD)
     np.testing.assert_allclose(shared, alone, rtol=1e-9)
+
+
+def test_readings_beside_the_forces_hold_no_energy() -> None:
+    """Three forces, five outputs of which the first three are the forces' own."""
+    tire = rolling()
+    shape, more = tire.basis.shape, np.ones((2, M))
+    response = couple(tire.states, np.vstack([shape, more]), shape, tire.basis.projection.momentum)
+    residual = np.vstack([np.diag([1e-6, 2e-6, 3e-6]), np.full((2, 3), 5.0)])
+    force = np.array([10.0, 20.0, 30.0])
+    assert springs(replace(response, residual=residual), force) == pytest.approx(1.8e-3)

@@ -14,6 +14,25 @@ def test_every_case_ends_well(package) -> None:
         assert caught and caught != "not caught", case
 
 
+def test_each_case_ends_as_it_should() -> None:
+    """Only what has no answer is refused; what has no vectors of its own goes to a block, nothing else does."""
+    modal = {case: (what, caught) for _, case, what, caught in stress_modal.rows()}
+    refused = {case for case, (what, _) in modal.items() if what.startswith("refused")}
+    assert refused == {"negative stiffness: 5 MPa from outside"}
+    identities = [what for what, _ in modal.values() if what.startswith("identities hold to")]
+    assert len(identities) == 4
+    for what in identities:
+        assert float(what.removeprefix("identities hold to ").split(";")[0]) < 1e-8
+    greens = {case: caught for _, case, _, caught in stress_greens.rows()}
+    blocks = {case for case, caught in greens.items() if "as a block" in caught}
+    defective = "near-defective: coupling back of "
+    assert {case for case in blocks if "critical damping" not in case} == {
+        f"{defective}0",
+        f"{defective}1e-13",
+    }
+    assert len(blocks) == 4
+
+
 def test_greens_functions_are_the_exponentials() -> None:
     """What the table shows as text: 1e-9 at worst."""
     for _, case, what, _ in stress_greens.rows():

@@ -8,7 +8,8 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.modal import undamped
 from tireroad.modal.symmetry import Sites
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.tire import make_body, make_section
+from tireroad.runs.scene.tire_section import make_section
+from tireroad.runs.stages.tire import make_body
 
 SCENE = """
 [tire.material]

@@ -1,0 +1,37 @@
+"""A section file (docs/section-file.md) as a tire from a file like any other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tireroad.fem.decks.compounds import Rubber
+from tireroad.fem.decks.shape.plies import Ply
+from tireroad.fem.errors import InputError
+from tireroad.fem.sections.construction import Construction
+from tireroad.fem.sections.mesh2d import SectionMesh
+from tireroad.fem.sections.section_file import read
+
+ELEMENTS = 26  # bead to bead: as the built-in radial tire
+
+
+def drawn(path: Path) -> tuple[SectionMesh, tuple[Rubber, ...], tuple[Ply, ...]]:
+    """Mesh of order 2, compound of each region, cords. InputError, with the file, for what is wrong."""
+    construction = read(path)
+    try:
+        mesh = construction.section(ELEMENTS)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    rubbers = tuple(_rubber(construction, name) for name in mesh.regions)
+    return mesh, rubbers, tuple(_ply(line, mesh) for line in construction.cords)
+
+
+def _rubber(construction: Construction, name: str) -> Rubber:
+    values = construction.compounds[name]
+    coefficients = {key: values[key] for key in ("youngs_modulus", "poisson_ratio")}
+    given = {key: values[key] for key in ("density", "dynamic", "loss_factor")}
+    return Rubber(name=name, model="neo-hookean", coefficients=coefficients, **given)
+
+
+def _ply(line, mesh: SectionMesh) -> Ply:
+    given = {key: value for key, value in vars(line).items() if key not in ("under", "to")}
+    return Ply(sides=mesh.plies[line.name], **given)

@@ -1,0 +1,201 @@
+"""A tire built from layers under its outer face: what the built-in radial tire and a section file say.
+
+Layers lie one under the other from the outer face inwards, each with a thickness along the section; cords lie on
+the inner side of a layer; parts of layers are other compounds. All lengths in m; places along the section by
+length s on the outer face from the crown, the same on both sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.sections import bead
+from tireroad.fem.sections.footprint import ring_corners
+from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
+from tireroad.fem.sections.mesh2d import SectionMesh
+from tireroad.fem.sections.outline import Outline
+from tireroad.fem.sections.ring import Ring, section_angles, wall_thickness
+
+LEAST = (6, 2)  # elements around and along: below, a tire is none
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A compound under the layer before it; `thickness` pairs (s, m), s ascending, smooth between them."""
+
+    name: str
+    compound: str
+    thickness: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a layer, |s| from `along[0]` to `along[1]`, of another compound."""
+
+    layer: str
+    compound: str
+    along: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CordLine:
+    """Cords on the inner side of the layer `under`, |s| <= `to`; as fem.tire.cords.Cords, angle in rad."""
+
+    name: str
+    under: str
+    to: float
+    angle: float
+    youngs_modulus: float
+    area: float
+    spacing: float
+    density: float = 0.0
+    compression: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Construction:
+    """`tread` m: the road can touch |s| up to there. `compounds` by name: what a `Material` takes."""
+
+    outline: Outline
+    layers: Sequence[Layer]
+    parts: Sequence[Part] = ()
+    cords: Sequence[CordLine] = ()
+    compounds: Mapping[str, Mapping[str, float]]
+    tread: float
+
+    def section(self, elements: int, order: int = 2) -> SectionMesh:
+        """Its elements: one a layer through the wall, about `elements` bead to bead, edges at every edge.
+
+        InputError for names that are not there, layers without thickness, a wall that folds.
+        """
+        length, levels = self.outline.length, len(self.layers)
+        self._check()
+        surfaces = self._surfaces()
+
+        def place(level: np.ndarray, s: np.ndarray) -> np.ndarray:
+            depths = surfaces(np.abs(s))  # (k, levels + 1), outer face first
+            under = levels * (1 - level)
+            k = np.clip(np.floor(under).astype(int), 0, levels - 1)
+            part, rows = under - k, np.arange(len(s))
+            depth = depths[rows, k] * (1 - part) + depths[rows, k + 1] * part
+            return self.outline.at(s) + depth[:, None] * self.outline.inwards(s)
+
+        patches = [self._patch(part) for part in self.parts]
+        for number, layer in enumerate(self.layers):
+            patches.insert(number, Patch(layer.compound, ((-length, length),), self._depth(number)))
+        plies = [self._ply(line) for line in self.cords]
+        ends = [end for part in self.parts for end in part.along] + [line.to for line in self.cords]
+        fixed = [end for end in [*ends, self.tread] if end < length * (1 - 1e-9)]
+        both = np.concatenate([fixed, np.negative(fixed)])
+        wall = np.linspace(0.0, 1.0, levels + 1)
+        arc = corners(elements, lambda s: 1 / self._size(s, elements), -length, length, both)
+        mesh = product(order=order, wall=wall, arc=arc, place=place, patches=patches, plies=plies)
+        return _named(mesh, arc, self.tread)
+
+    def ring(
+        self, segments: int, elements: int, order: int = 2, footprint_size: float = 1.0
+    ) -> Ring:
+        """The section revolved; half the elements both ways make its coarser companion."""
+
+        def coarser() -> Ring | None:
+            if segments // 2 < LEAST[0] or elements // 2 < 2 * LEAST[1]:
+                return None
+            return self.ring(segments // 2, elements // 2, order, footprint_size)
+
+        section = self.section(elements, order)
+        return Ring(
+            section=section,
+            ring_corners=ring_corners(segments, footprint_size),
+            arc_corners=section_angles(section),
+            thickness=wall_thickness(section),
+            height=float(np.ptp(section.nodes[:, 0])),
+            coarser=coarser,
+        )
+
+    def _check(self) -> None:
+        names = [layer.name for layer in self.layers]
+        for kind, wanted in (
+            ("part", [p.layer for p in self.parts]),
+            ("cords", [c.under for c in self.cords]),
+        ):
+            for name in wanted:
+                if name not in names:
+                    raise InputError(
+                        f"section: {kind} of layer {name!r}; there are {', '.join(names)}"
+                    )
+        for item in (*self.layers, *self.parts):
+            if item.compound not in self.compounds:
+                known = ", ".join(self.compounds)
+                raise InputError(f"section: no compound {item.compound!r}; there are {known}")
+
+    def _surfaces(self):
+        """Depths (k, layers + 1) m of outer face and inner sides of the layers at lengths (k,) >= 0."""
+        lines = []
+        for layer in self.layers:
+            s, thickness = np.array(layer.thickness, float).T
+            if (thickness <= 0).any():
+                raise InputError(
+                    f"section: layer {layer.name!r} needs a thickness above 0 everywhere"
+                )
+            if (np.diff(s) <= 0).any():
+                raise InputError(
+                    f"section: layer {layer.name!r}: places along the section must ascend"
+                )
+            lines.append((PchipInterpolator(s, thickness), s) if len(s) > 1 else (thickness[0], s))
+
+        def depths(s: np.ndarray) -> np.ndarray:
+            parts = [
+                line(np.clip(s, at[0], at[-1])) if len(at) > 1 else np.full(len(s), line)
+                for line, at in lines
+            ]
+            return np.cumsum([np.zeros(len(s)), *parts], axis=0).T
+
+        return depths
+
+    def _depth(self, number: int) -> tuple[float, float]:
+        count = len(self.layers)
+        return 1 - (number + 1) / count, 1 - number / count
+
+    def _number(self, name: str) -> int:
+        return [layer.name for layer in self.layers].index(name)
+
+    def _patch(self, part: Part) -> Patch:
+        low, high = part.along
+        high = min(high, self.outline.length)
+        arcs = ((-high, high),) if low == 0 else ((-high, -low), (low, high))
+        return Patch(part.compound, arcs, self._depth(self._number(part.layer)))
+
+    def _ply(self, line: CordLine) -> PlyLine:
+        end = min(line.to, self.outline.length)
+        return PlyLine(line.name, (-end, end), self._depth(self._number(line.under))[0])
+
+    def _size(self, s: np.ndarray, count: int) -> np.ndarray:
+        """Relative element size: geometric to the beads, smaller at the ends of cords."""
+        length = self.outline.length
+        thickness = self._surfaces()(np.array([length]))[0, -1]
+        size = bead.size(length - np.abs(s), 2 * length, count, bead.LEAST * thickness / count)
+        ends = np.array([line.to for line in self.cords if line.to < length])
+        if not len(ends):
+            return size
+        distance = np.abs(np.abs(s)[:, None] - ends).min(axis=1)
+        return size * (1 - _ENDS_DEPTH * np.exp(-((distance / (_ENDS * length)) ** 2)))
+
+
+_ENDS, _ENDS_DEPTH = 0.06, 0.6  # of the half section: where a belt ends, as for the torus
+
+
+def _named(mesh: SectionMesh, arc: np.ndarray, tread: float) -> SectionMesh:
+    """Regions of one compound as one, without the empty ones; the tread up to its edge."""
+    from dataclasses import replace
+
+    used = [mesh.regions[i] for i in np.unique(mesh.region)]
+    names = tuple(dict.fromkeys(used))
+    number = {name: i for i, name in enumerate(names)}
+    region = np.array([number[mesh.regions[i]] for i in mesh.region])
+    middle = np.abs(arc[1:] + arc[:-1]) / 2
+    return replace(mesh, region=region, regions=names, tread=mesh.outer[middle < tread])

@@ -1,0 +1,189 @@
+"""The section file: a construction written by hand in TOML (docs/section-file.md). Data only; nothing is executed."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.sections.construction import Construction, CordLine, Layer, Part
+from tireroad.fem.sections.outline import Outline, arcs
+
+UNITS = {"m": 1.0, "mm": 1e-3}
+LARGEST = 1_000_000  # bytes
+_TABLES = {"name", "unit", "tread", "outline", "layer", "part", "cords", "compound"}
+_COMPOUND = {
+    "youngs_modulus": None,
+    "poisson_ratio": 0.49,
+    "density": None,
+    "dynamic": 1.0,
+    "loss_factor": 0.0,
+}
+
+
+def read(path: Path | str) -> Construction:
+    """The construction of a file. InputError, with the file, for all that is not as documented."""
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    if len(data) > LARGEST:
+        raise InputError(f"{path}: not a section file: more than {LARGEST / 1e6:g} MB")
+    try:
+        raw = tomllib.loads(data.decode("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not a TOML file: {error}") from None
+    try:
+        return _construction(raw)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _construction(raw: dict[str, Any]) -> Construction:
+    _known(raw, _TABLES, "the file")
+    unit = raw.get("unit", "m")
+    if unit not in UNITS:
+        raise InputError(f'unit = "{unit}": must be "m" or "mm"')
+    scale = UNITS[unit]
+    return Construction(
+        outline=_outline(_table(raw, "outline"), scale),
+        layers=[_layer(one, scale) for one in _tables(raw, "layer", least=1)],
+        parts=[_part(one, scale) for one in _tables(raw, "part")],
+        cords=[_cords(one, scale) for one in _tables(raw, "cords")],
+        compounds={name: _compound(name, one) for name, one in _table(raw, "compound").items()},
+        tread=scale * _number(raw, "tread", "the file"),
+    )
+
+
+def _outline(table: dict[str, Any], scale: float) -> Outline:
+    _known(table, {"spline", "arcs"}, "[outline]")
+    if len(table) != 1:
+        raise InputError("[outline] has either spline = [[r, y], …] or arcs = [[r, y], …]")
+    kind, points = next(iter(table.items()))
+    points = scale * _pairs(points, f"outline.{kind}")
+    if points.min(axis=0)[0] <= 0:
+        raise InputError(f"outline.{kind}: r must be above 0 everywhere: points are [r, y]")
+    return Outline(arcs(points) if kind == "arcs" else points)
+
+
+def _layer(table: dict[str, Any], scale: float) -> Layer:
+    _known(table, {"name", "compound", "thickness"}, "[[layer]]")
+    name, thickness = _text(table, "name", "[[layer]]"), table.get("thickness")
+    constant = not isinstance(thickness, list)
+    pairs = [[0.0, _number(table, "thickness", f"layer {name!r}")]] if constant else thickness
+    values = scale * _pairs(pairs, f"layer {name!r}: thickness")
+    return Layer(
+        name, _text(table, "compound", f"layer {name!r}"), tuple(map(tuple, values.tolist()))
+    )
+
+
+def _part(table: dict[str, Any], scale: float) -> Part:
+    _known(table, {"layer", "compound", "along"}, "[[part]]")
+    low, high = scale * _pairs([table.get("along")], "part: along")[0]
+    if not 0 <= low < high:
+        raise InputError("[[part]]: along = [from, to] must ascend from 0 at the crown")
+    layer, compound = (_text(table, key, "[[part]]") for key in ("layer", "compound"))
+    return Part(layer, compound, (float(low), float(high)))
+
+
+def _cords(table: dict[str, Any], scale: float) -> CordLine:
+    """Areas and spacings in m2 and m whatever the unit of the drawing, as in [[tire.cords]]."""
+    keys = {
+        "name",
+        "under",
+        "to",
+        "angle",
+        "youngs_modulus",
+        "area",
+        "spacing",
+        "density",
+        "compression",
+    }
+    _known(table, keys, "[[cords]]")
+    name = _text(table, "name", "[[cords]]")
+    numbers = {
+        key: _number(table, key, f"cords {name!r}", default)
+        for key, default in (
+            ("youngs_modulus", None),
+            ("area", None),
+            ("spacing", None),
+            ("density", 0.0),
+            ("compression", 1.0),
+        )
+    }
+    return CordLine(
+        name=name,
+        under=_text(table, "under", f"cords {name!r}"),
+        to=scale * _number(table, "to", f"cords {name!r}"),
+        angle=float(np.radians(_number(table, "angle", f"cords {name!r}"))),
+        **numbers,
+    )
+
+
+def _compound(name: str, table: Any) -> dict[str, float]:
+    where = f"[compound.{name}]"
+    if not isinstance(table, dict):
+        raise InputError(f"{where} must be a table")
+    _known(table, set(_COMPOUND), where)
+    found = {key: _number(table, key, where, default) for key, default in _COMPOUND.items()}
+    if (
+        found["youngs_modulus"] <= 0
+        or found["density"] <= 0
+        or not -1 < found["poisson_ratio"] < 0.5
+    ):
+        raise InputError(
+            f"{where}: modulus and density above 0, Poisson's ratio between -1 and 0.5"
+        )
+    return found
+
+
+def _known(table: dict[str, Any], keys: set[str], where: str) -> None:
+    for key in table:
+        if key not in keys:
+            raise InputError(f"{where}: unknown key {key!r}; there are {', '.join(sorted(keys))}")
+
+
+def _table(raw: dict[str, Any], key: str) -> dict[str, Any]:
+    if not isinstance(raw.get(key), dict):
+        raise InputError(f"a table [{key}] is needed")
+    return raw[key]
+
+
+def _tables(raw: dict[str, Any], key: str, least: int = 0) -> list[dict[str, Any]]:
+    found = raw.get(key, [])
+    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+        raise InputError(f"{key} must be written [[{key}]], one for each")
+    if len(found) < least:
+        raise InputError(f"a [[{key}]] is needed")
+    return found
+
+
+def _number(table: dict[str, Any], key: str, where: str, default: float | None = None) -> float:
+    value = table.get(key, default)
+    right = isinstance(value, int | float) and not isinstance(value, bool)
+    if not right or not np.isfinite(value):
+        raise InputError(
+            f"{where}: {key} must be a number" + (", not " + str(value)[:40] if value else "")
+        )
+    return float(value)
+
+
+def _text(table: dict[str, Any], key: str, where: str) -> str:
+    value = table.get(key)
+    if not isinstance(value, str) or not value.strip():
+        raise InputError(f"{where}: {key} must be a text")
+    return value
+
+
+def _pairs(value: Any, where: str) -> np.ndarray:
+    try:
+        found = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    if found.ndim != 2 or found.shape[1] != 2 or not np.isfinite(found).all():
+        raise InputError(f"{where} must be pairs of numbers, [[a, b], …]")
+    return found

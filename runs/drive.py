@@ -1,0 +1,115 @@
+"""Rolling over a road, for scripts and notebooks: the time loop with its histories collected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.model import step_solver
+from tireroad.contact.patch import Patch
+from tireroad.contact.roads.under_tire import RoadUnderTire
+from tireroad.contact.rolling import roll as instants_of
+from tireroad.contact.setup import Rolled, contact_setup
+from tireroad.contact.spectra import amplitudes, third_octaves
+from tireroad.contact.steps import equal_steps
+from tireroad.contact.tread.law import TREADS, TreadLaw
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.matrices import probe
+from tireroad.greens.recursion import Recursion
+from tireroad.runs.library import RollingTire
+
+Array = NDArray[np.float64]
+_TURN = 0.3  # rad that the fastest mode turns in a step by default: under a percent in its phase
+_LEAST_STEPS = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class History:
+    """What happened: `time` (n,) s; `force` (n, c) N of each contact point, `axle_force` (n, 3) N,
+    `displacement` (n, c) m of the tire under the points, `gap` (n, c) m; the `patch` of points."""
+
+    time: Array
+    force: Array
+    axle_force: Array
+    displacement: Array
+    gap: Array
+    patch: Patch
+
+    @property
+    def total_force(self) -> Array:
+        """Vertical force of the road (n,), N."""
+        return self.force.sum(axis=1)
+
+    def spectrum(self) -> tuple[Array, NDArray[np.complex128]]:
+        """Frequencies (f,) Hz and amplitudes (f, 3) N of the axle force (contact.spectra)."""
+        return amplitudes(self.axle_force, self.time[1] - self.time[0])
+
+    def third_octaves(self) -> tuple[Array, Array]:
+        """Band centres (b,) Hz and levels (b, 3), dB re 1 N rms, of the axle force."""
+        return third_octaves(self.axle_force, self.time[1] - self.time[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Spec:
+    law: TreadLaw
+    solver: str = "auto"
+
+
+def drive(
+    tire: RollingTire,
+    road: RoadUnderTire,
+    *,
+    duration: float,
+    step: float | None = None,
+    tread: TreadLaw | None = None,
+    spacing: tuple[float, float] | None = None,
+    residual: str = "static",
+) -> History:
+    """Let the road pass under the tire for `duration` s, in steps of `step` s or as small as the modes ask.
+
+    `tread`: a law of contact.tread.laws, by default a half-space of 10 MPa; `spacing` (m, m) of a grid of
+    contact points, by default the nodes of the mesh. ConvergenceError where the road touches beyond the
+    patch of points. Frictionless. Collective.
+    """
+    if duration <= 0:
+        raise InputError(f"drive: duration = {duration:g} s must be above 0")
+    motions, turning = tire.standing.motions, tire.states.turning
+    static = motions.static
+    if static.road_height is None:
+        raise InputError("drive: the tire stands on no road: press it on one first")
+    rolled = Rolled(
+        speed=turning.speed * static.rolling_radius(), duration=duration, motion=lambda t: 0.0
+    )
+    setup = contact_setup(static, motions.lattice, road, rolled, spacing=spacing)
+    loads = probe.nodes(setup.patch.index, len(static.points), 2)
+    response = tire.respond(loads, loads, residual)
+    spec = _Spec(law=tread or TREADS["half-space"](youngs_modulus=1e7))
+    setup, _ = setup.settled(response, static.force, spec)
+    fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
+    chosen = equal_steps(duration, step or min(duration / _LEAST_STEPS, _TURN / fastest))
+    recursion = Recursion(response.resolved(chosen.size), chosen.size, "linear", motions.body.comm)
+    p = len(setup.patch.index)
+    solver = step_solver(spec, setup.patch, recursion.same_step[:p, :p])
+    seen = (
+        OnPoints(recursion, setup.patch.weights, 1)
+        if setup.patch.weights is not None
+        else recursion
+    )
+    instants = list(instants_of(seen, solver, setup.patch, setup.drive, chosen.size, chosen.count))
+    history = History(
+        time=np.array([instant.time for instant in instants]),
+        force=np.stack([instant.force for instant in instants]),
+        axle_force=np.stack([instant.axle_force for instant in instants]),
+        displacement=np.stack([instant.displacement for instant in instants]),
+        gap=np.stack([instant.gap for instant in instants]),
+        patch=setup.patch,
+    )
+    if (history.force[:, setup.patch.edge] > 0).any():
+        raise ConvergenceError(
+            "drive: the road touches at the edge of the patch of contact points: it is rougher than its "
+            "own highest spot says; take a smoother road or smaller steps"
+        )
+    return history

@@ -1,0 +1,187 @@
+"""The chain as functions of typed inputs, without scenes and files: for scripts and notebooks.
+
+    tire = torus(youngs_modulus=48e6, segments=24, elements_arc=10)
+    turning = Turning(speed=50.0, damping=(500.0, 0.0))
+    static = press(tire, inflation=2e5, load=500.0, turning=turning)
+    standing = modes(tire, static, count=60)
+    rolling = roll(standing, turning)
+    run = drive(rolling, make_road(kind="sine", amplitude=1e-3), duration=0.1)     # runs.drive
+
+SI units, angles in radians. Every function is collective: all processes of the tire's communicator call
+it with the same arguments, and all get the same arrays.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy import sparse
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.matrices import probe
+from tireroad.fem.model import SmallMotions, TireModel
+from tireroad.fem.sections.torus import Torus
+from tireroad.fem.static.press import press as press_tire
+from tireroad.fem.static.state import StaticState
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import Material
+from tireroad.fem.turning import Turning
+from tireroad.greens.coupling import Wheel, wheel_of
+from tireroad.greens.response import Response
+from tireroad.greens.responses import make_response
+from tireroad.modal.basis import ModalBasis
+from tireroad.modal.rolling import RollingModes, rolling_modes
+from tireroad.modal.standing import standing_modes
+
+Array = NDArray[np.float64]
+
+
+def torus(
+    *,
+    outer_radius: float = 0.32,
+    minor_radius: float = 0.10,
+    thickness: float = 0.012,
+    half_angle: float = 2 * math.pi / 3,
+    segments: int = 30,
+    elements_arc: int = 14,
+    elements_thickness: int = 1,
+    order: int = 3,
+    footprint_size: float = 0.2,
+    material: Material | None = None,
+    youngs_modulus: float = 4.8e8,
+    poisson_ratio: float = 0.45,
+    density: float = 1200.0,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> TireModel:
+    """A toroidal tire without loads. Lengths m, `half_angle` rad from the crown to each bead.
+
+    `material`, or a neo-Hookean rubber of `youngs_modulus` Pa, `poisson_ratio`, `density` kg/m3.
+    """
+    if not 0 < half_angle < math.pi:
+        raise InputError(
+            f"torus: half_angle = {half_angle:g} rad must lie between 0 and pi: it is in radians"
+        )
+    section = Torus(
+        outer_radius,
+        minor_radius,
+        thickness,
+        half_angle,
+        segments,
+        elements_arc,
+        elements_thickness,
+        order,
+        footprint_size=footprint_size,
+    ).ring()
+    rubber = material or Material(
+        "neo-hookean", density, youngs_modulus=youngs_modulus, poisson_ratio=poisson_ratio
+    )
+    return TireModel(section, lambda: Body(comm, section, {"wall": rubber}))
+
+
+def press(
+    tire: TireModel,
+    *,
+    inflation: float,
+    load: float | None = None,
+    deflection: float | None = None,
+    road_height: float | None = None,
+    turning: Turning | None = None,
+) -> StaticState:
+    """The tire inflated (Pa), and pressed on a flat road by a load (N), a deflection (m) from first touch,
+    or a height of the road (m, negative); without any of them there is no road.
+
+    `turning`: also the inertia and damping of the steadily rolling shape. ConvergenceError when the
+    tire finds no balance.
+    """
+    rolling = (
+        Rolling(turning.speed, *turning.damping, turning.inertia)
+        if turning is not None and turning.speed
+        else AT_REST
+    )
+    return press_tire(
+        tire,
+        inflation=inflation,
+        load=load,
+        deflection=deflection,
+        road_height=road_height,
+        rolling=rolling,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """The standing modes of a tire at its static state: `basis`, and the `motions` they are modes of."""
+
+    motions: SmallMotions
+    basis: ModalBasis
+
+    @property
+    def frequency(self) -> Array:
+        """Natural frequencies (m,), Hz."""
+        return self.basis.frequency
+
+
+def modes(
+    tire: TireModel,
+    static: StaticState,
+    *,
+    count: int | None = None,
+    up_to: float | None = None,
+    rim: str = "fixed",
+    road: str = "forces",
+) -> Standing:
+    """The `count` lowest undamped modes at a static state, or all below `up_to` Hz; none is missing.
+
+    `rim` "fixed" or "free"; `road` "forces": replaced by its forces, or "held".
+    """
+    motions = SmallMotions(tire, static, rim=rim, road=road)
+    return Standing(motions=motions, basis=standing_modes(motions, count=count, up_to=up_to))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RollingTire:
+    """A tire that turns: its `standing` modes and what they become, `states`."""
+
+    standing: Standing
+    states: RollingModes
+
+    @property
+    def eigenvalue(self) -> NDArray[np.complex128]:
+        """Eigenvalues s (q,) 1/s with Im s >= 0; frequency Im s / 2 pi, decay -Re s."""
+        return self.states.states.eigenvalue
+
+    @cached_property
+    def wheel(self) -> Wheel:
+        """The full matrices as the wheel turns."""
+        projection = self.standing.basis.projection
+        return wheel_of(self.standing.motions, self.states.turning, projection=projection)
+
+    def respond(self, outputs, loads, residual: str = "static") -> Response:
+        """Green's functions between probes (r, 3 s) and loads (k, 3 s) on the outer face, completed by the
+        `residual` flexibility of the modes left out (greens.responses)."""
+        basis = self.standing.basis
+        return make_response(
+            lambda: self.wheel, self.states, outputs, loads, residual, lambda: basis
+        ).response
+
+    def at(self, spots: list[tuple[float, float]], residual: str = "static") -> Response:
+        """The response between points of the outer face (angle around, angle along the section; rad),
+        in all three directions: probes x, y, z of the first, of the second, and so on."""
+        lattice = self.standing.motions.lattice
+        rows = [
+            probe.directed(probe.spot(lattice, *spot), axis) for spot in spots for axis in np.eye(3)
+        ]
+        probes = sparse.csr_matrix(np.stack(rows))
+        return self.respond(probes, probes, residual)
+
+
+def roll(standing: Standing, turning: Turning) -> RollingTire:
+    """The modes of the tire as it turns, seen in the frame that does not turn; at speed 0 those it has."""
+    comm = standing.motions.body.comm
+    return RollingTire(standing=standing, states=rolling_modes(standing.basis, turning, comm))

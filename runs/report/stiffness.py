@@ -1,0 +1,69 @@
+"""What the report says of load over deflection and of the stiffness of the standing tire (stiffness.h5)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.runs.files.read import Results, Section, Table
+from tireroad.runs.report.figures import COLOURS, MUTED, canvas, encode, styled
+from tireroad.runs.report.quantities import quantity
+
+_FILE = "stiffness.h5"
+_FACTS = (
+    ("vertical", "vertical stiffness, slope of the curve", "N/m"),
+    ("longitudinal", "longitudinal stiffness", "N/m"),
+    ("lateral", "lateral stiffness", "N/m"),
+    ("torsional", "torsional stiffness about the vertical", "N m/rad"),
+)
+_COLUMNS = (
+    ("deflection", 1e3, "deflection, mm"),
+    ("load", 1.0, "load, N"),
+    ("stiffness", 1e-3, "slope, N/mm"),
+    ("footprint_length", 1e3, "length, mm"),
+    ("footprint_width", 1e3, "width, mm"),
+    ("footprint_area", 1e4, "area, cm²"),
+    ("pressure", 1e-3, "mean pressure, kPa"),
+    ("rolling_radius", 1e3, "rolling radius, mm"),
+)
+
+
+def section(results: Results) -> Section:
+    """Curve, table and stiffnesses."""
+    made = Section(
+        "Load, deflection and stiffness",
+        "The standing tire pressed on a flat road, its rim held. Horizontally and about the vertical: "
+        "the footprint sticks to a road that moves a little, at constant load.",
+    )
+    load = float(results.array(_FILE, "load"))
+    made.facts.append(("at a load of", quantity(load, "N")))
+    for name, title, unit in _FACTS:
+        value = results.optional(_FILE, name)
+        if value is not None:
+            made.facts.append((title, quantity(float(value), unit)))
+    columns = [scale * results.array(_FILE, f"curve/{name}") for name, scale, _ in _COLUMNS]
+    head = tuple(title for *_, title in _COLUMNS)
+    made.table = Table(head, [tuple(f"{v:.4g}" for v in row) for row in np.transpose(columns)])
+    picture = curve(columns[0], columns[1], columns[5], load)
+    made.figures.append(
+        (picture, "Load and contact area over deflection; dashed: the scene's load.")
+    )
+    return made
+
+
+@styled
+def curve(deflection: NDArray, load: NDArray, area: NDArray, own: float) -> str:
+    """Load (n) N and area (n) cm2 over deflection (n) mm, as a picture."""
+    figure, axes = canvas(6.2, 3.0)
+    here, other = axes[0, 0], axes[0, 0].twinx()
+    start = np.zeros(1)
+    x = np.concatenate([start, deflection])
+    here.plot(x, np.concatenate([start, load]), "o-", ms=3, color=COLOURS[0], label="load")
+    here.axhline(own, color=MUTED, lw=0.8, ls="--")
+    other.plot(x, np.concatenate([start, area]), "s-", ms=3, color=COLOURS[2], label="area")
+    here.set_xlabel("deflection, mm")
+    here.set_ylabel("load, N")
+    other.set_ylabel("contact area, cm²")
+    lines = here.get_lines()[:1] + other.get_lines()
+    here.legend(lines, [line.get_label() for line in lines], loc="upper left")
+    return encode(figure)

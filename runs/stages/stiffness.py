@@ -1,0 +1,193 @@
+"""stiffness: load over deflection with the footprint at each, and the stiffness of the standing tire."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.matrices.road_stiffness import RoadStiffness, road_stiffness
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.load_curve import CurvePoint, load_curve, slopes
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.state import StaticState
+from tireroad.runs.files.store import put
+from tireroad.runs.process import observe
+from tireroad.runs.scene.stiffness_table import deflections
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.static import steady_rolling
+
+_CURVE = {
+    "deflection": "m",
+    "load": "N",
+    "stiffness": "N/m",
+    "tangent": "N/m",
+    "points": "-",
+    "rolling_radius": "m",
+    "pressure": "Pa",
+    "footprint_length": "m",
+    "footprint_width": "m",
+    "footprint_area": "m2",
+}
+_FIGURES = {
+    "load": "N",
+    "vertical": "N/m",
+    "longitudinal": "N/m",
+    "lateral": "N/m",
+    "torsional": "N m/rad",
+    "vertical_tangent": "N/m",
+    "vertical_stuck": "N/m",
+}
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """`curve`: arrays (k,) over the deflections by the names of the file; `figures` of one state by name;
+    `matrix` (6, 6) of the stuck footprint, None where it was not asked for.
+    """
+
+    curve: dict[str, np.ndarray]
+    figures: dict[str, float]
+    matrix: np.ndarray | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StiffnessStage(Computed[Stiffness]):
+    """From the undeformed tire up the curve, and about the scene's own state."""
+
+    name: ClassVar[str] = "stiffness"
+    static: Done[StaticState]
+
+    def inputs(self) -> dict:
+        """The static state and the table."""
+        return {"static": self.static.key, "stiffness": asdict(self.job.scene.stiffness)}
+
+    def compute(self, record: Record) -> Stiffness:
+        """The body is put back to the static state. Collective."""
+        state, wanted = self.static.product, self.job.scene.stiffness
+        body = self.job.tire.body
+        body.set_displacement(state.displacement)
+        on_road = state.road_height is not None
+        stuck = None
+        if wanted.which == "all" and on_road:
+            force = state.force[body.surface.place]
+            centre = state.force @ state.positions / state.load
+            stuck = self._stuck(record, body.surface.local[force > 0], centre)
+        try:
+            points, force = self._curve(record)
+            if wanted.which == "all" and not on_road:
+                places = body.lattice.points(body.ids) + body.owned(body.u.x.array)
+                centre = body.comm.allreduce(force @ places) / points[-1].load
+                stuck = self._stuck(record, np.flatnonzero(force > 0), centre)
+        finally:
+            body.set_displacement(state.displacement)
+        found = _result(points, state, stuck)
+        _describe(record, found, stuck)
+        return found
+
+    def _stuck(self, record: Record, nodes: np.ndarray, centre: np.ndarray) -> RoadStiffness:
+        """Stiffness of the present footprint, of this process's `nodes`. Collective."""
+        inflation = self.job.scene.static.inflation
+        with record.timing("stuck footprint"):
+            rolling = steady_rolling(self.job)
+            return road_stiffness(self.job.tire.body, inflation, nodes, centre, rolling)
+
+    def _curve(self, record: Record) -> tuple[list[CurvePoint], np.ndarray]:
+        """The points of the curve, and the last forces on own nodes, N. Collective."""
+        body, state = self.job.tire.body, self.static.product
+        body.u.x.array[:] = 0.0
+        with record.timing("mesh and forms"):
+            equilibrium = Equilibrium(body, steady_rolling(self.job))
+        loader = Loader(equilibrium, lambda progress: None)
+        try:
+            loader.inflate(self.job.scene.static.inflation)
+            points = load_curve(loader, deflections(self.job.scene.stiffness, _own(state)))
+        except ConvergenceError as error:
+            raise ConvergenceError(
+                f"{error} It is the load-deflection curve that stops: give smaller "
+                "stiffness.deflections, or a smaller stiffness.up_to (m)."
+            ) from None
+        record.cost |= equilibrium.cost
+        record.indicators["Newton steps"] = (loader.newton_steps, "-")
+        for point in points:
+            observe.say(
+                f"  {1e3 * point.deflection:.4g} mm: {point.load:.5g} N, footprint "
+                f"{1e3 * point.footprint.length:.3g} x {1e3 * point.footprint.width:.3g} mm"
+            )
+        return points, equilibrium.contact_force()
+
+    def write(self, file, product: Stiffness) -> None:
+        """The curve by columns, the figures, the matrix."""
+        for name, unit in _CURVE.items():
+            put(file, f"curve/{name}", product.curve[name], unit)
+        for name, value in product.figures.items():
+            put(file, name, np.array(value), _FIGURES[name])
+        if product.matrix is not None:
+            put(file, "matrix", product.matrix, "N/m, N/rad, N m/m, N m/rad")
+
+    def read(self, file) -> Stiffness:
+        """The same back."""
+        return Stiffness(
+            {name: file[f"curve/{name}"][:] for name in _CURVE},
+            {name: float(file[name][()]) for name in _FIGURES if name in file},
+            file["matrix"][:] if "matrix" in file else None,
+        )
+
+
+def _own(state: StaticState) -> float | None:
+    """Deflection of the scene's own state, m."""
+    return None if state.road_height is None else state.road_height - state.touch_height
+
+
+def _result(points: list[CurvePoint], state: StaticState, stuck: RoadStiffness | None) -> Stiffness:
+    plain = ("deflection", "load", "tangent", "points", "rolling_radius", "pressure")
+    curve = {name: np.array([getattr(point, name) for point in points]) for name in plain}
+    for name in ("length", "width", "area"):
+        values = [getattr(point.footprint, name) for point in points]
+        curve[f"footprint_{name}"] = np.array(values)
+    curve["stiffness"] = slopes(curve["deflection"], curve["load"], curve["deflection"])
+    load, vertical = _vertical(curve, state)
+    figures = {"load": load, "vertical": vertical}
+    if stuck is None:
+        return Stiffness(curve, figures, None)
+    for name in ("longitudinal", "lateral", "torsional"):
+        figures[name] = getattr(stuck, name)
+    figures |= {"vertical_tangent": stuck.frictionless, "vertical_stuck": float(stuck.matrix[2, 2])}
+    return Stiffness(curve, figures, stuck.matrix)
+
+
+def _vertical(curve: dict[str, np.ndarray], state: StaticState) -> tuple[float, float]:
+    """(load, slope) at the scene's own state, a point of the curve too, or at the curve's last."""
+    own = _own(state)
+    if own is None:
+        return float(curve["load"][-1]), float(curve["stiffness"][-1])
+    # Points closer than the curve's own steps would make waves of rounding.
+    apart = np.abs(curve["deflection"] - own) > 0.05 * own
+    deflection = np.append(curve["deflection"][apart], own)
+    load = np.append(curve["load"][apart], state.load)
+    order = np.argsort(deflection)
+    return state.load, float(slopes(deflection[order], load[order], np.array([own]))[0])
+
+
+def _describe(record: Record, found: Stiffness, stuck: RoadStiffness | None) -> None:
+    curve, figures = found.curve, found.figures
+    record.headline |= {
+        "deflections": (len(curve["load"]), "-"),
+        "up to": (float(curve["deflection"][-1]), "m"),
+        "load there": (float(curve["load"][-1]), "N"),
+        f"vertical stiffness at {figures['load']:.4g} N": (figures["vertical"], "N/m"),
+    }
+    if stuck is None:
+        return
+    for name in ("longitudinal", "lateral", "torsional"):
+        record.headline[name] = (figures[name], _FIGURES[name])
+    record.indicators["departure of the stiffness from symmetry"] = (stuck.asymmetry, "-")
+    tilt = np.diag(stuck.matrix)[3:5]
+    if tilt.min() < 1e-6 * tilt.max():
+        record.warnings.append(
+            "all nodes in contact lie on one line: the stiffness of the stuck footprint is that of a "
+            "mesh too coarse for it; refine tire.elements_arc, tire.segments or tire.footprint_size"
+        )

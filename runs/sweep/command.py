@@ -1,0 +1,86 @@
+"""The command `sweep`: all members, here or by a batch system, then one table and one page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.runs.files.store import stage_hash
+from tireroad.runs.process import observe
+from tireroad.runs.scene.tables import Scene
+from tireroad.runs.sweep import local, slurm
+from tireroad.runs.sweep.definition import Member, Sweep, read
+from tireroad.runs.sweep.gather import gather, write
+from tireroad.runs.sweep.page import write_page
+
+
+def sweep(path: Path, out: Path | None, *, at_once: int, queue: bool, only_gather: bool) -> None:
+    """Run the sweep of a file. Not collective: members are processes of their own.
+
+    ConvergenceError, after all is gathered, when a member did not end well: the same command runs those
+    again, and what is finished is reused.
+    """
+    family = read(path)
+    folder = out or Path("results") / family.name
+    folder.mkdir(parents=True, exist_ok=True)
+    if queue:
+        _queue(family, folder, path)
+        return
+    failed: list[str] = []
+    if not only_gather:
+        number, limit = local.at_once(family, at_once)
+        if limit:
+            observe.say(f"{number} member(s) at a time, limited by {limit}")
+        ended = local.run(family, folder, number)
+        failed = [one.line for one in ended if one.status]
+    _gather(family, folder, failed)
+    if failed:
+        raise ConvergenceError(
+            f"sweep: {len(failed)} of {len(family.members)} members did not end well, see above. The "
+            "others are kept; the same command runs these again"
+        )
+
+
+def _gather(family: Sweep, folder: Path, failed: Sequence[str]) -> None:
+    """The table and the page of what there is."""
+    table = gather(family, folder)
+    write(table, folder)
+    page = write_page(table, folder, family.name, failed)
+    for name in table.missing:
+        observe.say(f"  {name}: no results yet")
+    observe.say(f"{page} and sweep.csv, sweep.h5 beside it")
+
+
+def _queue(family: Sweep, folder: Path, source: Path) -> None:
+    """Scripts on disk, and in the queue."""
+    first, rest = shared_first(family)
+    scripts = slurm.write_scripts(family, folder, first, rest, source)
+    for script in scripts.values():
+        observe.say(f"{script}")
+    jobs = slurm.submit(scripts, {"first": len(first), "rest": len(rest)})
+    observe.say("submitted: " + ", ".join(f"{name} as job {job}" for name, job in jobs.items()))
+
+
+def shared_first(family: Sweep) -> tuple[list[Member], list[Member]]:
+    """(one member of each group that shares its static state and modes, all others)."""
+    seen: set[str] = set()
+    first, rest = [], []
+    for member in family.members:
+        key = _group(family.load(member))
+        (rest if key in seen else first).append(member)
+        seen.add(key)
+    return first, rest
+
+
+def _group(scene: Scene) -> str:
+    """What the static state and the modes depend on, as one key."""
+    from mpi4py import MPI
+
+    from tireroad.runs.stages.job import Job
+    from tireroad.runs.stages.stage import Done
+    from tireroad.runs.stages.static import StaticStage
+
+    stage = StaticStage(job=Job(scene, Path("."), MPI.COMM_SELF))
+    static = Done(stage_hash(stage.inputs()), lambda: None)
+    return f"{static.key} {scene.modal}"

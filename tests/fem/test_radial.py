@@ -1,0 +1,121 @@
+"""Sections from layers: outlines, the built-in radial tire of many sizes, the section file."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.sections.outline import Outline, arcs
+from tireroad.fem.sections.radial import radial
+from tireroad.fem.sections.section_file import read
+from tireroad.fem.sections.tire_size import size
+
+FILE = """
+unit = "mm"
+tread = 60.0
+[outline]
+arcs = [[320, 0], [290.71067811865476, 70.71067811865476], [220, 100], [183, 92.88], [170, 86.6]]
+[[layer]]
+name = "outer"
+compound = "rubber"
+thickness = [[0, 8], [100, 8], [150, 5]]
+[[layer]]
+name = "inner"
+compound = "rubber"
+thickness = 4
+[[part]]
+layer = "outer"
+compound = "soft"
+along = [50, 100]
+[[cords]]
+name = "belt"
+under = "outer"
+to = 50
+angle = 20
+youngs_modulus = 1.7e11
+area = 2.1e-7
+spacing = 1.2e-3
+[compound.rubber]
+youngs_modulus = 5e6
+density = 1100
+[compound.soft]
+youngs_modulus = 2e6
+density = 1000
+loss_factor = 0.2
+"""
+
+
+def test_an_outline_of_arcs_is_a_circle():
+    """Length, places and normals of a quarter of a circle of 0.1 m."""
+    root = np.sqrt(0.5)
+    outline = Outline(arcs([(0.32, 0.0), (0.22 + 0.1 * root, 0.1 * root), (0.22, 0.1)]))
+    assert outline.length == pytest.approx(0.1 * np.pi / 2, rel=1e-6)
+    s = np.array([-0.1, -0.03, 0.02, 0.11])
+    circle = np.stack([0.22 + 0.1 * np.cos(s / 0.1), 0.1 * np.sin(s / 0.1)], axis=-1)
+    np.testing.assert_allclose(outline.at(s), circle, atol=1e-6)
+    np.testing.assert_allclose(outline.inwards(s), ([0.22, 0] - circle) / 0.1, atol=1e-3)
+
+
+def test_a_section_file_is_built_as_drawn(tmp_path):
+    path = tmp_path / "section.toml"
+    path.write_text(FILE)
+    built = read(path)
+    mesh = built.section(20, 3)
+    assert set(mesh.regions) == {"rubber", "soft"}
+    belt = mesh.nodes[mesh.chain(mesh.plies["belt"])]
+    np.testing.assert_allclose(np.hypot(belt[:, 0] - 0.22, belt[:, 1]), 0.092, atol=1e-5)
+    assert abs(np.arctan2(belt[:, 1], belt[:, 0] - 0.22)).max() == pytest.approx(0.5, abs=1e-4)
+    soft = mesh.nodes[np.unique(mesh.cells[mesh.region == mesh.regions.index("soft")])]
+    angle = abs(np.arctan2(soft[:, 1], soft[:, 0] - 0.22))
+    np.testing.assert_allclose([angle.min(), angle.max()], [0.5, 1.0], atol=1e-4)
+    line = built.cords[0]
+    assert (line.angle, line.area) == (pytest.approx(np.radians(20)), 2.1e-7)
+    assert built.compounds["soft"]["loss_factor"] == 0.2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('unit = "mm"', 'unit = "inch"', "unit"),
+        ("tread = 60.0", "", "tread must be a number"),
+        ('compound = "soft"', 'compound = "sof"', "no compound 'sof'"),
+        ('under = "outer"', 'under = "middle"', "'middle'; there are outer, inner"),
+        ("thickness = 4", "thickness = -4", "needs a thickness above 0"),
+        ("thickness = 4", "thickness = 95", "element"),
+        ("[320, 0]", "[320, 1]", "not at the crown"),
+        ("angle = 20", "angel = 20", "unknown key 'angel'"),
+        ("arcs = [", "arcs = [[1]", "TOML"),
+        ("density = 1000", "density = 0", "above 0"),
+        ("along = [50, 100]", "along = [100, 50]", "ascend"),
+    ],
+)
+def test_what_is_wrong_in_a_section_file_is_told(tmp_path, old, new, message):
+    path = tmp_path / "section.toml"
+    path.write_text(FILE.replace(old, new))
+    with pytest.raises(InputError, match=message):
+        read(path).section(12)
+
+
+@pytest.mark.parametrize(
+    "text", ["175/65 R14", "205/60 R15", "205/55 R16", "225/45ZR17", "255/35 R20", "195/80R15"]
+)
+@pytest.mark.parametrize("order", [2, 3])
+def test_sizes_build(text, order):
+    """Height and width as the size says, every cord in, the same on both sides to rounding."""
+    mesh, tire = radial(text).section(28, order), size(text)
+    line = mesh.nodes[mesh.chain(mesh.outer)]
+    assert line[:, 0].max() == pytest.approx(
+        tire.rim + tire.height, rel=3e-4
+    )  # maybe no node there
+    assert np.ptp(line[:, 1]) == pytest.approx(tire.width, rel=0.01)
+    assert set(mesh.plies) == {"cap ply", "belt 1", "belt 2", "carcass"}
+    assert set(mesh.regions) == {"tread", "skim", "ply", "sidewall", "apex"}
+    distance, image = cKDTree(mesh.nodes).query(mesh.nodes * [1, -1])
+    assert distance.max() < 1e-14
+    assert len(np.unique(image)) == len(image)
+
+
+@pytest.mark.parametrize("text", ["", "205", "205/60 15", "999/99 R99", "205/60 R15 extra"])
+def test_no_size_is_told(text):
+    with pytest.raises(InputError, match=r"tire\.size"):
+        size(text)

@@ -1,0 +1,99 @@
+"""The elements a scene has by default, and a radial tire by its size."""
+
+import pytest
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.scene.load import load
+from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.tire_section import free_unknowns, make_section
+
+
+def scene(tmp_path, text, *overrides):
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    return load(path, overrides)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ((), (3, 30, 14, 1.0)),
+        (("tire.order=2",), (2, 100, 16, 1.0)),
+        (("tire.segments=24",), (2, 24, 16, 1.0)),
+        (("static.load=500",), (3, 30, 14, 0.2)),
+        (("static.load=500", "tire.footprint_size=1"), (3, 30, 14, 1.0)),
+        (('tire.section="radial"',), (2, 30, 26, 1.0)),
+    ],
+)
+def test_elements_where_the_scene_leaves_them_open(tmp_path, given, expected):
+    found = scene(tmp_path, "", *given)
+    tire = found.tire
+    assert (tire.order, tire.segments, tire.elements_arc, tire.footprint_size) == expected
+    path = tmp_path / "again.toml"
+    path.write_text(dumps(found))
+    assert load(path).tire == tire
+
+
+@pytest.mark.parametrize(
+    "given", [(), ("tire.order=2", "tire.elements_thickness=2"), ('tire.section="radial"',)]
+)
+def test_unknowns_are_those_of_the_section(tmp_path, given):
+    tire = scene(tmp_path, "", *given).tire
+    ring = make_section(tire)
+    held = len(set(ring.section.side(ring.section.rim).ravel()))
+    nodes = len(ring.section.nodes) - held
+    assert free_unknowns(tire) == 3 * ring.segments * ring.order * nodes
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('section = "radial"\nsize = "foo"', "like"),
+        ('section = "radial"\nthickness = 0.01', "belongs to section = torus"),
+        ('section = "radial"\n[[tire.cords]]\nname = "x"', "by its size"),
+        ('section = "radial"\n[tire.material]\ndensity = 1.0', "by its size"),
+        ('size = "205/60 R15"', "belongs to section = radial"),
+    ],
+)
+def test_a_radial_tire_says_what_it_does_not_take(tmp_path, text, message):
+    with pytest.raises(InputError, match=message):
+        scene(tmp_path, f"[tire]\n{text}\n")
+
+
+def test_a_section_file_is_a_tire(tmp_path):
+    """Compounds and cords by name, of the order asked for; the hash changes with the drawing."""
+    from tireroad.fem.sections.ring import wall_thickness
+    from tireroad.runs.scene.own_tire import fingerprint
+    from tireroad.runs.stages.own_tire import own_cords, own_materials
+
+    drawing = tmp_path / "section.toml"
+    drawing.write_text(DRAWING)
+    tire = scene(tmp_path, '[tire]\nsection = "file"\nfile = "section.toml"\norder = 3\n').tire
+    ring = make_section(tire)
+    assert ring.order == 3
+    assert wall_thickness(ring.section) == pytest.approx(0.009, rel=0.02)
+    assert own_materials(tire)["rubber"].youngs_modulus == 5e6
+    assert [(c.name, c.area) for c in own_cords(tire)] == [("ply", 4e-7)]
+    before = fingerprint(tire)
+    drawing.write_text(DRAWING.replace("thickness = 6", "thickness = 7"))
+    assert fingerprint(tire) != before
+    drawing.write_text(DRAWING.replace("rubber", "ruber", 1))
+    with pytest.raises(InputError, match=r"section\.toml.*no compound 'ruber'"):
+        scene(tmp_path, '[tire]\nsection = "file"\nfile = "section.toml"\n')
+
+
+DRAWING = """
+unit = "mm"
+tread = 60.0
+outline.arcs = [[320, 0], [290.71067811865476, 70.71067811865476], [220, 100], [183, 92.88], [170, 86.6]]
+layer = [
+    { name = "outer", compound = "rubber", thickness = 6 },
+    { name = "inner", compound = "rubber", thickness = 3 },
+]
+cords = [
+    { name = "ply", under = "outer", to = 500, angle = 90, youngs_modulus = 1e10, area = 4e-7, spacing = 1e-3 },
+]
+[compound.rubber]
+youngs_modulus = 5e6
+density = 1100
+"""
