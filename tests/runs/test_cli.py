@@ -132,15 +132,15 @@ def test_version_is_that_of_the_package(root: Path) -> None:
 @pytest.mark.parametrize(
     ("overrides", "until", "expected"),
     [
-        ([], None, {"response", "contact", "spectra", "greens"}),
-        (["rotation.speed=0"], None, {"rotating", "response", "contact", "spectra", "greens"}),
-        (["force=[{}]", "time={}"], None, {"contact", "spectra"}),
-        (["contact={}", "road={}", "time={}"], None, {"response"}),
+        ([], None, {"response", "contact", "spectra", "greens", "stiffness"}),
+        (["rotation.speed=0"], None, {"rotating", "response", "contact", "spectra", "greens", "stiffness"}),
+        (["force=[{}]", "time={}"], None, {"contact", "spectra", "stiffness"}),
+        (["contact={}", "road={}", "time={}"], None, {"response", "stiffness"}),
         (["contact={}", "road={}", "time={}", "output.spectra=false"], None, None),
         ([], "modes", set(STAGES) - {"static", "modes"}),
     ],
 )
 def test_stages_follow_from_the_scene(scene: Path, overrides, until, expected) -> None:
     reasons = skipped(load(scene, overrides), until)
-    assert set(reasons) == (expected if expected is not None else {"response", "spectra"})
+    assert set(reasons) == (expected if expected is not None else {"response", "spectra", "stiffness"})
     assert all(reasons.values())
