@@ -79,6 +79,36 @@ class Dissipation:
         self._last = kept["dissipation_last"]
 
 
+class Circulation:
+    """Work (J) of forces against the skew part of a flexibility, int f . G_a df, by the trapezoid rule.
+
+    The symmetric part of a residual flexibility stores what it is given; the skew part, which a rolling
+    tire's has, does not: it is what the modes left out lose, less what the drive gives them.
+    """
+
+    def __init__(self, flexibility: np.ndarray) -> None:
+        """`flexibility` (k, k) m/N."""
+        self._skew = (flexibility - flexibility.T) / 2
+        self.work = 0.0
+        self._force = np.zeros(len(flexibility))
+
+    def add(self, forces: np.ndarray) -> None:
+        """Count n steps: forces (n, k) N at their ends."""
+        path = np.concatenate([self._force[None], forces])
+        # f_a . G_a (f_b - f_a) = f_a . G_a f_b, for f . G_a f = 0.
+        for work in np.einsum("ni,ni->n", path[:-1], path[1:] @ self._skew.T).tolist():
+            self.work += work
+        self._force = path[-1]
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What a checkpoint keeps."""
+        return {"circulation": np.array(self.work), "circulation_force": self._force}
+
+    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on from `state`."""
+        self.work, self._force = float(kept["circulation"]), kept["circulation_force"]
+
+
 def stored(coordinates: np.ndarray, rates: np.ndarray, stiffness: np.ndarray) -> float:
     """Energy (J) of modal coordinates (m,) and rates (m,): kinetic, and of `stiffness` (m, m) 1/s2.
 

@@ -109,6 +109,11 @@ class Recursion:
         """This process's states and pushes (mine,), after `advance`."""
         return self.state, self._push
 
+    @property
+    def force(self) -> np.ndarray:
+        """The force (k,) N that `advance` took last."""
+        return self._force
+
     def everywhere(self, samples: list[np.ndarray]) -> np.ndarray:
         """Samples of n steps as (n, q), all states in the order of the response. Collective."""
         own = np.array(samples)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tireroad.contact.balance import Motion, energy_left, own_states, springs
+from tireroad.contact.energy import Circulation
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
@@ -25,36 +26,43 @@ class Losses:
         self._motion: Motion | None = None
         if isinstance(tire, Recursion) and Motion.known(rolling, response):
             self._motion = Motion(rolling, response.slow(step), step)
-        self._samples: list[tuple[np.ndarray, np.ndarray]] = []
+            inputs = response.residual.shape[1]
+            left_out = response.resolved(step).residual[:inputs]
+            self._circulation = Circulation(left_out * (not response.pulse))
+        self._samples: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
 
     @property
-    def found(self) -> tuple[float, float] | None:
-        """Energy lost in the material, and work of the drive, J; None where they are not known."""
+    def found(self) -> tuple[float, float, float] | None:
+        """Energy lost in the material, work of the drive, and what the modes left out lost less what the
+        drive gave them, J; None where they are not known."""
         if self._motion is None:
             return None
-        return self._motion.losses.lost, self._motion.losses.drive
+        losses = self._motion.losses
+        return losses.lost, losses.drive, self._circulation.work
 
     def sample(self) -> None:
         """Keep the states at the end of a step."""
         if self._motion is not None:
-            self._samples.append(self._tire.sample())
+            self._samples.append((*self._tire.sample(), self._tire.force))
 
     def flush(self) -> None:
         """Count what was kept. Collective."""
         if not self._samples:
             return
-        states, pushes = zip(*self._samples, strict=True)
+        states, pushes, forces = zip(*self._samples, strict=True)
         self._motion.add(self._tire.everywhere(states), self._tire.everywhere(pushes))
+        self._circulation.add(np.array(forces))
         self._samples.clear()
 
     def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint keeps."""
-        return self._motion.losses.state() if self._motion else {}
+        return self._motion.losses.state() | self._circulation.state() if self._motion else {}
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from `state`."""
         if self._motion is not None:
             self._motion.losses.set_state(kept)
+            self._circulation.set_state(kept)
 
 
 def describe_energy(
@@ -106,18 +114,21 @@ def _standing(record: Record, rolling: RollingModes, work: float, left: float) -
         )
 
 
-def _rolling(record: Record, work: float, left: float, lost: float, drive: float) -> None:
+def _rolling(
+    record: Record, work: float, left: float, lost: float, drive: float, beyond: float
+) -> None:
     """Every term is known: what does not add up is the error of the steps."""
-    off = work + drive - left - lost
+    off = work + drive - left - lost - beyond
     moved = max(abs(work), abs(drive), abs(left), abs(lost))
     record.indicators |= {
         "work of the drive against the damping": (drive, "J"),
         "energy lost in the material": (lost, "J"),
+        "energy lost in the modes left out, less their drive": (beyond, "J"),
         "energy that does not add up": (off, "J"),
     }
     observe.say(
         f"  energy: contact {work:.4g} J + drive {drive:.4g} J = in the tire {left:.4g} J + lost "
-        f"{lost:.4g} J, but for {off:.2g} J"
+        f"{lost:.4g} J + in modes left out {beyond:.2g} J, but for {off:.2g} J"
     )
     if abs(off) > _UNBALANCED * moved + _LEAST:
         record.warnings.append(

@@ -133,7 +133,11 @@ def test_version_is_that_of_the_package(root: Path) -> None:
     ("overrides", "until", "expected"),
     [
         ([], None, {"response", "contact", "spectra", "greens", "stiffness"}),
-        (["rotation.speed=0"], None, {"rotating", "response", "contact", "spectra", "greens", "stiffness"}),
+        (
+            ["rotation.speed=0"],
+            None,
+            {"rotating", "response", "contact", "spectra", "greens", "stiffness"},
+        ),
         (["force=[{}]", "time={}"], None, {"contact", "spectra", "stiffness"}),
         (["contact={}", "road={}", "time={}"], None, {"response", "stiffness"}),
         (["contact={}", "road={}", "time={}", "output.spectra=false"], None, None),
@@ -142,5 +146,7 @@ def test_version_is_that_of_the_package(root: Path) -> None:
 )
 def test_stages_follow_from_the_scene(scene: Path, overrides, until, expected) -> None:
     reasons = skipped(load(scene, overrides), until)
-    assert set(reasons) == (expected if expected is not None else {"response", "spectra", "stiffness"})
+    assert set(reasons) == (
+        expected if expected is not None else {"response", "spectra", "stiffness"}
+    )
     assert all(reasons.values())
