@@ -69,7 +69,9 @@ def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run) -> None:
     )
     work, off = found["work of contact on the tire"], found["energy that does not add up"]
     left = found["energy left in the modes"] + found["energy left in the residual flexibility"]
-    assert work + drive - left - lost == pytest.approx(off, abs=1e-12)
+    beyond = found["energy lost in the modes left out, less their drive"]
+    assert work + drive - left - lost - beyond == pytest.approx(off, abs=1e-12)
     assert lost > 0.1 * abs(work)
-    assert abs(off) < 0.02 * lost
+    assert abs(off) < 0.002 * lost
+    assert abs(off) < 0.2 * abs(beyond)  # without that term it would not add up
     assert not any("add up" in text for text in warnings)
