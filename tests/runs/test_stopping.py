@@ -73,7 +73,13 @@ def begin(command: list, cwd: Path | None = None, **extra: str) -> subprocess.Po
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=hears_hangups,
     )
+
+
+def hears_hangups() -> None:
+    """Whoever starts the suite by nohup has it ignore SIGHUP, and with it all that it starts."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def in_the_loop(process: subprocess.Popen, out: Path) -> None:
