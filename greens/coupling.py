@@ -179,7 +179,8 @@ class Wheel:
             if self.beyond is not None:
                 pencils = self._pencils(grown.projection)
                 flexibility = flexibility + regained(grown, *pencils, probes, probes).compliance
-            moment = self.operators.body.comm.allreduce(self.operators.carried @ shapes)
+            of_loads = self.operators.body.comm.allreduce(self.operators.carried @ shapes)
+            moment = (weights @ of_loads.T).T
             return self._lacking(grown.couple(probes, probes, flexibility), moment)
         return self._standing_attachments(modes, probes).couple(probes, probes)
 

@@ -82,13 +82,21 @@ def standing(projection: Projection, damping: Damping) -> StateModes:
     )
 
 
-def checks(modes: StateModes, drag: np.ndarray, stiffness: np.ndarray) -> dict[str, float]:
+LIMITS = 1e-8, 1e-6  # largest residual, and largest defect of an identity, of states that are taken
+
+
+def checks(
+    modes: StateModes,
+    drag: np.ndarray,
+    stiffness: np.ndarray,
+    limits: tuple[float, float] = LIMITS,
+) -> dict[str, float]:
     """How far the decoupled equations are from the problem they came from, relative figures by name.
 
     Over all 2m states  sum u w^T / a = 0,  sum s u w^T / a = 1,  sum -u w^T / (a s) = K~^-1,  and
     w_i^T [(s_i + s_j) + D~] u_j = a_i delta_ij among states with vectors; the third only where K~ has an
     inverse, which rigid modes deny it. Raises ConvergenceError when
-    a residual exceeds 1e-8 or an identity 1e-6.
+    a residual or an identity exceeds its one of the `limits`.
     """
     m = len(drag)
     s, block = modes.eigenvalue, modes.block
@@ -111,7 +119,7 @@ def checks(modes: StateModes, drag: np.ndarray, stiffness: np.ndarray) -> dict[s
             compliance -= modes.block_right @ np.linalg.solve(block, modes.block_left)
         figures["sum identity K^-1"] = float(np.abs(stiffness @ compliance - np.eye(m)).max())
     for name, figure in figures.items():
-        if not figure <= (1e-8 if "residual" in name else 1e-6):
+        if not figure <= limits["residual" not in name]:
             raise ConvergenceError(
                 f"rotating: {name} is {figure:.1e}: the second eigenproblem is too far from normal "
                 "for the number of digits. Take fewer modes, a lower speed or less damping."

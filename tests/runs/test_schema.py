@@ -27,7 +27,8 @@ def test_both_ends_of_every_range_hold(name: str) -> None:
     """The ends that belong to a range are read, the next number beyond is not."""
     key = KEYS[name]
     whole = key.read.__qualname__.startswith("integer")
-    size = int(key.values.split()[0]) if "numbers" in key.values else 0
+    counted = key.values.split()[0]  # "3 numbers", "ascending numbers": one of them will do
+    size = (int(counted) if counted.isdigit() else 1) if "numbers" in key.values else 0
 
     def read(value: float) -> Any:
         given = int(value) if whole else float(value)
@@ -197,6 +198,14 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
         )
         _run(tmp_path / "rolling", ROLLING.format(kind="flat"), "road.motion.kind=ramp")
         _run(tmp_path / "standing", STANDING)
+        stiffness = "stiffness.steps=1", "stiffness.up_to=0.001", "stiffness.which=vertical"
+        _run(tmp_path / "standing", STANDING, *stiffness)
+        _run(
+            tmp_path / "standing",
+            STANDING,
+            "stiffness.deflections=[0.001]",
+            "stiffness.which=vertical",
+        )
         _run(tmp_path / "full", FULL)
     tire = {of.__name__ for of in vars(tire_tables).values() if is_dataclass(of)}
     missing = {

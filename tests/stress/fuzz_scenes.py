@@ -90,7 +90,8 @@ def value(rng: np.random.Generator, key, legal: bool) -> str:
     if key.limits is None:
         return str(rng.choice(NASTY))
     if "numbers" in key.values:
-        count = int(key.values.split()[0])
+        counted = key.values.split()[0]
+        count = int(counted) if counted.isdigit() else int(rng.integers(1, 4))
         return f"[{', '.join(_number(rng, key.limits, legal) for _ in range(count))}]"
     number = _number(rng, key.limits, legal)
     return str(int(float(number))) if key.values == str(key.limits) and key.unit == "-" else number
