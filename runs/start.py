@@ -22,8 +22,10 @@ def program() -> None:
     try:
         signals.stop_on_signals()
         sys.exit(_status(arguments))
-    except signals.Stopped as stop:
-        print(f"stopped by {stop} before anything was begun", file=sys.stderr)
+    except (signals.Stopped, Exception):
+        if not signals.raised():
+            raise
+        print(f"stopped by {signals.raised()} before anything was begun", file=sys.stderr)
         os._exit(handed_over(STOPPED, for_all=False))
 
 

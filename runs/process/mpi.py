@@ -12,7 +12,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.parallel import ToldByRoot
 from tireroad.runs.files.disk import Removed, explained
 from tireroad.runs.process.packages import missing
-from tireroad.runs.process.signals import STOP_SIGNALS, Stopped
+from tireroad.runs.process.signals import STOP_SIGNALS, Stopped, raised
 from tireroad.runs.process.statuses import BUG, DONE, GAVE_UP, INPUT, STOPPED
 
 T = TypeVar("T")
@@ -39,6 +39,13 @@ def on_root(comm: Any, function: Callable[[], T]) -> T:
 
 def judged(function: Callable[[], None]) -> tuple[int, str]:
     """Run `function`; the exit status it earns and the message for the user."""
+    status, message = _judged(function)
+    if status == BUG and raised():
+        return STOPPED, f"stopped by {raised()}: the same command or resume goes on"
+    return status, message
+
+
+def _judged(function: Callable[[], None]) -> tuple[int, str]:
     try:
         function()
     except InputError as error:

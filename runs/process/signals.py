@@ -49,6 +49,8 @@ class Deferred:
 class _Heard:
     """The last request of this process, and who wants to know that it was heard."""
 
+    raised = ""
+
     at: float = -1e9
     supervisor: int | None = None
 
@@ -66,6 +68,13 @@ def stop_on_signals() -> None:
     sys.unraisablehook = _not_lost
 
 
+def raised() -> str:
+    """The name of the signal for which `Stopped` was raised, "" for none. Raised while a library loads its
+    compiled part, it comes out as that library's own error.
+    """
+    return _Heard.raised
+
+
 def _stop(number: int, _frame: Any) -> None:
     now, before = time.monotonic(), _Heard.at
     if now - before < TOGETHER:
@@ -76,6 +85,7 @@ def _stop(number: int, _frame: Any) -> None:
             os.write(_Heard.supervisor, b"!")
     name, current = signal.Signals(number).name, Deferred._current
     if current is None or current.asked:
+        _Heard.raised = name
         raise Stopped(name)
     current.asked = name
 
