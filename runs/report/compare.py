@@ -14,7 +14,6 @@ from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.reader import RunResults
 from tireroad.runs.report import comparison_figures as pictures
 from tireroad.runs.report.differences import (
-    AXES,
     Row,
     cost_rows,
     figure_rows,
@@ -96,7 +95,6 @@ def _page(runs: Sequence[RunResults], names: Sequence[str], groups: dict[str, li
     return pages.get_template("compare.html.j2").render(
         program=f"{PROGRAM} {VERSION}",
         names=names,
-        axes=AXES,
         groups=groups,
         figures=_figures(runs, names, groups["levels"]),
         missing=_missing(runs, names),
@@ -118,12 +116,9 @@ def _figures(
     runs: Sequence[RunResults], names: Sequence[str], levels: Sequence[Row]
 ) -> list[tuple[str, str]]:
     found = []
-    for axis in reversed(AXES):
-        rows = [row for row in levels if row.group == f"axle force {axis}"]
-        if rows and axis == "z":
-            found.append(
-                (pictures.levels(rows, names), "Third octaves of the vertical axle force.")
-            )
+    rows = [row for row in levels if row.group == "axle force z"]
+    if rows:
+        found.append((pictures.levels(rows, names), "Third octaves of the vertical axle force."))
     histories = {
         name: (run["contact/time"], run["contact/total_force"][:, 2])
         for name, run in zip(names, runs, strict=True)

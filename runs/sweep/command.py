@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from tireroad.fem.errors import ConvergenceError
@@ -78,9 +79,7 @@ def _group(scene: Scene) -> str:
     from mpi4py import MPI
 
     from tireroad.runs.stages.job import Job
-    from tireroad.runs.stages.stage import Done
     from tireroad.runs.stages.static import StaticStage
 
-    stage = StaticStage(job=Job(scene, Path("."), MPI.COMM_SELF))
-    static = Done(stage_hash(stage.inputs()), lambda: None)
-    return f"{static.key} {scene.modal}"
+    static = StaticStage(job=Job(scene, Path("."), MPI.COMM_SELF))
+    return stage_hash({"static": static.inputs(), "modal": asdict(scene.modal)})
