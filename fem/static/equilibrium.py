@@ -78,8 +78,10 @@ class Equilibrium:
         self._force = np.zeros(len(body.tread))
         self._scale, self._stiffness = self._yardsticks()
         damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
-        kind = "lu" if damped else "cholesky"
-        self._system = HeldSystem(body.comm, self.matrix, kind, self.cost)
+        self._system = self._make_system("lu" if damped else "cholesky")
+
+    def _make_system(self, kind: str) -> HeldSystem:
+        return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
 
     @property
     def rounding(self) -> float:
