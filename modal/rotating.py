@@ -10,6 +10,8 @@ to have usable vectors of their own.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import linalg
 
@@ -29,6 +31,13 @@ def matrices(
     projection: Projection, speed: float, damping: Damping, inertia: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """D~ (1/s) and K~ (1/s2) of the projected problem; `damping` as in modal.damping."""
+    return projection.pencil(*held_matrices(projection, speed, damping, inertia), speed)
+
+
+def held_matrices(
+    projection: Projection, speed: float, damping: Damping, inertia: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same of tire and air with the rim held: without a corner."""
     pencil = _tire_matrices(projection, speed, damping, inertia)
     air = projection.air
     return pencil if air is None else air.joined(*pencil, speed)
@@ -182,6 +191,25 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
         _quadratic_residual(drag, stiffness, values, right),
         _quadratic_residual(drag.T, stiffness.T, values, left.T),
         float(condition[good].max(initial=1.0)),
+    )
+
+
+def beside(drag: np.ndarray, stiffness: np.ndarray, adrift: np.ndarray) -> StateModes:
+    """The same where the motions `adrift` (m, r), orthonormal, meet neither force nor damping: they are parted
+    from the others, and drift in a block of their own.
+    """
+    m, r = adrift.shape
+    others = linalg.qr(adrift)[0][:, r:]
+    found = rotating(others.T @ drag @ others, others.T @ stiffness @ others)
+    block, right, left = _companion_blocks(np.arange(r), np.zeros(r), np.zeros(r), r)
+    return replace(
+        found,
+        right=others @ found.right,
+        left=found.left @ others.T,
+        block=linalg.block_diag(found.block, block),
+        block_right=np.hstack([others @ found.block_right, adrift @ right]),
+        block_left=np.vstack([found.block_left @ others.T, left @ adrift.T]),
+        rigid=2 * r,
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import described
 from tireroad.fem.sections.tire_size import size
+from tireroad.runs.scene.axle_table import check_axle
 from tireroad.runs.scene.cavity_table import check_cavity
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.stiffness_table import check_stiffness
@@ -288,5 +289,6 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("greens", "rotation"), _greens),
     (("stiffness", "static"), check_stiffness),
     (("tire", "rotation", "modal", "greens"), check_cavity),
+    (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
     (("time",), _time),
 )

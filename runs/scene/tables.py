@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.parameters import choice, flag, integer, number, text, vector
+from tireroad.runs.scene.axle_table import AxleTable
 from tireroad.runs.scene.road_tables import Road
 from tireroad.runs.scene.schema import (
     Pitch,
@@ -272,6 +273,7 @@ class Scene:
         optional=True,
     )
     rotation: Rotation | None = table(Rotation, "rotation of the wheel", optional=True)
+    axle: AxleTable = table(AxleTable, "what holds the wheel")
     greens: Greens = table(Greens, "Green's functions")
     force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")
     contact: Contact | None = table(Contact, "contact with the road in time", optional=True)
