@@ -33,7 +33,7 @@ from tireroad.modal.basis import Projection, project, with_air
 from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_loss
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import StateModes, matrices
-from tireroad.modal.undamped import Modes
+from tireroad.modal.solver.undamped import Modes
 
 _SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by their sign at least
 

@@ -8,9 +8,9 @@ from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
-from tireroad.modal import undamped
 from tireroad.modal.basis import ModalBasis, project, with_air
-from tireroad.modal.symmetry import Sites
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.symmetry import Sites
 
 _SAME = 1e-6  # relative distance of the frequencies of one mode in two solutions
 

@@ -19,9 +19,9 @@ from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.truncation import Cutoff, estimate, estimate_axle
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
-from tireroad.modal.fields import gram, multiply
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.fields import gram, multiply
 
 MATERIAL = {
     "model": "neo-hookean",

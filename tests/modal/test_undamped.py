@@ -7,9 +7,9 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.modal import undamped
-from tireroad.modal.fields import gram, multiply
-from tireroad.modal.symmetry import Sites
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.fields import gram, multiply
+from tireroad.modal.solver.symmetry import Sites
 
 COMM = MPI.COMM_WORLD
 ROUNDING = 1e-9  # relative error of an eigenvalue of a well-scaled chain

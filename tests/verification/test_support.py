@@ -15,7 +15,7 @@ from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
-from tireroad.modal import undamped
+from tireroad.modal.solver import undamped
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD

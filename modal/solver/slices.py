@@ -18,7 +18,7 @@ from scipy import linalg, sparse
 from slepc4py import SLEPc
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.modal.shifted import Shifted
+from tireroad.modal.solver.shifted import Shifted
 
 # Residual of a Ritz pair relative to theta: as small as vectors of neighbouring slices must be
 # orthogonal to each other, a few digits above rounding.

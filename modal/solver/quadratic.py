@@ -17,7 +17,7 @@ from scipy import optimize
 from slepc4py import SLEPc
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.modal.fields import multiply
+from tireroad.modal.solver.fields import multiply
 
 RESIDUAL_TOLERANCE = 1e-8
 _EXTRA = 10  # states beyond the wanted ones, to end in a gap and never inside a cluster

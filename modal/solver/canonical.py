@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.modal.fields import CHUNK
+from tireroad.modal.solver.fields import CHUNK
 
 _SAME_LENGTH = 1e-3  # relative
 

@@ -1,9 +1,9 @@
 """The first eigenproblem: K Phi = M Phi Lambda, Phi^T M Phi = I, with none of the lowest missing.
 
 The diagonal mass makes it the standard problem of A = M^-1/2 K M^-1/2, which symmetries split: equal
-segments by wave number (modal.circulant), or else mirror planes or a half turn (modal.symmetry). The
+segments by wave number (modal.solver.circulant), or else mirror planes or a half turn (modal.solver.symmetry). The
 inertia of each part, L D L^T by MUMPS, says how many eigenvalues lie below a value and so where to slice
-(modal.spectrum); SLEPc extracts the eigenpairs of each slice (modal.slices). Residuals and orthonormality
+(modal.solver.spectrum); SLEPc extracts the eigenpairs of each slice (modal.solver.slices). Residuals and orthonormality
 are then measured on A itself.
 """
 
@@ -18,11 +18,18 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.modal.canonical import ordered, turn_to_rule
-from tireroad.modal.circulant import repeated
-from tireroad.modal.fields import CHUNK, collect, everywhere, multiply, orthonormalise, scaled_by
-from tireroad.modal.spectrum import Bottom, Part, Slice, Spectrum
-from tireroad.modal.symmetry import Sites, sectors, symmetries, whole
+from tireroad.modal.solver.canonical import ordered, turn_to_rule
+from tireroad.modal.solver.circulant import repeated
+from tireroad.modal.solver.fields import (
+    CHUNK,
+    collect,
+    everywhere,
+    multiply,
+    orthonormalise,
+    scaled_by,
+)
+from tireroad.modal.solver.spectrum import Bottom, Part, Slice, Spectrum
+from tireroad.modal.solver.symmetry import Sites, sectors, symmetries, whole
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
 MOST = 1e-6  # where rounding alone is more than the tolerance
@@ -34,7 +41,7 @@ _SAME = 1e-10  # relative distance of equal eigenvalues, where rounding is not m
 class Modes:
     """The lowest m modes. `squares` omega^2 (m,) 1/s2 ascending; `vectors` this process's rows (n, m)
     of the mass-normalised shapes, kg^-1/2, signs and bases of repeated frequencies by rule
-    (modal.canonical); `residual` (m,) ||K phi - lambda M phi|| / ||lambda M phi||, twice the relative error
+    (modal.solver.canonical); `residual` (m,) ||K phi - lambda M phi|| / ||lambda M phi||, twice the relative error
     of the frequency at most; `inertia_count` eigenvalues below `counted_below` (1/s2) by Sylvester's law,
     equal to the number found there; `rigid` modes without stiffness, whose square is 0, among them;
     `sectors` sizes of the independent problems that the `symmetries` (names) or wave numbers split it

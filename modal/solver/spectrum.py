@@ -17,8 +17,8 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.modal.shifted import Shifted
-from tireroad.modal.slices import Interval, eigenpairs
+from tireroad.modal.solver.shifted import Shifted
+from tireroad.modal.solver.slices import Interval, eigenpairs
 
 ZERO = 1e-12  # of the matrix norm: eigenvalues nearer to zero are rigid modes, rounding is 1e-16
 _SLICE = 64  # eigenvalues a slice and matrix: the basis stays small, factorisations few

@@ -20,7 +20,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from tireroad.modal.symmetry import TOLERANCE, Sites
+from tireroad.modal.solver.symmetry import TOLERANCE, Sites
 
 _NEAR = 1e-6  # of the body's size: nodes are each other's images
 _LONGEST = 4  # nodes a segment along the ring, at most

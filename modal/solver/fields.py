@@ -7,7 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
-from tireroad.modal.spectrum import Slice
+from tireroad.modal.solver.spectrum import Slice
 
 CHUNK = 64  # columns a matrix product: no second copy of all vectors
 # Vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product.
