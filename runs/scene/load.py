@@ -15,9 +15,10 @@ from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Key, ParameterError, described
-from tireroad.runs.scene import locate, rules
-from tireroad.runs.scene.cavity_table import filled
-from tireroad.runs.scene.own_tire import file_has_losses, with_own_section
+from tireroad.runs.scene import locate
+from tireroad.runs.scene.extent.own_tire import file_has_losses, with_own_section
+from tireroad.runs.scene.extent.tire_section import with_elements
+from tireroad.runs.scene.rules import scene as rules
 from tireroad.runs.scene.schema import (
     Table,
     applies,
@@ -29,8 +30,8 @@ from tireroad.runs.scene.schema import (
     variant_of,
 )
 from tireroad.runs.scene.source import Source, shortened
-from tireroad.runs.scene.tables import Damping, Scene
-from tireroad.runs.scene.tire_section import with_elements
+from tireroad.runs.scene.tables.cavity import filled
+from tireroad.runs.scene.tables.scene import Damping, Scene
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 LARGEST = 1_000_000

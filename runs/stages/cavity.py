@@ -14,7 +14,7 @@ from tireroad.modal.air import Air
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.scene.cavity_table import has_air
+from tireroad.runs.scene.tables.cavity import has_air
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Done, Shared

@@ -15,7 +15,7 @@ from tireroad.greens.responses import Wanted, judged, make_response, selected
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.scene.cavity_table import has_air
+from tireroad.runs.scene.tables.cavity import has_air
 from tireroad.runs.stages import cavity
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.responses import fill_response, read_responses

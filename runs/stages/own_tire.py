@@ -7,8 +7,8 @@ import numpy as np
 from tireroad.fem.decks.compounds import Rubber
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import Material
-from tireroad.runs.scene.own_tire import own_section, region_of
-from tireroad.runs.scene.tire_tables import Tire
+from tireroad.runs.scene.extent.own_tire import own_section, region_of
+from tireroad.runs.scene.tables.tire import Tire
 
 
 def own_materials(tire: Tire) -> dict[str, Material]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tireroad.runs.scene.tables import PointForce
+from tireroad.runs.scene.tables.scene import PointForce
 
 
 def directions(forces: Sequence[PointForce]) -> np.ndarray:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tireroad.fem.sections.ring import Ring
-from tireroad.runs.scene.tire_section import built, make_section, patch
-from tireroad.runs.scene.tire_tables import Material as MaterialTable
-from tireroad.runs.scene.tire_tables import Region, Tire
+from tireroad.runs.scene.extent.tire_section import built, make_section, patch
+from tireroad.runs.scene.tables.tire import Material as MaterialTable
+from tireroad.runs.scene.tables.tire import Region, Tire
 
 if TYPE_CHECKING:
     from mpi4py import MPI

@@ -13,8 +13,8 @@ from torus_decks import CORDS, HALF_ANGLE, Torus, membranes, plain
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
+from tireroad.runs.scene.extent.own_tire import fingerprint, own_section
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.own_tire import fingerprint, own_section
 from tireroad.runs.scene.resolved import dumps
 
 TIRE = """

@@ -6,7 +6,7 @@ from functools import lru_cache
 from tireroad.contact.roads.kind import RoadKind
 from tireroad.contact.roads.under_tire import Road
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 # The effective rolling radius of a pressed tire over its outer radius, at the least; and how far the
 # patch may reach ahead of the axle, m: what is refused here the run would refuse for certain.

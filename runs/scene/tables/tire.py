@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from tireroad.fem.parameters import filename, flag, texts
-from tireroad.runs.scene.cavity_table import Cavity
 from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
+from tireroad.runs.scene.tables.cavity import Cavity
 
 TORUS, FILE = ("section", ("torus",)), ("section", ("file",))
 RADIAL, MESHED = ("section", ("radial",)), ("section", ("torus", "radial"))

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.tables import Scene
-from tireroad.runs.scene.tire_tables import Tire
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.tire import Tire
 
 Where = Callable[[tuple[str, ...], str], InputError]
 

@@ -13,7 +13,7 @@ from tireroad.fem.parameters import Key, Limits, described, finite, parameter
 from tireroad.runs.scene.schema import choice, integer, number
 
 if TYPE_CHECKING:
-    from tireroad.runs.scene.tables import Scene
+    from tireroad.runs.scene.tables.scene import Scene
 
 Where = Callable[[tuple[str, ...], str], InputError]
 _MOST = 200

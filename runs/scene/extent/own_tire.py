@@ -12,8 +12,8 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.source import Source
-from tireroad.runs.scene.tables import Scene
-from tireroad.runs.scene.tire_tables import Region, Tire
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.tire import Region, Tire
 
 if TYPE_CHECKING:
     from tireroad.fem.decks.own import OwnSection, Wishes

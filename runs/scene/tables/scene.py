@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.parameters import choice, flag, integer, number, text, vector
-from tireroad.runs.scene.road_tables import Road
 from tireroad.runs.scene.schema import (
     Pitch,
     Variants,
@@ -15,8 +14,9 @@ from tireroad.runs.scene.schema import (
     tables,
     variant,
 )
-from tireroad.runs.scene.stiffness_table import Stiffness
-from tireroad.runs.scene.tire_tables import Tire
+from tireroad.runs.scene.tables.road import Road
+from tireroad.runs.scene.tables.stiffness import Stiffness
+from tireroad.runs.scene.tables.tire import Tire
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.process.memory import available_memory
-from tireroad.runs.scene.estimate import KEYS, Estimate
+from tireroad.runs.scene.extent.estimate import KEYS, Estimate
 
 # The estimate may be off by 1.5: beyond that a run cannot succeed, below it it may not.
 CERTAIN, DOUBTFUL = 1.5, 0.8

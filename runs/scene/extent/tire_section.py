@@ -10,9 +10,9 @@ import numpy as np
 from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
-from tireroad.runs.scene.own_tire import own_free_unknowns, own_ring
-from tireroad.runs.scene.tables import Scene
-from tireroad.runs.scene.tire_tables import Region, Tire
+from tireroad.runs.scene.extent.own_tire import own_free_unknowns, own_ring
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.tire import Region, Tire
 
 if TYPE_CHECKING:
     from tireroad.fem.sections.construction import Construction

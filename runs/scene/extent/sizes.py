@@ -8,10 +8,10 @@ import math
 from dataclasses import dataclass
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.road_check import least_travel, made
+from tireroad.runs.scene.extent.tire_section import free_unknowns
+from tireroad.runs.scene.rules.road import least_travel, made
 from tireroad.runs.scene.schema import Pitch
-from tireroad.runs.scene.tables import Scene
-from tireroad.runs.scene.tire_section import free_unknowns
+from tireroad.runs.scene.tables.scene import Scene
 
 TURN = 0.3  # radians of the fastest mode in an automatic step, 200 steps at least (stages.stepping)
 MARGIN = 5e-3  # m: the reach of the patch beyond the road's height (stages.greens)

@@ -10,7 +10,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.scene.schema import choice, number
 
 if TYPE_CHECKING:
-    from tireroad.runs.scene.tables import Scene
+    from tireroad.runs.scene.tables.scene import Scene
 
 Where = Callable[[tuple[str, ...], str], InputError]
 

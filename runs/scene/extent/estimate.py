@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tireroad.runs.scene.extent.sizes import Sizes, sizes
 from tireroad.runs.scene.plan import skipped
-from tireroad.runs.scene.sizes import Sizes, sizes
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 PROGRAM = 2.1e8
 """Bytes of one process with all libraries loaded and the mesh made (measured)."""

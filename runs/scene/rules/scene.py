@@ -7,13 +7,13 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import described
 from tireroad.fem.sections.tire_size import size
-from tireroad.runs.scene.cavity_table import check_cavity
+from tireroad.runs.scene.extent.tire_section import free_unknowns
+from tireroad.runs.scene.rules.tire import check_cords, full_matrices
 from tireroad.runs.scene.source import Source
-from tireroad.runs.scene.stiffness_table import check_stiffness
-from tireroad.runs.scene.tables import Scene
-from tireroad.runs.scene.tire_rules import check_cords, full_matrices
-from tireroad.runs.scene.tire_section import free_unknowns
-from tireroad.runs.scene.tire_tables import Material, Tire
+from tireroad.runs.scene.tables.cavity import check_cavity
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.stiffness import check_stiffness
+from tireroad.runs.scene.tables.tire import Material, Tire
 
 Where = Callable[[tuple[str, ...], str], InputError]
 
