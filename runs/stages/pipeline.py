@@ -31,7 +31,8 @@ from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.rules.road import check_road
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.cavity import AirColumn
+from tireroad.runs.stages.build.cavity import AirColumn
+from tireroad.runs.stages.build.setup import Setup
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.greens import GreensStage, Responses
 from tireroad.runs.stages.job import Job
@@ -39,7 +40,6 @@ from tireroad.runs.stages.modes import Fields, ModesStage, Motions
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
-from tireroad.runs.stages.setup import Setup
 from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.static import StaticStage

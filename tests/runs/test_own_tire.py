@@ -121,7 +121,7 @@ def test_messages(folder, add, message):
 
 def test_materials_of_the_scene(folder):
     """[[tire.region]] by name replaces the file's compound, [[tire.cords]] by name its cords."""
-    from tireroad.runs.stages.own_tire import own_cords, own_materials
+    from tireroad.runs.stages.build.own_tire import own_cords, own_materials
 
     (folder / "own.toml").write_text(
         TIRE + '[[tire.region]]\nname = "wall"\ndynamic = 1.4\nloss_factor = 0.1\n'

@@ -64,7 +64,7 @@ def test_a_section_file_is_a_tire(tmp_path):
     """Compounds and cords by name, of the order asked for; the hash changes with the drawing."""
     from tireroad.fem.sections.ring import wall_thickness
     from tireroad.runs.scene.extent.own_tire import fingerprint
-    from tireroad.runs.stages.own_tire import own_cords, own_materials
+    from tireroad.runs.stages.build.own_tire import own_cords, own_materials
 
     drawing = tmp_path / "section.toml"
     drawing.write_text(DRAWING)

@@ -9,7 +9,7 @@ from tireroad.modal.solver import undamped
 from tireroad.modal.solver.symmetry import Sites
 from tireroad.runs.scene.extent.tire_section import make_section
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.tire import make_body
+from tireroad.runs.stages.build.tire import make_body
 
 SCENE = """
 [tire.material]

@@ -18,7 +18,7 @@ BASES = 3
 DENSE = 1000
 """Contact points up to which a tread's matrix is kept (contact.model.DENSE_POINTS)."""
 BLOCK = 512
-"""Steps of contact results held between two writes (stages.contact_file)."""
+"""Steps of contact results held between two writes (stages.stored.contact_file)."""
 PACKED = 0.3
 """Size of contact.h5 over its numbers: most forces are 0 (measured: 0.24 on stones, 0.29 on texture)."""
 

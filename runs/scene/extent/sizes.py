@@ -13,7 +13,7 @@ from tireroad.runs.scene.rules.road import least_travel, made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.scene import Scene
 
-TURN = 0.3  # radians of the fastest mode in an automatic step, 200 steps at least (stages.stepping)
+TURN = 0.3  # radians of the fastest mode in an automatic step, 200 steps at least (stages.build.stepping)
 MARGIN = 5e-3  # m: the reach of the patch beyond the road's height (stages.greens)
 
 

@@ -28,7 +28,7 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
     from tireroad.fem.tire.body import Body
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
-    from tireroad.runs.stages.own_tire import own_cords, own_materials
+    from tireroad.runs.stages.build.own_tire import own_cords, own_materials
 
     if tire.section == "file":
         return Body(comm, section, own_materials(tire), cords=own_cords(tire))

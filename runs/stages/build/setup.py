@@ -13,9 +13,9 @@ from tireroad.contact.roads.road import make_road
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
+from tireroad.runs.stages.build.stepping import run_time
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.stage import Done, Shared
-from tireroad.runs.stages.stepping import run_time
 
 
 @dataclass(frozen=True, kw_only=True)
