@@ -1,16 +1,16 @@
 """The first eigenproblem: K Phi = M Phi Lambda, Phi^T M Phi = I, with none of the lowest missing.
 
 The diagonal mass makes it the standard problem of A = M^-1/2 K M^-1/2, which symmetries split: equal
-segments by wave number (modal.solver.circulant), or else mirror planes or a half turn (modal.solver.symmetry). The
+segments by wave number (circulant), or else mirror planes or a half turn (symmetry). The
 inertia of each part, L D L^T by MUMPS, says how many eigenvalues lie below a value and so where to slice
-(modal.solver.spectrum); SLEPc extracts the eigenpairs of each slice (modal.solver.slices). Residuals and orthonormality
+(spectrum); SLEPc extracts the eigenpairs of each slice (slices). Residuals and orthonormality
 are then measured on A itself.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -28,6 +28,7 @@ from tireroad.modal.solver.fields import (
     orthonormalise,
     scaled_by,
 )
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.spectrum import Bottom, Part, Slice, Spectrum
 from tireroad.modal.solver.symmetry import Sites, sectors, symmetries, whole
 
@@ -35,48 +36,6 @@ RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
 MOST = 1e-6  # where rounding alone is more than the tolerance
 ORTHONORMALITY_TOLERANCE = 1e-10
 _SAME = 1e-10  # relative distance of equal eigenvalues, where rounding is not more
-
-
-@dataclass(frozen=True, kw_only=True)
-class Modes:
-    """The lowest m modes. `squares` omega^2 (m,) 1/s2 ascending; `vectors` this process's rows (n, m)
-    of the mass-normalised shapes, kg^-1/2, signs and bases of repeated frequencies by rule
-    (modal.solver.canonical); `residual` (m,) ||K phi - lambda M phi|| / ||lambda M phi||, twice the relative error
-    of the frequency at most; `inertia_count` eigenvalues below `counted_below` (1/s2) by Sylvester's law,
-    equal to the number found there; `rigid` modes without stiffness, whose square is 0, among them;
-    `sectors` sizes of the independent problems that the `symmetries` (names) or wave numbers split it
-    into, `slices` intervals solved; `segments` equal ones around the axle, 1 where none are used.
-    """
-
-    squares: np.ndarray
-    vectors: np.ndarray
-    residual: np.ndarray
-    orthonormality: float
-    inertia_count: int
-    counted_below: float
-    rigid: int
-    sectors: tuple[int, ...]
-    slices: int
-    segments: int = 1
-    symmetries: tuple[str, ...] = ()
-
-    @property
-    def frequency(self) -> np.ndarray:
-        """Natural frequencies (m,), Hz; 0 for rigid modes."""
-        return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * np.pi)
-
-    def first(self, count: int) -> Modes:
-        """The `count` lowest of them."""
-        return replace(
-            self,
-            squares=self.squares[:count],
-            vectors=self.vectors[:, :count],
-            residual=self.residual[:count],
-        )
-
-    def among(self, wanted: np.ndarray) -> Modes:
-        """With the squares and vectors of those `wanted`, an index or a mask."""
-        return replace(self, squares=self.squares[wanted], vectors=self.vectors[:, wanted])
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.damping import Damping, StrainEnergy
-from tireroad.modal.solver.undamped import Modes
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import projected, solved, with_fields
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.files.store import put

@@ -11,7 +11,8 @@ import numpy as np
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.parallel import on_root
-from tireroad.greens.coupling import Wheel, wheel_of
+from tireroad.greens.coupling import Wheel
+from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
 from tireroad.modal.damping import StrainEnergy

@@ -19,7 +19,7 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple
 from tireroad.modal.basis import Projection, project
 from tireroad.modal.rotating import matrices, rotating, standing
-from tireroad.modal.solver.undamped import Modes
+from tireroad.modal.solver.modes import Modes
 
 FLAT = 1e6  # m, radius of the section circle: what is used of the torus is a cylinder
 COMM = MPI.COMM_SELF

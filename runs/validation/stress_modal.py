@@ -16,6 +16,7 @@ from tireroad.modal.basis import Projection, project
 from tireroad.modal.campbell import critical_speed, growth, onset
 from tireroad.modal.rotating import checks, matrices, rotating
 from tireroad.modal.solver import undamped
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import sites
 
 COUNT = 120
@@ -39,7 +40,7 @@ def rows() -> list[list]:
     return [["modal", *row] for row in found]
 
 
-def _modes(operators: Operators) -> undamped.Modes:
+def _modes(operators: Operators) -> Modes:
     return undamped.solve(operators.stiffness, operators.mass, COUNT, sites=sites(operators))
 
 

@@ -1,11 +1,13 @@
-"""What the cords and the compounds of a scene must keep to."""
+"""What the geometry, the cords and the compounds of a scene must keep to."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.sections.tire_size import size
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.scene.tables.tire import Tire
+from tireroad.runs.scene.tables.tire import Material, Tire
 
 Where = Callable[[tuple[str, ...], str], InputError]
 
@@ -47,3 +49,56 @@ def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     receptance = scene.output.receptance
     if receptance is not None and receptance.direct:
         raise error(("output", "receptance", "direct"), f"= {receptance.direct} {advice}")
+
+
+def _radial(tire: Tire, error: Where) -> None:
+    for key, absent in (("material", Material()), ("region", ()), ("cords", ())):
+        if getattr(tire, key) != absent:
+            raise error(("tire", key), "is of a torus: a radial tire has all of it by its size")
+    try:
+        size(tire.size)
+    except InputError as problem:
+        raise error(("tire", "size"), str(problem).removeprefix("tire.size ")) from None
+
+
+def geometry(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    tire = scene.tire
+    if tire.section == "file":
+        return
+    if tire.section == "radial":
+        _radial(tire, error)
+        return
+    if tire.thickness >= tire.minor_radius:
+        raise error(
+            ("tire", "thickness"),
+            f"= {tire.thickness:g} m must be less than minor_radius = {tire.minor_radius:g} m",
+        )
+    if tire.minor_radius >= tire.outer_radius:
+        raise error(
+            ("tire", "minor_radius"),
+            f"= {tire.minor_radius:g} m must be less than outer_radius = {tire.outer_radius:g} m",
+        )
+    bead = (
+        tire.outer_radius
+        - tire.minor_radius
+        + tire.minor_radius * math.cos(math.radians(tire.half_angle))
+    )
+    if bead <= 0:
+        raise error(
+            ("tire", "half_angle"),
+            f"= {tire.half_angle:g} deg puts the beads at {bead:g} m from the axle:"
+            " make it or minor_radius smaller",
+        )
+    for number, region in enumerate(tire.region):
+        if region.name is not None:
+            raise error(
+                ("tire", "region", str(number), "name"),
+                'is for section = "file": a part of a torus is told by arc, side and depth',
+            )
+        for key in ("arc", "depth"):
+            low, high = getattr(region, key)
+            if low >= high:
+                raise error(
+                    ("tire", "region", str(number), key), f"= [{low:g}, {high:g}] must ascend"
+                )
+    check_cords(tire, error)

@@ -11,7 +11,8 @@ from tireroad.greens.convolution import Convolution
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.process import observe
-from tireroad.runs.scene.tables.scene import Road, Time
+from tireroad.runs.scene.tables.contact import Time
+from tireroad.runs.scene.tables.scene import Road
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
 
