@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
@@ -24,54 +23,19 @@ from tireroad.fem.matrices.compliance import (
 from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
-from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning
 from tireroad.greens.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.basis import Basis, regained
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, modal_moments, second_order
-from tireroad.modal.basis import Projection, project, with_air, with_corner
-from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_loss
+from tireroad.modal.basis import Projection, project, with_air
+from tireroad.modal.damping import Damping, tail_loss
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import StateModes, held_matrices
-from tireroad.modal.undamped import Modes
+from tireroad.modal.solver.modes import Modes
 
 _SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by their sign at least
-
-
-def wheel_of(
-    motions: SmallMotions,
-    turning: Turning,
-    air: Column | None = None,
-    projection: Projection | None = None,
-    axle: Axle | None = None,
-) -> Wheel:
-    """The full matrices of a tire at its static state as the wheel turns, with the `air` in it.
-
-    `projection` on the modes: for damping by strain energy only, which has no full matrices. `axle`: what the
-    wheel moves on, where it does; the full matrices are those of a rim that is held. Collective.
-    """
-    shape, tail = motions.static.rolling, None
-    if shape.speed and (shape.speed, shape.inertia) != (turning.speed, turning.inertia):
-        raise InputError(
-            f"the static state rolls at {shape.speed:g} rad/s with {shape.inertia} inertia, its small motions at "
-            f"{turning.speed:g} rad/s with {turning.inertia}: take one and the same, or a state at rest"
-        )
-    if isinstance(turning.damping, StrainEnergy):
-        if projection is None:
-            raise InputError(
-                "damping by strain energy is known by the modes: give their projection"
-            )
-        tail = beyond(turning.damping, projection)
-    rotation = motions.rotation if turning.speed else None
-    given = turning.speed, turning.damping, turning.inertia
-
-    def corner(projection: Projection, modes: Modes) -> Projection:
-        comm, places = motions.body.comm, motions.static.positions
-        return with_corner(projection, modes, axle, motions.rim_motion, places, comm)
-
-    return Wheel(motions.operators, rotation, *given, air, tail, corner if axle else None)
 
 
 @dataclass(frozen=True)
@@ -137,9 +101,7 @@ class Wheel:
         if option in ("static", "dirac"):
             return self._with_statics(basis, outputs, loads, pulse=option == "dirac")
         if option == "second-order" and self.corner:
-            raise InputError(
-                'greens.residual = "second-order" knows no wheel that moves: take "static" or "attachment"'
-            )
+            raise InputError("greens.residual: second-order knows no wheel that moves")
         r, k = outputs.shape[0], loads.shape[0]
         same = outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
@@ -179,15 +141,14 @@ class Wheel:
             *pencil, held.seen(outputs), held.seen(loads), held.projection.carried
         )
         response = basis.couple(outputs, loads)
-        lacking = flexibility - known.compliance
-        response = replace(response, residual=response.residual + lacking)
+        lacking = response.residual + flexibility - known.compliance
+        response = replace(response, residual=lacking)
         return self._lacking(response, moment - known.momentum)
 
     def _lacking(self, response: Response, moment: np.ndarray) -> Response:
         """The response that knows what its states lack of the static first moment (3, k) kg m/N."""
-        if self.air is not None:  # its own momentum is not in that of the full matrices
-            return response
-        return replace(response, left_out=moment)
+        # The air's own momentum is not in that of the full matrices.
+        return replace(response, left_out=moment) if self.air is None else response
 
     def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
         full = self.rotating_stiffness, self.rotating_damping
@@ -266,8 +227,7 @@ class Wheel:
             stays = dynamic(projection, self.speed, len(modes.squares))
             projection, grown = projection.among(stays), grown.among(stays)
         projection = self.with_air(projection, grown)
-        if self.corner:
-            projection = self.corner(projection, grown)
+        projection = self.corner(projection, grown) if self.corner else projection
         shape = operators.trace(grown.vectors)
         return Basis(shape, projection, self.decouple(projection, comm), self.speed)
 

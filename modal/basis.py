@@ -11,8 +11,8 @@ from tireroad.fem.cavity.column import Column
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.modal.air import Air
 from tireroad.modal.corner import Corner, meeting
-from tireroad.modal.fields import CHUNK, gram, multiply
-from tireroad.modal.undamped import Modes
+from tireroad.modal.solver.fields import CHUNK, gram, multiply
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import Labels
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from tireroad.fem.errors import InputError
 from tireroad.fem.parallel import on_root
 from tireroad.fem.turning import Turning
+from tireroad.modal.adrift import beside
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.campbell import Campbell
 from tireroad.modal.rotating import (
     LIMITS,
     StateModes,
-    beside,
     checks,
     matrices,
     rotating,

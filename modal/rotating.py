@@ -10,8 +10,6 @@ to have usable vectors of their own.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy import linalg
 
@@ -82,7 +80,7 @@ def standing(projection: Projection, damping: Damping) -> StateModes:
     k = np.arange(len(mode))
     right[mode, k] = weight
     left[k, mode] = 1 / (2 * eigenvalue + 2 * half[mode])
-    block, block_right, block_left = _companion_blocks(defective, squares, half, m)
+    block, block_right, block_left = companion_blocks(defective, squares, half, m)
     none = np.zeros(len(mode))
     worst = float(condition[np.r_[paired, real]].max(initial=1.0))
     drifting = 2 * int(rigid.sum())
@@ -147,7 +145,7 @@ def overlap(one: StateModes, other: StateModes, drag: np.ndarray) -> np.ndarray:
     return one.eigenvalue[:, None] * near + near * other.eigenvalue + one.left @ (drag @ right)
 
 
-def _companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m: int):
+def companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m: int):
     """(T, R_b, L_b) of single modes, critically damped or rigid, each as its own companion matrix."""
     k = 2 * len(modes)
     block, right, left = np.zeros((k, k)), np.zeros((m, k)), np.zeros((k, m))
@@ -191,25 +189,6 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
         _quadratic_residual(drag, stiffness, values, right),
         _quadratic_residual(drag.T, stiffness.T, values, left.T),
         float(condition[good].max(initial=1.0)),
-    )
-
-
-def beside(drag: np.ndarray, stiffness: np.ndarray, adrift: np.ndarray) -> StateModes:
-    """The same where the motions `adrift` (m, r), orthonormal, meet neither force nor damping: they are parted
-    from the others, and drift in a block of their own.
-    """
-    m, r = adrift.shape
-    others = linalg.qr(adrift)[0][:, r:]
-    found = rotating(others.T @ drag @ others, others.T @ stiffness @ others)
-    block, right, left = _companion_blocks(np.arange(r), np.zeros(r), np.zeros(r), r)
-    return replace(
-        found,
-        right=others @ found.right,
-        left=found.left @ others.T,
-        block=linalg.block_diag(found.block, block),
-        block_right=np.hstack([others @ found.block_right, adrift @ right]),
-        block_left=np.vstack([found.block_left @ others.T, left @ adrift.T]),
-        rigid=2 * r,
     )
 
 

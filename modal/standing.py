@@ -9,9 +9,10 @@ from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
-from tireroad.modal import undamped
 from tireroad.modal.basis import ModalBasis, project, with_air, with_corner
-from tireroad.modal.symmetry import Sites
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.symmetry import Sites
 
 _SAME = 1e-6  # relative distance of the frequencies of one mode in two solutions
 
@@ -35,9 +36,7 @@ def standing_modes(
     return projected(motions, modes, rotation, air, axle)
 
 
-def solved(
-    operators: Operators, *, count: int | None = None, up_to: float | None = None
-) -> undamped.Modes:
+def solved(operators: Operators, *, count: int | None = None, up_to: float | None = None) -> Modes:
     """The modes alone. Collective."""
     if count is None and up_to is None:
         raise InputError("modes: give count, how many of the lowest, or up_to, a frequency in Hz")
@@ -52,7 +51,7 @@ def solved(
 
 def projected(
     motions: SmallMotions,
-    modes: undamped.Modes,
+    modes: Modes,
     rotation: bool,
     air: Column | None = None,
     axle: Axle | None = None,

@@ -108,7 +108,7 @@ def _answer(section, consistent: bool = False) -> Answer:
 
 
 def _frequencies(operators, count: int = COUNT) -> np.ndarray:
-    from tireroad.modal import undamped
+    from tireroad.modal.solver import undamped
     from tireroad.modal.standing import sites
 
     where = sites(operators)

@@ -35,7 +35,7 @@ def _operators(around: int, along: int, order: int):
 
 
 def _solve(operators, count: int, waves: bool = True):
-    from tireroad.modal import undamped
+    from tireroad.modal.solver import undamped
 
     return undamped.solve(
         operators.stiffness, operators.mass, count, sites=sites(operators), waves=waves

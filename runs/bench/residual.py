@@ -17,8 +17,9 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.turning import Turning
-from tireroad.greens.coupling import Basis, Wheel, wheel_of
+from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.recursion import Recursion
+from tireroad.greens.small_motions import wheel_of
 from tireroad.greens.state_selection import keep
 from tireroad.greens.truncation import Cutoff, estimate
 from tireroad.modal.basis import ModalBasis

@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from dataclasses import Field, fields
 from pathlib import Path
 
-from tireroad.fem.parameters import Key
+from tireroad.fem.keys import Key
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.schema import Variant, key_of, table_of, variant_of
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 HEAD = """\
 # Keys of a scene

@@ -19,7 +19,7 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple
 from tireroad.modal.basis import Projection, project
 from tireroad.modal.rotating import matrices, rotating, standing
-from tireroad.modal.undamped import Modes
+from tireroad.modal.solver.modes import Modes
 
 FLAT = 1e6  # m, radius of the section circle: what is used of the torus is a cylinder
 COMM = MPI.COMM_SELF
@@ -93,7 +93,7 @@ def _ring(speed: float) -> Iterator[tuple]:
 
 def _soft_modes(operators: Operators) -> Modes:
     """60 modes by SciPy: next to the ring's stiffness across, its softest bending is below what
-    modal.undamped takes for digits."""
+    modal.solver.undamped takes for digits."""
     size = operators.stiffness.getSize()
     stiffness = sparse.csr_matrix(operators.stiffness.getValuesCSR()[::-1], shape=size)
     mass = sparse.diags(operators.mass).tocsc()

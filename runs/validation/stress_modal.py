@@ -12,10 +12,11 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
-from tireroad.modal import undamped
 from tireroad.modal.basis import Projection, project
 from tireroad.modal.campbell import critical_speed, growth, onset
 from tireroad.modal.rotating import checks, matrices, rotating
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import sites
 
 COUNT = 120
@@ -39,7 +40,7 @@ def rows() -> list[list]:
     return [["modal", *row] for row in found]
 
 
-def _modes(operators: Operators) -> undamped.Modes:
+def _modes(operators: Operators) -> Modes:
     return undamped.solve(operators.stiffness, operators.mass, COUNT, sites=sites(operators))
 
 

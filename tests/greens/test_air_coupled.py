@@ -21,8 +21,8 @@ from tireroad.fem.transient.linear import FullTire
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
+from tireroad.modal.solver import undamped
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD

@@ -14,8 +14,8 @@ from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
 from tireroad.greens import attachment
 from tireroad.greens.coupling import Basis, Wheel
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
+from tireroad.modal.solver import undamped
 
 COMM = MPI.COMM_WORLD
 SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}

@@ -26,11 +26,11 @@ from tireroad.greens.basis import Basis
 from tireroad.greens.blocked import disagreement
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion
-from tireroad.modal import undamped
 from tireroad.modal.basis import Projection, project, with_corner
 from tireroad.modal.corner import Corner
-from tireroad.modal.fields import everywhere
 from tireroad.modal.rolling import decouple
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.fields import everywhere
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
@@ -72,9 +72,7 @@ def test_the_golden_car_on_its_tire() -> None:
     assert response.rigid == 2  # wheel and body fall together
     # (m_u s2 + c s + k_s + k_t)(s2 + c s + k_s) = (c s + k_s)^2
     spring = np.array([c, k_s])
-    exact = np.polysub(
-        np.polymul([m_u, c, k_s + k_t], [1.0, c, k_s]), np.polymul(spring, spring)
-    )
+    exact = np.polysub(np.polymul([m_u, c, k_s + k_t], [1.0, c, k_s]), np.polymul(spring, spring))
     exact = np.roots(exact)
 
     def closed(s):

@@ -19,8 +19,8 @@ from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.response import couple
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
+from tireroad.modal.solver import undamped
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD

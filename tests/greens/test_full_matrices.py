@@ -19,9 +19,10 @@ from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.truncation import Cutoff, estimate, estimate_axle
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
-from tireroad.modal.fields import gram, multiply
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.fields import gram, multiply
+from tireroad.modal.solver.modes import Modes
 
 MATERIAL = {
     "model": "neo-hookean",
@@ -153,7 +154,7 @@ def test_a_basis_that_grows_keeps_its_projection() -> None:
     operators, rotation, modes, _, _ = tire()
     comm = operators.body.comm
     first = {**vars(modes), "squares": modes.squares[:7], "vectors": modes.vectors[:, :7]}
-    known = project(undamped.Modes(**first), rotation, operators.carried, comm)
+    known = project(Modes(**first), rotation, operators.carried, comm)
     whole = project(modes, rotation, operators.carried, comm)
     grown = project(modes, rotation, operators.carried, comm, known)
     matrices = {name: value for name, value in vars(whole).items() if value is not None}

@@ -19,9 +19,9 @@ from tireroad.fem.tire.wall import Region
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.modal_damping import ModalDamping
 from tireroad.greens.coupling import Basis, Wheel
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
 from tireroad.modal.damping import StrainEnergy, beyond, rates
+from tireroad.modal.solver import undamped
 
 INFLATION, KEPT = 1e5, 30
 

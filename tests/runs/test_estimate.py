@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene import demand
 from tireroad.runs.scene.check import explain
-from tireroad.runs.scene.estimate import estimate, memory
+from tireroad.runs.scene.extent import demand
+from tireroad.runs.scene.extent.estimate import estimate, memory
+from tireroad.runs.scene.extent.sizes import highest_frequency, sizes
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.sizes import highest_frequency, sizes
 
 
 @pytest.fixture

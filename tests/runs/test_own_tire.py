@@ -13,8 +13,8 @@ from torus_decks import CORDS, HALF_ANGLE, Torus, membranes, plain
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
+from tireroad.runs.scene.extent.own_tire import fingerprint, own_section
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.own_tire import fingerprint, own_section
 from tireroad.runs.scene.resolved import dumps
 
 TIRE = """
@@ -121,7 +121,7 @@ def test_messages(folder, add, message):
 
 def test_materials_of_the_scene(folder):
     """[[tire.region]] by name replaces the file's compound, [[tire.cords]] by name its cords."""
-    from tireroad.runs.stages.own_tire import own_cords, own_materials
+    from tireroad.runs.stages.build.own_tire import own_cords, own_materials
 
     (folder / "own.toml").write_text(
         TIRE + '[[tire.region]]\nname = "wall"\ndynamic = 1.4\nloss_factor = 0.1\n'

@@ -12,11 +12,11 @@ from mpi4py import MPI
 
 from tireroad.contact.roads.kind import ROADS
 from tireroad.fem.parameters import ParameterError
-from tireroad.runs.scene import tire_tables
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.reference import reference
 from tireroad.runs.scene.schema import variant_of, walk
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables import tire as tire_tables
+from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.pipeline import run_scene
 
 KEYS = {f"{of.__name__}.{item.name}": key for _, of, item, key in walk(Scene)}

@@ -12,10 +12,11 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
 from tireroad.modal.campbell import critical_speed, growth, onset
 from tireroad.modal.rotating import checks, matrices, rotating
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
@@ -33,7 +34,7 @@ def operators() -> Operators:
 
 
 @pytest.fixture(scope="module")
-def modes(operators) -> undamped.Modes:
+def modes(operators) -> Modes:
     return undamped.solve(operators.stiffness, operators.mass, 10**6, sites=sites(operators))
 
 

@@ -21,7 +21,7 @@ from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
 from tireroad.modal.basis import project
 from tireroad.modal.rotating import matrices, rotating
-from tireroad.modal.undamped import Modes
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import label
 
 R, H, E, RHO = 0.3, 0.003, 4.8e8, 1200.0
@@ -60,7 +60,7 @@ def spin_up(body: Body, speed: float) -> None:
 
 
 def lowest(operators: Operators, count: int) -> Modes:
-    """The lowest modes: so thin a ring is beyond the digits that modal.undamped demands."""
+    """The lowest modes: so thin a ring is beyond the digits that modal.solver.undamped demands."""
     stiffness, mass = csr(operators.stiffness).tocsc(), sparse.diags(operators.mass).tocsc()
     squares, vectors = eigsh(stiffness, count, mass, sigma=-1.0)
     order = np.argsort(squares)

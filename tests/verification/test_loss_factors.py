@@ -16,10 +16,10 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.wall import Region, compounds
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
 from tireroad.modal.damping import Proportional, StrainEnergy, beyond, rates
 from tireroad.modal.rotating import matrices, standing
+from tireroad.modal.solver import undamped
 
 INFLATION = 1.0e5
 

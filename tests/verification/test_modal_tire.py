@@ -12,10 +12,10 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Torus
-from tireroad.modal import quadratic, undamped
-from tireroad.modal.agreement import truncation
 from tireroad.modal.basis import project
 from tireroad.modal.rotating import checks, matrices, rotating
+from tireroad.modal.solver import quadratic, undamped
+from tireroad.modal.solver.agreement import truncation
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
