@@ -141,13 +141,11 @@ class Wheel:
             *pencil, held.seen(outputs), held.seen(loads), held.projection.carried
         )
         response = basis.couple(outputs, loads)
-        lacking = response.residual + flexibility - known.compliance
-        response = replace(response, residual=lacking)
+        response = replace(response, residual=response.residual + flexibility - known.compliance)
         return self._lacking(response, moment - known.momentum)
 
     def _lacking(self, response: Response, moment: np.ndarray) -> Response:
-        """The response that knows what its states lack of the static first moment (3, k) kg m/N."""
-        # The air's own momentum is not in that of the full matrices.
+        """With the static first moment (3, k) kg m/N that the states lack; not with air, whose own is not known."""
         return replace(response, left_out=moment) if self.air is None else response
 
     def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
@@ -228,8 +226,8 @@ class Wheel:
             projection, grown = projection.among(stays), grown.among(stays)
         projection = self.with_air(projection, grown)
         projection = self.corner(projection, grown) if self.corner else projection
-        shape = operators.trace(grown.vectors)
-        return Basis(shape, projection, self.decouple(projection, comm), self.speed)
+        states = self.decouple(projection, comm)
+        return Basis(operators.trace(grown.vectors), projection, states, self.speed)
 
     @property
     def turning(self) -> Turning:
@@ -241,7 +239,7 @@ class Wheel:
         return with_air(projection, modes, self.air)
 
     def decouple(self, projection: Projection, comm) -> StateModes:
-        """The second eigenproblem, or the closed formula of a tire without air that stands. Collective."""
+        """The second eigenproblem, or the closed formula of a tire that stands. Collective."""
         return decouple(projection, self.turning, comm)
 
     def receptance(

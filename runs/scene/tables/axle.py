@@ -10,7 +10,8 @@ import numpy as np
 
 from tireroad.fem.axle import DIRECTIONS, Axle
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Key, OnlyFor, described, finite, parameter
+from tireroad.fem.keys import Key, OnlyFor, described, finite
+from tireroad.fem.parameters import parameter
 from tireroad.runs.scene.schema import choice, number, vector
 
 if TYPE_CHECKING:
