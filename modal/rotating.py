@@ -25,25 +25,22 @@ SINGULAR = 1e13  # condition of K~ beyond which it has no inverse
 _AT_REST, _SKEWED = 1e-5, 1e2
 
 
-def matrices(
-    projection: Projection, speed: float, damping: Damping, inertia: str
-) -> tuple[np.ndarray, np.ndarray]:
+Pencil = tuple[np.ndarray, np.ndarray]
+
+
+def matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """D~ (1/s) and K~ (1/s2) of the projected problem; `damping` as in modal.damping."""
     return projection.pencil(*held_matrices(projection, speed, damping, inertia), speed)
 
 
-def held_matrices(
-    projection: Projection, speed: float, damping: Damping, inertia: str
-) -> tuple[np.ndarray, np.ndarray]:
+def held_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """The same of tire and air with the rim held: without a corner."""
     pencil = _tire_matrices(projection, speed, damping, inertia)
     air = projection.air
     return pencil if air is None else air.joined(*pencil, speed)
 
 
-def _tire_matrices(
-    projection: Projection, speed: float, damping: Damping, inertia: str
-) -> tuple[np.ndarray, np.ndarray]:
+def _tire_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """The same of the tire without the air in it."""
     rate = rates(damping, projection)
     stiffness, drag = np.diag(projection.squares), np.diag(rate)
