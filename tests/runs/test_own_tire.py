@@ -128,7 +128,7 @@ def test_materials_of_the_scene(folder):
     )
     tire = load(folder / "own.toml").tire
     (wall,) = own_materials(tire).values()
-    assert (wall.youngs_modulus, wall.dynamic, wall.loss_factor) == (6e6, 1.4, 0.1)
+    assert (wall.law.youngs_modulus, wall.dynamic, wall.loss_factor) == (6e6, 1.4, 0.1)
     (folder / "own.toml").write_text(
         TIRE
         + '[[tire.region]]\nname = "WALL"\n[tire.region.material]\nyoungs_modulus = 9e6\n'
