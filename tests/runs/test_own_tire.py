@@ -135,7 +135,7 @@ def test_materials_of_the_scene(folder):
         + '[[tire.cords]]\nname = "B"\nangle = 30.0\narea = 3e-7\n'
     )
     tire = load(folder / "own.toml").tire
-    assert own_materials(tire)["WALL"].youngs_modulus == 9e6
+    assert own_materials(tire)["WALL"].law.youngs_modulus == 9e6
     (belt,) = own_cords(tire)
     assert (np.degrees(belt.angle), belt.area) == (pytest.approx(30), 3e-7)
 
