@@ -24,7 +24,6 @@ SINGULAR = 1e13  # condition of K~ beyond which it has no inverse
 # States slower than this part of the fastest drift, as rigid modes do, unless their vectors are apart.
 _AT_REST, _SKEWED = 1e-5, 1e2
 
-
 Pencil = tuple[np.ndarray, np.ndarray]
 
 
@@ -36,8 +35,7 @@ def matrices(projection: Projection, speed: float, damping: Damping, inertia: st
 def held_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """The same of tire and air with the rim held: without a corner."""
     pencil = _tire_matrices(projection, speed, damping, inertia)
-    air = projection.air
-    return pencil if air is None else air.joined(*pencil, speed)
+    return pencil if projection.air is None else projection.air.joined(*pencil, speed)
 
 
 def _tire_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
