@@ -85,7 +85,15 @@ def _layers(at: _Stations) -> tuple[Layer, ...]:
     """Thickness in mm at the crown, under the belt's edge, at the tread's edge, at the widest point, half way
     from there to the flange, at the flange and at the heel.
     """
-    places = (0.0, 0.8 * at.belt, at.shoulder, at.widest, (at.widest + at.held) / 2, at.held, at.end)
+    places = (
+        0.0,
+        0.8 * at.belt,
+        at.shoulder,
+        at.widest,
+        (at.widest + at.held) / 2,
+        at.held,
+        at.end,
+    )
 
     def layer(name: str, compound: str, *values: float) -> Layer:
         return Layer(name, compound, tuple(zip(places, np.multiply(1e-3, values), strict=True)))
