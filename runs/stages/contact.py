@@ -23,13 +23,13 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
-from tireroad.runs.stages.contact_file import ContactFile, ContactHistory
+from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
+from tireroad.runs.stages.build.stepping import Integration, integration, passing_period
 from tireroad.runs.stages.energy import Losses, describe_energy
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Done, Stage
-from tireroad.runs.stages.stepping import Integration, integration, passing_period
+from tireroad.runs.stages.stored.contact_file import ContactFile, ContactHistory
 from tireroad.runs.stages.watch import Watch
 
 
@@ -93,7 +93,7 @@ class ContactStage(Stage[ContactHistory]):
             file.finish()
         _describe(record, totals.figures, loop.solver, chosen, chosen.steps - done)
         if chosen.scheme != "convolution":
-            work = totals.work.total, driven.work if driven else None
+            work = totals.work.total, driven.work if self.job.scene.force else None
             given = self.rotating.product, response, loop.tire.snapshot(), work
             describe_energy(record, *given, losses, chosen.step)
 
@@ -104,9 +104,9 @@ class ContactStage(Stage[ContactHistory]):
         return min(passing, shortest_period(scene.force))
 
     def _driven(self, chosen: Integration) -> Driven | None:
-        """The tire under the scene's prescribed forces, where there are any."""
+        """The tire under the scene's prescribed forces, and with a wheel that is read, where there is either."""
         forces = self.job.scene.force
-        if not forces:
+        if not forces and self.job.axle is None:
             return None
         time = chosen.step * np.arange(chosen.steps + 1)
         return Driven(chosen.tire, histories(forces, time), directions(forces))

@@ -1,0 +1,216 @@
+"""contact.h5 as the time loop goes, and the checkpoint from which a loop goes on."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from tireroad.contact.rolling import Instant
+from tireroad.contact.setup import ContactSetup
+from tireroad.runs.files import packed, store
+from tireroad.runs.files.checksum import seal
+from tireroad.runs.files.disk import part_of, replacing
+from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.build import corner
+from tireroad.runs.stages.job import Job
+
+BLOCK = 512  # steps kept in memory between two writes
+CHECKPOINT = "checkpoint.h5"
+STATE = "state"  # the group of a checkpoint that contact.h5 does not have
+
+_LAYOUT: dict[str, tuple[tuple, str]] = {
+    "time": ((), "s"),
+    "normal_force": ((None,), "N"),
+    "horizontal_force": ((None, 2), "N"),
+    "total_force": ((3,), "N"),
+    "displacement": ((None,), "m"),
+    "gap": ((None,), "m"),
+    "axle_force": ((3,), "N"),
+    "active": ((), "-"),
+    "residual": ((), "-"),
+}
+DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, where a scene has them
+_OF_WHEEL = {
+    name: ((3,) if name != "body/height" else (), unit) for name, unit in corner.UNITS.items()
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactHistory:
+    """What the road did to the tire, n steps of `step` s at the times `time` (n,): `total_force` (n, 3) N,
+    `axle_force` (n, 3) N where it is kept, displacement (n, k, 3) m at `driven` points, where there are any, and by the names of runs.stages.corner the
+    motions and moments of a `wheel` that moves.
+    """
+
+    step: float
+    scheme: str
+    time: np.ndarray
+    total_force: np.ndarray
+    axle_force: np.ndarray | None = None
+    driven: np.ndarray | None = None
+    wheel: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @staticmethod
+    def of(file: h5py.File) -> ContactHistory:
+        """The history in contact.h5; not its points, which may be many."""
+        kept = {"axle_force": "axle_force", "driven": DRIVEN}
+        return ContactHistory(
+            step=float(file.attrs["step"]),
+            scheme=str(file.attrs["scheme"]),
+            time=file["time"][:],
+            total_force=file["total_force"][:],
+            **{name: file[stored][:] for name, stored in kept.items() if stored in file},
+            wheel={name: file[name][:] for name in corner.UNITS if name in file},
+        )
+
+
+class ContactFile:
+    """Blocks of steps, compressed, on the root process; a checkpoint is a copy with the loop's state."""
+
+    def __init__(self, job: Job, key: str, setup: ContactSetup, attributes: dict):
+        self._job, self._key, self._patch = job, key, setup.patch
+        self._attributes = attributes | {
+            "road": job.scene.road.kind,
+            "speed": job.speed,
+            "road_speed": setup.rolled.speed,
+        }
+        self._checkpoint = job.directory / CHECKPOINT
+        self._stack: list = []
+        self._readings: list[np.ndarray] = []
+        self._rubs = job.scene.contact.brush_stiffness is not None
+        self._layout = dict(_LAYOUT)
+        if not job.scene.output.axle_force:
+            del self._layout["axle_force"]
+        self._done = 0
+
+    def open(self, stack: ExitStack, path: Path) -> dict[str, np.ndarray] | None:
+        """Begin the temporary file; the stack puts it in place at its end, or removes it after an
+        error. The state of a checkpoint of the same inputs to go on from, else None. Collective.
+        """
+        self._done, state = on_root(self._job.comm, lambda: self._open(stack, path))
+        return state
+
+    def _open(self, stack: ExitStack, path: Path) -> tuple[int, dict[str, np.ndarray] | None]:
+        self._path, self._packer = path, packed.Packer()
+        stack.callback(self._packer.close)
+        provenance = self._job.provenance("contact", self._key)
+        going_on = not self._job.fresh and self._usable(provenance.input_hash)
+        begin = self._checkpoint if going_on else None
+        self._file = stack.enter_context(store.writing(path, provenance, begin))
+        if not going_on:
+            self._lay_out()
+            return 0, None
+        state = {name: value[()] for name, value in self._file[STATE].items()}
+        del self._file[STATE]
+        return len(self._file["time"]), state
+
+    def _usable(self, wanted: str) -> bool:
+        """Whether there is a checkpoint to go on from; one that cannot serve is named."""
+        reason = store.why_not(self._checkpoint, wanted, "contact")
+        if reason and reason != "absent":
+            observe.say(f"  {CHECKPOINT} is there, but {reason}: the loop begins at t = 0")
+        return not reason
+
+    def _lay_out(self) -> None:
+        patch = self._patch
+        c = len(patch.points)
+        store.put(self._file, "points", patch.points, "m")
+        store.put(self._file, "area", patch.area, "m2")
+        forces = len(self._job.scene.force)
+        driven = {DRIVEN: ((forces, 3), "m")} if forces else {}
+        driven |= _OF_WHEEL if self._job.axle else {}
+        # A chunk of many points would be many megabytes: 4 MB at most is read at once.
+        rows = 2 ** int(np.log2(np.clip(500_000 // max(c, 1), 1, BLOCK)))
+        for name, (shape, unit) in (self._layout | driven).items():
+            width = tuple(c if n is None else n for n in shape)
+            if width[:1] == (c,):
+                dataset = packed.create(self._file, name, rows, width)
+            else:
+                sizes = {"maxshape": (None, *width), "chunks": (BLOCK, *width)}
+                dataset = self._file.create_dataset(name, (0, *width), "f8", **sizes)
+            dataset.attrs["unit"] = unit
+        self._file.attrs.update(self._attributes)
+
+    def add(self, instant, reading: np.ndarray | None = None) -> bool:
+        """Keep a step, with what was read of driven points and wheel. Whether it is time to `flush`."""
+        self._stack.append(instant)
+        if reading is not None:
+            self._readings.append(reading)
+        return (self._done + len(self._stack)) % BLOCK == 0
+
+    def flush(self, count: Callable[[dict[str, np.ndarray]], None]) -> None:
+        """Write the n steps kept since the last time, once `count` has seen them: all of `Instant`
+        and `total_force` as arrays (n, ...) by name. Collective."""
+        if not self._stack:
+            return
+        steps = _columns(self._stack)
+        count(steps)
+        on_root(self._job.comm, lambda: self._write(steps))
+        self._done += len(self._stack)
+        self._stack.clear()
+        self._readings.clear()
+
+    def _write(self, steps: dict[str, np.ndarray]) -> None:
+        self._packer.wait()
+        driven = self._read()
+        for name in self._layout | driven:
+            dataset, values = self._file[name], (steps | driven)[name]
+            if name == "horizontal_force" and not self._rubs:
+                dataset.resize(self._done + len(values), axis=0)  # what is not written is zero
+            elif dataset.compression:
+                self._packer.append(dataset, values)
+            else:
+                dataset.resize(self._done + len(values), axis=0)
+                dataset[self._done :] = values
+
+    def _read(self) -> dict[str, np.ndarray]:
+        """What was read beside the contact since the last time, name by name."""
+        if not self._readings:
+            return {}
+        readings, forces = np.stack(self._readings), len(self._job.scene.force)
+        points, wheel = np.split(readings, [3 * forces], axis=1)
+        driven = {DRIVEN: points.reshape(-1, forces, 3)} if forces else {}
+        if self._job.axle is None:
+            return driven
+        return driven | corner.parts(wheel, corner.standing_moment(self._patch))
+
+    def checkpoint(self, state: dict[str, np.ndarray]) -> None:
+        """Keep the steps flushed so far and the loop's state, whole or not at all. Collective."""
+        on_root(self._job.comm, lambda: self._save(state))
+
+    def _save(self, state: dict[str, np.ndarray]) -> None:
+        self._packer.wait()
+        self._file.flush()
+        with replacing(self._checkpoint) as part:
+            shutil.copyfile(part_of(self._path), part)
+            with h5py.File(part, "r+") as copy:
+                for name, value in state.items():
+                    copy.create_dataset(f"{STATE}/{name}", data=value)
+            seal(part)
+
+    def finish(self) -> None:
+        """All steps are flushed: delete the checkpoint. Collective."""
+        on_root(self._job.comm, self._finish)
+
+    def _finish(self) -> None:
+        self._packer.wait()
+        self._checkpoint.unlink(missing_ok=True)
+
+
+def _columns(instants: list[Instant]) -> dict[str, np.ndarray]:
+    """A block of steps, name by name."""
+    steps = {
+        name: np.array(values)
+        for name, values in zip(Instant._fields, zip(*instants, strict=True), strict=True)
+    }
+    steps["normal_force"] = steps.pop("force")
+    steps["horizontal_force"] = steps.pop("horizontal")
+    sums = steps["horizontal_force"].sum(axis=1), steps["normal_force"].sum(axis=1)[:, None]
+    return steps | {"total_force": np.concatenate(sums, axis=1)}
