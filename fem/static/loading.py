@@ -77,6 +77,7 @@ class Loader:
 
     def _start_round(self, pressure: float) -> bool:
         """Whether equilibrium is found from the round shape. Collective."""
+
         def shape() -> np.ndarray:
             section = RoundEquilibrium(self.body, self.equilibrium.rolling)
             Loader(section, self.report)._inflate_in_steps(pressure)
