@@ -66,7 +66,9 @@ class Material:
 
 
 def _dynamic():
-    return number(1.0, "-", "modulus of the modes over that of the static state", least=0.01, most=100)
+    return number(
+        1.0, "-", "modulus of the modes over that of the static state", least=0.01, most=100
+    )
 
 
 def _loss_factor():
