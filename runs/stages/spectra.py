@@ -10,9 +10,9 @@ import numpy as np
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.spectra import amplitudes, third_octaves
 from tireroad.runs.files.store import put
-from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 _FEWEST = 32  # steps of which a spectrum says anything
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from tireroad.contact.roads.kind import ROADS
 from tireroad.contact.tread.law import TREADS
+from tireroad.fem.tire.law import MATERIALS
 from tireroad.runs.scene.schema import walk
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fem" / "decks"))
 
@@ -155,7 +156,8 @@ def needed(name: str, of: type, key) -> list[str]:
     """What must be set for a key to be one of its table's kind."""
     table = name.rpartition(".")[0]
     found = []
-    for selector, registry in (("road.kind", ROADS), ("contact.tread", TREADS)):
+    registries = ("road.kind", ROADS), ("contact.tread", TREADS), (f"{table}.model", MATERIALS)
+    for selector, registry in registries:
         kinds = [kind for kind in registry if registry[kind] is of]
         found += [f"{selector}={kind}" for kind in kinds if not kind.startswith(("grid", "crg"))]
     if key.only_for is not None and key.only_for[0] != "section":
