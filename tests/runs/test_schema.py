@@ -191,7 +191,8 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
             "road.motion.kind=sine",
             "greens.dynamic=6",
         )
-        _run(tmp_path / "rolling", ROLLING.format(kind="flat"), "road.motion.kind=ramp")
+        wheel = "road.motion.kind=ramp", "axle.kind=corner", "axle.body_mass=300"
+        _run(tmp_path / "rolling", ROLLING.format(kind="flat"), *wheel)
         _run(tmp_path / "standing", STANDING)
         stiffness = "stiffness.steps=1", "stiffness.up_to=0.001", "stiffness.which=vertical"
         _run(tmp_path / "standing", STANDING, *stiffness)
