@@ -66,6 +66,7 @@ loss_factor = 0.1
 dynamic = 1.3
 """
 AIR = "[tire.cavity]\ntemperature = 300.0\n"
+CORNER = '[axle]\nkind = "corner"\nbody_mass = 300.0\n'
 CURVES = "[stiffness]\nsteps = 2\nup_to = 0.002\n"
 DECK = """
 name = "fuzz"
@@ -98,6 +99,7 @@ BASES = {  # text, tables whose keys are changed more often than others
     "cords": (TIRE + PLIES + PRESSED + ROLLING, "tire.cords|tire.region|damping"),
     "air": (TIRE + AIR + PRESSED + ROLLING, "tire.cavity|greens|modal"),
     "curves": (TIRE + PRESSED + CURVES, "stiffness|static"),
+    "corner": (TIRE + PRESSED + CORNER + ROLLING, "axle|road.motion"),
     "deck": (DECK + ROLLING, "tire.|static"),
     "radial": (RADIAL, "tire.cavity|static|tire.footprint"),
 }
