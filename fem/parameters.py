@@ -6,7 +6,7 @@ key reference and the error messages all follow from them. Like `fem.errors` thi
 that all packages may import; it needs nothing but the standard library.
 """
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 from tireroad.fem.errors import InputError
@@ -21,6 +21,7 @@ class ParameterError(InputError):
         self.parameter, self.reason = parameter, reason
 
 
+@dataclass(frozen=True, kw_only=True)
 class Parameters:
     """Base of dataclasses made of parameters: the constructor checks every value, then `validate`.
 

@@ -91,7 +91,7 @@ class Construction:
         plies = [self._ply(line) for line in self.cords]
         ends = [end for part in self.parts for end in part.along] + [line.to for line in self.cords]
         fixed = [end for end in [*ends, self.tread] if end < length * (1 - 1e-9)]
-        both = np.concatenate([fixed, np.negative(fixed)])
+        both = [*fixed, *(-end for end in fixed)]
         wall = np.linspace(0.0, 1.0, levels + 1)
         arc = corners(elements, lambda s: 1 / self._size(s, elements), -length, length, both)
         mesh = product(order=order, wall=wall, arc=arc, place=place, patches=patches, plies=plies)
@@ -128,10 +128,10 @@ class Construction:
                     raise InputError(
                         f"section: {kind} of layer {name!r}; there are {', '.join(names)}"
                     )
-        for item in (*self.layers, *self.parts):
-            if item.compound not in self.compounds:
+        for compound in [one.compound for one in self.layers] + [p.compound for p in self.parts]:
+            if compound not in self.compounds:
                 known = ", ".join(self.compounds)
-                raise InputError(f"section: no compound {item.compound!r}; there are {known}")
+                raise InputError(f"section: no compound {compound!r}; there are {known}")
 
     def _surfaces(self):
         """Depths (k, layers + 1) m of outer face and inner sides of the layers at lengths (k,) >= 0."""

@@ -92,6 +92,7 @@ class HeldSystem:
         if moved is not None:
             change += moved.change
             self._x.array[:] = change
+        assert self._reaction is not None, "solve() before take()"
         force = self._reaction.createVecLeft()
         self._reaction.mult(self._x, force)
         at_held = force.array_r.copy()

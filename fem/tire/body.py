@@ -40,6 +40,7 @@ class Body:
         self.comm = comm
         if isinstance(tire, Torus):
             tire = tire.ring([region.patch(i) for i, region in enumerate(regions)])
+        if isinstance(material, Material):
             material = compounds(material, tuple(regions))
         self.materials = material
         self.tire = build(comm, tire)

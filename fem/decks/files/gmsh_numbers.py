@@ -45,6 +45,8 @@ def parts(data: bytes, name: str) -> dict[str, Part]:
 class _Numbers:
     """Numbers of a part, taken one after the other. Raises InputError where there are too few."""
 
+    binary: bool
+
     def __init__(self, part: Part):
         self.part = part
 
