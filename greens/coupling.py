@@ -25,11 +25,11 @@ from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.turning import Turning
 from tireroad.greens.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
-from tireroad.greens.basis import Basis, regained
+from tireroad.greens.basis import Basis, Pencil, regained
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, second_order
 from tireroad.modal.basis import Projection, project, with_air
-from tireroad.modal.damping import Damping, tail_loss
+from tireroad.modal.damping import Damping, StrainEnergy, tail_loss
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import StateModes, matrices
 from tireroad.modal.solver.modes import Modes
@@ -69,19 +69,23 @@ class Wheel:
     @property
     def _uniform(self) -> tuple[float, float]:
         """What the full matrices are damped by."""
-        return self.damping if self.beyond is None else self.beyond
+        if self.beyond is not None:
+            return self.beyond
+        if isinstance(self.damping, StrainEnergy):
+            raise InputError(
+                "damping: the full matrices cannot be damped by the modes' strain energy"
+            )
+        return self.damping
 
     @cached_property
     def _loss(self):
         """sum_r eta_r K_r, or None."""
         return self.operators.loss_stiffness()
 
-    def _pencils(self, projection: Projection) -> tuple:
+    def _pencils(self, projection: Projection) -> tuple[Pencil, Pencil]:
         """The projected pencil as the modes are damped, and as the full matrices are."""
-        return tuple(
-            matrices(projection, self.speed, damping, self.inertia)
-            for damping in (self.damping, self._uniform)
-        )
+        true = matrices(projection, self.speed, self.damping, self.inertia)
+        return true, matrices(projection, self.speed, self._uniform, self.inertia)
 
     def respond(
         self,
@@ -102,6 +106,8 @@ class Wheel:
         same = outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
+            if modes is None:
+                raise InputError("attachment modes need the modes on all unknowns: pass `modes`")
             whole = self._attached(basis, modes, probes)
         else:
             shapes = self._static_shapes(probes)
@@ -191,7 +197,7 @@ class Wheel:
         moment = np.where(np.arange(carried.shape[1]) < grown.projection.own, carried, 0.0)
         response = couple(grown.states, np.vstack([seen[:6], moment]), seen, carried)
         # By strain energy a rigid motion is not damped, so nothing acts against the wheel.
-        turning = self.speed, self.damping[0] if self.beyond is None else 0.0
+        turning = self.speed, self._uniform[0] if self.beyond is None else 0.0
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
     def _grown(

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
 from tireroad.fem.cavity.column import Column
+from tireroad.fem.errors import InputError
 from tireroad.modal.air import Air
 from tireroad.modal.solver.fields import CHUNK, gram, multiply
 from tireroad.modal.solver.modes import Modes
@@ -44,9 +46,23 @@ class Projection:
         """Coordinates of the tire itself, m."""
         return len(self.squares)
 
+    def rotating(self, inertia: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What multiplies 2 Omega, Omega^2, and Omega times the damping rate, of the inertia "full" or
+        "doppler". InputError where the projection is of a wheel that stands.
+        """
+        full = inertia == "full"
+        gyroscopic = self.gyroscopic if full else self.body
+        convective = self.convective if full else self.body_convective
+        if gyroscopic is None or convective is None or self.body is None:
+            raise InputError("modes: these are of a wheel that stands, and have no rotating states")
+        return gyroscopic, convective, self.body
+
     def first(self, count: int) -> Projection:
         """On the first `count` modes alone."""
-        cut = {"squares": self.squares[:count], "momentum": self.momentum[:, :count]}
+        cut: dict[str, Any] = {
+            "squares": self.squares[:count],
+            "momentum": self.momentum[:, :count],
+        }
         for item in fields(self):
             values = getattr(self, item.name)
             if item.name not in cut and isinstance(values, np.ndarray):
@@ -57,7 +73,7 @@ class Projection:
 
     def among(self, wanted: np.ndarray) -> Projection:
         """On the coordinates where `wanted` (m,) is true, before any air joins them."""
-        small = {
+        small: dict[str, Any] = {
             name: None if value is None else value[np.ix_(*[wanted] * value.ndim)]
             for name, value in vars(self).items()
             if name not in ("momentum", "air")
@@ -132,7 +148,7 @@ def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projec
 
 def _loss_factors(modes: Modes, loss, comm, known: Projection | None) -> np.ndarray:
     """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of modes of unit mass; 0 of rigid ones. Collective."""
-    done = np.zeros(0) if known is None else known.loss_factor
+    done = np.zeros(0) if known is None or known.loss_factor is None else known.loss_factor
     lost = np.empty(modes.vectors.shape[1] - len(done))
     for start in range(0, len(lost), CHUNK):
         some = modes.vectors[:, len(done) + start : len(done) + start + CHUNK]

@@ -25,8 +25,9 @@ class Window:
         self._most = max(PIECE // rows.shape[1], 2)
         self._begin, self._z = 0, np.empty((0, len(y)))
         self._corners: tuple[Array, ...] = ()
-        self._known: NDArray[np.bool_] | None = None
-        self.missing, self.hole = 0, None
+        self._known = np.zeros(0, dtype=bool)
+        self.missing = 0
+        self.hole: tuple[int, int] | None = None
 
     def scan(self) -> None:
         """Look for holes, all through once. InputError when there is no height at all."""
@@ -82,7 +83,7 @@ class Window:
         begin = max(low - margin, 0)
         end = min(max(begin + self._most, high), len(self._x))
         z = self._read(begin, end)
-        if self._known is not None and self.missing:
+        if len(self._known) and self.missing:
             z = self._without_holes(z, begin, end)
         # Four views in which one index finds the corners of a cell.
         self._begin, self._z = begin, np.ascontiguousarray(z)
