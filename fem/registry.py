@@ -4,7 +4,7 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
-from typing import Any, Generic, TypeVar, dataclass_transform
+from typing import Any, Generic, TypeVar
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Parameters
@@ -26,7 +26,6 @@ class Registry(Generic[T]):
         self._docs: dict[str, str] = {}
         self._found = False
 
-    @dataclass_transform(frozen_default=True, kw_only_default=True)
     def register(self, name: str, doc: str) -> Callable[[type], type]:
         """Decorator: makes a frozen dataclass of keywords out of a class, known by `name`.
 
