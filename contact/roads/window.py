@@ -18,7 +18,9 @@ class Window:
     holes in them are filled. `missing` counts all holes, `hole` is the first (row, column) or None.
     """
 
-    def __init__(self, rows: Rows, place: tuple[int, slice], x: Array, y: Array, source: str):
+    def __init__(
+        self, rows: Rows, place: tuple[int, slice], x: Array, y: Array, source: str
+    ) -> None:
         self._rows, (self._first, self._columns), self._source = rows, place, source
         self._x, self._y = x, y
         # As many rows as are read at a time: whole rows come from the file, a part of each is kept.

@@ -56,7 +56,7 @@ class Operators:
         inflation: float,
         support: Support = FIXED,
         rolling: Rolling = AT_REST,
-    ):
+    ) -> None:
         self.body = body
         self.unknowns = Unknowns(body, support)
         self.mass, self.carried = self.unknowns.mass, self.unknowns.carried

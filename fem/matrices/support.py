@@ -44,7 +44,7 @@ class Unknowns:
     `component` (n,) 0, 1, 2 for x, y, z and 3, 4, 5 for rotations; `carried` (3, n) kg: momentum per rate.
     """
 
-    def __init__(self, body: Body, support: Support):
+    def __init__(self, body: Body, support: Support) -> None:
         self._body = body
         rim = body.rim[body.rim < body.nodes]
         known = np.zeros((body.nodes, 3), bool)
@@ -135,7 +135,7 @@ class Rim:
     `coordinates` (6, 6): translation and rotation per unknown. `mine`: this process has the unknowns.
     """
 
-    def __init__(self, body: Body, nodes: np.ndarray, mass: np.ndarray):
+    def __init__(self, body: Body, nodes: np.ndarray, mass: np.ndarray) -> None:
         self._comm = body.comm
         self._points = body.lattice.points(body.ids[nodes])
         self._mass = np.repeat(mass, 3)

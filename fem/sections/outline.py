@@ -19,7 +19,7 @@ class Outline:
     crown. `length` m from the crown to the bead.
     """
 
-    def __init__(self, points: np.ndarray):
+    def __init__(self, points: np.ndarray) -> None:
         points = np.asarray(points, float)
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 4:
             raise InputError("section: an outline needs four points (r, y) or more")

@@ -57,7 +57,7 @@ class LoadingStopped(ConvergenceError):
 class Loader:
     """Brings the body of one equilibrium problem to the wanted state. All methods are collective."""
 
-    def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]):
+    def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]) -> None:
         self.equilibrium = equilibrium
         self.body = equilibrium.body
         self.report = report

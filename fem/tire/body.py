@@ -36,7 +36,7 @@ class Body:
         material: Material | Mapping[str, Material],
         regions: Sequence[Region] = (),
         cords: Sequence[Cords] = (),
-    ):
+    ) -> None:
         self.comm = comm
         if isinstance(tire, Torus):
             tire = tire.ring([region.patch(i) for i, region in enumerate(regions)])

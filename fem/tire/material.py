@@ -36,7 +36,7 @@ class Material:
     dynamic: float = 1.0
     loss_factor: float = 0.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.model not in LAWS:
             raise InputError(f"material model {self.model!r}: known are {', '.join(LAWS)}")
         if not self.density > 0:

@@ -106,7 +106,7 @@ def _within(values: np.ndarray, interval: Interval) -> np.ndarray:
 class _Inverse:
     """(A - sigma I)^-1 as PETSc applies it."""
 
-    def __init__(self, shifted: Shifted):
+    def __init__(self, shifted: Shifted) -> None:
         self._shifted = shifted
 
     def mult(self, _, right: PETSc.Vec, out: PETSc.Vec) -> None:

@@ -80,7 +80,7 @@ class Bottom:
 class Spectrum:
     """Independent parts of a symmetric problem, the same on all processes of `comm`."""
 
-    def __init__(self, comm: MPI.Comm, parts: list[Part]):
+    def __init__(self, comm: MPI.Comm, parts: list[Part]) -> None:
         self.comm, self.parts = comm, parts
         norms = [float(abs(part.matrix).sum(axis=1).max()) for part in parts]
         self.bound = 1.001 * max(norms)

@@ -48,7 +48,7 @@ def read(path: Path) -> Deck:
 class _Reader:
     """Keeps the data of a keyword that is used until the next one begins, and then reads it."""
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path) -> None:
         self.path = path
         self.card: Card | None = None
         self.lines: list[Data] = []

@@ -23,7 +23,7 @@ SUBOPTIONS = (
 class SectionReader:
     """What the elements are made of, as the deck says it."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.solids: list[Solid] = []
         self.layers: list[Layer] = []
         self.embedded: list[Embedded] = []

@@ -47,7 +47,7 @@ class _Numbers:
 
     binary: bool
 
-    def __init__(self, part: Part):
+    def __init__(self, part: Part) -> None:
         self.part = part
 
     def error(self, message: str) -> InputError:
@@ -65,7 +65,7 @@ class TextNumbers(_Numbers):
 
     binary = False
 
-    def __init__(self, part: Part):
+    def __init__(self, part: Part) -> None:
         super().__init__(part)
         self._at = 0
         with warnings.catch_warnings():
@@ -103,7 +103,7 @@ class BinaryNumbers(_Numbers):
 
     binary = True
 
-    def __init__(self, part: Part):
+    def __init__(self, part: Part) -> None:
         super().__init__(part)
         self._at = 0
 
