@@ -101,11 +101,14 @@ def _made(response: Response, figures: Figures | None = None) -> Made:
     return Made(response, figures or {}, warnings)
 
 
-def selected(whole: Response, rolling: RollingModes, wanted: Wanted) -> Response:
-    """The states that stay dynamic; without a residual the others are gone altogether."""
+def selected(
+    whole: Response, rolling: RollingModes, wanted: Wanted, counted: slice = slice(None)
+) -> Response:
+    """The states that stay dynamic; without a residual the others are gone altogether. `counted`: the outputs
+    and forces by which they are chosen."""
     if wanted.dynamic is None:
         return whole
-    kept = keep(whole, wanted.dynamic, band(rolling, wanted), wanted.choice)
+    kept = keep(whole, wanted.dynamic, band(rolling, wanted), wanted.choice, counted)
     return replace(kept, residual=whole.residual) if wanted.residual == "none" else kept
 
 

@@ -24,19 +24,21 @@ SINGULAR = 1e13  # condition of K~ beyond which it has no inverse
 # States slower than this part of the fastest drift, as rigid modes do, unless their vectors are apart.
 _AT_REST, _SKEWED = 1e-5, 1e2
 
+Pencil = tuple[np.ndarray, np.ndarray]
 
-def matrices(
-    projection: Projection, speed: float, damping: Damping, inertia: str
-) -> tuple[np.ndarray, np.ndarray]:
+
+def matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """D~ (1/s) and K~ (1/s2) of the projected problem; `damping` as in modal.damping."""
+    return projection.pencil(*held_matrices(projection, speed, damping, inertia), speed)
+
+
+def held_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
+    """The same of tire and air with the rim held: without a corner."""
     pencil = _tire_matrices(projection, speed, damping, inertia)
-    air = projection.air
-    return pencil if air is None else air.joined(*pencil, speed)
+    return pencil if projection.air is None else projection.air.joined(*pencil, speed)
 
 
-def _tire_matrices(
-    projection: Projection, speed: float, damping: Damping, inertia: str
-) -> tuple[np.ndarray, np.ndarray]:
+def _tire_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """The same of the tire without the air in it."""
     rate = rates(damping, projection)
     stiffness, drag = np.diag(projection.squares), np.diag(rate)
@@ -71,7 +73,7 @@ def standing(projection: Projection, damping: Damping) -> StateModes:
     k = np.arange(len(mode))
     right[mode, k] = weight
     left[k, mode] = 1 / (2 * eigenvalue + 2 * half[mode])
-    block, block_right, block_left = _companion_blocks(defective, squares, half, m)
+    block, block_right, block_left = companion_blocks(defective, squares, half, m)
     none = np.zeros(len(mode))
     worst = float(condition[np.r_[paired, real]].max(initial=1.0))
     drifting = 2 * int(rigid.sum())
@@ -136,7 +138,7 @@ def overlap(one: StateModes, other: StateModes, drag: np.ndarray) -> np.ndarray:
     return one.eigenvalue[:, None] * near + near * other.eigenvalue + one.left @ (drag @ right)
 
 
-def _companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m: int):
+def companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m: int):
     """(T, R_b, L_b) of single modes, critically damped or rigid, each as its own companion matrix."""
     k = 2 * len(modes)
     block, right, left = np.zeros((k, k)), np.zeros((m, k)), np.zeros((k, m))

@@ -30,7 +30,7 @@ from tireroad.fem.static.press import press as press_tire
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import Material, compound
 from tireroad.fem.turning import Turning
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.response import Response
@@ -80,7 +80,7 @@ def torus(
         order,
         footprint_size=footprint_size,
     ).ring()
-    rubber = material or Material(
+    rubber = material or compound(
         "neo-hookean", density, youngs_modulus=youngs_modulus, poisson_ratio=poisson_ratio
     )
     return TireModel(section, lambda: Body(comm, section, {"wall": rubber}))

@@ -76,9 +76,13 @@ def _section(order, segments, arc, thickness, grading, size):
 
 def _body(section, ratio: float = 0.45):
     from tireroad.fem.tire.body import Body
-    from tireroad.fem.tire.material import Material
+    from tireroad.fem.tire.material import compound
 
-    return Body(MPI.COMM_WORLD, section, Material("neo-hookean", 1200.0, 48e6, ratio))
+    return Body(
+        MPI.COMM_WORLD,
+        section,
+        compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=ratio),
+    )
 
 
 def _answer(section, consistent: bool = False) -> Answer:

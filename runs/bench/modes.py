@@ -66,11 +66,11 @@ def _tire(comm: MPI.Comm):
     from tireroad.fem.static.equilibrium import Equilibrium
     from tireroad.fem.static.loading import Loader
     from tireroad.fem.tire.body import Body
-    from tireroad.fem.tire.material import Material
+    from tireroad.fem.tire.material import compound
     from tireroad.fem.tire.mesh import Torus
 
     section = Torus(0.32, 0.1, 0.012, np.radians(120), 80, 16, 1, 2, footprint_size=0.25)
-    material = Material(
+    material = compound(
         model="neo-hookean", youngs_modulus=48e6, poisson_ratio=0.45, density=1200.0
     )
     body = Body(comm, section, material)

@@ -93,7 +93,7 @@ class ContactStage(Stage[ContactHistory]):
             file.finish()
         _describe(record, totals.figures, loop.solver, chosen, chosen.steps - done)
         if chosen.scheme != "convolution":
-            work = totals.work.total, driven.work if driven else None
+            work = totals.work.total, driven.work if self.job.scene.force else None
             given = self.rotating.product, response, loop.tire.snapshot(), work
             describe_energy(record, *given, losses, chosen.step)
 
@@ -104,9 +104,9 @@ class ContactStage(Stage[ContactHistory]):
         return min(passing, shortest_period(scene.force))
 
     def _driven(self, chosen: Integration) -> Driven | None:
-        """The tire under the scene's prescribed forces, where there are any."""
+        """The tire under the scene's prescribed forces, and with a wheel that is read, where there is either."""
         forces = self.job.scene.force
-        if not forces:
+        if not forces and self.job.axle is None:
             return None
         time = chosen.step * np.arange(chosen.steps + 1)
         return Driven(chosen.tire, histories(forces, time), directions(forces))

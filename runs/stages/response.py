@@ -83,7 +83,7 @@ class ResponseStage(Computed[PointResponse]):
     @property
     def _drifts(self) -> bool:
         """Whether a constant force moves the tire ever further: it has no receptance at 0 Hz then."""
-        return self.job.scene.modal.rim == "free"
+        return self.job.scene.modal.rim == "free" or self._response.rigid > 0
 
     def _in_contact(self, record: Record, history: ContactHistory) -> Curves:
         """What the contact loop found at the driven points, contact included."""
@@ -115,7 +115,9 @@ class ResponseStage(Computed[PointResponse]):
             "force": (force, "N"),
             "displacement": (displacement.reshape(len(time), -1, 3), "m"),
         }
-        if self.job.scene.output.axle_force and not self._drifts:  # nothing holds the axle then
+        if (
+            self.job.scene.output.axle_force and self.job.scene.modal.rim != "free"
+        ):  # else nothing holds the axle
             curves["axle_force"] = axle, "N"
         return curves | self._rates(time, chosen)
 

@@ -15,7 +15,7 @@ from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.truncation import Cutoff, estimate, estimate_axle
@@ -40,7 +40,7 @@ def tire():
     """An inflated soft torus of 2,112 free unknowns, its lowest modes, loads and readings."""
     comm = MPI.COMM_WORLD
     section = Torus(0.32, 0.10, 0.012, np.radians(120), 16, 6, 1, 2)
-    body = Body(comm, section, Material(**MATERIAL))
+    body = Body(comm, section, compound(**MATERIAL))
     Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)
     modes = undamped.solve(operators.stiffness, operators.mass, COUNT)

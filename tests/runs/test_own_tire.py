@@ -128,14 +128,14 @@ def test_materials_of_the_scene(folder):
     )
     tire = load(folder / "own.toml").tire
     (wall,) = own_materials(tire).values()
-    assert (wall.youngs_modulus, wall.dynamic, wall.loss_factor) == (6e6, 1.4, 0.1)
+    assert (wall.law.youngs_modulus, wall.dynamic, wall.loss_factor) == (6e6, 1.4, 0.1)
     (folder / "own.toml").write_text(
         TIRE
         + '[[tire.region]]\nname = "WALL"\n[tire.region.material]\nyoungs_modulus = 9e6\n'
         + '[[tire.cords]]\nname = "B"\nangle = 30.0\narea = 3e-7\n'
     )
     tire = load(folder / "own.toml").tire
-    assert own_materials(tire)["WALL"].youngs_modulus == 9e6
+    assert own_materials(tire)["WALL"].law.youngs_modulus == 9e6
     (belt,) = own_cords(tire)
     assert (np.degrees(belt.angle), belt.area) == (pytest.approx(30), 3e-7)
 

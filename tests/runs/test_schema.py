@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from tireroad.contact.roads.kind import ROADS
 from tireroad.fem.parameters import ParameterError
+from tireroad.fem.tire.law import MATERIALS
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.reference import reference
 from tireroad.runs.scene.schema import variant_of, walk
@@ -196,7 +197,8 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
             "road.motion.kind=sine",
             "greens.dynamic=6",
         )
-        _run(tmp_path / "rolling", ROLLING.format(kind="flat"), "road.motion.kind=ramp")
+        wheel = "road.motion.kind=ramp", "axle.kind=corner", "axle.body_mass=300"
+        _run(tmp_path / "rolling", ROLLING.format(kind="flat"), *wheel)
         _run(tmp_path / "standing", STANDING)
         stiffness = "stiffness.steps=1", "stiffness.up_to=0.001", "stiffness.which=vertical"
         _run(tmp_path / "standing", STANDING, *stiffness)
@@ -208,6 +210,7 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
         )
         _run(tmp_path / "full", FULL)
     tire = {of.__name__ for of in vars(tire_tables).values() if is_dataclass(of)}
+    tire |= {MATERIALS[name].__name__ for name in MATERIALS}  # tests/fem/test_material.py
     missing = {
         name
         for name in set(KEYS) - recorder.seen - UNREAD

@@ -72,7 +72,7 @@ def test_a_section_file_is_a_tire(tmp_path):
     ring = make_section(tire)
     assert ring.order == 3
     assert wall_thickness(ring.section) == pytest.approx(0.009, rel=0.02)
-    assert own_materials(tire)["rubber"].youngs_modulus == 5e6
+    assert own_materials(tire)["rubber"].law.youngs_modulus == 5e6
     assert [(c.name, c.area) for c in own_cords(tire)] == [("ply", 4e-7)]
     before = fingerprint(tire)
     drawing.write_text(DRAWING.replace("thickness = 6", "thickness = 7"))

@@ -9,11 +9,11 @@ from tireroad.fem.static.load_error import load_error
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.tire.wall import Region
 
-RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
+RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
 
 
 def pressed(segments, arc, rolling=AT_REST, comm=MPI.COMM_SELF, order=2, regions=()) -> Loader:
@@ -58,7 +58,7 @@ def test_it_says_why_there_is_none():
 
 
 def test_a_thin_region_is_in_the_companion_too():
-    soft = Material("neo-hookean", 1200.0, youngs_modulus=5e6, poisson_ratio=0.45)
+    soft = compound("neo-hookean", 1200.0, youngs_modulus=5e6, poisson_ratio=0.45)
     thin = [Region(soft, tuple(np.radians([105.0, 120.0])))]
     found = load_error(pressed(16, 8, regions=thin), AT_REST)
     assert found.load == pytest.approx(pressed(8, 4, regions=thin).load(), rel=1e-8)

@@ -55,14 +55,10 @@ def _plate(scene: Scene) -> tuple[float, float]:
     """Area (m²) of the wall, and its mass per area over its bending stiffness (s²/m⁴)."""
     tire = scene.tire
     material = tire.material
-    if material.model in ("linear", "neo-hookean"):
-        modulus, ratio = material.youngs_modulus, material.poisson_ratio
-    else:
-        second = material.c01 if material.model == "mooney-rivlin" else 0.0
-        modulus, ratio = 6 * (material.c10 + second), 0.5
     middle = tire.outer_radius - 0.5 * tire.minor_radius
     area = 2 * math.pi * middle * 2 * math.radians(tire.half_angle) * tire.minor_radius
-    bending = modulus * tire.thickness**3 / (12 * (1 - ratio**2))
+    law = material.law
+    bending = law.youngs * tire.thickness**3 / (12 * (1 - law.poisson**2))
     return area, material.density * tire.thickness / bending
 
 

@@ -8,6 +8,7 @@ from tireroad.runs.scene.schema import (
     table,
     tables,
 )
+from tireroad.runs.scene.tables.axle import AxleTable
 from tireroad.runs.scene.tables.contact import Contact, Time
 from tireroad.runs.scene.tables.road import Road
 from tireroad.runs.scene.tables.stiffness import Stiffness
@@ -208,6 +209,7 @@ class Scene:
         optional=True,
     )
     rotation: Rotation | None = table(Rotation, "rotation of the wheel", optional=True)
+    axle: AxleTable = table(AxleTable, "what holds the wheel")
     greens: Greens = table(Greens, "Green's functions")
     force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")
     contact: Contact | None = table(Contact, "contact with the road in time", optional=True)

@@ -3,66 +3,30 @@
 from dataclasses import dataclass
 
 from tireroad.fem.parameters import filename, flag, texts
-from tireroad.runs.scene.schema import choice, integer, number, table, tables, text, vector
+from tireroad.fem.tire.law import MATERIALS, MaterialLaw
+from tireroad.runs.scene.schema import (
+    Variants,
+    choice,
+    integer,
+    number,
+    registered,
+    table,
+    tables,
+    text,
+    variant,
+    vector,
+)
 from tireroad.runs.scene.tables.cavity import Cavity
 
 TORUS, FILE = ("section", ("torus",)), ("section", ("file",))
 RADIAL, MESHED = ("section", ("radial",)), ("section", ("torus", "radial"))
-LINEAR = ("model", ("linear", "neo-hookean"))
 
 
-@dataclass(frozen=True)
-class Material:
-    model: str = choice(
-        "neo-hookean", ("linear", "neo-hookean", "mooney-rivlin", "yeoh"), "strain energy"
-    )
-    youngs_modulus: float = number(
-        4.8e8, "Pa", "at small strain", above=0, most=1e13, only_for=LINEAR
-    )
-    poisson_ratio: float = number(
-        0.45, "-", "at small strain", above=-1, below=0.5, only_for=LINEAR
-    )
-    density: float = number(1200.0, "kg/m³", "of the undeformed wall", above=0, most=1e5)
-    c10: float = number(
-        6.6e7,
-        "Pa",
-        "first invariant, linear",
-        above=0,
-        most=1e13,
-        only_for=("model", ("mooney-rivlin", "yeoh")),
-    )
-    c01: float = number(
-        1.6e7,
-        "Pa",
-        "second invariant, linear",
-        least=0,
-        most=1e13,
-        only_for=("model", ("mooney-rivlin",)),
-    )
-    c20: float = number(
-        0.0,
-        "Pa",
-        "first invariant, squared",
-        least=-1e13,
-        most=1e13,
-        only_for=("model", ("yeoh",)),
-    )
-    c30: float = number(
-        0.0,
-        "Pa",
-        "first invariant, cubed",
-        least=-1e13,
-        most=1e13,
-        only_for=("model", ("yeoh",)),
-    )
-    bulk_modulus: float = number(
-        1.6e9,
-        "Pa",
-        "of the volumetric term",
-        above=0,
-        most=1e15,
-        only_for=("model", ("mooney-rivlin", "yeoh")),
-    )
+@dataclass(frozen=True, kw_only=True)
+class Material(Variants):
+    model: str = registered(MATERIALS, "neo-hookean", "strain energy")
+    law: MaterialLaw = variant("model", MATERIALS)
+    density: float = number(1200.0, "kg/m³", "density, undeformed", above=0, most=1e5)
 
 
 def _dynamic():

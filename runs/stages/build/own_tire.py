@@ -6,7 +6,7 @@ import numpy as np
 
 from tireroad.fem.decks.compounds import Rubber
 from tireroad.fem.tire.cords import Cords
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import Material, compound
 from tireroad.runs.scene.extent.own_tire import own_section, region_of
 from tireroad.runs.scene.tables.tire import Tire
 
@@ -15,13 +15,13 @@ def own_materials(tire: Tire) -> dict[str, Material]:
     """The compound of each region by name: of [[tire.region]], else of the file, else [tire.material]."""
     own = own_section(tire)
     return {
-        name: Material(**_material(tire, name, rubber))
+        name: _material(tire, name, rubber)
         for name, rubber in zip(own.mesh.regions, own.rubbers, strict=True)
     }
 
 
-def _material(tire: Tire, name: str, rubber: Rubber | None) -> dict:
-    """Arguments of the material of one region.
+def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
+    """The material of one region.
 
     A [[tire.region]] of it gives its dynamic modulus and loss factor where they are not 1 and 0.
     """
@@ -33,11 +33,11 @@ def _material(tire: Tire, name: str, rubber: Rubber | None) -> dict:
         change |= {"dynamic": region.dynamic} if region.dynamic != 1 else {}
         change |= {"loss_factor": region.loss_factor} if region.loss_factor else {}
     if region is not None and region.material is not None:
-        return vars(region.material) | change
+        return Material(region.material.law, region.material.density, **change)
     if rubber is None:
-        return vars(tire.material) | change
+        return Material(tire.material.law, tire.material.density, **change)
     density = tire.material.density if rubber.density is None else rubber.density
-    return {"model": rubber.model, "density": density, **rubber.coefficients, **change}
+    return compound(rubber.model, density, **rubber.coefficients, **change)
 
 
 def own_cords(tire: Tire) -> list[Cords]:

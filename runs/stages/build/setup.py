@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +14,7 @@ from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.scene.schema import Pitch
+from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.stepping import run_time
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.stage import Done, Shared
@@ -65,11 +66,12 @@ def components(job: Job) -> tuple[int, ...]:
 @dataclass(frozen=True)
 class Probes:
     """What is driven and read, on the outer face: `name` "contact" or "force", `outputs` (r, 3 s) and
-    `loads` (k, 3 s)."""
+    `loads` (k, 3 s), or wider with a wheel that moves; `counted` of both are displacements at loads."""
 
     name: str
     outputs: sparse.csr_matrix
     loads: sparse.csr_matrix
+    counted: slice = field(default_factory=lambda: slice(None))
 
 
 def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
@@ -82,7 +84,10 @@ def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
     if job.scene.force:
         parts += [loads, readings]
     points = sparse.vstack(parts, format="csr")
-    return Probes("contact", points, points)
+    if job.axle is None:
+        return Probes("contact", points, points)
+    points, last = corner.widened(points), points.shape[0]
+    return Probes("contact", points, points, slice(last))
 
 
 def driven_points(job: Job) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:

@@ -36,11 +36,8 @@ def make_body(comm: MPI.Comm, tire: Tire, section: Ring):
         return _radial_body(comm, tire, section)
 
     def rubber(part: Tire | Region) -> Material:
-        given = vars(part.material or MaterialTable()) | {
-            "dynamic": part.dynamic,
-            "loss_factor": part.loss_factor,
-        }
-        return Material(**given)
+        table = part.material or MaterialTable()
+        return Material(table.law, table.density, part.dynamic, part.loss_factor)
 
     names = [patch(i, region).name for i, region in enumerate(tire.region)]
     materials = {name: rubber(r) for name, r in zip(names, tire.region, strict=True)}
@@ -59,7 +56,7 @@ def _radial_body(comm: MPI.Comm, tire: Tire, section: Ring):
     """The body of a tire built of layers. Collective."""
     from tireroad.fem.tire.body import Body
     from tireroad.fem.tire.cords import Cords
-    from tireroad.fem.tire.material import Material
+    from tireroad.fem.tire.material import compound
 
     construction, places = built(tire), {"under", "to"}
     cords = [
@@ -67,6 +64,6 @@ def _radial_body(comm: MPI.Comm, tire: Tire, section: Ring):
         for line in construction.cords
     ]
     compounds = {
-        name: Material("neo-hookean", **values) for name, values in construction.compounds.items()
+        name: compound("neo-hookean", **values) for name, values in construction.compounds.items()
     }
     return Body(comm, section, compounds, cords=cords)
