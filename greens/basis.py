@@ -59,7 +59,7 @@ class Basis:
             by_state -= (part @ states.right) * s**k
             by_block -= part @ powered
             powered = powered @ block
-        moment = self.projection.corner.rigid(loads)[:, MOMENTS] - self.seen(loads) @ rows[2].T
+        moment = self.projection.wheel.rigid(loads)[:, MOMENTS] - self.seen(loads) @ rows[2].T
         return replace(
             response,
             output=response.output + wanted @ by_state,

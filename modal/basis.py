@@ -73,7 +73,13 @@ class Projection:
 
     def moments(self, speed: float) -> np.ndarray:
         """The rows (3, 3, m + a + c) of `Corner.moments` on all coordinates."""
-        return self.corner.moments(self.inside.shape[1], speed) @ self._change
+        return self.wheel.moments(self.inside.shape[1], speed) @ self._change
+
+    @property
+    def wheel(self) -> Corner:
+        """The corner, of which there must be one."""
+        assert self.corner is not None, "the axle of this tire is fixed"
+        return self.corner
 
     @property
     def adrift(self) -> np.ndarray:
@@ -90,7 +96,7 @@ class Projection:
     @property
     def rim_momentum(self) -> np.ndarray:
         """P (7, m + a) kg^1/2 of a corner."""
-        return self.corner.momentum(None if self.air is None else self.air.duct.momentum)
+        return self.wheel.momentum(None if self.air is None else self.air.duct.momentum)
 
     @property
     def _moved(self) -> tuple[np.ndarray, float]:
@@ -98,7 +104,7 @@ class Projection:
 
     @property
     def _change(self) -> np.ndarray:
-        return self.corner.change(*self._moved)
+        return self.wheel.change(*self._moved)
 
     @property
     def own(self) -> int:
@@ -207,6 +213,7 @@ def with_corner(
     of the outer face in the static state. Collective."""
     if axle is None:
         return projection
+    assert rim is not None, "with an axle that moves come the motions of the rim"
     return replace(projection, corner=meeting(axle, rim, modes.vectors, places, comm))
 
 
