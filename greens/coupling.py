@@ -73,10 +73,7 @@ class Wheel:
         """What the full matrices are damped by."""
         if self.beyond is not None:
             return self.beyond
-        if isinstance(self.damping, StrainEnergy):
-            raise InputError(
-                "damping: the full matrices cannot be damped by the modes' strain energy"
-            )
+        assert not isinstance(self.damping, StrainEnergy), "`beyond` is given then"
         return self.damping
 
     @cached_property
@@ -106,12 +103,10 @@ class Wheel:
             return self._with_statics(basis, outputs, loads, pulse=option == "dirac")
         if option == "second-order" and self.corner:
             raise InputError("greens.residual: second-order knows no wheel that moves")
-        r, k = outputs.shape[0], loads.shape[0]
-        same = outputs is loads
+        r, k, same = outputs.shape[0], loads.shape[0], outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
-            if modes is None:
-                raise InputError("attachment modes need the modes on all unknowns: pass `modes`")
+            assert modes is not None, "attachment modes need the modes on all unknowns"
             whole = self._attached(basis, modes, probes)
         else:
             shapes = self._static_shapes(probes)
@@ -143,9 +138,8 @@ class Wheel:
             return self._lacking(response, moment - response.static_moment())
         held = basis.held
         pencil = held_matrices(basis.projection, self.speed, self.damping, self.inertia)
-        known = modal_moments(
-            *pencil, held.seen(outputs), held.seen(loads), held.projection.carried
-        )
+        seen = held.seen(outputs), held.seen(loads)
+        known = modal_moments(*pencil, *seen, held.projection.carried)
         response = basis.couple(outputs, loads)
         response = replace(response, residual=response.residual + flexibility - known.compliance)
         return self._lacking(response, moment - known.momentum)
