@@ -29,8 +29,13 @@ STEEPEST = 0.25
 class Spec(Protocol):
     """The table [contact] of a scene."""
 
-    law: TreadLaw
-    solver: str
+    @property
+    def law(self) -> TreadLaw:
+        """The tread law."""
+
+    @property
+    def solver(self) -> str:
+        """Its name, or "auto"."""
 
 
 def solver_name(spec: Spec, patch: Patch) -> str:
@@ -106,6 +111,7 @@ def _product(spec: Spec, patch: Patch, tire: Array) -> Compliance:
             "contact.tread: the tread leaves a grid of points without compliance of its own: take "
             'another, e.g. "half-space", or points = "nodes"'
         )
+    assert patch.places is not None, "only a grid of points makes a product"
     influence = spec.law.influence(_farthest(patch))
     return SpreadCompliance(tire, patch.weights, KernelTread(patch.places, influence))
 

@@ -30,7 +30,7 @@ class Recursion:
     so that processes meet once a step.
     """
 
-    def __init__(self, response: Response, step: float, scheme: str, comm: MPI.Comm):
+    def __init__(self, response: Response, step: float, scheme: str, comm: MPI.Comm) -> None:
         self.comm = comm
         self.step = step
         mine = np.arange(comm.rank, len(response.eigenvalue), comm.size)
@@ -158,7 +158,7 @@ class _Block:
     Its last three outputs are the rate of momentum, the jump with the force left out.
     """
 
-    def __init__(self, response: Response, step: float, scheme: str):
+    def __init__(self, response: Response, step: float, scheme: str) -> None:
         block, push = response.block, response.block_input
         self._output = np.vstack([response.block_output, response.block_momentum @ block @ block])
         self._decay, self._old, self._new = block_steps(block, push, step, scheme)

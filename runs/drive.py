@@ -87,7 +87,7 @@ def drive(
     setup = contact_setup(static, motions.lattice, road, rolled, spacing=spacing)
     loads = probe.nodes(setup.patch.index, len(static.points), 2)
     response = tire.respond(loads, loads, residual)
-    spec = _Spec(law=tread or TREADS["half-space"](youngs_modulus=1e7))
+    spec = _Spec(law=tread or TREADS.make("half-space", youngs_modulus=1e7))
     setup, _ = setup.settled(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     chosen = equal_steps(duration, step or min(duration / _LEAST_STEPS, _TURN / fastest))

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from tireroad.fem import compat, kinematics
-from tireroad.fem.static.held_system import HeldSystem, Moved
+from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.shape_damping import ShapeDamping
 from tireroad.fem.static.virtual_work import (
     AT_REST,
@@ -51,7 +51,7 @@ class Equilibrium:
     `cost`: seconds by part.
     """
 
-    def __init__(self, body: Body, rolling: Rolling = AT_REST):
+    def __init__(self, body: Body, rolling: Rolling = AT_REST) -> None:
         self.body, self.rolling = body, rolling
         self.cost = Timing()
         self.road_height: float | None = None
@@ -80,7 +80,7 @@ class Equilibrium:
         damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
         self._system = self._make_system("lu" if damped else "cholesky")
 
-    def _make_system(self, kind: str) -> HeldSystem:
+    def _make_system(self, kind: str) -> System:
         return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
 
     @property

@@ -34,7 +34,7 @@ class RoundEquilibrium(Equilibrium):
     On the calling process alone. The state is `body.u` of its own `body`, a sector.
     """
 
-    def __init__(self, whole: Body, rolling: Rolling):
+    def __init__(self, whole: Body, rolling: Rolling) -> None:
         ring = whole.ring
         angle = float(np.diff(ring.ring_corners).min())
         sector = replace(ring, ring_corners=np.array([0.0, angle]), coarser=lambda: None)
@@ -64,10 +64,9 @@ class RoundEquilibrium(Equilibrium):
 class RoundSystem:
     """P^T K P of the sector: what a `HeldSystem` is to the whole ring; nothing is held."""
 
-    closing: Moved | None = None
-
-    def __init__(self, turned: sparse.csr_matrix, timing: Timing):
+    def __init__(self, turned: sparse.csr_matrix, timing: Timing) -> None:
         self._turned, self._timing = turned, timing
+        self.closing = self.raising = Moved(np.zeros(turned.shape[0]), np.zeros(turned.shape[0]))
         self._factor: SuperLU | None = None
 
     def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
@@ -83,6 +82,7 @@ class RoundSystem:
 
     def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Motion (m) of all dofs of the sector under forces (N), and no reactions."""
+        assert self._factor is not None, "take() comes before"
         with self._timing("solve"):
             change = self._turned @ self._factor.solve(self._turned.T @ right)
         return change, np.zeros(0)

@@ -54,7 +54,8 @@ class ResponseStage(Computed[PointResponse]):
 
     def compute(self, record: Record) -> PointResponse:
         """Integrate and sweep. Collective."""
-        scene, curves = self.job.scene, {}
+        scene = self.job.scene
+        curves: dict[str, tuple[np.ndarray, str]] = {}
         if self.contact:
             curves |= self._in_contact(record, self.contact.product)
         elif scene.time:

@@ -66,7 +66,8 @@ def _queue(family: Sweep, folder: Path, source: Path) -> None:
 def shared_first(family: Sweep) -> tuple[list[Member], list[Member]]:
     """(one member of each group that shares its static state and modes, all others)."""
     seen: set[str] = set()
-    first, rest = [], []
+    first: list[Member] = []
+    rest: list[Member] = []
     for member in family.members:
         key = _group(family.load(member))
         (rest if key in seen else first).append(member)

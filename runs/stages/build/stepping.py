@@ -24,7 +24,9 @@ _PER_PERIOD = 16  # steps in the shortest period of the excitation
 
 def run_time(time: Time) -> float:
     """How long the run is, s: whole steps, so a little longer than a duration that is no multiple."""
-    return time.duration if time.step == "auto" else steps_of(time.duration, time.step).duration
+    if isinstance(time.step, str):
+        return time.duration
+    return steps_of(time.duration, time.step).duration
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
     """
     wanted = job.scene.time
     fastest = np.abs(response.every).max(initial=0.0)
-    if wanted.step == "auto":
+    if isinstance(wanted.step, str):
         limits = [wanted.duration / _LEAST_STEPS, shortest / _PER_PERIOD]
         if fastest > 0:
             limits.append(_TURN / fastest)

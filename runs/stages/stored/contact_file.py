@@ -142,7 +142,7 @@ class ContactFile:
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
         forces = len(self._job.scene.force)
-        driven = {DRIVEN: ((forces, 3), "m")} if forces else {}
+        driven: dict[str, tuple[tuple, str]] = {DRIVEN: ((forces, 3), "m")} if forces else {}
         driven |= _OF_WHEEL if self._job.axle else {}
         # A chunk of many points would be many megabytes: 4 MB at most is read at once.
         rows = 2 ** int(np.log2(np.clip(500_000 // max(c, 1), 1, BLOCK)))
