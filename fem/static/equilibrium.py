@@ -88,10 +88,13 @@ class Equilibrium:
         """Force below which nothing is balanced, N."""
         return TOLERANCE * self._scale
 
-    def solve(self, road_height: float | None = None, load: float | None = None) -> Step:
+    def solve(
+        self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
+    ) -> Step:
         """Equilibrium with the road plane at the given height (m), or without a road. Collective.
 
-        With a `load` (N) the road is moved, from the given height on, until it carries that.
+        With a `load` (N) the road is moved, from the given height on, until it carries that. `allowed`
+        N may stay out of balance in a state that is only on the way to another.
 
         Newton's method and the active set of the road in one loop: a dof is held where
         f - c gap > 0, with c the dof's own stiffness; that is the complementarity condition for any
@@ -99,15 +102,15 @@ class Equilibrium:
         the road by the linearised step: lifting them first strains the wall beyond any sense.
         A tangent serves for as long as each step with it leaves a fifth of the error or less.
         """
-        body = self.body
-        kept = body.u.x.array.copy(), self._active.copy(), self._force.copy()
+        field = self.body.u.x
+        kept = field.array.copy(), self._active.copy(), self._force.copy()
         self._height = -np.inf if road_height is None else road_height
-        self._before.x.array[:] = body.u.x.array
+        self._before.x.array[:] = field.array
         error, tangents = 0.0, 0
         while True:
             changed, last = self._choose_active(), error
             error = self._error(load)
-            reason = self._stopped(error, changed, tangents)
+            reason = self._stopped(error, changed, tangents, allowed / self._scale)
             if reason == "converged":
                 self.road_height = None if road_height is None else self._height
                 return Step(True, tangents, error, reason)
@@ -119,14 +122,15 @@ class Equilibrium:
             reason = reason or self._move(closing, load)
             if reason:
                 break
-        body.u.x.array[:], self._active, self._force = kept
+        field.array[:], self._active, self._force = kept
         return Step(False, tangents, error, reason)
 
-    def _stopped(self, error: float, changed: bool, tangents: int) -> str:
+    def _stopped(self, error: float, changed: bool, tangents: int, allowed: float) -> str:
         """Why not to go on; empty while there is hope. Collective."""
         if not error < _DIVERGED:
             return "the residual grows without bound"
-        if error <= TOLERANCE and not changed:
+        enough = error <= TOLERANCE or (tangents > 0 and error <= allowed)
+        if enough and not changed:
             return "an element is inside out" if self._inside_out() else "converged"
         return "" if tangents < MOST_STEPS else f"no convergence in {MOST_STEPS} Newton steps"
 

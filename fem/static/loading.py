@@ -1,7 +1,6 @@
 """Load steps to a wanted state: inflation, then the road by height, deflection or load.
 
-Steps are cut back when Newton fails and grow again when it is easy; a step that cannot be made
-small enough is an error that names the last good state.
+Steps are cut back when Newton fails (fem.static.stepping).
 """
 
 from __future__ import annotations
@@ -15,13 +14,12 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.parallel import on_root
 from tireroad.fem.static.equilibrium import Equilibrium, Step
 from tireroad.fem.static.round import RoundEquilibrium
+from tireroad.fem.static.stepping import Attempt, Show, march
 from tireroad.fem.static.tread_surface import TreadSurface
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
-_SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
-_LARGEST = 4  # times the first step
 _REACH = 1.9  # times the largest deflection so far: a load is sought no further away
-_EASY = 6  # tangents up to which the next load step may grow
+_NEAR = 0.01  # of a wanted load: what may be out of balance on the way to it (a third of the tangents saved)
 
 
 @dataclass(frozen=True)
@@ -43,17 +41,6 @@ class _Known:
     deflection: float
     load: float
     displacement: np.ndarray
-
-
-class LoadingStopped(ConvergenceError):
-    """Load steps that became too small; `fact` is where, without advice."""
-
-    def __init__(self, fact: str) -> None:
-        super().__init__(
-            f"{fact}. The tire may fold or buckle here: lower the load or raise the inflation, stiffen "
-            "the material or refine the mesh around the footprint."
-        )
-        self.fact = fact
 
 
 class Loader:
@@ -99,7 +86,7 @@ class Loader:
             self.equilibrium.pressure.value = fraction * pressure
             return self.equilibrium.solve()
 
-        self._march(attempt, 0.0, 1.0, 1.0, "inflation", pressure, "Pa")
+        self._march(attempt, 1.0, 1.0, Show("inflation", pressure, "Pa"))
 
     @property
     def touch(self) -> float:
@@ -135,14 +122,18 @@ class Loader:
         if load <= 0:
             raise InputError(f"static.load = {load:g} N: a road carries a positive load")
         known = [_Known(0.0, 0.0, self.body.u.x.array.copy())]
-        trial = 0.1 * self.body.ring.thickness
+        trial, allowed = 0.1 * self.body.ring.thickness, _NEAR * load
         for _ in range(60):
-            self._try_deflection(trial, known)
-            if abs(known[-1].load - load) <= max(LOAD_TOLERANCE * load, self.equilibrium.rounding):
+            self._try_deflection(trial, known, allowed)
+            rounding = self.equilibrium.rounding
+            if not allowed and abs(known[-1].load - load) <= max(LOAD_TOLERANCE * load, rounding):
                 return trial
             trial = self._next_deflection(known, load)
-            if trial < _REACH * max(k.deflection for k in known) and self._meet(load, trial, known):
-                return self.deflection
+            if trial < _REACH * max(k.deflection for k in known):
+                if self._meet(load, trial, known):
+                    return self.deflection
+                if allowed:  # from here on a bracket has to close
+                    known, allowed = known[:1], 0.0
         nearest = min(known, key=lambda k: abs(k.load - load))
         raise ConvergenceError(
             f"static: the load of {load:g} N was not met in 60 trials; nearest is {nearest.load:g} N. "
@@ -168,13 +159,13 @@ class Loader:
         self.body.u.x.array[:] = near[0].displacement + reach * change
         return True
 
-    def _try_deflection(self, trial: float, known: list[_Known]) -> None:
+    def _try_deflection(self, trial: float, known: list[_Known], allowed: float = 0.0) -> None:
         """Solve at the trial deflection from a line through the two nearest states, else by steps.
 
-        What converges on the way is known from then on.
+        What converges on the way is known from then on, `allowed` (N) out of balance.
         """
         if self._guess(trial, known):
-            step = self.equilibrium.solve(self.touch + trial)
+            step = self.equilibrium.solve(self.touch + trial, allowed=allowed)
             self.newton_steps += step.iterations
             if step.converged:
                 self._report("deflection", trial, "m", step)
@@ -182,7 +173,7 @@ class Loader:
                 return
         below = max((k for k in known if k.deflection <= trial), key=lambda k: k.deflection)
         self.body.u.x.array[:] = below.displacement
-        self._raise_road(below.deflection, trial, known)
+        self._raise_road(below.deflection, trial, known, allowed)
 
     def _reached(self, deflection: float) -> _Known:
         return _Known(deflection, self.load(), self.body.u.x.array.copy())
@@ -211,38 +202,31 @@ class Loader:
         """Total vertical force of the road, N. Collective."""
         return self.body.comm.allreduce(self.equilibrium.contact_force().sum())
 
-    def _raise_road(self, start: float, end: float, known: list[_Known]) -> None:
+    def _raise_road(
+        self, start: float, end: float, known: list[_Known], allowed: float = 0.0
+    ) -> None:
         """In steps, each of which is entered in `known`."""
 
         def attempt(deflection: float) -> Step:
-            step = self.equilibrium.solve(self.touch + deflection)
+            step = self.equilibrium.solve(self.touch + deflection, allowed=allowed)
             if step.converged:
                 known.append(self._reached(deflection))
             return step
 
         largest = 0.25 * self.body.ring.thickness
-        self._march(attempt, start, end, largest, "deflection", 1.0, "m")
+        self._march(attempt, end, largest, Show("deflection", 1.0, "m"), start)
 
-    def _march(self, attempt, start, end, first, what, scale, unit) -> None:
-        """From a converged `start` to `end` in steps from `first` on: grown when easy, cut back on failure."""
-        done, size = start, first
-        while True:
-            target = end if abs(end - done) <= size * (1 + 1e-12) else done + size
+    def _march(
+        self, attempt: Attempt, end: float, first: float, show: Show, start: float = 0.0
+    ) -> None:
+        def tried(target: float) -> Step:
             step = attempt(target)
             self.newton_steps += step.iterations
             if step.converged:
-                self._report(what, target * scale, unit, step)
-                done = target
-                if done == end:
-                    return
-                size = min(_LARGEST * first, 2 * size) if step.iterations <= _EASY else size
-                continue
-            size = 0.5 * min(size, abs(target - done))
-            if size < _SMALLEST * first:
-                raise LoadingStopped(
-                    f"static: {what} stops at {done * scale:.6g} {unit} of {end * scale:.6g} {unit}; "
-                    f"a further step of {size * scale:.2g} {unit} does not converge ({step.reason})"
-                )
+                self._report(show.what, target * show.scale, show.unit, step)
+            return step
+
+        march(tried, start, end, first, show)
 
     def _report(self, what: str, value: float, unit: str, step: Step) -> None:
         force = self.equilibrium.contact_force()

@@ -1,0 +1,62 @@
+"""Load steps: cut back when Newton fails, grown again when it is easy.
+
+A step that cannot be made small enough is an error that names the last good state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.static.equilibrium import Step
+
+_SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
+_LARGEST = 4  # times the first step
+_EASY = 6  # tangents up to which the next load step may grow
+
+Attempt = Callable[[float], Step]
+
+
+@dataclass(frozen=True)
+class Show:
+    """What is stepped, for people: its name, and `unit` of what is `scale` at 1."""
+
+    what: str
+    scale: float
+    unit: str
+
+
+class LoadingStopped(ConvergenceError):
+    """Load steps that became too small; `fact` is where, without advice."""
+
+    def __init__(self, fact: str) -> None:
+        super().__init__(
+            f"{fact}. The tire may fold or buckle here: lower the load or raise the inflation, stiffen "
+            "the material or refine the mesh around the footprint."
+        )
+        self.fact = fact
+
+
+def march(attempt: Attempt, start: float, end: float, first: float, show: Show) -> None:
+    """From a converged `start` to `end` in steps from `first` on. Collective.
+
+    LoadingStopped where a ten-thousandth of the first step does not converge either.
+    """
+    done, size = start, first
+    while True:
+        target = end if abs(end - done) <= size * (1 + 1e-12) else done + size
+        step = attempt(target)
+        if step.converged:
+            done = target
+            if done == end:
+                return
+            size = min(_LARGEST * first, 2 * size) if step.iterations <= _EASY else size
+            continue
+        size = 0.5 * min(size, abs(target - done))
+        if size < _SMALLEST * first:
+            scale, unit = show.scale, show.unit
+            raise LoadingStopped(
+                f"static: {show.what} stops at {done * scale:.6g} {unit} of {end * scale:.6g} {unit}; "
+                f"a further step of {size * scale:.2g} {unit} does not converge ({step.reason})"
+            )
