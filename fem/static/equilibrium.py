@@ -165,11 +165,10 @@ class Equilibrium:
         return self._system.take(self.matrix, held, -self._gap()[self._active])
 
     def _move(self, closing: Moved | None, load: float | None) -> str:
-        """One linearised step to balance, held dofs to the road; with a load, the road to that.
+        """One linearised step to balance, held dofs to the road; with a load, the road to that. Collective.
 
-        Why it cannot be taken, or nothing. Collective.
-        The road's force is the reaction of the linearised problem; what the new state is out of
-        balance is no force of the road (seen: held dofs let go and caught again for ever).
+        Why it cannot be taken, or nothing. The road's force is the reaction of the linearised problem;
+        what is out of balance is no force of the road (seen: held dofs let go and caught for ever).
         """
         field, held = self.body.u.x, self._vertical[self._active]
         out = self._work.array_r.copy()
