@@ -121,7 +121,7 @@ class ContactStage(Stage[ContactHistory]):
             f"solver {solver_name(spec, patch)}"
         )
         friction = None
-        if spec.brush_stiffness is not None:
+        if spec.rubs:
             friction = _friction(spec, setup, tire, step)
             limit = friction.largest_unique(patch.force > 0, solver)
             record.indicators["friction up to which a step has one answer"] = (limit, "-")
@@ -176,7 +176,8 @@ def beyond_unique(friction: float | None, limit: float) -> list[str]:
 def _friction(spec, setup: ContactSetup, tire, step: float) -> Friction:
     """The brush of the scene, at rest."""
     patch = setup.patch
-    law = BrushLaw(spec.brush_stiffness, spec.friction, spec.slip, spec.brush)
+    stiffness = spec.brush_stiffness or spec.brush_stiffness_per_area * patch.area
+    law = BrushLaw(stiffness, spec.friction, spec.slip, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0)
     return Friction(brush, tire.same_step, patch.weights)

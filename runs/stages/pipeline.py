@@ -131,6 +131,8 @@ def run_scene(
         found = _done(job, kind, done, reasons, summary)
         if found is not None:
             done[kind.name] = found
+        if kind is StaticStage and scene.rotation and scene.rotation.travel_speed:
+            job.settle(done["static"].product)
     _check_options(petsc_options)
     if "report" in reasons:
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))

@@ -74,7 +74,14 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 def _rotation(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     rotation = scene.rotation
-    if rotation is None or not any(rotation.window):
+    if rotation is None:
+        return
+    given = raw.get("rotation", {}).get("speed")
+    if rotation.travel_speed is not None and given not in (None, rotation.speed):
+        raise error(
+            ("rotation", "travel_speed"), "and speed give the wheel's speed twice: keep one of them"
+        )
+    if not any(rotation.window):
         return
     low, high = rotation.window
     if low >= high:
@@ -196,11 +203,17 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     if static.load is None and static.deflection is None and static.road_height is None:
         raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
     contact = scene.contact
-    if contact.brush_stiffness is None and contact.friction is not None:
-        raise error(("contact", "friction"), "needs brush_stiffness (N/m), which carries it")
+    if None not in (contact.brush_stiffness, contact.brush_stiffness_per_area):
+        raise error(
+            ("contact", "brush_stiffness_per_area"), "and brush_stiffness are two brushes: keep one"
+        )
+    if not contact.rubs and contact.friction is not None:
+        raise error(
+            ("contact", "friction"), "needs brush_stiffness_per_area (N/m³), which carries it"
+        )
     standing = scene.rotation is None or scene.rotation.speed == 0
-    if any(contact.slip) and (contact.brush_stiffness is None or standing):
-        raise error(("contact", "slip"), "needs brush_stiffness (N/m) and a rolling tire")
+    if any(contact.slip) and (not contact.rubs or standing):
+        raise error(("contact", "slip"), "needs brush_stiffness_per_area (N/m³) and a rolling tire")
 
 
 def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:

@@ -17,9 +17,18 @@ class Contact(Variants):
     brush_stiffness: float | None = number(
         None,
         "N/m",
-        "tangential stiffness of a point's bristle; absent: no horizontal forces",
+        "tangential stiffness of a point's bristle, whatever its area: the force depends on the grid; absent, and "
+        "brush_stiffness_per_area too: no horizontal forces",
         least=1e-3,
         most=1e12,
+    )
+    brush_stiffness_per_area: float | None = number(
+        None,
+        "N/m³",
+        "tangential stiffness of the bristles, instead of brush_stiffness: the same on every grid; a tread of shear "
+        "modulus G and thickness h has about G/h",
+        least=1e-3,
+        most=1e15,
     )
     brush: str = choice(
         "rolling",
@@ -48,6 +57,11 @@ class Contact(Variants):
         least=1e-6,
         most=1,
     )
+
+    @property
+    def rubs(self) -> bool:
+        """Whether bristles carry horizontal forces."""
+        return (self.brush_stiffness, self.brush_stiffness_per_area) != (None, None)
 
 
 @dataclass(frozen=True)

@@ -79,6 +79,13 @@ class Rotation:
     speed: float = number(
         100.0, "rad/s", "speed of rotation of the wheel; 0: standing", least=0, most=2000
     )
+    travel_speed: float | None = number(
+        None,
+        "m/s",
+        "speed over the road, instead of speed: the wheel turns as fast as it rolls freely; 25 m/s are 90 km/h",
+        above=0,
+        most=500,
+    )
     inertia: str = choice(
         "full",
         ("full", "doppler"),

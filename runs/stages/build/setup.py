@@ -59,7 +59,7 @@ def rolling_speed(job: Job, state: StaticState) -> float:
 
 def components(job: Job) -> tuple[int, ...]:
     """Directions of the contact forces: z, and with a brush x and y after it."""
-    return (2,) if job.scene.contact.brush_stiffness is None else (2, 0, 1)
+    return (2, 0, 1) if job.scene.contact.rubs else (2,)
 
 
 @dataclass(frozen=True)
