@@ -14,7 +14,7 @@ from tireroad.fem.sections.outline import Outline, arcs
 
 UNITS = {"m": 1.0, "mm": 1e-3}
 LARGEST = 1_000_000  # bytes
-_TABLES = {"name", "unit", "tread", "outline", "layer", "part", "cords", "compound"}
+_TABLES = {"name", "unit", "tread", "held", "outline", "layer", "part", "cords", "compound"}
 _COMPOUND = {
     "youngs_modulus": None,
     "poisson_ratio": 0.49,
@@ -49,6 +49,7 @@ def _construction(raw: dict[str, Any]) -> Construction:
     if unit not in UNITS:
         raise InputError(f'unit = "{unit}": must be "m" or "mm"')
     scale = UNITS[unit]
+    held = scale * _number(raw, "held", "the file") if "held" in raw else None
     return Construction(
         outline=_outline(_table(raw, "outline"), scale),
         layers=[_layer(one, scale) for one in _tables(raw, "layer", least=1)],
@@ -56,6 +57,7 @@ def _construction(raw: dict[str, Any]) -> Construction:
         cords=[_cords(one, scale) for one in _tables(raw, "cords")],
         compounds={name: _compound(name, one) for name, one in _table(raw, "compound").items()},
         tread=scale * _number(raw, "tread", "the file"),
+        held=held,
     )
 
 

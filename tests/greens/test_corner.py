@@ -19,7 +19,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Basis
@@ -34,7 +34,7 @@ from tireroad.modal.solver.fields import everywhere
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
-RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
+RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
 SPOTS = [(0.0, 0.0), (0.15, 0.1), (-0.2, -0.3), (1.0, 0.5)]
 DAMPING = (60.0, 1e-6)
 FREQUENCY = np.array([0.7, 5.0, 40.0, 130.0])
