@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from tireroad.contact.grid_patch import make_grid_patch, settle
-from tireroad.contact.model import Spec, step_solver
+from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import Patch, make_patch
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
 from tireroad.contact.rolling import Drive
@@ -68,7 +68,7 @@ class ContactSetup:
             return self, 0.0
         p = len(patch.index)
         flexibility = (response.static() + response.residual)[:p, :p]
-        solver = step_solver(spec, patch, flexibility)
+        solver = static_solver(spec, patch, flexibility, self.rolled.speed)
         settled, rise = settle(patch, solver, flexibility, nodal_force[patch.index])
         return replace(self, patch=settled), rise
 

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from tireroad.contact.driven import Driven
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.model import solver_name, step_solver
+from tireroad.contact.model import solver_name, step_solver, tread_memory
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.friction import Friction
@@ -115,7 +115,9 @@ class ContactStage(Stage[ContactHistory]):
         """The tire as seen at the patch's points, normal solver, friction; the choice is shown."""
         spec, patch = self.job.scene.contact, setup.patch
         p = len(patch.index)
-        solver = step_solver(spec, patch, tire.same_step[:p, :p])
+        memory = tread_memory(spec, patch, setup.rolled.speed, step)
+        at_once = memory.at_once if memory else 1.0
+        solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once)
         observe.say(
             f"  {len(patch.points)} contact points on {p} nodes, tread {spec.tread}, "
             f"solver {solver_name(spec, patch)}"
@@ -128,13 +130,13 @@ class ContactStage(Stage[ContactHistory]):
             record.warnings += beyond_unique(spec.friction, limit)
         if patch.weights is not None:
             tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
-        return Loop(tire, solver, friction)
+        return Loop(tire, solver, friction, memory)
 
     def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, losses, chosen) -> None:
         """Take the steps that are left; stop between two of them when asked to. Collective."""
         done, steps = totals.figures.steps, chosen.steps
         given = setup.patch, setup.drive, chosen.step, steps
-        instants = roll(loop.tire, loop.solver, *given, loop.friction, done)
+        instants = roll(loop.tire, loop.solver, *given, loop.friction, done, loop.memory)
         watch = Watch(self.job.comm, self.job.scene.time.checkpoint)
         with (
             Deferred() as deferred,

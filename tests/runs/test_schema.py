@@ -186,7 +186,7 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
             file = ["road.file=road.npz"] if kind == "grid" else []
             if kind != "crg":  # its keys are the grid's
                 _run(tmp_path / "rolling", ROLLING.format(kind=kind), *file)
-        for tread in ("layer", "winkler"):
+        for tread in ("layer", "winkler", "viscoelastic"):
             points = "contact.points={dx=0.02,dy=0.02}"
             _run(
                 tmp_path / "rolling", ROLLING.format(kind="flat"), f"contact.tread={tread}", points
@@ -198,6 +198,8 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
             "greens.dynamic=6",
         )
         wheel = "road.motion.kind=ramp", "axle.kind=corner", "axle.body_mass=300"
+        area = "contact.brush_stiffness=", "contact.brush_stiffness_per_area=1e7"
+        wheel += (*area, "rotation.speed=", "rotation.travel_speed=10")
         _run(tmp_path / "rolling", ROLLING.format(kind="flat"), *wheel)
         _run(tmp_path / "standing", STANDING)
         stiffness = "stiffness.steps=1", "stiffness.up_to=0.001", "stiffness.which=vertical"

@@ -10,6 +10,7 @@ from tireroad.runs.scene.rules.tire import full_matrices, geometry
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.axle import check_axle
 from tireroad.runs.scene.tables.cavity import check_cavity
+from tireroad.runs.scene.tables.contact import check_tread
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.tables.stiffness import check_stiffness
 
@@ -203,17 +204,8 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     if static.load is None and static.deflection is None and static.road_height is None:
         raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
     contact = scene.contact
-    if None not in (contact.brush_stiffness, contact.brush_stiffness_per_area):
-        raise error(
-            ("contact", "brush_stiffness_per_area"), "and brush_stiffness are two brushes: keep one"
-        )
-    if not contact.rubs and contact.friction is not None:
-        raise error(
-            ("contact", "friction"), "needs brush_stiffness_per_area (N/m³), which carries it"
-        )
     standing = scene.rotation is None or scene.rotation.speed == 0
-    if any(contact.slip) and (not contact.rubs or standing):
-        raise error(("contact", "slip"), "needs brush_stiffness_per_area (N/m³) and a rolling tire")
+    check_tread(contact, standing, error)
 
 
 def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:

@@ -1,10 +1,14 @@
 """The tables of the contact and of the run in time, with units, ranges and defaults."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from tireroad.contact.tread.law import TREADS, TreadLaw
+from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import choice, number, vector
 from tireroad.runs.scene.schema import Pitch, Variants, points, registered, variant
+
+Where = Callable[[tuple[str, ...], str], InputError]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +66,25 @@ class Contact(Variants):
     def rubs(self) -> bool:
         """Whether bristles carry horizontal forces."""
         return (self.brush_stiffness, self.brush_stiffness_per_area) != (None, None)
+
+
+def check_tread(contact: Contact, standing: bool, error: Where) -> None:
+    """Raise InputError for treads and brushes that cannot be."""
+    if contact.law.creep is not None and contact.points == "nodes":
+        raise error(
+            ("contact", "tread"),
+            "= a tread that creeps needs a grid: contact.points = { dx, dy } (m)",
+        )
+    if None not in (contact.brush_stiffness, contact.brush_stiffness_per_area):
+        raise error(
+            ("contact", "brush_stiffness_per_area"), "and brush_stiffness are two brushes: keep one"
+        )
+    if not contact.rubs and contact.friction is not None:
+        raise error(
+            ("contact", "friction"), "needs brush_stiffness_per_area (N/m³), which carries it"
+        )
+    if any(contact.slip) and (not contact.rubs or standing):
+        raise error(("contact", "slip"), "needs brush_stiffness_per_area (N/m³) and a rolling tire")
 
 
 @dataclass(frozen=True)
