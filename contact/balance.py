@@ -45,7 +45,8 @@ class Motion:
         self._real, self._imaginary = right.real.copy(), right.imag.copy()
         self._eigenvalue = states.eigenvalue[slow][:, None]
         damping = rates(turning.damping, projection)
-        self.losses = Dissipation(damping, turning.speed * projection.body, step)
+        _, _, body = projection.rotating(turning.inertia)
+        self.losses = Dissipation(damping, turning.speed * body, step)
 
     @staticmethod
     def known(rolling: RollingModes, response: Response) -> bool:

@@ -192,7 +192,7 @@ def _say_once(kept: Path) -> None:
     announce(f"compiling finite-element forms, once for this kind of tire (kept in {kept}) ...")
 
 
-def end_compilers(folder: Path) -> None:
+def end_compilers(folder: str | Path) -> None:
     """Kill the compilers at work in a folder: they outlive the process that started them."""
     named = os.fsencode(folder)
     for entry in Path("/proc").glob("[0-9]*"):

@@ -6,8 +6,8 @@ key reference and the error messages all follow from them. Like `fem.errors` thi
 that all packages may import; it needs nothing but the standard library.
 """
 
-from dataclasses import field
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, dataclass_transform
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite, keys
@@ -21,6 +21,8 @@ class ParameterError(InputError):
         self.parameter, self.reason = parameter, reason
 
 
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+@dataclass(frozen=True, kw_only=True)
 class Parameters:
     """Base of dataclasses made of parameters: the constructor checks every value, then `validate`.
 

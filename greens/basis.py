@@ -14,6 +14,8 @@ from tireroad.modal.corner import MOMENTS, SEEN
 from tireroad.modal.rolling import RollingModes
 from tireroad.modal.rotating import StateModes
 
+Pencil = tuple[np.ndarray, np.ndarray]  # D~ and K~ of a projected problem
+
 
 @dataclass(frozen=True)
 class Basis:
@@ -57,7 +59,7 @@ class Basis:
             by_state -= (part @ states.right) * s**k
             by_block -= part @ powered
             powered = powered @ block
-        moment = self.projection.corner.rigid(loads)[:, MOMENTS] - self.seen(loads) @ rows[2].T
+        moment = self.projection.wheel.rigid(loads)[:, MOMENTS] - self.seen(loads) @ rows[2].T
         return replace(
             response,
             output=response.output + wanted @ by_state,
@@ -81,7 +83,11 @@ class Basis:
 
 
 def regained(
-    basis: Basis, true: tuple, uniform: tuple, outputs: sparse.csr_matrix, loads: sparse.csr_matrix
+    basis: Basis,
+    true: Pencil,
+    uniform: Pencil,
+    outputs: sparse.csr_matrix,
+    loads: sparse.csr_matrix,
 ) -> Moments:
     """What the modes answer under their true damping beyond what they do under that of the full matrices.
 
@@ -92,8 +98,9 @@ def regained(
     flexible = np.pad(own, (0, len(true[0]) - len(own)), constant_values=True)  # the air's are
     seen = basis.seen(outputs)[:, flexible], basis.seen(loads)[:, flexible]
     carried = basis.projection.carried[:, flexible]
-    parts = [
-        [matrix[np.ix_(flexible, flexible)] for matrix in pencil] for pencil in (true, uniform)
-    ]
-    one, other = (modal_moments(*pencil, *seen, carried) for pencil in parts)
-    return one.minus(other)
+
+    def moments(pencil: Pencil) -> Moments:
+        drag, stiffness = (matrix[np.ix_(flexible, flexible)] for matrix in pencil)
+        return modal_moments(drag, stiffness, *seen, carried)
+
+    return moments(true).minus(moments(uniform))

@@ -23,7 +23,7 @@ def substituted(basis: Basis, turning: Turning, loads, frequency: np.ndarray) ->
     """Force on the hub (f, 3, k) per unit load at the probes (k, 3 s), at `frequency` (f,) Hz above 0: of its
     springs and dampers where the wheel moves, of the held rim where it is locked.
     """
-    corner, held = basis.projection.corner, basis.held
+    corner, held = basis.projection.wheel, basis.held
     drag, stiffness = held_matrices(
         held.projection, turning.speed, turning.damping, turning.inertia
     )
@@ -85,7 +85,7 @@ def by_states(basis: Basis, loads, frequency: np.ndarray) -> np.ndarray:
         residual=np.zeros((3, count)),
     )
     s = 2j * np.pi * frequency[:, None, None]
-    return basis.projection.corner.rigid(loads)[:, :3].T - s**2 * moving.receptance(frequency)
+    return basis.projection.wheel.rigid(loads)[:, :3].T - s**2 * moving.receptance(frequency)
 
 
 def disagreement(basis: Basis, turning: Turning, loads, frequency: np.ndarray) -> float:

@@ -26,11 +26,11 @@ from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.turning import Turning
 from tireroad.greens.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
-from tireroad.greens.basis import Basis, regained
+from tireroad.greens.basis import Basis, Pencil, regained
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, modal_moments, second_order
 from tireroad.modal.basis import Projection, project, with_air
-from tireroad.modal.damping import Damping, tail_loss
+from tireroad.modal.damping import Damping, StrainEnergy, tail_loss
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import StateModes, held_matrices
 from tireroad.modal.solver.modes import Modes
@@ -71,19 +71,20 @@ class Wheel:
     @property
     def _uniform(self) -> tuple[float, float]:
         """What the full matrices are damped by."""
-        return self.damping if self.beyond is None else self.beyond
+        if self.beyond is not None:
+            return self.beyond
+        assert not isinstance(self.damping, StrainEnergy), "`beyond` is given then"
+        return self.damping
 
     @cached_property
     def _loss(self):
         """sum_r eta_r K_r, or None."""
         return self.operators.loss_stiffness()
 
-    def _pencils(self, projection: Projection) -> tuple:
+    def _pencils(self, projection: Projection) -> tuple[Pencil, Pencil]:
         """With the rim held, the projected pencil as the modes are damped, and as the full matrices are."""
-        return tuple(
-            held_matrices(projection, self.speed, damping, self.inertia)
-            for damping in (self.damping, self._uniform)
-        )
+        true = held_matrices(projection, self.speed, self.damping, self.inertia)
+        return true, held_matrices(projection, self.speed, self._uniform, self.inertia)
 
     def respond(
         self,
@@ -102,10 +103,10 @@ class Wheel:
             return self._with_statics(basis, outputs, loads, pulse=option == "dirac")
         if option == "second-order" and self.corner:
             raise InputError("greens.residual: second-order knows no wheel that moves")
-        r, k = outputs.shape[0], loads.shape[0]
-        same = outputs is loads
+        r, k, same = outputs.shape[0], loads.shape[0], outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
+            assert modes is not None, "attachment modes need the modes on all unknowns"
             whole = self._attached(basis, modes, probes)
         else:
             shapes = self._static_shapes(probes)
@@ -137,9 +138,8 @@ class Wheel:
             return self._lacking(response, moment - response.static_moment())
         held = basis.held
         pencil = held_matrices(basis.projection, self.speed, self.damping, self.inertia)
-        known = modal_moments(
-            *pencil, held.seen(outputs), held.seen(loads), held.projection.carried
-        )
+        seen = held.seen(outputs), held.seen(loads)
+        known = modal_moments(*pencil, *seen, held.projection.carried)
         response = basis.couple(outputs, loads)
         response = replace(response, residual=response.residual + flexibility - known.compliance)
         return self._lacking(response, moment - known.momentum)
@@ -208,7 +208,7 @@ class Wheel:
         moment = np.where(np.arange(carried.shape[1]) < grown.projection.own, carried, 0.0)
         response = couple(grown.states, np.vstack([seen[:6], moment]), seen, carried)
         # By strain energy a rigid motion is not damped, so nothing acts against the wheel.
-        turning = self.speed, self.damping[0] if self.beyond is None else 0.0
+        turning = self.speed, self._uniform[0] if self.beyond is None else 0.0
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
     def _grown(

@@ -92,7 +92,7 @@ def make_response(
 def _made(response: Response, figures: Figures | None = None) -> Made:
     """The response with a warning where its states grow."""
     count, rate = response.growth
-    warnings = ()
+    warnings: tuple[str, ...] = ()
     if count:
         warnings = (
             f"{count} state(s) of the response grow by themselves, the fastest at {rate:.3g} 1/s: lower the "

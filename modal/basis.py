@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
 from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
+from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.modal.air import Air
 from tireroad.modal.corner import Corner, meeting
@@ -71,7 +73,13 @@ class Projection:
 
     def moments(self, speed: float) -> np.ndarray:
         """The rows (3, 3, m + a + c) of `Corner.moments` on all coordinates."""
-        return self.corner.moments(self.inside.shape[1], speed) @ self._change
+        return self.wheel.moments(self.inside.shape[1], speed) @ self._change
+
+    @property
+    def wheel(self) -> Corner:
+        """The corner, of which there must be one."""
+        assert self.corner is not None, "the axle of this tire is fixed"
+        return self.corner
 
     @property
     def adrift(self) -> np.ndarray:
@@ -88,7 +96,7 @@ class Projection:
     @property
     def rim_momentum(self) -> np.ndarray:
         """P (7, m + a) kg^1/2 of a corner."""
-        return self.corner.momentum(None if self.air is None else self.air.duct.momentum)
+        return self.wheel.momentum(None if self.air is None else self.air.duct.momentum)
 
     @property
     def _moved(self) -> tuple[np.ndarray, float]:
@@ -96,16 +104,30 @@ class Projection:
 
     @property
     def _change(self) -> np.ndarray:
-        return self.corner.change(*self._moved)
+        return self.wheel.change(*self._moved)
 
     @property
     def own(self) -> int:
         """Coordinates of the tire itself, m."""
         return len(self.squares)
 
+    def rotating(self, inertia: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What multiplies 2 Omega, Omega^2, and Omega times the damping rate, of the inertia "full" or
+        "doppler". InputError where the projection is of a wheel that stands.
+        """
+        full = inertia == "full"
+        gyroscopic = self.gyroscopic if full else self.body
+        convective = self.convective if full else self.body_convective
+        if gyroscopic is None or convective is None or self.body is None:
+            raise InputError("modes: these are of a wheel that stands, and have no rotating states")
+        return gyroscopic, convective, self.body
+
     def first(self, count: int) -> Projection:
         """On the first `count` modes alone."""
-        cut = {"squares": self.squares[:count], "momentum": self.momentum[:, :count]}
+        cut: dict[str, Any] = {
+            "squares": self.squares[:count],
+            "momentum": self.momentum[:, :count],
+        }
         for item in fields(self):
             values = getattr(self, item.name)
             if item.name not in cut and isinstance(values, np.ndarray):
@@ -118,7 +140,7 @@ class Projection:
 
     def among(self, wanted: np.ndarray) -> Projection:
         """On the coordinates where `wanted` (m,) is true, before anything joins them."""
-        small = {
+        small: dict[str, Any] = {
             name: None if value is None else value[np.ix_(*[wanted] * value.ndim)]
             for name, value in vars(self).items()
             if name not in ("momentum", "air", "corner")
@@ -191,6 +213,7 @@ def with_corner(
     of the outer face in the static state. Collective."""
     if axle is None:
         return projection
+    assert rim is not None, "with an axle that moves come the motions of the rim"
     return replace(projection, corner=meeting(axle, rim, modes.vectors, places, comm))
 
 
@@ -203,7 +226,7 @@ def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projec
 
 def _loss_factors(modes: Modes, loss, comm, known: Projection | None) -> np.ndarray:
     """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of modes of unit mass; 0 of rigid ones. Collective."""
-    done = np.zeros(0) if known is None else known.loss_factor
+    done = np.zeros(0) if known is None or known.loss_factor is None else known.loss_factor
     lost = np.empty(modes.vectors.shape[1] - len(done))
     for start in range(0, len(lost), CHUNK):
         some = modes.vectors[:, len(done) + start : len(done) + start + CHUNK]

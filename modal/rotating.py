@@ -44,10 +44,8 @@ def _tire_matrices(projection: Projection, speed: float, damping: Damping, inert
     stiffness, drag = np.diag(projection.squares), np.diag(rate)
     if speed == 0:
         return drag, stiffness
-    full = inertia == "full"
-    gyroscopic = projection.gyroscopic if full else projection.body
-    convective = projection.convective if full else projection.body_convective
-    turning = speed * rate[:, None] * projection.body
+    gyroscopic, convective, body = projection.rotating(inertia)
+    turning = speed * rate[:, None] * body
     return drag + 2 * speed * gyroscopic, stiffness + speed**2 * convective + turning
 
 

@@ -91,8 +91,7 @@ def with_fields(
     if basis.modes is not None:
         return basis
     rotation = basis.projection.gyroscopic is not None
-    given = {"count": count, "up_to": up_to, "rotation": rotation}
-    again = standing_modes(motions, **given, air=air, axle=axle)
+    again = standing_modes(motions, count=count, up_to=up_to, rotation=rotation, air=air, axle=axle)
     top = max(float(basis.frequency.max(initial=0.0)), 1e-300)
     alike = len(again.frequency) == len(basis.frequency)
     if not alike or np.abs(again.frequency - basis.frequency).max(initial=0.0) > _SAME * top:

@@ -39,7 +39,7 @@ def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> R
     unknowns = operators.unknowns
     points = body.lattice.points(body.ids) + body.owned(body.u.x.array)
     motions = rigid_motions(points)[unknowns.free]
-    if unknowns.rim.mine:
+    if unknowns.rim is not None and unknowns.rim.mine:
         motions = np.vstack([motions, np.linalg.inv(unknowns.rim.coordinates)])
     products = {"mass": operators.mass[:, None] * motions}
     products["stiffness"] = _still(multiply(operators.stiffness, motions))

@@ -83,8 +83,8 @@ class GreensStage(Computed[Responses]):
         points = probes(self.job, self.static.product, self.setup.product)
         whole = self._whole(record, rolling, points, wanted.residual)
         response = selected(whole, rolling, wanted, points.counted)
-        judging = (one.between(points.counted, points.counted) for one in (whole, response))
-        record.indicators |= judged(points.name, *judging, rolling, wanted)
+        seen, kept = (one.between(points.counted, points.counted) for one in (whole, response))
+        record.indicators |= judged(points.name, seen, kept, rolling, wanted)
         if rolling.basis.projection.corner is not None:
             loads, top = points.loads[points.counted], band(rolling, wanted)
             corner.check_blocked(record, rolling, loads, top)

@@ -118,11 +118,18 @@ class Fields(Shared[ModalBasis]):
     def make(self) -> ModalBasis:
         """Collective."""
         wanted = self.job.scene.modal
-        given = self.modes.product, self.motions.product
-        if given[0].modes is not None:
-            return given[0]
-        sizes = {"count": wanted.count, "up_to": wanted.up_to}
-        return with_fields(*given, **sizes, air=self.air.product, axle=self.job.axle)
+        basis = self.modes.product
+        if basis.modes is not None:
+            return basis
+        motions, air = self.motions.product, self.air.product
+        return with_fields(
+            basis,
+            motions,
+            count=wanted.count,
+            up_to=wanted.up_to,
+            air=air,
+            axle=self.job.axle,
+        )
 
 
 def _describe(record: Record, modes: Modes) -> None:
@@ -150,7 +157,8 @@ def _damping(given: Damping, projection: Projection) -> str:
     """Which damping acts, in words."""
     if not isinstance(given, StrainEnergy):
         unused = "" if projection.loss_factor is None else "; the loss factors do not act"
-        return f"γ1 = {given.mass:g} 1/s, γ2 = {given.stiffness:g} s{unused}"
+        mass, stiffness = given
+        return f"γ1 = {mass:g} 1/s, γ2 = {stiffness:g} s{unused}"
     low, high = projection.loss_factor.min(), projection.loss_factor.max()
     return f"modal strain energy, loss factors {low:.3g} to {high:.3g}"
 

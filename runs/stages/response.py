@@ -14,7 +14,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.build.setup import driven_points
-from tireroad.runs.stages.build.stepping import Integration, integration
+from tireroad.runs.stages.build.stepping import Integration, integration, planned
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
@@ -54,7 +54,8 @@ class ResponseStage(Computed[PointResponse]):
 
     def compute(self, record: Record) -> PointResponse:
         """Integrate and sweep. Collective."""
-        scene, curves = self.job.scene, {}
+        scene = self.job.scene
+        curves: dict[str, tuple[np.ndarray, str]] = {}
         if self.contact:
             curves |= self._in_contact(record, self.contact.product)
         elif scene.time:
@@ -100,7 +101,10 @@ class ResponseStage(Computed[PointResponse]):
     def _in_time(self, record: Record) -> Curves:
         """Displacements and axle force of the prescribed forces. Collective."""
         forces = self.job.scene.force
-        chosen = integration(self.job, record, self._response, shortest_period(forces))
+        plan = planned(self.job, record, self._response, shortest_period(forces))
+        wanted = self.job.scene.time.scheme
+        # Given forces have no contact to chatter: linear over the step is of the higher order.
+        chosen = integration(self.job, plan, "linear" if wanted == "auto" else wanted)
         time = chosen.step * np.arange(chosen.steps + 1)
         force = histories(forces, time)
         displacement, axle = self._marched(record, chosen, force)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +21,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.extent.own_tire import fingerprint
+from tireroad.runs.stages.build.turning import rolling_shape, turning_of
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed
@@ -37,9 +38,7 @@ def steady_rolling(job: Job, speed: float | None = None) -> Rolling:
     speed = job.speed if speed is None else speed
     if not scene.static.steady_rolling or speed == 0:
         return AT_REST
-    # By strain energy there is no damping before there are modes: the shape has inertia alone.
-    damping = (scene.damping.mass, scene.damping.stiffness) if scene.damping else (0.0, 0.0)
-    return Rolling(speed, *damping, scene.rotation.inertia)
+    return rolling_shape(replace(turning_of(job), speed=speed))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -210,7 +210,7 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     time = scene.time
-    if time is None or time.step == "auto":
+    if time is None or isinstance(time.step, str):
         return
     if time.step > time.duration:
         raise error(

@@ -13,6 +13,7 @@ from tireroad.contact.roads.road import make_road
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
+from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.stepping import run_time
 from tireroad.runs.stages.job import Job
@@ -46,7 +47,7 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
             motion=make_motion(motion.kind, motion.amplitude, motion.frequency, motion.duration),
             lift=abs(motion.amplitude) if motion.kind != "none" else 0.0,
         ),
-        spacing=None if points == "nodes" else (points.dx, points.dy),
+        spacing=(points.dx, points.dy) if isinstance(points, Pitch) else None,
         reach=scene.contact.reach,
     )
 
@@ -93,9 +94,10 @@ def driven_points(job: Job) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
     """The prescribed forces (k, 3 s), and the readings (3 k, 3 s) of x, y and z at their centres."""
     lattice, loads, readings = job.tire.lattice, [], []
     for force in job.scene.force:
-        angles = np.radians([force.angle, force.arc])
-        spread = tuple(np.radians(force.spread))
-        loads.append(probe.directed(probe.spot(lattice, *angles, spread), force.direction))
-        here = probe.spot(lattice, *angles)
+        angle, arc = np.radians([force.angle, force.arc])
+        spread = np.radians(force.spread[0]), np.radians(force.spread[1])
+        direction = np.array(force.direction)
+        loads.append(probe.directed(probe.spot(lattice, angle, arc, spread), direction))
+        here = probe.spot(lattice, angle, arc)
         readings += [probe.directed(here, axis) for axis in np.eye(3)]
     return sparse.csr_matrix(np.stack(loads)), sparse.csr_matrix(np.stack(readings))

@@ -71,6 +71,24 @@ class ContactHistory:
         )
 
 
+def begun_with(job: Job, key: str) -> str | None:
+    """The scheme of the checkpoint that a loop of these inputs goes on from, or None. Collective."""
+
+    def found() -> str | None:
+        path = job.directory / CHECKPOINT
+        if job.fresh or store.why_not(path, job.provenance("contact", key).input_hash, "contact"):
+            return None
+        with store.opened(path) as file:
+            return str(file.attrs["scheme"])
+
+    return on_root(job.comm, found)
+
+
+def forget_checkpoint(job: Job) -> None:
+    """The loop begins at t = 0 again. Collective."""
+    on_root(job.comm, lambda: (job.directory / CHECKPOINT).unlink(missing_ok=True))
+
+
 class ContactFile:
     """Blocks of steps, compressed, on the root process; a checkpoint is a copy with the loop's state."""
 
@@ -124,7 +142,7 @@ class ContactFile:
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
         forces = len(self._job.scene.force)
-        driven = {DRIVEN: ((forces, 3), "m")} if forces else {}
+        driven: dict[str, tuple[tuple, str]] = {DRIVEN: ((forces, 3), "m")} if forces else {}
         driven |= _OF_WHEEL if self._job.axle else {}
         # A chunk of many points would be many megabytes: 4 MB at most is read at once.
         rows = 2 ** int(np.log2(np.clip(500_000 // max(c, 1), 1, BLOCK)))
