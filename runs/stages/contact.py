@@ -24,6 +24,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
+from tireroad.runs.stages.build import pattern
 from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, told
 from tireroad.runs.stages.build.stepping import (
@@ -62,7 +63,7 @@ class ContactStage(Stage[ContactHistory]):
         return {
             "greens": self.greens.key,
             "contact": asdict(scene.contact),
-            "road": asdict(scene.road),
+            "road": [asdict(scene.road), pattern.inputs(self.job)],
             "file": store.file_hash(scene.road.file) if scene.road.file else None,
             "speed": self.setup.product.rolled.speed,
             "axle_force": scene.output.axle_force,
@@ -88,10 +89,8 @@ class ContactStage(Stage[ContactHistory]):
             begun = begun_with(self.job, key)
             chosen = chosen_scheme(self.job, record, setup, plan, begun)
         spec, patch = self.job.scene.contact, setup.patch
-        observe.say(
-            f"  {len(patch.points)} contact points on {len(patch.index)} nodes, tread {spec.tread}, "
-            f"solver {solver_name(spec, patch)}"
-        )
+        count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
+        observe.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
         doubtful = self.job.scene.time.scheme == "auto" and chosen.scheme == "linear"
         try:
             self._attempt(key, record, setup, plan, chosen.scheme, doubtful)
@@ -135,6 +134,7 @@ class ContactStage(Stage[ContactHistory]):
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
         _describe(record, totals, loop.solver, chosen, chosen.steps - done)
+        pattern.describe(record, setup)
         if chosen.scheme != "convolution":
             work = works(chosen.scheme, totals.work, driven if self.job.scene.force else None)
             given = self.rotating.product, response, loop.tire.snapshot(), work

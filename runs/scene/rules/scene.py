@@ -11,6 +11,7 @@ from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.axle import check_axle
 from tireroad.runs.scene.tables.cavity import check_cavity
 from tireroad.runs.scene.tables.contact import check_tread
+from tireroad.runs.scene.tables.pattern import check_pattern
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.tables.stiffness import check_stiffness
 
@@ -238,6 +239,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("greens", "rotation"), _greens),
     (("stiffness", "static"), check_stiffness),
     (("tire", "rotation", "modal", "greens"), check_cavity),
+    (("pattern", "contact"), check_pattern),
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
     (("time",), _time),
 )

@@ -10,6 +10,7 @@ from tireroad.runs.scene.schema import (
 )
 from tireroad.runs.scene.tables.axle import AxleTable
 from tireroad.runs.scene.tables.contact import Contact, Time
+from tireroad.runs.scene.tables.pattern import PatternTable
 from tireroad.runs.scene.tables.road import Road
 from tireroad.runs.scene.tables.stiffness import Stiffness
 from tireroad.runs.scene.tables.tire import Tire
@@ -220,6 +221,11 @@ class Scene:
     greens: Greens = table(Greens, "Green's functions")
     force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")
     contact: Contact | None = table(Contact, "contact with the road in time", optional=True)
+    pattern: PatternTable | None = table(
+        PatternTable,
+        "grooves of the tread, which turn with the tire; absent: a slick",
+        optional=True,
+    )
     road: Road | None = table(Road, "the road driven over", optional=True)
     time: Time | None = table(Time, "the run in time", optional=True)
     output: Output = table(Output, "what is computed and kept")
