@@ -83,7 +83,7 @@ class Rotation:
         None,
         "m/s",
         "speed over the road, instead of speed: the wheel turns as fast as it rolls freely; 25 m/s are 90 km/h",
-        above=0,
+        least=1e-6,
         most=500,
     )
     inertia: str = choice(
