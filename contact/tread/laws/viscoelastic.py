@@ -25,10 +25,10 @@ class Viscoelastic(Elastic):
     )
     relaxation: tuple[float, ...] = numbers(
         "shares of the modulus that relax, one to three, of a sum below 1", "-",
-        Limits(above=0, below=1), (0.3,),
+        Limits(least=1e-6, most=0.999999), (0.3,),
     )  # fmt: skip
     relaxation_time: tuple[float, ...] = numbers(
-        "the time in which each does", "s", Limits(above=0, most=1e6), (1e-3,)
+        "the time in which each does", "s", Limits(least=1e-9, most=1e6), (1e-3,)
     )
 
     def validate(self) -> None:

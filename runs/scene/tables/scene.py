@@ -28,11 +28,11 @@ class Static:
         None,
         "m",
         "deflection from the first touch of the inflated tire, instead of load",
-        least=1e-9,
+        least=1e-6,
         most=10,
     )
     road_height: float | None = number(
-        None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, below=0
+        None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, most=-1e-3
     )
     steady_rolling: bool = flag(
         True, "inertia and material damping of the rolling shape; false: the state at rest"
@@ -84,7 +84,7 @@ class Rotation:
         None,
         "m/s",
         "speed over the road, instead of speed: the wheel turns as fast as it rolls freely; 25 m/s are 90 km/h",
-        above=0,
+        least=1e-6,
         most=500,
     )
     inertia: str = choice(
