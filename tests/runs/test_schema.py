@@ -192,6 +192,9 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
             "greens.dynamic=6",
         )
         wheel = "road.motion.kind=ramp", "axle.kind=corner", "axle.body_mass=300"
+        grooves = "pattern.pitches=50", "pattern.groove=[{width=0.004}]"
+        points = "contact.points={dx=0.01,dy=0.01}"
+        _run(tmp_path / "rolling", ROLLING.format(kind="flat"), *grooves, points)
         area = "contact.brush_stiffness=", "contact.brush_stiffness_per_area=1e7"
         wheel += (*area, "rotation.speed=", "rotation.travel_speed=10")
         _run(tmp_path / "rolling", ROLLING.format(kind="flat"), *wheel)

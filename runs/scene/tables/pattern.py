@@ -25,8 +25,8 @@ class Groove:
     position: float = number(
         0.0, "-", "place in its pitch, 0 to 1; of a circumferential groove y in m", least=-1, most=1
     )
-    width: float = number(0.004, "m", "between the middles of its flanks", above=0, most=1)
-    depth: float = number(0.008, "m", "under the outer face", above=0, most=0.1)
+    width: float = number(0.004, "m", "between the middles of its flanks", least=1e-6, most=1)
+    depth: float = number(0.008, "m", "under the outer face", least=1e-6, most=0.1)
     flank: float = number(0.001, "m", "in which it comes to its depth", least=1e-5, most=0.1)
     angle: float = number(
         0.0, "deg", "of a lateral groove from the axle's direction", least=-80, most=80
@@ -50,8 +50,8 @@ class PatternTable:
         "depths in place of grooves: .npz with depth (n, m) m around the tire and y (m) m, or an image (.png) from "
         "white, the outer face, to black, the full depth, its width around the tire"
     )
-    depth: float = number(0.008, "m", "of the black of an image", above=0, most=0.1)
-    width: float = number(0.15, "m", "across the tire, of an image", above=0, most=10)
+    depth: float = number(0.008, "m", "of the black of an image", least=1e-6, most=0.1)
+    width: float = number(0.15, "m", "across the tire, of an image", least=1e-6, most=10)
     groove: tuple[Groove, ...] = tables(Groove, "a groove of the tread")
 
 
