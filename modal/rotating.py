@@ -2,9 +2,9 @@
 
     s^2 I + s (D_mod + 2 Omega G) + (Lambda + Omega^2 S + Omega D_mod B),  D_mod as in modal.damping
 
-(thesis (2.1)-(2.5), put right; the doppler form takes B for G and S_B for S). Its response to modal forces is
-kept as  eta(t) = Re[R z(t)] + R_b y(t),  z' = s z + L f,  y' = T y + L_b f:  one complex state per conjugate
-pair or real eigenvalue, and a real block for those too close to defective to have usable vectors.
+(thesis (2.1)-(2.5), put right; the doppler form takes B for G and S_B for S). Its response to modal
+forces is kept as  eta(t) = Re[R z(t)] + R_b y(t),  z' = s z + L f,  y' = T y + L_b f:  one complex
+state per conjugate pair or real eigenvalue, and a real block for those too close to defective.
 """
 
 from __future__ import annotations

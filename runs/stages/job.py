@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -49,8 +49,12 @@ class Job:
             return self.speed
         return rotation.travel_speed / (rotation.rolling_radius or state.rolling_radius())
 
-    def settle(self, state: StaticState) -> None:
-        """Take the speed for which the static state was found."""
+    def settle(self, done: Mapping[str, Any]) -> None:
+        """At a travel speed, take the wheel's for which the static state was found, once it is `done`. Collective."""
+        rotation = self.scene.rotation
+        if rotation is None or not rotation.travel_speed or self.found or "static" not in done:
+            return
+        state = done["static"].product
         self.found["speed"] = state.rolling.speed or self.free_speed(state)
 
     @cached_property

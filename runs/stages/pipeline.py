@@ -44,6 +44,7 @@ from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
+from tireroad.runs.stages.vibration import VibrationStage
 
 PARTS: tuple[type[Part], ...] = (
     StaticStage,
@@ -59,6 +60,7 @@ PARTS: tuple[type[Part], ...] = (
     ContactStage,
     ResponseStage,
     SpectraStage,
+    VibrationStage,
 )
 """In their order: each takes, by name, what stands before it."""
 
@@ -128,11 +130,9 @@ def run_scene(
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
     done: dict[str, Done] = {}
     for kind in PARTS:
-        found = _done(job, kind, done, reasons, summary)
-        if found is not None:
+        if (found := _done(job, kind, done, reasons, summary)) is not None:
             done[kind.name] = found
-        if kind is StaticStage and scene.rotation and scene.rotation.travel_speed:
-            job.settle(done["static"].product)
+        job.settle(done)
     _check_options(petsc_options)
     if "report" in reasons:
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))
