@@ -96,7 +96,7 @@ class Construction:
         ends = [end for part in self.parts for end in part.along] + [line.to for line in self.cords]
         ends += [self.tread, self._held]
         fixed = [end for end in ends if end < length * (1 - 1e-9)]
-        both = np.concatenate([fixed, np.negative(fixed)])
+        both = [*fixed, *(-end for end in fixed)]
         wall = np.linspace(0.0, 1.0, levels + 1)
         arc = corners(elements, lambda s: 1 / self._size(s, elements), -length, length, both)
         mesh = product(order=order, wall=wall, arc=arc, place=place, patches=patches, plies=plies)
@@ -137,10 +137,10 @@ class Construction:
                     raise InputError(
                         f"section: {kind} of layer {name!r}; there are {', '.join(names)}"
                     )
-        for item in (*self.layers, *self.parts):
-            if item.compound not in self.compounds:
+        for compound in [one.compound for one in self.layers] + [p.compound for p in self.parts]:
+            if compound not in self.compounds:
                 known = ", ".join(self.compounds)
-                raise InputError(f"section: no compound {item.compound!r}; there are {known}")
+                raise InputError(f"section: no compound {compound!r}; there are {known}")
 
         if not self.tread < self._held:
             raise InputError(

@@ -165,7 +165,7 @@ def _tables(raw: dict[str, Any], key: str, least: int = 0) -> list[dict[str, Any
 
 
 def _number(table: dict[str, Any], key: str, where: str, default: float | None = None) -> float:
-    value = table.get(key, default)
+    value: Any = table.get(key, default)
     right = isinstance(value, int | float) and not isinstance(value, bool)
     if not right or not np.isfinite(value):
         raise InputError(

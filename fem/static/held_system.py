@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -22,6 +23,21 @@ class Moved:
     force: np.ndarray
 
 
+class System(Protocol):
+    """The linearised equilibrium as Newton's method needs it; as `HeldSystem` says."""
+
+    closing: Moved
+    raising: Moved
+
+    def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
+        """Factorise; False when the matrix is singular. Collective."""
+        ...
+
+    def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Motion (m) of the owned dofs under forces (N), and force (N) at the held ones. Collective."""
+        ...
+
+
 class HeldSystem:
     """K du = right, with du given at the held dofs. All methods are collective.
 
@@ -30,7 +46,9 @@ class HeldSystem:
     `raising` that of all held dofs by one.
     """
 
-    def __init__(self, comm: MPI.Comm, matrix: PETSc.Mat, factorisation: str, timing: Timing):
+    def __init__(
+        self, comm: MPI.Comm, matrix: PETSc.Mat, factorisation: str, timing: Timing
+    ) -> None:
         self._comm, self._timing = comm, timing
         self._ksp = _solver(comm, matrix, factorisation)
         self._right, self._x = matrix.createVecs()
@@ -92,6 +110,7 @@ class HeldSystem:
         if moved is not None:
             change += moved.change
             self._x.array[:] = change
+        assert self._reaction is not None, "solve() before take()"
         force = self._reaction.createVecLeft()
         self._reaction.mult(self._x, force)
         at_held = force.array_r.copy()

@@ -41,7 +41,7 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
     body = Body(fine.comm, ring, fine.materials, cords=fine.plies.cords)
     coarse = Equilibrium(body, rolling)
     companion = Loader(coarse, lambda progress: None)
-    deflection = equilibrium.road_height - loader.touch
+    deflection = loader.deflection
     try:
         companion.inflate(float(equilibrium.pressure.value))
         inflated = body.u.x.array.copy()

@@ -1,7 +1,6 @@
 """Load steps to a wanted state: inflation, then the road by height, deflection or load.
 
-Steps are cut back when Newton fails and grow again when it is easy; a step that cannot be made
-small enough is an error that names the last good state.
+Steps are cut back when Newton fails and grow when it is easy; one too small is an error with the last good state.
 """
 
 from __future__ import annotations
@@ -12,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.parallel import on_root
 from tireroad.fem.static.equilibrium import Equilibrium, Step
+from tireroad.fem.static.round import RoundEquilibrium
 from tireroad.fem.static.tread_surface import TreadSurface
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
@@ -57,22 +58,59 @@ class LoadingStopped(ConvergenceError):
 class Loader:
     """Brings the body of one equilibrium problem to the wanted state. All methods are collective."""
 
-    def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]):
+    def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]) -> None:
         self.equilibrium = equilibrium
         self.body = equilibrium.body
         self.report = report
         self.newton_steps = 0
-        self.touch: float | None = None
+        self._touch: float | None = None
 
     def inflate(self, pressure: float) -> None:
-        """Inflation from 0 to `pressure` (Pa), without a road; also the steady-rolling loads alone."""
+        """Inflation from 0 to `pressure` (Pa), without a road; also the steady-rolling loads alone.
 
+        By the round shape of one section, where that is near enough for Newton; else in steps.
+        """
+        if not (self.body.plies.cords and self._start_round(pressure)):
+            self._inflate_in_steps(pressure)
+        self._touch = self.lowest()
+
+    def _start_round(self, pressure: float) -> bool:
+        """Whether equilibrium is found from the round shape. Collective."""
+
+        def shape() -> np.ndarray:
+            section = RoundEquilibrium(self.body, self.equilibrium.rolling)
+            Loader(section, self.report)._inflate_in_steps(pressure)
+            return section.on(self.body.lattice)
+
+        before = self.body.u.x.array.copy()
+        self.body.set_displacement(on_root(self.body.comm, shape))
+        self.equilibrium.pressure.value = pressure
+        step = self.equilibrium.solve()
+        self.newton_steps += step.iterations
+        if step.converged:
+            self._report("inflation", pressure, "Pa", step)
+        else:
+            self.body.u.x.array[:] = before
+        return step.converged
+
+    def _inflate_in_steps(self, pressure: float) -> None:
         def attempt(fraction: float) -> Step:
             self.equilibrium.pressure.value = fraction * pressure
             return self.equilibrium.solve()
 
         self._march(attempt, 0.0, 1.0, 1.0, "inflation", pressure, "Pa")
-        self.touch = self.lowest()
+
+    @property
+    def touch(self) -> float:
+        """Height of a road that just touches the inflated tire, m."""
+        assert self._touch is not None, "inflate() comes before the road"
+        return self._touch
+
+    @property
+    def deflection(self) -> float:
+        """How far the road has been raised from first touch, m."""
+        assert self.equilibrium.road_height is not None, "there is no road"
+        return self.equilibrium.road_height - self.touch
 
     def lowest(self) -> float:
         """Height of the lowest point of the outer face between its nodes, m. Collective."""
@@ -103,7 +141,7 @@ class Loader:
                 return trial
             trial = self._next_deflection(known, load)
             if trial < _REACH * max(k.deflection for k in known) and self._meet(load, trial, known):
-                return self.equilibrium.road_height - self.touch
+                return self.deflection
         nearest = min(known, key=lambda k: abs(k.load - load))
         raise ConvergenceError(
             f"static: the load of {load:g} N was not met in 60 trials; nearest is {nearest.load:g} N. "
@@ -116,7 +154,7 @@ class Loader:
         step = self.equilibrium.solve(self.touch + trial, load)
         self.newton_steps += step.iterations
         if step.converged:
-            self._report("deflection", self.equilibrium.road_height - self.touch, "m", step)
+            self._report("deflection", self.deflection, "m", step)
         return step.converged
 
     def _guess(self, trial: float, known: list[_Known]) -> bool:

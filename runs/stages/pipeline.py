@@ -44,6 +44,7 @@ from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
+from tireroad.runs.stages.vibration import VibrationStage
 
 PARTS: tuple[type[Part], ...] = (
     StaticStage,
@@ -59,6 +60,7 @@ PARTS: tuple[type[Part], ...] = (
     ContactStage,
     ResponseStage,
     SpectraStage,
+    VibrationStage,
 )
 """In their order: each takes, by name, what stands before it."""
 
@@ -161,7 +163,7 @@ def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done |
     part = kind.taken(job, done)
     if isinstance(part, Shared):
         return Done("", part.make)
-    return None if part is None else _run(part, summary)
+    return _run(part, summary) if isinstance(part, Stage) else None
 
 
 def _run(stage: Stage, summary: Summary) -> Done:

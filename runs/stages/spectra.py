@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.spectra import amplitudes, third_octaves
 from tireroad.runs.files.store import put
+from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
 from tireroad.runs.stages.stored.contact_file import ContactHistory
@@ -21,12 +22,14 @@ _FEWEST = 32  # steps of which a spectrum says anything
 class Spectra:
     """Complex amplitudes over `frequency` (f,) Hz of the `contact_force` and, where it is kept, of the
     `axle_force`, (f, 3) N; its third octaves: band `centre` (b,) Hz and `level` (b, 3) dB re 1 N. The
-    first `left_out` s of the run, its run-in, are not in them.
+    first `left_out` s of the run, its run-in, are not in them. `wheel`: the motions of a wheel that moves and the
+    moments on its hub, (f, 3) or (f, 1), by the names of runs.stages.corner.
     """
 
     frequency: np.ndarray
     contact_force: np.ndarray
     left_out: float
+    wheel: dict[str, np.ndarray] = field(default_factory=dict)
     axle_force: np.ndarray | None = None
     centre: np.ndarray | None = None
     level: np.ndarray | None = None
@@ -70,9 +73,15 @@ class SpectraStage(Computed[Spectra]):
             centre, level = third_octaves(history.axle_force[start:], step)
             axle = {"axle_force": amplitude, "centre": centre, "level": level}
             _largest(record, frequency, amplitude)
+        wheel = {
+            name: amplitudes(values[start:].reshape(len(total), -1), step)[1]
+            for name, values in history.wheel.items()
+        }
         if start:
             record.headline["left out as run-in"] = (start * step, "s")
-        return Spectra(frequency=frequency, contact_force=contact, left_out=start * step, **axle)
+        return Spectra(
+            frequency=frequency, contact_force=contact, left_out=start * step, wheel=wheel, **axle
+        )
 
     def _after_run_in(self, record: Record, time: np.ndarray) -> int:
         """First step with the whole patch beyond the run-in.
@@ -100,12 +109,15 @@ class SpectraStage(Computed[Spectra]):
         for name, (stored, unit) in _UNITS.items():
             if getattr(product, name) is not None:
                 put(file, stored, getattr(product, name), unit)
+        for name, values in product.wheel.items():
+            put(file, name, values, corner.UNITS[name])
         file.attrs["left_out"] = product.left_out
 
     def read(self, file) -> Spectra:
         """The same."""
         kept = {name: file[stored][:] for name, (stored, _) in _UNITS.items() if stored in file}
-        return Spectra(left_out=float(file.attrs["left_out"]), **kept)
+        wheel = {name: file[name][:] for name in corner.UNITS if name in file}
+        return Spectra(left_out=float(file.attrs["left_out"]), wheel=wheel, **kept)
 
 
 def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
