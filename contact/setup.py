@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -81,7 +81,7 @@ class ContactSetup:
 
 def contact_setup(
     face: OuterFace,
-    lattice,
+    lattice: Any,
     road: RoadUnderTire,
     rolled: Rolled,
     *,

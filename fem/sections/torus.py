@@ -72,7 +72,9 @@ class Torus:
             order=self.order, wall=wall, arc=arc, place=self._place, patches=patches, plies=plies
         )
 
-    def lines(self, patches: Sequence[Patch], plies: Sequence[PlyLine]):
+    def lines(
+        self, patches: Sequence[Patch], plies: Sequence[PlyLine]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Corners through the wall, as shares of it, and along the arc, rad."""
         arcs = [end for patch in patches for arc in patch.arcs for end in arc]
         ends = [end for ply in plies for end in ply.arc]

@@ -196,7 +196,16 @@ class Loader:
         largest = 0.25 * self.body.ring.thickness
         self._march(attempt, start, end, largest, "deflection", 1.0, "m")
 
-    def _march(self, attempt, start, end, first, what, scale, unit) -> None:
+    def _march(
+        self,
+        attempt: Callable[[float], Step],
+        start: float,
+        end: float,
+        first: float,
+        what: str,
+        scale: float,
+        unit: str,
+    ) -> None:
         """From a converged `start` to `end` in steps from `first` on: grown when easy, cut back on failure."""
         done, size = start, first
         while True:

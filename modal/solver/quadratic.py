@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import optimize
 from slepc4py import SLEPc
@@ -117,7 +118,9 @@ def solve(mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -
     )
 
 
-def _condition(comm, mass, s, u, w, turn) -> float:
+def _condition(
+    comm: MPI.Comm, mass: np.ndarray, s: np.ndarray, u: np.ndarray, w: np.ndarray, turn: np.ndarray
+) -> float:
     """Of the pairing between vectors of unit momentum: about the worst of an eigenvalue. Raises ConvergenceError
     where states are next to defective, for which no vectors of their own serve.
     """
@@ -137,14 +140,18 @@ def _condition(comm, mass, s, u, w, turn) -> float:
     return condition
 
 
-def _pairing(comm, mass, drag, s, u, w) -> np.ndarray:
+def _pairing(
+    comm: MPI.Comm, mass: np.ndarray, drag: PETSc.Mat, s: np.ndarray, u: np.ndarray, w: np.ndarray
+) -> np.ndarray:
     """w_i^T [(s_i + s_j) M + D] u_j: diagonal but for clusters, where its inverse makes w biorthogonal."""
     moved = _times(drag, u)
     near = comm.allreduce(w.T @ (mass[:, None] * u))
     return s[:, None] * near + near * s + comm.allreduce(w.T @ moved)
 
 
-def _states(mass, drag, stiffness, wanted: int):
+def _states(
+    mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, wanted: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(s, vectors, residuals) of about `wanted` states nearest to zero, conjugates included."""
     weight = stiffness.createVecLeft()
     weight.array[:] = mass
@@ -200,7 +207,9 @@ def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, found: int) -> tuple[np.ndarray, np
     return s, vectors
 
 
-def _polished(factor: PETSc.Mat, mass, drag, s, vectors) -> np.ndarray:
+def _polished(
+    factor: PETSc.Mat, mass: np.ndarray, drag: PETSc.Mat, s: np.ndarray, vectors: np.ndarray
+) -> np.ndarray:
     """u = -K^-1 (s^2 M + s D) u once more, with the factorised K: it takes out what the Krylov basis
     carries in the stiffest directions, which is little in u and much in K u. Collective.
     """
@@ -234,12 +243,14 @@ def _up_to_a_gap(s: np.ndarray, wanted: int) -> np.ndarray:
     return order[:end]
 
 
-def _residuals(mass, drag, stiffness, s, vectors) -> np.ndarray:
+def _residuals(
+    mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, s: np.ndarray, vectors: np.ndarray
+) -> np.ndarray:
     """||(s^2 M + s D + K) u|| over the sum of its terms' norms, column by column. Collective."""
     comm = stiffness.comm.tompi4py()
     terms = [mass[:, None] * vectors * s**2, _times(drag, vectors) * s, _times(stiffness, vectors)]
 
-    def norm(field):
+    def norm(field: np.ndarray) -> np.ndarray:
         return np.sqrt(comm.allreduce((np.abs(field) ** 2).sum(axis=0)))
 
     return norm(sum(terms)) / sum(norm(term) for term in terms)
