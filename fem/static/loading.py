@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.errors import ConvergenceError, InputError, LoadingStopped
 from tireroad.fem.parallel import on_root
 from tireroad.fem.static.equilibrium import Equilibrium, Step
 from tireroad.fem.static.round import RoundEquilibrium
@@ -43,17 +43,6 @@ class _Known:
     deflection: float
     load: float
     displacement: np.ndarray
-
-
-class LoadingStopped(ConvergenceError):
-    """Load steps that became too small; `fact` is where, without advice."""
-
-    def __init__(self, fact: str) -> None:
-        super().__init__(
-            f"{fact}. The tire may fold or buckle here: lower the load or raise the inflation, stiffen "
-            "the material or refine the mesh around the footprint."
-        )
-        self.fact = fact
 
 
 class Loader:

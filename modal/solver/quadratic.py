@@ -20,6 +20,7 @@ from slepc4py import SLEPc
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver.fields import multiply
 
+Array = np.ndarray
 RESIDUAL_TOLERANCE = 1e-8
 _EXTRA = 10  # states beyond the wanted ones, to end in a gap and never inside a cluster
 _SAME = 1e-6  # relative distance of the right and left eigenvalue of one state
@@ -35,14 +36,14 @@ class FullModes:
     unit momentum.
     """
 
-    eigenvalue: np.ndarray
-    right: np.ndarray
-    left: np.ndarray
-    residual: np.ndarray
-    left_residual: np.ndarray
+    eigenvalue: Array
+    right: Array
+    left: Array
+    residual: Array
+    left_residual: Array
     condition: float
 
-    def among(self, wanted: np.ndarray) -> FullModes:
+    def among(self, wanted: Array) -> FullModes:
         """The states where `wanted` (q,) is true."""
         return FullModes(
             self.eigenvalue[wanted],
@@ -55,7 +56,7 @@ class FullModes:
 
 
 def window(
-    mass: np.ndarray,
+    mass: Array,
     drag: PETSc.Mat,
     stiffness: PETSc.Mat,
     span: tuple[float, float],
@@ -86,7 +87,7 @@ def window(
     return found.among(inside)
 
 
-def solve(mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -> FullModes:
+def solve(mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -> FullModes:
     """The `count` pairs (or about as many real states more) nearest to zero of a diagonal mass (own rows) kg,
     D (n, n) kg/s and K (n, n) N/m. Raises ConvergenceError. Collective.
     """
@@ -118,9 +119,7 @@ def solve(mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -
     )
 
 
-def _condition(
-    comm: MPI.Comm, mass: np.ndarray, s: np.ndarray, u: np.ndarray, w: np.ndarray, turn: np.ndarray
-) -> float:
+def _condition(comm: MPI.Comm, mass: Array, s: Array, u: Array, w: Array, turn: Array) -> float:
     """Of the pairing between vectors of unit momentum: about the worst of an eigenvalue. Raises ConvergenceError
     where states are next to defective, for which no vectors of their own serve.
     """
@@ -140,9 +139,7 @@ def _condition(
     return condition
 
 
-def _pairing(
-    comm: MPI.Comm, mass: np.ndarray, drag: PETSc.Mat, s: np.ndarray, u: np.ndarray, w: np.ndarray
-) -> np.ndarray:
+def _pairing(comm: MPI.Comm, mass: Array, drag: PETSc.Mat, s: Array, u: Array, w: Array) -> Array:
     """w_i^T [(s_i + s_j) M + D] u_j: diagonal but for clusters, where its inverse makes w biorthogonal."""
     moved = _times(drag, u)
     near = comm.allreduce(w.T @ (mass[:, None] * u))
@@ -150,8 +147,8 @@ def _pairing(
 
 
 def _states(
-    mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, wanted: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, wanted: int
+) -> tuple[Array, Array, Array]:
     """(s, vectors, residuals) of about `wanted` states nearest to zero, conjugates included."""
     weight = stiffness.createVecLeft()
     weight.array[:] = mass
@@ -195,7 +192,7 @@ def _states(
     return s, vectors, residual
 
 
-def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, found: int) -> tuple[np.ndarray, np.ndarray]:
+def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, found: int) -> tuple[Array, Array]:
     real, imaginary = matrix.createVecs()
     s = np.empty(found, complex)
     vectors = np.empty((real.getLocalSize(), found), complex)
@@ -207,9 +204,7 @@ def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, found: int) -> tuple[np.ndarray, np
     return s, vectors
 
 
-def _polished(
-    factor: PETSc.Mat, mass: np.ndarray, drag: PETSc.Mat, s: np.ndarray, vectors: np.ndarray
-) -> np.ndarray:
+def _polished(factor: PETSc.Mat, mass: Array, drag: PETSc.Mat, s: Array, vectors: Array) -> Array:
     """u = -K^-1 (s^2 M + s D) u once more, with the factorised K: it takes out what the Krylov basis
     carries in the stiffest directions, which is little in u and much in K u. Collective.
     """
@@ -228,11 +223,11 @@ def _polished(
     return better / np.sqrt(size)
 
 
-def _times(matrix: PETSc.Mat, vectors: np.ndarray) -> np.ndarray:
+def _times(matrix: PETSc.Mat, vectors: Array) -> Array:
     return multiply(matrix, vectors.real) + 1j * multiply(matrix, vectors.imag)
 
 
-def _up_to_a_gap(s: np.ndarray, wanted: int) -> np.ndarray:
+def _up_to_a_gap(s: Array, wanted: int) -> Array:
     """Indices by |s|, ending at the widest gap after the wanted ones: conjugates stay together."""
     order = np.argsort(np.abs(s), kind="stable")
     size = np.abs(s[order])
@@ -244,13 +239,13 @@ def _up_to_a_gap(s: np.ndarray, wanted: int) -> np.ndarray:
 
 
 def _residuals(
-    mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, s: np.ndarray, vectors: np.ndarray
-) -> np.ndarray:
+    mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, s: Array, vectors: Array
+) -> Array:
     """||(s^2 M + s D + K) u|| over the sum of its terms' norms, column by column. Collective."""
     comm = stiffness.comm.tompi4py()
     terms = [mass[:, None] * vectors * s**2, _times(drag, vectors) * s, _times(stiffness, vectors)]
 
-    def norm(field: np.ndarray) -> np.ndarray:
+    def norm(field: Array) -> Array:
         return np.sqrt(comm.allreduce((np.abs(field) ** 2).sum(axis=0)))
 
     return norm(sum(terms)) / sum(norm(term) for term in terms)
