@@ -24,9 +24,8 @@ Array = np.ndarray
 RESIDUAL_TOLERANCE = 1e-8
 _EXTRA = 10  # states beyond the wanted ones, to end in a gap and never inside a cluster
 _SAME = 1e-6  # relative distance of the right and left eigenvalue of one state
-DEFECTIVE = (
-    1e5  # two equal states come out at 7e5 to 1.3e6 by rounding, which differs with the processes
-)
+# Two equal states come out at 7e5 to 1.3e6 by rounding, which differs with the processes.
+DEFECTIVE = 1e5
 
 
 @dataclass(frozen=True)
