@@ -23,7 +23,7 @@ A rolling tire on a rough road: finite elements, modes, Green's functions, conta
 `mpirun -n N python3 -m runs COMMAND` is the same program in a batch script.
 """
 RUN = """\
-Runs the stages static, modes, rotating, greens, response, contact, spectra, report, as far as the
+Runs the stages static, modes, rotating, greens, response, contact, spectra, vibration, report, as far as the
 scene needs them. Stages already computed from the same inputs are reused unless --fresh.
 """
 SET_HELP = (

@@ -44,6 +44,7 @@ from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
+from tireroad.runs.stages.vibration import VibrationStage
 
 PARTS: tuple[type[Part], ...] = (
     StaticStage,
@@ -59,6 +60,7 @@ PARTS: tuple[type[Part], ...] = (
     ContactStage,
     ResponseStage,
     SpectraStage,
+    VibrationStage,
 )
 """In their order: each takes, by name, what stands before it."""
 

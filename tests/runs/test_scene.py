@@ -161,7 +161,6 @@ def test_contradictions_need_both_sides(scene_file) -> None:
     [
         "tire.mesh=tire.msh",
         "tire.section=car",
-        "output.vibration=true",
         "output.fields=true",
     ],
 )

@@ -186,7 +186,9 @@ class Output:
     )
     velocity: bool = flag(False, "velocity of the driven points")
     acceleration: bool = flag(False, "acceleration of the driven points")
-    vibration: bool = later("u(ω) on the whole tire")
+    vibration: bool = flag(
+        False, "vibration of the outer face in frequency, and its equivalent radiated power"
+    )
     fields: bool = later("motion of the whole tire in time, as XDMF")
     receptance: Receptance | None = table(
         Receptance, "receptances between the driven points", optional=True
