@@ -60,7 +60,9 @@ class Placement(Parameters):
         most=1e4,
     )
     start: float = number(0.0, "m", "x of the road under the axle at t = 0", least=-1e6, most=1e6)
-    offset: float = number(0.0, "m", "added to all heights, positive up", least=-10, most=10)
+    offset: float = number(
+        0.0, "m", "height added to the whole road, positive up", least=-10, most=10
+    )
 
 
 class RoadUnderTire:
