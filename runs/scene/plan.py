@@ -12,6 +12,7 @@ STAGES = (
     "response",
     "spectra",
     "vibration",
+    "motion",
     "report",
 )
 
@@ -36,6 +37,8 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
         reasons["spectra"] = "output.spectra is false"
     if not scene.output.vibration:
         reasons["vibration"] = "output.vibration is false"
+    if not scene.output.fields:
+        reasons["motion"] = "output.fields is false"
     if until is not None:
         for stage in STAGES[STAGES.index(until) + 1 :]:
             reasons.setdefault(stage, f"--until {until}")

@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import h5py
 import numpy as np
-from scipy import sparse
 
 from tireroad.contact.levels import a_weighting, band_sums
 from tireroad.contact.setup import ContactSetup
@@ -19,8 +18,7 @@ from tireroad.greens.vibration import Surface, coordinates, mean_square_velocity
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.build.point_forces import histories
-from tireroad.runs.stages.build.setup import components, probes
+from tireroad.runs.stages.build.forces import Forces, driven_loads
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.spectra import Spectra
 from tireroad.runs.stages.stage import Computed, Done
@@ -28,7 +26,6 @@ from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: references of the levels, ISO 1683
 _LARGEST = 2e8  # bytes of displacement fields kept
-_ROWS = 4096  # steps read at once
 HANN = 1.5  # lines of its window that share what one sine holds: mean of w^2 over the square of its mean
 
 
@@ -92,12 +89,15 @@ class VibrationStage(Computed[Vibration]):
     def compute(self, record: Record) -> Vibration | None:
         """On the root process, None on the others. Collective."""
         made: list[Vibration] = []
-        rolling, state, points = self.rotating.product, self.static.product, self._loads
+        rolling, state = self.rotating.product, self.static.product
+        loads = driven_loads(self.job, state, self.setup.product)
         left_out = self.spectra.product.left_out if self.spectra else 0.0
 
         def compute() -> dict[str, tuple[float, str]]:
             basis = Basis.of(rolling)
-            frequency, a = self._coordinates(basis, basis.seen(points).T, left_out)
+            contact = self.contact.product if self.contact else None
+            forces = Forces.of(self.job, self.setup.product, contact, basis.seen(loads))
+            frequency, a = self._coordinates(basis, forces, left_out)
             surface = Surface.of(state.points, self.job.tire.lattice.quads())
             made.append(_seen(basis.shape[: 3 * len(state.points)], surface, state, frequency, a))
             return _headline(made[0], surface)
@@ -105,26 +105,13 @@ class VibrationStage(Computed[Vibration]):
         record.headline |= on_root(self.job.comm, compute)
         return made[0] if made else None
 
-    @property
-    def _loads(self) -> sparse.csr_matrix:
-        """The driven points: of the patch's nodes in all components, then the prescribed forces. Collective."""
-        setup = self.setup.product
-        loads = probes(self.job, self.static.product, setup).loads
-        if setup is None:
-            return loads
-        patch = len(components(self.job)) * len(setup.patch.index)
-        return loads[: patch + len(self.job.scene.force)]
-
     def _coordinates(
-        self, basis: Basis, pushes: np.ndarray, left_out: float
+        self, basis: Basis, forces: Forces, left_out: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Lines (f,) Hz up to the end of the model, and a (f, m) at them. Root process only."""
-        time, step = self._time()
-        start = round(left_out / step)
-        pushed = np.concatenate(
-            [self._push(time[some], some, pushes) for some in _blocks(start, len(time))]
-        )
-        frequency, amplitude = amplitudes(pushed, step)
+        start = round(left_out / forces.step)
+        pushed = np.concatenate(list(forces.pushes(start)))
+        frequency, amplitude = amplitudes(pushed, forces.step)
         top = self._top
         below = (frequency > 0) & (frequency <= top)
         return frequency[below], coordinates(basis.states, amplitude[below], frequency[below])
@@ -132,27 +119,6 @@ class VibrationStage(Computed[Vibration]):
     @property
     def _top(self) -> float:
         return band(self.rotating.product, Wanted(band=self.job.scene.greens.band))
-
-    def _time(self) -> tuple[np.ndarray, float]:
-        if self.contact is not None:
-            return self.contact.product.time, self.contact.product.step
-        with h5py.File(self.job.path("response")) as file:
-            time = file["time"][1:]  # the end of each step
-        return time, float(time[1] - time[0])
-
-    def _push(self, time: np.ndarray, some: slice, pushes: np.ndarray) -> np.ndarray:
-        """Modal forces (n, m) of the steps `some`: B F, (m, k) times (k, n)."""
-        force = [histories(self.job.scene.force, time)]
-        setup = self.setup.product
-        if setup is not None:
-            with h5py.File(self.job.path("contact")) as file:
-                along = [file["normal_force"][some]]
-                if len(components(self.job)) > 1:
-                    along += [file["horizontal_force"][some, :, k] for k in (0, 1)]
-            weights = setup.patch.weights
-            onto = along if weights is None else [(weights.T @ one.T).T for one in along]
-            force = [*onto, *force]
-        return np.hstack(force) @ pushes.T
 
     def write(self, file: h5py.File, product: Vibration) -> None:
         """All there is."""
@@ -162,10 +128,6 @@ class VibrationStage(Computed[Vibration]):
     def read(self, file: h5py.File) -> Vibration:
         """The same."""
         return Vibration(**{name: file[stored][:] for name, (stored, _) in _UNITS.items()})
-
-
-def _blocks(start: int, stop: int) -> list[slice]:
-    return [slice(k, min(k + _ROWS, stop)) for k in range(start, stop, _ROWS)]
 
 
 def _seen(

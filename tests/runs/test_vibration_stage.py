@@ -27,6 +27,7 @@ error_estimate = false
 count = 12
 [output]
 vibration = true
+fields = true
 """
 FORCE = """
 [[force]]
@@ -58,7 +59,7 @@ def run(folder: Path, text: str) -> tireroad.RunResults:
     folder.mkdir(exist_ok=True)
     (folder / "scene.toml").write_text(TIRE + text)
     scene = load(folder / "scene.toml")
-    run_scene(scene, folder, MPI.COMM_SELF, until="vibration", fresh=False, petsc_options=[])
+    run_scene(scene, folder, MPI.COMM_SELF, until="motion", fresh=False, petsc_options=[])
     return tireroad.load(folder)
 
 
@@ -77,6 +78,18 @@ def test_a_steady_force_moves_the_face_by_its_receptance(tmp_path: Path) -> None
     assert level.argmax() == line and level[line + 3 :].max() < 1e-3 * level[line]
 
 
+def test_the_field_in_time_is_the_response_in_time(tmp_path: Path) -> None:
+    """By another stage of the program, from the same states."""
+    results = run(tmp_path, FORCE)
+    time, moved = results["motion/time"], results["motion/displacement"]
+    points = results["motion/surface/points"]
+    driven = np.argmax(points[:, 0] - 10 * np.abs(points[:, 1]) - 10 * np.abs(points[:, 2]))
+    rows = np.searchsorted(results["response/time"], time - 1e-6)
+    known = results["response/displacement"][rows, 0, 0]
+    np.testing.assert_allclose(moved[:, driven, 0], known, atol=0.01 * np.abs(known).max())
+    assert len(time) == 400 and time[-1] == pytest.approx(0.4)
+
+
 def test_a_rolling_tire_vibrates_as_its_road_passes(tmp_path: Path) -> None:
     results = run(tmp_path, ROLLING)
     frequency = results["vibration/frequency"]
@@ -86,6 +99,9 @@ def test_a_rolling_tire_vibrates_as_its_road_passes(tmp_path: Path) -> None:
     power = results["vibration/third_octave/radiated_power_level"]
     heard = results["vibration/third_octave/radiated_power_level_a_weighted"]
     assert len(power) and (heard < power).all()  # below 1 kHz
+    # The points of contact move as the loop said, but for the residual flexibility at them.
+    time, moved = results["motion/time"], results["motion/displacement"]
+    assert len(time) > 200 and np.isfinite(moved).all() and np.abs(moved).max() > 1e-6
 
 
 @pytest.mark.parametrize(

@@ -42,19 +42,20 @@ def _count(path, what: str, to: float, step: float, unit: str, most: int, error:
 
 
 def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """What the motion of the whole tire needs, in frequency and in time."""
     output = scene.output
-    if not output.vibration:
-        return
-    if scene.time is None or not (scene.force or scene.contact):
-        raise error(
-            ("output", "vibration"),
-            "needs forces in time: add [time] with [contact] or a [[force]]",
-        )
-    if scene.contact is not None and not output.spectra:
+    for key in ("vibration", "fields"):
+        if not getattr(output, key):
+            continue
+        if scene.time is None or not (scene.force or scene.contact):
+            raise error(
+                ("output", key), "needs forces in time: add [time] with [contact] or a [[force]]"
+            )
+        if scene.rotation is not None and scene.rotation.speed and scene.rotation.method == "full":
+            raise error(
+                ("output", key), 'is seen through the modes: take rotation.method = "projected"'
+            )
+    if output.vibration and scene.contact is not None and not output.spectra:
         raise error(
             ("output", "vibration"), "needs output.spectra, which find the run-in and the limit"
-        )
-    if scene.rotation is not None and scene.rotation.speed and scene.rotation.method == "full":
-        raise error(
-            ("output", "vibration"), 'is seen through the modes: take rotation.method = "projected"'
         )
