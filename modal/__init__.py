@@ -10,7 +10,6 @@ _HOMES = {
     "StateModes": "states",
     "StrainEnergy": "damping",
     "critical_speed": "campbell",
-    "full_states": "full_states",
     "onset": "campbell",
     "rolling_modes": "rolling",
     "standing_modes": "standing",

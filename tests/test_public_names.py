@@ -40,6 +40,8 @@ def _number(parameter: inspect.Parameter) -> bool:
 def test_an_unknown_name_is_an_attribute_error(package: str) -> None:
     module = import_module(f"tireroad.{package}")
     assert set(module.__all__) <= set(dir(module))
+    beside = {file.stem for file in Path(module.__path__[0]).iterdir()}
+    assert not beside & set(module.__all__), "a module of that name would take the name's place"
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         module.nothing  # noqa: B018
 
