@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.errors import LoadingStopped
 from tireroad.fem.static.equilibrium import Step
 
 _SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
@@ -25,17 +25,6 @@ class Show:
     what: str
     scale: float
     unit: str
-
-
-class LoadingStopped(ConvergenceError):
-    """Load steps that became too small; `fact` is where, without advice."""
-
-    def __init__(self, fact: str) -> None:
-        super().__init__(
-            f"{fact}. The tire may fold or buckle here: lower the load or raise the inflation, stiffen "
-            "the material or refine the mesh around the footprint."
-        )
-        self.fact = fact
 
 
 def march(attempt: Attempt, start: float, end: float, first: float, show: Show) -> None:
