@@ -96,7 +96,6 @@ class Equilibrium:
 
         With a `load` (N) the road is moved, from the given height on, until it carries that. `allowed`
         N may stay out of balance in a state that is only on the way to another.
-
         Newton's method and the active set of the road in one loop: a dof is held where
         f - c gap > 0, with c the dof's own stiffness; that is the complementarity condition for any
         c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Held dofs are put on
