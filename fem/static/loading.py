@@ -96,8 +96,12 @@ class Loader:
 
     def _inflate_in_steps(self, pressure: float) -> None:
         def attempt(fraction: float) -> Step:
+            reached = float(self.equilibrium.pressure.value)
             self.equilibrium.pressure.value = fraction * pressure
-            return self.equilibrium.solve()
+            step = self.equilibrium.solve()
+            if not step.converged:
+                self.equilibrium.pressure.value = reached  # the displacement is that one's again
+            return step
 
         self._march(attempt, 0.0, 1.0, 1.0, "inflation", pressure, "Pa")
 

@@ -64,11 +64,10 @@ class StaticStage(Computed[StaticState]):
         try:
             _press(loader, wanted)
         except ConvergenceError as error:
-            self._keep_last(static_state(equilibrium, loader.lowest()))
+            kept = self._keep_last(loader)
             rolling = steady_rolling(self.job)
             cause = with_cause(error, loader, rolling, lambda other: _press(other, wanted))
-            last = self.job.path("static_last")
-            raise ConvergenceError(f"{cause} The last state that converged is in {last}.") from None
+            raise ConvergenceError(f"{cause}{kept}") from None
         record.cost |= equilibrium.cost
         record.cost["other"] = time.perf_counter() - began - sum(equilibrium.cost.values())
         state = static_state(equilibrium, loader.touch)
@@ -80,12 +79,16 @@ class StaticStage(Computed[StaticState]):
         observe.say(f"  {_parts(record.cost)}")
         return state
 
-    def _keep_last(self, state: StaticState) -> None:
-        """Write the last state that converged. Collective."""
+    def _keep_last(self, loader: Loader) -> str:
+        """Write the last state that converged, if any did; a sentence that says where. Collective."""
+        if loader.touch is None and loader.equilibrium.pressure.value == 0:
+            return ""
         job, last = self.job, self.job.path("static_last")
+        state = static_state(loader.equilibrium, loader.lowest())
         job.write(
             last, job.provenance("static", "unfinished"), lambda file: self.write(file, state)
         )
+        return f" The last state that converged is in {last}."
 
     def _warn_at_rest(self, record: Record) -> None:
         if self.job.speed and not self.job.scene.static.steady_rolling:
