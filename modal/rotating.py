@@ -4,8 +4,7 @@
 
 (thesis (2.1)-(2.5), put right; the doppler form takes B for G and S_B for S). Its response to modal
 forces is kept as  eta(t) = Re[R z(t)] + R_b y(t),  z' = s z + L f,  y' = T y + L_b f:  one complex
-state per conjugate pair or real eigenvalue, and a real block for eigenvalues too close to defective
-to have usable vectors of their own.
+state per conjugate pair or real eigenvalue, and a real block for those too close to defective.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Load steps to a wanted state: inflation, then the road by height, deflection or load.
 
-Steps are cut back when Newton fails and grow again when it is easy; a step that cannot be made
-small enough is an error that names the last good state.
+Steps are cut back when Newton fails and grow when it is easy; one too small is an error with the last good state.
 """
 
 from __future__ import annotations

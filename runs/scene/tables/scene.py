@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from tireroad.fem.parameters import choice, flag, integer, number, text, vector
 from tireroad.runs.scene.schema import (
-    later,
     table,
     tables,
 )
@@ -193,8 +192,12 @@ class Output:
     )
     velocity: bool = flag(False, "velocity of the driven points")
     acceleration: bool = flag(False, "acceleration of the driven points")
-    vibration: bool = later("u(ω) on the whole tire")
-    fields: bool = later("motion of the whole tire in time, as XDMF")
+    vibration: bool = flag(
+        False, "vibration of the outer face in frequency, and its equivalent radiated power"
+    )
+    fields: bool = flag(
+        False, "motion of the outer face at the end of the run, also as XDMF for ParaView"
+    )
     receptance: Receptance | None = table(
         Receptance, "receptances between the driven points", optional=True
     )
