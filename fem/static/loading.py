@@ -1,7 +1,4 @@
-"""Load steps to a wanted state: inflation, then the road by height, deflection or load.
-
-Steps are cut back when Newton fails and grow when it is easy; one too small is an error with the last good state.
-"""
+"""Load steps to a wanted state: inflation, then the road by height, deflection or load."""
 
 from __future__ import annotations
 
@@ -84,8 +81,7 @@ class Loader:
 
         before = self.body.u.x.array.copy()
         self.body.set_displacement(on_root(self.body.comm, shape))
-        self.equilibrium.pressure.value = pressure
-        step = self.equilibrium.solve()
+        step = self._solve_at(pressure)
         self.newton_steps += step.iterations
         if step.converged:
             self._report("inflation", pressure, "Pa", step)
@@ -94,15 +90,17 @@ class Loader:
         return step.converged
 
     def _inflate_in_steps(self, pressure: float) -> None:
-        def attempt(fraction: float) -> Step:
-            reached = float(self.equilibrium.pressure.value)
-            self.equilibrium.pressure.value = fraction * pressure
-            step = self.equilibrium.solve()
-            if not step.converged:
-                self.equilibrium.pressure.value = reached  # the displacement is that one's again
-            return step
+        self._march(
+            lambda part: self._solve_at(part * pressure), 0.0, 1.0, 1.0, "inflation", pressure, "Pa"
+        )
 
-        self._march(attempt, 0.0, 1.0, 1.0, "inflation", pressure, "Pa")
+    def _solve_at(self, pressure: float) -> Step:
+        before = float(self.equilibrium.pressure.value)
+        self.equilibrium.pressure.value = pressure
+        step = self.equilibrium.solve()
+        if not step.converged:
+            self.equilibrium.pressure.value = before  # as the displacement is put back
+        return step
 
     @property
     def touch(self) -> float:
@@ -223,8 +221,7 @@ class Loader:
                 known.append(self._reached(deflection))
             return step
 
-        largest = 0.25 * self.body.ring.thickness
-        self._march(attempt, start, end, largest, "deflection", 1.0, "m")
+        self._march(attempt, start, end, 0.25 * self.body.ring.thickness, "deflection", 1.0, "m")
 
     def _march(self, attempt, start, end, first, what, scale, unit) -> None:
         """From a converged `start` to `end` in steps from `first` on: grown when easy, cut back on failure."""
@@ -249,6 +246,5 @@ class Loader:
 
     def _report(self, what: str, value: float, unit: str, step: Step) -> None:
         force = self.equilibrium.contact_force()
-        total = self.body.comm.allreduce(force.sum())
-        active = self.body.comm.allreduce(int((force > 0).sum()))
+        total, active = self.load(), self.body.comm.allreduce(int((force > 0).sum()))
         self.report(Progress(what, value, unit, total, active, step))
