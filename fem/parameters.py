@@ -148,6 +148,21 @@ def text(default: str | None, doc: str, *, only_for: OnlyFor = None) -> Any:
     return parameter(key, default)
 
 
+def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] = ()) -> Any:
+    """A list of finite numbers, of any length, each within the limits."""
+
+    def read(value: Any) -> tuple[float, ...]:
+        if not isinstance(value, list | tuple):
+            raise ValueError(f"must be a list of numbers, not {described(value)}")
+        result = tuple(finite(part) for part in value)
+        for part in result:
+            limits.check(part, unit)
+        return result
+
+    key = Key(read=read, unit=unit, doc=doc, values=f"numbers, {limits}", limits=limits)
+    return parameter(key, default)
+
+
 def texts(doc: str, *, only_for: OnlyFor = None) -> Any:
     """A list of texts, or one alone; empty by default."""
 

@@ -9,6 +9,7 @@ from tireroad.runs.scene.schema import (
 )
 from tireroad.runs.scene.tables.axle import AxleTable
 from tireroad.runs.scene.tables.contact import Contact, Time
+from tireroad.runs.scene.tables.pattern import PatternTable
 from tireroad.runs.scene.tables.road import Road
 from tireroad.runs.scene.tables.stiffness import Stiffness
 from tireroad.runs.scene.tables.tire import Tire
@@ -84,6 +85,13 @@ class Campbell:
 class Rotation:
     speed: float = number(
         100.0, "rad/s", "speed of rotation of the wheel; 0: standing", least=0, most=2000
+    )
+    travel_speed: float | None = number(
+        None,
+        "m/s",
+        "speed over the road, instead of speed: the wheel turns as fast as it rolls freely; 25 m/s are 90 km/h",
+        least=1e-6,
+        most=500,
     )
     inertia: str = choice(
         "full",
@@ -223,6 +231,11 @@ class Scene:
     greens: Greens = table(Greens, "Green's functions")
     force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")
     contact: Contact | None = table(Contact, "contact with the road in time", optional=True)
+    pattern: PatternTable | None = table(
+        PatternTable,
+        "grooves of the tread, which turn with the tire; absent: a slick",
+        optional=True,
+    )
     road: Road | None = table(Road, "the road driven over", optional=True)
     time: Time | None = table(Time, "the run in time", optional=True)
     output: Output = table(Output, "what is computed and kept")
