@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -98,7 +98,7 @@ class ContactSetup:
 
 def contact_setup(
     face: OuterFace,
-    lattice,
+    lattice: Any,
     road: RoadUnderTire,
     rolled: Rolled,
     *,
