@@ -15,6 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from tireroad.fem import compat, kinematics
+from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.held_system import HeldSystem, Moved
 from tireroad.fem.static.shape_damping import ShapeDamping
 from tireroad.fem.static.virtual_work import (
@@ -193,6 +194,23 @@ class Equilibrium:
         nothing = np.zeros(len(self._work.array_r))
         _, force = self._system.solve(nothing, self._system.raising)
         return self.body.comm.allreduce(float(force.sum()))
+
+    def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
+        """Under a vertical traction in place of the road: the height (m) that the face gains by one step of
+        Newton's method from the present state, and that by a newton more. Collective.
+
+        `weights` (s,) of the outer face's nodes, of sum 1, say where the `load` (N) acts and the height is read.
+        """
+        self._before.x.array[:] = self.body.u.x.array
+        out = self._assemble_residual().copy()
+        self._assemble_tangent()
+        if not self._system.take(self.matrix, np.zeros(0, np.intp), np.zeros(0)):
+            raise ConvergenceError("static: the tangent without a road is singular")
+        face, push = self.body.surface, np.zeros(len(out))
+        push[3 * face.local + 2] = weights[face.place]
+        push[self._rim] = 0.0
+        gained = [push @ self._system.solve(right)[0] for right in (load * push - out, push)]
+        return tuple(self.body.comm.allreduce(np.array(gained)))
 
     def contact_force(self) -> np.ndarray:
         """Vertical force of the road on the owned nodes (nodes,), N; not negative. Not collective."""

@@ -85,7 +85,7 @@ def spectra(results: Results) -> Section:
         return section
     spacing = quantity(float(frequency[1] - frequency[0]), "Hz")
     section.facts.append(("spacing of lines", spacing))
-    section.facts.append(("up to", quantity(float(frequency.max()), "Hz")))
+    section.facts += attributes(results, name, (("limit", "Hz"), ("limit_cause", "")))
     section.figures.append((figures.spectrum(frequency, force, of), "Amplitude spectrum."))
     centre = results.optional(name, "third_octave/centre")
     level = results.optional(name, "third_octave/level")

@@ -41,7 +41,8 @@ class Static:
         True, "inertia and material damping of the rolling shape; false: the state at rest"
     )
     error_estimate: bool = flag(
-        True, "estimate of the load's discretisation error, by a solution on coarser elements"
+        True,
+        "estimate of the load's discretisation error, by finer elements at the footprint and another order of all",
     )
 
 

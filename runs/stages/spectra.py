@@ -7,9 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from tireroad.contact.limits import Limit, limits, lowest, pitch
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.spectra import amplitudes, third_octaves
+from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
+from tireroad.runs.process import observe
 from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
@@ -20,15 +23,18 @@ _FEWEST = 32  # steps of which a spectrum says anything
 @dataclass(frozen=True, kw_only=True)
 class Spectra:
     """Complex amplitudes over `frequency` (f,) Hz of the `contact_force` and, where it is kept, of the
-    `axle_force`, (f, 3) N; its third octaves: band `centre` (b,) Hz and `level` (b, 3) dB re 1 N. The
-    first `left_out` s of the run, its run-in, are not in them.
+    `axle_force`, (f, 3) N; third octaves: band `centre` (b,) Hz, `level` of the axle force and
+    `contact_level` (b, 3) dB re 1 N. The first `left_out` s of the run, its run-in, are not in them, nor
+    is anything beyond the `limit` of the model.
     """
 
     frequency: np.ndarray
     contact_force: np.ndarray
     left_out: float
+    limit: Limit
+    centre: np.ndarray
+    contact_level: np.ndarray
     axle_force: np.ndarray | None = None
-    centre: np.ndarray | None = None
     level: np.ndarray | None = None
 
 
@@ -38,6 +44,7 @@ _UNITS = {
     "axle_force": ("axle_force", "N"),
     "centre": ("third_octave/centre", "Hz"),
     "level": ("third_octave/level", "dB re 1 N"),
+    "contact_level": ("third_octave/contact_level", "dB re 1 N"),
 }
 
 
@@ -48,9 +55,10 @@ class SpectraStage(Computed[Spectra]):
     name: ClassVar[str] = "spectra"
     contact: Done[ContactHistory]
     setup: Done[ContactSetup]
+    rotating: Done[RollingModes]
 
     def inputs(self) -> dict:
-        """The contact forces: the length of road that is left out as run-in is in them."""
+        """The contact forces: the length of road that is left out as run-in is in them, and the modes."""
         return {"contact": self.contact.key}
 
     def compute(self, record: Record) -> Spectra:
@@ -62,17 +70,51 @@ class SpectraStage(Computed[Spectra]):
             record.warnings.append(
                 f"the spectra are of {len(total)} steps: lengthen time.duration to have any use of them"
             )
-        frequency, contact = amplitudes(total, step)
         record.headline["resolution"] = (1 / (len(total) * step), "Hz")
-        axle = {}
-        if history.axle_force is not None:
-            _, amplitude = amplitudes(history.axle_force[start:], step)
-            centre, level = third_octaves(history.axle_force[start:], step)
-            axle = {"axle_force": amplitude, "centre": centre, "level": level}
-            _largest(record, frequency, amplitude)
         if start:
             record.headline["left out as run-in"] = (start * step, "s")
-        return Spectra(frequency=frequency, contact_force=contact, left_out=start * step, **axle)
+        limit = self._limit(record, step)
+        frequency, contact = amplitudes(total, step)
+        below = frequency <= limit.frequency
+        centre, contact_level = third_octaves(total, step, limit.frequency)
+        axle = {}
+        if history.axle_force is not None:
+            force = history.axle_force[start:]
+            amplitude = amplitudes(force, step)[1][below]
+            axle = {
+                "axle_force": amplitude,
+                "level": third_octaves(force, step, limit.frequency)[1],
+            }
+            _largest(record, frequency[below], amplitude)
+        return Spectra(
+            frequency=frequency[below],
+            contact_force=contact[below],
+            left_out=start * step,
+            limit=limit,
+            centre=centre,
+            contact_level=contact_level,
+            **axle,
+        )
+
+    def _limit(self, record: Record, step: float) -> Limit:
+        """Where the model ends, told with what sets it."""
+        setup, rolling = self.setup.product, self.rotating.product
+        found = limits(
+            step=step,
+            highest=rolling.highest / (2 * np.pi),
+            pitch=pitch(setup.patch),
+            speed=setup.rolled.speed,
+        )
+        limit = lowest(found)
+        record.headline["an answer up to"] = (limit.frequency, "Hz")
+        record.headline["which is"] = (limit.cause, "-")
+        others = ", ".join(
+            f"{other.cause} would allow {other.frequency:.4g} Hz"
+            for other in found
+            if other != limit
+        )
+        observe.say(f"  spectra end at {limit.frequency:.4g} Hz, {limit.cause}; {others}")
+        return limit
 
     def _after_run_in(self, record: Record, time: np.ndarray) -> int:
         """First step with the whole patch beyond the run-in.
@@ -101,16 +143,19 @@ class SpectraStage(Computed[Spectra]):
             if getattr(product, name) is not None:
                 put(file, stored, getattr(product, name), unit)
         file.attrs["left_out"] = product.left_out
+        file.attrs["limit"] = product.limit.frequency
+        file.attrs["limit_cause"] = product.limit.cause
 
     def read(self, file) -> Spectra:
         """The same."""
         kept = {name: file[stored][:] for name, (stored, _) in _UNITS.items() if stored in file}
-        return Spectra(left_out=float(file.attrs["left_out"]), **kept)
+        limit = Limit(float(file.attrs["limit"]), str(file.attrs["limit_cause"]))
+        return Spectra(left_out=float(file.attrs["left_out"]), limit=limit, **kept)
 
 
 def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
-    """The largest line of the vertical axle force below 1 kHz, away from the mean."""
-    band = np.flatnonzero((np.arange(len(frequency)) > 2) & (frequency < 1000))
+    """The largest line of the vertical axle force, away from the mean."""
+    band = np.arange(min(3, len(frequency)), len(frequency))
     if len(band):
         peak = band[np.abs(axle[band, 2]).argmax()]
         record.headline["largest vertical axle force"] = (float(np.abs(axle[peak, 2])), "N")

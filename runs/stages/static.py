@@ -138,12 +138,11 @@ def _estimate(record: Record, state: StaticState, loader: Loader) -> None:
     if isinstance(found, str):
         observe.say(f"  error of the load not estimated: {found}")
         return
-    load = state.load
     record.indicators["estimated error of the load"] = (100 * found.relative, "%")
     observe.say(
-        f"  estimated error of the load at this deflection: {100 * found.relative:.2g} %, from "
-        f"{found.load:.6g} N on elements of twice the size ({found.unknowns} unknowns) against "
-        f"{load:.6g} N"
+        f"  estimated error of the load at this height of the road: {100 * found.relative:.2g} % (ever "
+        f"smaller elements: {found.load:.5g} N); of the footprint's elements {100 * found.footprint:.2g} %, of "
+        f"the rest {100 * found.bulk:.2g} %; {found.unknowns} unknowns with finer elements there"
     )
     if found.relative > COARSE:
         record.warnings.append(
