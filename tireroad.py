@@ -21,6 +21,7 @@ _HOMES = {
     "drive": "tireroad.runs.drive",
     "make_road": "tireroad.contact.roads.road",
     "Material": "tireroad.fem.tire.material",
+    "compound": "tireroad.fem.tire.material",
     "Turning": "tireroad.fem.turning",
     "load": "tireroad.runs.files.reader",
     "RunResults": "tireroad.runs.files.reader",

@@ -22,8 +22,8 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.modal.basis import Projection
-from tireroad.modal.fields import gram, multiply
-from tireroad.modal.undamped import Modes
+from tireroad.modal.solver.fields import gram, multiply
+from tireroad.modal.solver.modes import Modes
 
 # Of each point's own static flexibility: what the shapes left out may add up to. At 90 rad/s the receptance up
 # to half the highest mode then changes by 1.2e-3, with 1e-3 by 5e-3.

@@ -22,7 +22,6 @@ from tireroad.fem.matrices.compliance import (
 from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
-from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning
 from tireroad.greens.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
@@ -30,39 +29,12 @@ from tireroad.greens.basis import Basis, regained
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, second_order
 from tireroad.modal.basis import Projection, project, with_air
-from tireroad.modal.damping import Damping, StrainEnergy, beyond, tail_loss
+from tireroad.modal.damping import Damping, tail_loss
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import StateModes, matrices
-from tireroad.modal.undamped import Modes
+from tireroad.modal.solver.modes import Modes
 
 _SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by their sign at least
-
-
-def wheel_of(
-    motions: SmallMotions,
-    turning: Turning,
-    air: Column | None = None,
-    projection: Projection | None = None,
-) -> Wheel:
-    """The full matrices of a tire at its static state as the wheel turns, with the `air` in it.
-
-    `projection` on the modes: for damping by strain energy only, which has no full matrices. Collective.
-    """
-    shape, tail = motions.static.rolling, None
-    if shape.speed and (shape.speed, shape.inertia) != (turning.speed, turning.inertia):
-        raise InputError(
-            f"the static state rolls at {shape.speed:g} rad/s with {shape.inertia} inertia, its small motions at "
-            f"{turning.speed:g} rad/s with {turning.inertia}: take one and the same, or a state at rest"
-        )
-    if isinstance(turning.damping, StrainEnergy):
-        if projection is None:
-            raise InputError(
-                "damping by strain energy is known by the modes: give their projection"
-            )
-        tail = beyond(turning.damping, projection)
-    rotation = motions.rotation if turning.speed else None
-    given = turning.speed, turning.damping, turning.inertia
-    return Wheel(motions.operators, rotation, *given, air, tail)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg
 
+from tireroad.greens.parted import parted
 from tireroad.modal.states import StateModes, growing
 
 # Radians a state may turn in a step and stay dynamic. Undamped and bouncing on a stiff tread, up to 3
@@ -138,48 +139,30 @@ class Response:
         return np.concatenate([self.eigenvalue, np.linalg.eigvals(self._held_block()[0])])
 
     def keeping_where(self, wanted: Callable[[np.ndarray], np.ndarray]) -> Response:
-        """The poles and the block's states where `wanted` of all their eigenvalues is true, and rigid states;
-        the others follow the force statically.
-        """
+        """Rigid states, and those where `wanted` of their eigenvalues is true; the others follow statically."""
         values = self.every
         stays = wanted(values)
         poles = self.keeping(stays[: len(self.eigenvalue)])
         return poles._block_keeping(values[len(self.eigenvalue) :], stays[len(self.eigenvalue) :])
 
     def _block_keeping(self, values: np.ndarray, stays: np.ndarray) -> Response:
-        """The same for the block alone: its Schur form is cut between the two kinds, and Sylvester's
-        equation A X - X B = -C parts them.
-        """
+        """The same for the block alone."""
         if stays.all():
             return self
         held, output, push = self._held_block()
         momentum = self.block_momentum[:, : len(held)]
-
-        def first(re: float, im: float) -> bool:
-            return bool(stays[np.abs(values - complex(re, im)).argmin()])
-
-        schur, turn, p = linalg.schur(held, output="real", sort=first)
-        X = linalg.solve_sylvester(schur[:p, :p], -schur[p:, p:], -schur[:p, p:])
-        unit = np.eye(len(held))
-        left, right = unit.copy(), unit
-        right[:p, p:], left[:p, p:] = X, -X
-        output, momentum, push = (
-            output @ turn @ right,
-            momentum @ turn @ right,
-            left @ turn.T @ push,
-        )
-        following = np.linalg.solve(schur[p:, p:], push[p:])
-        gone, left_out = output[:, p:] @ following, self.left_out
+        kept = parted(held, values, stays)
+        following = kept.following(push)
+        k, left_out = len(held), self.left_out
         if left_out is not None:
-            left_out = left_out - momentum[:, p:] @ following
-        k = len(held)
+            left_out = left_out - momentum @ following
         return replace(
             self,
-            block=linalg.block_diag(schur[:p, :p], self.block[k:, k:]),
-            block_output=np.hstack([output[:, :p], self.block_output[:, k:]]),
-            block_input=np.vstack([push[:p], self.block_input[k:]]),
-            block_momentum=np.hstack([momentum[:, :p], self.block_momentum[:, k:]]),
-            residual=self.residual - gone,
+            block=linalg.block_diag(kept.block, self.block[k:, k:]),
+            block_output=np.hstack([output @ kept.right, self.block_output[:, k:]]),
+            block_input=np.vstack([kept.left @ push, self.block_input[k:]]),
+            block_momentum=np.hstack([momentum @ kept.right, self.block_momentum[:, k:]]),
+            residual=self.residual - output @ following,
             left_out=left_out,
         )
 
@@ -188,10 +171,8 @@ class Response:
         return np.abs(self.eigenvalue) * step <= limit
 
     def resolved(self, step: float, limit: float = RESOLVED) -> Response:
-        """Poles and states of the block with |s| step above the limit follow the force statically.
-
-        Over so long a step their turning is not seen, and they can gain energy in contact.
-        """
+        """Poles and states of the block with |s| step above the limit follow the force statically: over so
+        long a step their turning is not seen, and they can gain energy in contact."""
         return self.keeping_where(lambda s: np.abs(s) * step <= limit)
 
     def rate(self) -> Response:
@@ -221,9 +202,7 @@ class Response:
         )
 
     def joined(self, other: Response) -> Response:
-        """Both sets of states between the same outputs and forces; the residuals add up. The `other`
-        has no rigid states.
-        """
+        """Both sets of states between the same outputs and forces, the residuals added; no rigid `other`."""
         return Response(
             np.concatenate([self.eigenvalue, other.eigenvalue]),
             np.hstack([self.output, other.output]),

@@ -8,8 +8,8 @@ import numpy as np
 
 from tireroad.fem.cavity.column import Column
 from tireroad.modal.air import Air
-from tireroad.modal.fields import CHUNK, gram, multiply
-from tireroad.modal.undamped import Modes
+from tireroad.modal.solver.fields import CHUNK, gram, multiply
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import Labels
 
 

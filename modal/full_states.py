@@ -12,13 +12,13 @@ import numpy as np
 from petsc4py import PETSc
 
 from tireroad.fem.matrices.operators import Operators
-from tireroad.modal import quadratic
-from tireroad.modal.agreement import missing, truncation
 from tireroad.modal.damping import beyond
-from tireroad.modal.fields import gram
-from tireroad.modal.quadratic import FullModes
 from tireroad.modal.rolling import RollingModes
 from tireroad.modal.rotating import StateModes
+from tireroad.modal.solver import quadratic
+from tireroad.modal.solver.agreement import missing, truncation
+from tireroad.modal.solver.fields import gram
+from tireroad.modal.solver.quadratic import FullModes
 
 _ROUNDING = 1e-14  # of the largest squared length: directions below are the fields' rounding
 

@@ -8,9 +8,10 @@ from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
-from tireroad.modal import undamped
 from tireroad.modal.basis import ModalBasis, project, with_air
-from tireroad.modal.symmetry import Sites
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.symmetry import Sites
 
 _SAME = 1e-6  # relative distance of the frequencies of one mode in two solutions
 
@@ -32,9 +33,7 @@ def standing_modes(
     return projected(motions, solved(motions.operators, count=count, up_to=up_to), rotation, air)
 
 
-def solved(
-    operators: Operators, *, count: int | None = None, up_to: float | None = None
-) -> undamped.Modes:
+def solved(operators: Operators, *, count: int | None = None, up_to: float | None = None) -> Modes:
     """The modes alone. Collective."""
     if count is None and up_to is None:
         raise InputError("modes: give count, how many of the lowest, or up_to, a frequency in Hz")
@@ -48,7 +47,7 @@ def solved(
 
 
 def projected(
-    motions: SmallMotions, modes: undamped.Modes, rotation: bool, air: Column | None = None
+    motions: SmallMotions, modes: Modes, rotation: bool, air: Column | None = None
 ) -> ModalBasis:
     """The basis of these modes: what they project and show. Collective."""
     operators = motions.operators

@@ -30,11 +30,12 @@ from tireroad.fem.static.press import press as press_tire
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import Material, compound
 from tireroad.fem.turning import Turning
-from tireroad.greens.coupling import Wheel, wheel_of
+from tireroad.greens.coupling import Wheel
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
+from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes
@@ -78,7 +79,7 @@ def torus(
         order,
         footprint_size=footprint_size,
     ).ring()
-    rubber = material or Material(
+    rubber = material or compound(
         "neo-hookean", density, youngs_modulus=youngs_modulus, poisson_ratio=poisson_ratio
     )
     return TireModel(section, lambda: Body(comm, section, {"wall": rubber}))

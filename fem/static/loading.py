@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.static.equilibrium import Equilibrium, Step
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.step import Step
 from tireroad.fem.static.tread_surface import TreadSurface
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to

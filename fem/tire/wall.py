@@ -11,7 +11,8 @@ from dolfinx import fem
 from tireroad.fem import compat
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.grid import Patch
-from tireroad.fem.tire.material import LAWS, Material
+from tireroad.fem.tire.law import MATERIALS, MaterialLaw
+from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import TireMesh
 
 
@@ -57,21 +58,19 @@ class Wall:
             raise InputError(f"section: no material for region {missing[0]!r}")
         self._owner = section.region[tire.section_cell]  # of each cell: the number of its region
         self._materials = [materials[name] for name in section.regions]
-        self.density = self._field("density", None)
+        self.density = self._by_cell([m.density for m in self._materials])
         self.stiffens = any(m.dynamic != 1 for m in self._materials)
         self.loses = any(m.loss_factor for m in self._materials)
         self._laws = [
-            (law.energy, [self._field(name, model) for name in law.coefficients])
-            for model, law in LAWS.items()
-            if any(m.model == model for m in self._materials)
+            (law.energy, [self._coefficient(name, law) for name in law.coefficients])
+            for law in map(MATERIALS.__getitem__, MATERIALS)
+            if any(type(m.law) is law for m in self._materials)
         ]
 
-    def _field(self, name: str, model: str | None) -> fem.Function:
-        """An attribute of the materials by cell; 0 where the material follows another law."""
-        materials = self._materials
-        return self._by_cell(
-            [getattr(m, name) if model in (None, m.model) else 0.0 for m in materials]
-        )
+    def _coefficient(self, name: str, law: type[MaterialLaw]) -> fem.Function:
+        """A coefficient of the law by cell; 0 where the material follows another law."""
+        own = [m.law for m in self._materials]
+        return self._by_cell([getattr(one, name) if type(one) is law else 0.0 for one in own])
 
     def _by_cell(self, values: Sequence[float]) -> fem.Function:
         field = fem.Function(self._space)

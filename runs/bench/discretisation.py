@@ -76,9 +76,13 @@ def _section(order, segments, arc, thickness, grading, size):
 
 def _body(section, ratio: float = 0.45):
     from tireroad.fem.tire.body import Body
-    from tireroad.fem.tire.material import Material
+    from tireroad.fem.tire.material import compound
 
-    return Body(MPI.COMM_WORLD, section, Material("neo-hookean", 1200.0, 48e6, ratio))
+    return Body(
+        MPI.COMM_WORLD,
+        section,
+        compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=ratio),
+    )
 
 
 def _answer(section, consistent: bool = False) -> Answer:
@@ -108,7 +112,7 @@ def _answer(section, consistent: bool = False) -> Answer:
 
 
 def _frequencies(operators, count: int = COUNT) -> np.ndarray:
-    from tireroad.modal import undamped
+    from tireroad.modal.solver import undamped
     from tireroad.modal.standing import sites
 
     where = sites(operators)

@@ -26,16 +26,16 @@ def _operators(around: int, along: int, order: int):
     """The undeformed torus. Collective."""
     from tireroad.fem.matrices.operators import Operators
     from tireroad.fem.tire.body import Body
-    from tireroad.fem.tire.material import Material
+    from tireroad.fem.tire.material import compound
     from tireroad.fem.tire.mesh import Torus
 
     section = Torus(0.32, 0.1, 0.012, np.radians(120), around, along, 1, order)
-    rubber = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
+    rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     return Operators(Body(MPI.COMM_WORLD, section, rubber), 0.0)
 
 
 def _solve(operators, count: int, waves: bool = True):
-    from tireroad.modal import undamped
+    from tireroad.modal.solver import undamped
 
     return undamped.solve(
         operators.stiffness, operators.mass, count, sites=sites(operators), waves=waves

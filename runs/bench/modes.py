@@ -66,11 +66,11 @@ def _tire(comm: MPI.Comm):
     from tireroad.fem.static.equilibrium import Equilibrium
     from tireroad.fem.static.loading import Loader
     from tireroad.fem.tire.body import Body
-    from tireroad.fem.tire.material import Material
+    from tireroad.fem.tire.material import compound
     from tireroad.fem.tire.mesh import Torus
 
     section = Torus(0.32, 0.1, 0.012, np.radians(120), 80, 16, 1, 2, footprint_size=0.25)
-    material = Material(
+    material = compound(
         model="neo-hookean", youngs_modulus=48e6, poisson_ratio=0.45, density=1200.0
     )
     body = Body(comm, section, material)
@@ -89,7 +89,7 @@ def _timed(comm: MPI.Comm, work: Callable):
 
 
 def _standing(comm: MPI.Comm, operators):
-    from tireroad.modal import undamped
+    from tireroad.modal.solver import undamped
     from tireroad.modal.standing import sites
 
     rows, modes = [], None
@@ -128,8 +128,8 @@ def _standing(comm: MPI.Comm, operators):
 
 def _plain(comm: MPI.Comm, operators) -> Table:
     """The same modes by SLEPc's interval slicing of the whole standard problem, on one process. Collective."""
-    from tireroad.modal import undamped
-    from tireroad.modal.fields import everywhere, scaled_by
+    from tireroad.modal.solver import undamped
+    from tireroad.modal.solver.fields import everywhere, scaled_by
     from tireroad.runs.stages.modes import sites
 
     observe.say(f"{RATIO} modes by SLEPc's interval slicing ...")
@@ -194,9 +194,9 @@ def _interval(matrix, top: float) -> int:
 
 def _rolling(comm: MPI.Comm, operators, modes) -> tuple[Table, float]:
     """The projected problem at 50 rad/s on leading parts of one basis: time, and error of the lowest states."""
-    from tireroad.modal.agreement import truncation
     from tireroad.modal.basis import project
     from tireroad.modal.rotating import checks, matrices, rotating
+    from tireroad.modal.solver.agreement import truncation
 
     observe.say("projected states ...")
     projection = project(modes, operators.rotation(), operators.carried, comm)

@@ -14,11 +14,12 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.turning import Turning
-from tireroad.greens.coupling import Basis, Wheel, wheel_of
+from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.recursion import Recursion
+from tireroad.greens.small_motions import wheel_of
 from tireroad.greens.state_selection import keep
 from tireroad.greens.truncation import Cutoff, estimate
 from tireroad.modal.basis import ModalBasis
@@ -64,7 +65,7 @@ def run() -> list[Table]:
 def _tire(comm: MPI.Comm, segments: int, elements_arc: int) -> SmallMotions:
     """An inflated torus of 48 MPa. Collective."""
     section = Torus(0.32, 0.10, 0.012, np.radians(120), segments, elements_arc, 1, 2)
-    rubber = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
+    rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     tire = TireModel(section, lambda: Body(comm, section, rubber))
     loader = Loader(Equilibrium(tire.body), lambda progress: None)
     loader.inflate(INFLATION)

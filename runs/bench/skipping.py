@@ -86,7 +86,7 @@ def _seconds(run: Rolled, stages: tuple[str, ...]) -> float:
 
 def _mirrors(folder: Path, mesh: Mesh, keys: dict) -> list:
     """The modes of a tire whose mirror plane is used, and is not."""
-    from tireroad.modal import undamped
+    from tireroad.modal.solver import undamped
     from tireroad.modal.standing import solved
 
     operators = prepared(folder / "rolling", mesh, **keys).run.motions.operators

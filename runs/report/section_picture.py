@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.runs.report.section_figure import save_section
-from tireroad.runs.scene.own_tire import own_section
-from tireroad.runs.scene.tables import Scene
-from tireroad.runs.scene.tire_section import make_section
+from tireroad.runs.scene.extent.own_tire import own_section
+from tireroad.runs.scene.extent.tire_section import make_section
+from tireroad.runs.scene.tables.scene import Scene
 
 NAME = "section.png"
 

@@ -3,14 +3,14 @@
 from pathlib import Path
 from typing import Any
 
-from tireroad.runs.scene.demand import check_demand, duration
-from tireroad.runs.scene.estimate import estimate
-from tireroad.runs.scene.own_tire import described
+from tireroad.runs.scene.extent.demand import check_demand, duration
+from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.scene.extent.own_tire import described
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.road_check import check_road
+from tireroad.runs.scene.rules.road import check_road
 from tireroad.runs.scene.schema import applies, entries, key_of, table_of
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 Row = tuple[str, str, str, str, str]
 HEAD: Row = ("key", "value", "unit", "range", "meaning")

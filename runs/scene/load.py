@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import Key, ParameterError, described
-from tireroad.runs.scene import locate, rules
-from tireroad.runs.scene.cavity_table import filled
-from tireroad.runs.scene.own_tire import file_has_losses, with_own_section
+from tireroad.fem.keys import Key, described
+from tireroad.fem.parameters import ParameterError
+from tireroad.runs.scene.extent.own_tire import file_has_losses, with_own_section
+from tireroad.runs.scene.extent.tire_section import with_elements
+from tireroad.runs.scene.raw import override, read_text
+from tireroad.runs.scene.rules import scene as rules
 from tireroad.runs.scene.schema import (
     Table,
     applies,
@@ -29,11 +31,10 @@ from tireroad.runs.scene.schema import (
     variant_of,
 )
 from tireroad.runs.scene.source import Source, shortened
-from tireroad.runs.scene.tables import Damping, Scene
-from tireroad.runs.scene.tire_section import with_elements
+from tireroad.runs.scene.tables.cavity import filled
+from tireroad.runs.scene.tables.scene import Damping, Scene
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
-LARGEST = 1_000_000
 
 
 def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
@@ -42,14 +43,14 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     Raises InputError with all that is wrong with it. Not collective; reads one file.
     """
     path = Path(path)
-    text = _text(path)
+    text = read_text(path)
     try:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not a TOML file: {error}") from None
     except RecursionError:
         raise InputError(f"{path}: not a scene: tables nested too deep") from None
-    changed = frozenset(_override(raw, item) for item in overrides)
+    changed = frozenset(override(raw, item) for item in overrides)
     source = Source(path, text, changed)
     raw.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "-", path.stem).lstrip(".-") or "scene")
     rules.refuse_later(raw, source)
@@ -72,59 +73,6 @@ def _with_damping(scene: Scene) -> Scene:
     tire = scene.tire
     loses = any(part.loss_factor for part in (tire, *tire.region)) or file_has_losses(tire)
     return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
-
-
-def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such scene file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    if len(data) > LARGEST:
-        raise InputError(f"{path}: not a scene: more than {LARGEST / 1e6:g} MB")
-    try:
-        return data.decode("utf-8").removeprefix("\ufeff")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise InputError(f"{path}, line {line}: not UTF-8 text") from None
-
-
-def _value(text: str) -> Any:
-    """A value of --set: TOML where it is TOML, else the text itself."""
-    try:
-        read = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
-        return text
-    return read["value"] if len(read) == 1 else text
-
-
-def _override(raw: dict[str, Any], item: str) -> tuple[str, ...]:
-    """Lay one `table.key=value` over the raw scene; an empty value takes the key away."""
-    dotted, equals, value = item.partition("=")
-    path = locate.parts(dotted)
-    if not equals or not all(path):
-        raise InputError(f"--set {item[:80]}: must be table.key=value, e.g. static.load=400")
-    here: Any = raw
-    for depth, part in enumerate(path):
-        last = depth == len(path) - 1
-        if isinstance(here, list):
-            if not part.isdigit() or int(part) >= len(here):
-                name = ".".join(path[:depth])
-                raise InputError(f"--set {dotted}: {name} has the numbers 0 to {len(here) - 1}")
-            part = int(part)
-        elif not isinstance(here, dict):
-            raise InputError(f"--set {dotted}: {'.'.join(path[:depth])} is not a table")
-        if not last:
-            here = here[part] if isinstance(here, list) else here.setdefault(part, {})
-        elif value.strip():
-            here[part] = _value(value.strip())
-        elif isinstance(here, list):
-            del here[part]
-        else:
-            here.pop(part, None)
-    return path
 
 
 def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:

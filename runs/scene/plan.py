@@ -1,6 +1,6 @@
 """Which stages a scene needs, and why the others are skipped."""
 
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 STAGES = (
     "static",

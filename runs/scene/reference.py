@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from dataclasses import Field, fields
 from pathlib import Path
 
-from tireroad.fem.parameters import Key
+from tireroad.fem.keys import Key
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.schema import Variant, key_of, table_of, variant_of
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 HEAD = """\
 # Keys of a scene
@@ -28,14 +28,19 @@ COLUMNS = "| key | default | unit | values | meaning |\n|---|---|---|---|---|\n"
 
 def reference() -> str:
     """The whole page, Markdown."""
-    return HEAD + "".join(_tables(Scene, "", "scene", False))
+    return HEAD + "".join(_tables(Scene, "", "scene", False, {}))
 
 
-def _tables(of: type, path: str, doc: str, many: bool) -> Iterator[str]:
-    """A table of keys, its variants, then the tables in it."""
+def _tables(of: type, path: str, doc: str, many: bool, written: dict[type, str]) -> Iterator[str]:
+    """A table of keys, its variants, then the tables in it; one that is `written` already is named."""
     name = f"`[[{path}]]`" if many else f"`[{path}]`" if path else "At the top"
     own = [(item, key_of(item)) for item in fields(of) if key_of(item)]
-    yield f"\n## {name}\n\n{doc[0].upper()}{doc[1:]}.\n\n{COLUMNS}"
+    yield f"\n## {name}\n\n{doc[0].upper()}{doc[1:]}.\n"
+    if of in written:
+        yield f"\nThe keys are those of `[{written[of]}]`.\n"
+        return
+    written[of] = path
+    yield f"\n{COLUMNS}"
     yield from (_row(item, key) for item, key in own)
     for item in fields(of):
         part = variant_of(item)
@@ -46,7 +51,7 @@ def _tables(of: type, path: str, doc: str, many: bool) -> Iterator[str]:
         if part is not None:
             inner = f"{path}.{item.name}" if path else item.name
             about = f"{part.doc}; absent by default" if part.optional else part.doc
-            yield from _tables(part.of, inner, about, part.many)
+            yield from _tables(part.of, inner, about, part.many, written)
 
 
 def _variants(part: Variant, path: str) -> Iterator[str]:

@@ -12,16 +12,12 @@ from collections.abc import Iterator
 from dataclasses import Field, dataclass, field, fields
 from typing import Any
 
+from tireroad.fem.keys import Key, Limits, described, finite, key_of
 from tireroad.fem.parameters import (
-    Key,
-    Limits,
     Parameters,
     choice,
-    described,
-    finite,
     flag,
     integer,
-    key_of,
     number,
     parameter,
     text,

@@ -23,13 +23,13 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
-from tireroad.runs.stages.contact_file import ContactFile, ContactHistory
+from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
+from tireroad.runs.stages.build.stepping import Integration, integration, passing_period
 from tireroad.runs.stages.energy import Losses, describe_energy
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Done, Stage
-from tireroad.runs.stages.stepping import Integration, integration, passing_period
+from tireroad.runs.stages.stored.contact_file import ContactFile, ContactHistory
 from tireroad.runs.stages.watch import Watch
 
 

@@ -15,13 +15,13 @@ from tireroad.greens.responses import Wanted, judged, make_response, selected
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.scene.cavity_table import has_air
-from tireroad.runs.stages import cavity
+from tireroad.runs.scene.tables.cavity import has_air
+from tireroad.runs.stages.build import cavity
+from tireroad.runs.stages.build.setup import components, probes
+from tireroad.runs.stages.build.turning import turning_of
 from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.responses import fill_response, read_responses
-from tireroad.runs.stages.setup import components, probes
 from tireroad.runs.stages.stage import Computed, Done
-from tireroad.runs.stages.turning import turning_of
+from tireroad.runs.stages.stored.responses import fill_response, read_responses
 
 
 @dataclass(frozen=True)

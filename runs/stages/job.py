@@ -14,8 +14,8 @@ from tireroad.fem.model import TireModel
 from tireroad.runs.files import store
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.tables import Scene
-from tireroad.runs.stages.tire import make_tire
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages.build.tire import make_tire
 
 T = TypeVar("T")
 

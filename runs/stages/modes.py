@@ -12,15 +12,15 @@ from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.damping import Damping, StrainEnergy
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import projected, solved, with_fields
-from tireroad.modal.undamped import Modes
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.stages import cavity
+from tireroad.runs.stages.build import cavity
+from tireroad.runs.stages.build.turning import damping_of
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done, Shared
-from tireroad.runs.stages.turning import damping_of
 
 _NAMED = 8  # modes of a round tire shown by name
 

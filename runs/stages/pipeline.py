@@ -25,13 +25,14 @@ from tireroad.runs.files.folder import Summary
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import peak_memory
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.scene.demand import check_demand, duration
-from tireroad.runs.scene.estimate import estimate
+from tireroad.runs.scene.extent.demand import check_demand, duration
+from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.road_check import check_road
-from tireroad.runs.scene.tables import Scene
-from tireroad.runs.stages.cavity import AirColumn
+from tireroad.runs.scene.rules.road import check_road
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages.build.cavity import AirColumn
+from tireroad.runs.stages.build.setup import Setup
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.greens import GreensStage, Responses
 from tireroad.runs.stages.job import Job
@@ -39,7 +40,6 @@ from tireroad.runs.stages.modes import Fields, ModesStage, Motions
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
-from tireroad.runs.stages.setup import Setup
 from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.static import StaticStage

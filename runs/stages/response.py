@@ -12,13 +12,13 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.stages.contact_file import ContactHistory
+from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
+from tireroad.runs.stages.build.setup import driven_points
+from tireroad.runs.stages.build.stepping import Integration, integration
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.setup import driven_points
 from tireroad.runs.stages.stage import Computed, Done
-from tireroad.runs.stages.stepping import Integration, integration
+from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 Curves = dict[str, tuple[np.ndarray, str]]
 

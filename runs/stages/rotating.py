@@ -11,7 +11,8 @@ import numpy as np
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.parallel import on_root
-from tireroad.greens.coupling import Wheel, wheel_of
+from tireroad.greens.coupling import Wheel
+from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
 from tireroad.modal.damping import StrainEnergy
@@ -19,11 +20,11 @@ from tireroad.modal.full_states import full_states
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.rotating import StateModes
 from tireroad.runs.files.store import put
-from tireroad.runs.stages import cavity
+from tireroad.runs.stages.build import cavity
+from tireroad.runs.stages.build.turning import turning_of
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done, Shared
-from tireroad.runs.stages.turning import turning_of
 
 _UNITS = {
     "eigenvalue": "1/s",

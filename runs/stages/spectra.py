@@ -13,9 +13,9 @@ from tireroad.contact.spectra import amplitudes, third_octaves
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.stages.contact_file import ContactHistory
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 _FEWEST = 32  # steps of which a spectrum says anything
 

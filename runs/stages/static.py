@@ -20,11 +20,11 @@ from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.scene.own_tire import fingerprint
-from tireroad.runs.stages import cords_file
+from tireroad.runs.scene.extent.own_tire import fingerprint
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed
+from tireroad.runs.stages.stored import cords_file
 
 COARSE = 0.02  # estimated error of the load above which the user is warned
 

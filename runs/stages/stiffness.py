@@ -15,7 +15,7 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.scene.stiffness_table import deflections
+from tireroad.runs.scene.tables.stiffness import deflections
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
 from tireroad.runs.stages.static import steady_rolling

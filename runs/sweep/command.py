@@ -9,7 +9,7 @@ from pathlib import Path
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.store import stage_hash
 from tireroad.runs.process import observe
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.sweep import local, slurm
 from tireroad.runs.sweep.definition import Member, Sweep, read
 from tireroad.runs.sweep.gather import gather, write

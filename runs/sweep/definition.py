@@ -32,7 +32,7 @@ from scipy.stats import qmc
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 PLANS = ("grid", "list", "latin-hypercube")
 MOST = 10_000

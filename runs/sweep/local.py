@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import available_memory
-from tireroad.runs.scene.estimate import memory
+from tireroad.runs.scene.extent.estimate import memory
 from tireroad.runs.sweep.definition import Member, Sweep
 
 _LOOK = 0.5  # s between two looks at the running members

@@ -13,8 +13,8 @@ from scipy import sparse
 
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.model import SmallMotions
-from tireroad.greens.coupling import wheel_of
 from tireroad.greens.response import Response
+from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.standing import solved
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.tires import Tires

@@ -13,13 +13,13 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import Material, compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple
 from tireroad.modal.basis import Projection, project
 from tireroad.modal.rotating import matrices, rotating, standing
-from tireroad.modal.undamped import Modes
+from tireroad.modal.solver.modes import Modes
 
 FLAT = 1e6  # m, radius of the section circle: what is used of the torus is a cylinder
 COMM = MPI.COMM_SELF
@@ -48,7 +48,7 @@ def _tube() -> Iterator[tuple]:
     p = 2 (C1 + C2) [ln(a B/(b A)) + (a^2 - A^2)(a^-2 - b^-2)/2].
     """
     A, B = 0.25, 0.30
-    rubber = Material("mooney-rivlin", 1000.0, c10=4e5, c01=1e5, bulk_modulus=1e9)
+    rubber = compound("mooney-rivlin", 1000.0, c10=4e5, c01=1e5, bulk_modulus=1e9)
     body = _cylinder(B, B - A, 20.0, (8, 24, 1), rubber)
     loader = Loader(Equilibrium(body), lambda progress: None)
     for a in (0.26, 0.275):
@@ -68,7 +68,13 @@ def _ring(speed: float) -> Iterator[tuple]:
     |2 n W/(n^2+1) +- sqrt{n^2 (n^2-1)^2/(n^2+1) [EI/(rho A R^4) + W^2/(n^2+1)]} - n W|.
     """
     R, h, E, density = 0.3, 0.003, 480e6, 1200.0
-    body = _cylinder(R + h / 2, h, h, (120, 1, 1), Material("neo-hookean", density, E, 0.0))
+    body = _cylinder(
+        R + h / 2,
+        h,
+        h,
+        (120, 1, 1),
+        compound("neo-hookean", density, youngs_modulus=E, poisson_ratio=0.0),
+    )
     body.rim = np.array([], dtype=np.int32)
     points = body.lattice.points(np.arange(body.lattice.size))
     # The spin's hoop strain rho R^2 W^2/E, by a displacement that stretches nothing else.
@@ -93,7 +99,7 @@ def _ring(speed: float) -> Iterator[tuple]:
 
 def _soft_modes(operators: Operators) -> Modes:
     """60 modes by SciPy: next to the ring's stiffness across, its softest bending is below what
-    modal.undamped takes for digits."""
+    modal.solver.undamped takes for digits."""
     size = operators.stiffness.getSize()
     stiffness = sparse.csr_matrix(operators.stiffness.getValuesCSR()[::-1], shape=size)
     mass = sparse.diags(operators.mass).tocsc()

@@ -14,7 +14,7 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 
 
@@ -57,7 +57,12 @@ def result(asked: Attempt) -> tuple[StaticState, str]:
     segments, arc, order = asked.mesh
     half = np.radians(120)
     section = Torus(0.32, 0.1, 0.012, half, segments, arc, 1, order, footprint_size=asked.size)
-    rubber = Material("neo-hookean", 1200.0, asked.youngs_modulus, asked.poisson_ratio)
+    rubber = compound(
+        "neo-hookean",
+        1200.0,
+        youngs_modulus=asked.youngs_modulus,
+        poisson_ratio=asked.poisson_ratio,
+    )
     equilibrium = Equilibrium(Body(MPI.COMM_SELF, section, rubber), Rolling(asked.speed, 500.0))
     loader = Loader(equilibrium, lambda progress: None)
     message = ""

@@ -10,12 +10,13 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
-from tireroad.modal import undamped
 from tireroad.modal.basis import Projection, project
 from tireroad.modal.campbell import critical_speed, growth, onset
 from tireroad.modal.rotating import checks, matrices, rotating
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import sites
 
 COUNT = 120
@@ -26,7 +27,11 @@ SPEEDS = (0.0, 0.3, 0.999, 1.3)  # of the critical one
 def rows() -> list[list]:
     """(package, case, what happened, how it was caught)."""
     section = Torus(0.32, 0.1, 0.012, np.radians(120), 8, 4, 1, 2)
-    body = Body(MPI.COMM_SELF, section, Material("neo-hookean", 1200.0, 48e6, 0.45))
+    body = Body(
+        MPI.COMM_SELF,
+        section,
+        compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45),
+    )
     loader = Loader(Equilibrium(body), lambda progress: None)
     loader.inflate(2e5)
     found = [_double(Operators(body, 2e5)), _negative(body)]
@@ -39,7 +44,7 @@ def rows() -> list[list]:
     return [["modal", *row] for row in found]
 
 
-def _modes(operators: Operators) -> undamped.Modes:
+def _modes(operators: Operators) -> Modes:
     return undamped.solve(operators.stiffness, operators.mass, COUNT, sites=sites(operators))
 
 

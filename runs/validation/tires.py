@@ -20,9 +20,9 @@ from tireroad.modal.damping import StrainEnergy, beyond, rates
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
+from tireroad.runs.stages.build.setup import probes, scene_setup
+from tireroad.runs.stages.build.turning import turning_of
 from tireroad.runs.stages.pipeline import Finished, run_scene
-from tireroad.runs.stages.setup import probes, scene_setup
-from tireroad.runs.stages.turning import turning_of
 from tireroad.runs.validation.histories import Trial
 
 # Of the full finite elements' scheme. Axle force on a cleat at steps of 1e-4 s with 0, 0.5 and 0.8: 5.4, 2.8

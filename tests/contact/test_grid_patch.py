@@ -13,7 +13,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.fem.tire.mesh import Torus, field_lattice
 from tireroad.runs.scene.schema import Pitch
-from tireroad.runs.scene.tables import Contact
+from tireroad.runs.scene.tables.contact import Contact
 
 SECTION = Torus(0.32, 0.10, 0.012, np.radians(120), 60, 16, 1, 2, "bead", 0.3)
 

@@ -22,7 +22,7 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.cord_forces import cord_forces
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.face_rule import Face
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 
 STEEL = {"youngs_modulus": 172.2e9, "area": 2.118e-7, "spacing": 1.16e-3}
 
@@ -312,7 +312,7 @@ def test_forces_of_cords_in_a_wavy_ring():
     half = np.radians(30)
     section = Torus(5.1, 5.0, 0.002, half, 16, 8, 1, 2, "uniform")
     ring = section.ring((), [PlyLine("hoop", (-half, half), 1.0)])
-    soft = Material("neo-hookean", 1000.0, youngs_modulus=1e3, poisson_ratio=0.45)
+    soft = compound("neo-hookean", 1000.0, youngs_modulus=1e3, poisson_ratio=0.45)
     found = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         body = Body(comm, ring, {"wall": soft}, cords=[cords(0.0, "hoop", spacing=2e-3)])

@@ -12,7 +12,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 
 TERMS = {
     "stress": (0.0, Rolling()),
@@ -74,7 +74,7 @@ def test_tangent_is_the_derivative_and_every_term_counts(make_body, csr, term):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_tangent_of_every_material(make_body, csr, model):
-    body = make_body(segments=8, arc=2, material=Material(model, 1200.0, **MODELS[model]))
+    body = make_body(segments=8, arc=2, material=compound(model, 1200.0, **MODELS[model]))
     direction = deformed(body)
     exact = csr(matrix(body, 0.0, Rolling())) @ direction
     numeric = central(body, forces(body, 0.0, Rolling()), direction, 1e-7)
@@ -231,7 +231,7 @@ def fresh(equilibrium):
 
 @pytest.mark.parametrize("ratio", [0.3, 0.49, 0.4995])
 def test_newton_steps_do_not_grow_towards_incompressibility(make_body, ratio):
-    rubber = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=ratio)
+    rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=ratio)
     _, steps, _ = loaded(make_body, material=rubber)
     assert max(step.step.iterations for step in steps) <= 8
 

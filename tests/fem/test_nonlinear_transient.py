@@ -11,7 +11,7 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.nonlinear import NonlinearTire
@@ -25,7 +25,9 @@ PUSH = 300.0  # N: some millimetres
 def inflated(comm):
     """A soft inflated torus of few elements, and a push at its lowest point."""
     section = Torus(0.32, 0.10, 0.012, np.radians(120), 10, 4, 1, 2)
-    body = Body(comm, section, Material("neo-hookean", 1200.0, 4.8e6, 0.45))
+    body = Body(
+        comm, section, compound("neo-hookean", 1200.0, youngs_modulus=4.8e6, poisson_ratio=0.45)
+    )
     Loader(Equilibrium(body), lambda progress: None).inflate(INFLATION)
     weights = probe.spot(body.lattice, 0.0, 0.0)
     return Operators(body, INFLATION), sparse.csr_matrix(probe.directed(weights, (0.0, 0.0, 1.0)))

@@ -11,7 +11,7 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.transient.linear import FullTire
 
@@ -21,7 +21,7 @@ DAMPING = (400.0, 0.0)
 def inflated(comm):
     """An inflated torus of few elements, its operators, rotation matrices, a load and its reading."""
     section = Torus(0.32, 0.10, 0.012, np.radians(120), 12, 4, 1, 2)
-    material = Material("neo-hookean", 1200.0, 4.8e7, 0.45)
+    material = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
     body = Body(comm, section, material)
     Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)

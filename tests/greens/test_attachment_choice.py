@@ -10,12 +10,12 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.greens import attachment
 from tireroad.greens.coupling import Basis, Wheel
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
+from tireroad.modal.solver import undamped
 
 COMM = MPI.COMM_WORLD
 SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
@@ -25,7 +25,7 @@ SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "
 def tire():
     """7,200 unknowns, 40 modes, vertical probes at 15 x 9 points 8 mm apart (closer than the nodes)."""
     section = Torus(0.32, 0.10, 0.012, np.radians(120), 24, 9, 1, 2, footprint_size=0.4)
-    body = Body(COMM, section, Material(**SOFT))
+    body = Body(COMM, section, compound(**SOFT))
     Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)
     modes = undamped.solve(operators.stiffness, operators.mass, 40)

@@ -15,16 +15,16 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.response import couple
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
+from tireroad.modal.solver import undamped
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
-RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
+RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
 SPOTS = [(0.0, 0.0), (0.15, 0.1), (-0.2, -0.3), (1.0, 0.5)]
 DAMPING = (60.0, 1e-6)
 

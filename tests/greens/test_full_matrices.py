@@ -15,13 +15,14 @@ from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.truncation import Cutoff, estimate, estimate_axle
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
-from tireroad.modal.fields import gram, multiply
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.fields import gram, multiply
+from tireroad.modal.solver.modes import Modes
 
 MATERIAL = {
     "model": "neo-hookean",
@@ -39,7 +40,7 @@ def tire():
     """An inflated soft torus of 2,112 free unknowns, its lowest modes, loads and readings."""
     comm = MPI.COMM_WORLD
     section = Torus(0.32, 0.10, 0.012, np.radians(120), 16, 6, 1, 2)
-    body = Body(comm, section, Material(**MATERIAL))
+    body = Body(comm, section, compound(**MATERIAL))
     Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)
     modes = undamped.solve(operators.stiffness, operators.mass, COUNT)
@@ -153,7 +154,7 @@ def test_a_basis_that_grows_keeps_its_projection() -> None:
     operators, rotation, modes, _, _ = tire()
     comm = operators.body.comm
     first = {**vars(modes), "squares": modes.squares[:7], "vectors": modes.vectors[:, :7]}
-    known = project(undamped.Modes(**first), rotation, operators.carried, comm)
+    known = project(Modes(**first), rotation, operators.carried, comm)
     whole = project(modes, rotation, operators.carried, comm)
     grown = project(modes, rotation, operators.carried, comm, known)
     matrices = {name: value for name, value in vars(whole).items() if value is not None}

@@ -14,14 +14,14 @@ from tireroad.fem.matrices.probe import nodes
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.wall import Region
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.modal_damping import ModalDamping
 from tireroad.greens.coupling import Basis, Wheel
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
 from tireroad.modal.damping import StrainEnergy, beyond, rates
+from tireroad.modal.solver import undamped
 
 INFLATION, KEPT = 1e5, 30
 
@@ -30,9 +30,9 @@ INFLATION, KEPT = 1e5, 30
 def tire() -> SimpleNamespace:
     """A torus of two compounds with 30 modes, and its matrices in full."""
     rubber = {"density": 1200.0, "youngs_modulus": 48e6, "poisson_ratio": 0.45}
-    tread = Region(Material("neo-hookean", **rubber, loss_factor=0.3), (0.0, np.radians(60)))
+    tread = Region(compound("neo-hookean", **rubber, loss_factor=0.3), (0.0, np.radians(60)))
     section = Torus(0.32, 0.1, 0.012, np.radians(120), 8, 4, 1, 2)
-    wall = Material("neo-hookean", **rubber, loss_factor=0.1)
+    wall = compound("neo-hookean", **rubber, loss_factor=0.1)
     body = Body(MPI.COMM_SELF, section, wall, (tread,))
     equilibrium = Equilibrium(body)
     equilibrium.pressure.value = INFLATION

@@ -6,9 +6,9 @@ from chains import chain, distributed, own_rows, ring, spatial
 from mpi4py import MPI
 from scipy import linalg
 
-from tireroad.modal import undamped
-from tireroad.modal.canonical import ordered, turn_to_rule
-from tireroad.modal.symmetry import Sites
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.canonical import ordered, turn_to_rule
+from tireroad.modal.solver.symmetry import Sites
 
 COMM = MPI.COMM_WORLD
 

@@ -7,9 +7,9 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.modal import undamped
-from tireroad.modal.circulant import repeated
-from tireroad.modal.symmetry import Sites
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.circulant import repeated
+from tireroad.modal.solver.symmetry import Sites
 
 COMM = MPI.COMM_WORLD
 

@@ -7,9 +7,10 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.modal import undamped
-from tireroad.modal.fields import gram, multiply
-from tireroad.modal.symmetry import Sites
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.fields import gram, multiply
+from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.symmetry import Sites
 
 COMM = MPI.COMM_WORLD
 ROUNDING = 1e-9  # relative error of an eigenvalue of a well-scaled chain
@@ -20,7 +21,7 @@ def ones(size: int, unit: int = 1) -> np.ndarray:
     return np.ones(high - low)
 
 
-def checked(matrix, mass, modes: undamped.Modes) -> None:
+def checked(matrix, mass, modes: Modes) -> None:
     """Residual and orthonormality, measured here once more with the unscaled matrices."""
     product = multiply(matrix, modes.vectors)
     weighted = mass[:, None] * modes.vectors

@@ -51,7 +51,7 @@ def run(tmp_path_factory, launch):
 
 def receptance(folder) -> np.ndarray:
     """H (f, c, c) m/N between the contact points, of the stored states."""
-    from tireroad.runs.stages.responses import read_responses
+    from tireroad.runs.stages.stored.responses import read_responses
 
     with h5py.File(folder / "greens.h5") as file:
         return read_responses(file, False)["contact"].receptance(FREQUENCY)

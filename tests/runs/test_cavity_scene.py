@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.cavity_table import Cavity, filled, has_air
 from tireroad.runs.scene.load import load
+from tireroad.runs.scene.tables.cavity import Cavity, filled, has_air
 
 SCENE = """
 [tire]

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene import demand
 from tireroad.runs.scene.check import explain
-from tireroad.runs.scene.estimate import estimate, memory
+from tireroad.runs.scene.extent import demand
+from tireroad.runs.scene.extent.estimate import estimate, memory
+from tireroad.runs.scene.extent.sizes import highest_frequency, sizes
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.sizes import highest_frequency, sizes
 
 
 @pytest.fixture
@@ -54,7 +54,11 @@ def test_modes_below_a_frequency_count(quickstart: Path) -> None:
         (["contact.points={dx=1e-5,dy=1e-5}"], ["contact.points"]),
     ],
 )
-def test_what_cannot_succeed_is_refused_by_its_key(quickstart, overrides, words) -> None:
+def test_what_cannot_succeed_is_refused_by_its_key(
+    quickstart, overrides, words, monkeypatch
+) -> None:
+    free = "tireroad.runs.scene.extent.demand.available_memory"
+    monkeypatch.setattr(free, lambda: 64e9)  # whatever runs beside
     with pytest.raises(InputError) as caught:
         explain(load(quickstart, overrides))
     for word in words:

@@ -13,8 +13,8 @@ from torus_decks import CORDS, HALF_ANGLE, Torus, membranes, plain
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
+from tireroad.runs.scene.extent.own_tire import fingerprint, own_section
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.own_tire import fingerprint, own_section
 from tireroad.runs.scene.resolved import dumps
 
 TIRE = """
@@ -121,21 +121,21 @@ def test_messages(folder, add, message):
 
 def test_materials_of_the_scene(folder):
     """[[tire.region]] by name replaces the file's compound, [[tire.cords]] by name its cords."""
-    from tireroad.runs.stages.own_tire import own_cords, own_materials
+    from tireroad.runs.stages.build.own_tire import own_cords, own_materials
 
     (folder / "own.toml").write_text(
         TIRE + '[[tire.region]]\nname = "wall"\ndynamic = 1.4\nloss_factor = 0.1\n'
     )
     tire = load(folder / "own.toml").tire
     (wall,) = own_materials(tire).values()
-    assert (wall.youngs_modulus, wall.dynamic, wall.loss_factor) == (6e6, 1.4, 0.1)
+    assert (wall.law.youngs_modulus, wall.dynamic, wall.loss_factor) == (6e6, 1.4, 0.1)
     (folder / "own.toml").write_text(
         TIRE
         + '[[tire.region]]\nname = "WALL"\n[tire.region.material]\nyoungs_modulus = 9e6\n'
         + '[[tire.cords]]\nname = "B"\nangle = 30.0\narea = 3e-7\n'
     )
     tire = load(folder / "own.toml").tire
-    assert own_materials(tire)["WALL"].youngs_modulus == 9e6
+    assert own_materials(tire)["WALL"].law.youngs_modulus == 9e6
     (belt,) = own_cords(tire)
     assert (np.degrees(belt.angle), belt.area) == (pytest.approx(30), 3e-7)
 

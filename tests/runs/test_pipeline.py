@@ -245,7 +245,7 @@ def test_options_that_petsc_did_not_read_are_told(monkeypatch) -> None:
 
 
 def test_the_estimated_memory_is_about_what_a_run_takes(run):
-    from tireroad.runs.scene.estimate import memory
+    from tireroad.runs.scene.extent.estimate import memory
     from tireroad.runs.scene.load import load
 
     folder, stages = run("again", FLAT + "[rotation]\nspeed = 40.0\n")

@@ -8,7 +8,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.schema import walk
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 FULL = """
 [static]
@@ -44,7 +44,7 @@ def refused(path: Path, *overrides: str) -> str:
 def test_empty_scene_has_every_default(scene_file) -> None:
     scene = load(scene_file("", "plain.toml"))
     assert scene.name == "plain"
-    assert scene.tire.outer_radius == 0.32 and scene.tire.material.youngs_modulus == 4.8e8
+    assert scene.tire.outer_radius == 0.32 and scene.tire.material.law.youngs_modulus == 4.8e8
     assert (scene.static.load, scene.rotation, scene.contact, scene.road, scene.time) == (None,) * 5
     assert scene.force == () and scene.output.receptance is None
 

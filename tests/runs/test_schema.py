@@ -12,11 +12,12 @@ from mpi4py import MPI
 
 from tireroad.contact.roads.kind import ROADS
 from tireroad.fem.parameters import ParameterError
-from tireroad.runs.scene import tire_tables
+from tireroad.fem.tire.law import MATERIALS
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.reference import reference
 from tireroad.runs.scene.schema import variant_of, walk
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables import tire as tire_tables
+from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.pipeline import run_scene
 
 KEYS = {f"{of.__name__}.{item.name}": key for _, of, item, key in walk(Scene)}
@@ -208,6 +209,7 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
         )
         _run(tmp_path / "full", FULL)
     tire = {of.__name__ for of in vars(tire_tables).values() if is_dataclass(of)}
+    tire |= {MATERIALS[name].__name__ for name in MATERIALS}  # tests/fem/test_material.py
     missing = {
         name
         for name in set(KEYS) - recorder.seen - UNREAD

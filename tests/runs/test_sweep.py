@@ -75,7 +75,7 @@ def test_a_list_names_its_members(folder: Path) -> None:
     sweep = sweep_of(folder, text)
     assert [member.name for member in sweep.members] == ["soft", "heavy"]
     assert sweep.axes == ("tire.material.youngs_modulus", "static.load")
-    assert sweep.load(sweep.members[0]).tire.material.youngs_modulus == 30e6
+    assert sweep.load(sweep.members[0]).tire.material.law.youngs_modulus == 30e6
 
 
 @pytest.mark.parametrize(

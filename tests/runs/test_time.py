@@ -8,9 +8,9 @@ import pytest
 
 from tireroad.contact.steps import equal_steps, steps_of
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.road_tables import Motion, Road
+from tireroad.runs.scene.tables.road import Motion, Road
+from tireroad.runs.stages.build.stepping import passing_period
 from tireroad.runs.stages.contact import beyond_unique
-from tireroad.runs.stages.stepping import passing_period
 
 SCENE = """
 name = "time"

@@ -3,9 +3,9 @@
 import pytest
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.scene.extent.tire_section import free_unknowns, make_section
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.tire_section import free_unknowns, make_section
 
 
 def scene(tmp_path, text, *overrides):
@@ -63,8 +63,8 @@ def test_a_radial_tire_says_what_it_does_not_take(tmp_path, text, message):
 def test_a_section_file_is_a_tire(tmp_path):
     """Compounds and cords by name, of the order asked for; the hash changes with the drawing."""
     from tireroad.fem.sections.ring import wall_thickness
-    from tireroad.runs.scene.own_tire import fingerprint
-    from tireroad.runs.stages.own_tire import own_cords, own_materials
+    from tireroad.runs.scene.extent.own_tire import fingerprint
+    from tireroad.runs.stages.build.own_tire import own_cords, own_materials
 
     drawing = tmp_path / "section.toml"
     drawing.write_text(DRAWING)
@@ -72,7 +72,7 @@ def test_a_section_file_is_a_tire(tmp_path):
     ring = make_section(tire)
     assert ring.order == 3
     assert wall_thickness(ring.section) == pytest.approx(0.009, rel=0.02)
-    assert own_materials(tire)["rubber"].youngs_modulus == 5e6
+    assert own_materials(tire)["rubber"].law.youngs_modulus == 5e6
     assert [(c.name, c.area) for c in own_cords(tire)] == [("ply", 4e-7)]
     before = fingerprint(tire)
     drawing.write_text(DRAWING.replace("thickness = 6", "thickness = 7"))

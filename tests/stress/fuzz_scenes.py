@@ -28,7 +28,7 @@ from tireroad.runs.process.mpi import judged
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.schema import walk
-from tireroad.runs.scene.tables import Scene
+from tireroad.runs.scene.tables.scene import Scene
 
 BASE = """
 name = "fuzz"

@@ -10,12 +10,13 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
 from tireroad.modal.campbell import critical_speed, growth, onset
 from tireroad.modal.rotating import checks, matrices, rotating
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
@@ -25,7 +26,7 @@ SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "
 @pytest.fixture(scope="module")
 def operators() -> Operators:
     section = Torus(0.32, 0.1, 0.012, np.radians(120), 8, 2, 1, 2)
-    body = Body(COMM, section, Material(**SOFT))
+    body = Body(COMM, section, compound(**SOFT))
     loader = Loader(Equilibrium(body), lambda progress: None)
     loader.inflate(2e5)
     loader.deflect(0.003)
@@ -33,7 +34,7 @@ def operators() -> Operators:
 
 
 @pytest.fixture(scope="module")
-def modes(operators) -> undamped.Modes:
+def modes(operators) -> Modes:
     return undamped.solve(operators.stiffness, operators.mass, 10**6, sites=sites(operators))
 
 
@@ -73,7 +74,7 @@ def test_growth_begins_where_onset_says(operators, modes):
 def test_bulk_a_thousand_times_the_shear_modulus():
     """Rounding leaves more than 1e-8 of the lowest eigenvalue: as good as LAPACK's, and not refused."""
     section = Torus(0.32, 0.1, 0.012, np.radians(120), 12, 4, 1, 3)
-    rubber = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.4995)
+    rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.4995)
     operators = Operators(Body(MPI.COMM_SELF, section, rubber), 0.0)
     modes = undamped.solve(operators.stiffness, operators.mass, 10)
     root = 1 / np.sqrt(operators.mass)

@@ -5,11 +5,11 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.matrices.operators import Operators
-from tireroad.modal import undamped
-from tireroad.modal.symmetry import Sites
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.symmetry import Sites
+from tireroad.runs.scene.extent.tire_section import make_section
 from tireroad.runs.scene.load import load
-from tireroad.runs.scene.tire_section import make_section
-from tireroad.runs.stages.tire import make_body
+from tireroad.runs.stages.build.tire import make_body
 
 SCENE = """
 [tire.material]

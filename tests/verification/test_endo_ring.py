@@ -17,11 +17,11 @@ from tireroad.fem import compat
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.modal.basis import project
 from tireroad.modal.rotating import matrices, rotating
-from tireroad.modal.undamped import Modes
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import label
 
 R, H, E, RHO = 0.3, 0.003, 4.8e8, 1200.0
@@ -38,7 +38,7 @@ def ring() -> Body:
     """A square cross section, nothing held."""
     section = Torus(R + H / 2, FLAT, H, H / 2 / FLAT, 200, 1, 1, 2, "uniform")
     body = Body(
-        MPI.COMM_SELF, section, Material("linear", RHO, youngs_modulus=E, poisson_ratio=0.3)
+        MPI.COMM_SELF, section, compound("linear", RHO, youngs_modulus=E, poisson_ratio=0.3)
     )
     body.rim = np.array([], dtype=np.int32)
     return body
@@ -60,7 +60,7 @@ def spin_up(body: Body, speed: float) -> None:
 
 
 def lowest(operators: Operators, count: int) -> Modes:
-    """The lowest modes: so thin a ring is beyond the digits that modal.undamped demands."""
+    """The lowest modes: so thin a ring is beyond the digits that modal.solver.undamped demands."""
     stiffness, mass = csr(operators.stiffness).tocsc(), sparse.diags(operators.mass).tocsc()
     squares, vectors = eigsh(stiffness, count, mass, sigma=-1.0)
     order = np.argsort(squares)

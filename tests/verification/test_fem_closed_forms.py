@@ -15,7 +15,7 @@ from tireroad.fem import compat
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 
 FLAT = 1e3  # m, radius of the section circle
@@ -33,7 +33,7 @@ def csr(matrix):
 
 def inflated_radius(segments: int, layers: int, order: int, pressure: float) -> float:
     """Inner radius of the inflated thick tube in plane strain; Newton with four load steps."""
-    rubber = Material("mooney-rivlin", 1000.0, c10=4e5, c01=1e5, bulk_modulus=1e12)
+    rubber = compound("mooney-rivlin", 1000.0, c10=4e5, c01=1e5, bulk_modulus=1e12)
     body = cylinder(0.30, 0.05, 0.02, segments, layers, rubber, order)
     constant = fem.Constant(body.mesh, 0.0)
     residual = static_residual(body, constant, Rolling())
@@ -81,7 +81,7 @@ def ring_frequencies(ratio: float, segments: int) -> np.ndarray:
     """In-plane bending of a free ring, n = 2, 3, 4, Hz."""
     R = 0.3
     h = ratio * R
-    steel = Material("linear", 1200.0, youngs_modulus=480e6, poisson_ratio=0.3)
+    steel = compound("linear", 1200.0, youngs_modulus=480e6, poisson_ratio=0.3)
     body = cylinder(R + h / 2, h, h, segments, 1, steel)
     body.rim = np.array([], dtype=np.int32)
     operators = Operators(body, 0.0)

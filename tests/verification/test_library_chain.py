@@ -21,11 +21,11 @@ from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.press import press
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.turning import Turning
-from tireroad.greens.coupling import wheel_of
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.responses import make_response
+from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.standing import standing_modes
 
@@ -68,7 +68,7 @@ COMM, SPEED, STEP = MPI.COMM_SELF, 40.0, 5e-5
 @pytest.fixture(scope="module")
 def tire() -> TireModel:
     section = Torus(0.32, 0.10, 0.012, np.radians(120), 16, 6, 1, 2, grading="uniform")
-    rubber = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
+    rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     return TireModel(section, lambda: Body(COMM, section, rubber))
 
 

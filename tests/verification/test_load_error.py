@@ -14,11 +14,11 @@ from tireroad.fem.static.load_error import load_error
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.tire.wall import Region
 
-RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
+RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
 HEIGHT, CONVERGED = -0.3184244, 532.8  # m, N
 
 
@@ -43,7 +43,7 @@ def test_the_estimate_lies_between_half_and_twice_the_error(segments, arc, order
 def test_the_tire_is_left_as_it_was_and_the_companion_rolls_too():
     """A companion that takes over the state ends where one that was loaded from the beginning does."""
     rolling = Rolling(60.0, 500.0)
-    soft = Material("neo-hookean", 1200.0, youngs_modulus=5e6, poisson_ratio=0.45)
+    soft = compound("neo-hookean", 1200.0, youngs_modulus=5e6, poisson_ratio=0.45)
     thin = [Region(soft, tuple(np.radians([105.0, 120.0])))]
     loader = pressed(ring(12, 6), rolling, regions=thin)
     before = loader.body.u.x.array.copy()

@@ -14,12 +14,12 @@ from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.cords import Cords
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.wall import Region, compounds
-from tireroad.modal import undamped
 from tireroad.modal.basis import project
 from tireroad.modal.damping import Proportional, StrainEnergy, beyond, rates
 from tireroad.modal.rotating import matrices, standing
+from tireroad.modal.solver import undamped
 
 INFLATION = 1.0e5
 
@@ -28,13 +28,13 @@ def tire(crown: dict, side: dict, segments=8, arc=6, plies=True, comm=MPI.COMM_S
     """A small inflated torus of two compounds with a radial ply."""
     rubber = {"density": 1200.0, "youngs_modulus": 48e6, "poisson_ratio": 0.45}
     section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, 1, 2)
-    regions = (Region(Material("neo-hookean", **rubber, **crown), (0.0, np.radians(50))),)
+    regions = (Region(compound("neo-hookean", **rubber, **crown), (0.0, np.radians(50))),)
     lines = [PlyLine("ply", (-np.radians(120), np.radians(120)), 0.0)] if plies else []
     cords = [Cords(name="ply", angle=np.pi / 2, youngs_modulus=2e9, area=4.21e-7, spacing=1e-3)][
         : len(lines)
     ]
     ring = section.ring([regions[0].patch(0)], lines)
-    wall = Material("neo-hookean", **rubber, **side)
+    wall = compound("neo-hookean", **rubber, **side)
     body = Body(comm, ring, compounds(wall, regions), cords=cords)
     equilibrium = Equilibrium(body)
     equilibrium.pressure.value = INFLATION

@@ -10,12 +10,12 @@ from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
-from tireroad.modal import quadratic, undamped
-from tireroad.modal.agreement import truncation
 from tireroad.modal.basis import project
 from tireroad.modal.rotating import checks, matrices, rotating
+from tireroad.modal.solver import quadratic, undamped
+from tireroad.modal.solver.agreement import truncation
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
@@ -27,7 +27,7 @@ SMALL = Torus(0.32, 0.1, 0.012, np.radians(120), 16, 4, 1, 2)
 
 
 def tire(deflection: float) -> Operators:
-    body = Body(COMM, SMALL, Material(**SOFT))
+    body = Body(COMM, SMALL, compound(**SOFT))
     loader = Loader(Equilibrium(body), lambda progress: None)
     loader.inflate(INFLATION)
     if deflection:
@@ -114,7 +114,7 @@ def test_a_light_load_keeps_both_mirror_planes():
     lowest eigenvalue. That is rounding, no asymmetry, and shifts no frequency by as much.
     """
     section = Torus(0.32, 0.1, 0.012, np.radians(120), 24, 6, 1, 3)
-    body = Body(COMM, section, Material(**SOFT | {"youngs_modulus": 4.8e8}))
+    body = Body(COMM, section, compound(**SOFT | {"youngs_modulus": 4.8e8}))
     loader = Loader(Equilibrium(body), lambda progress: None)
     loader.inflate(0.0)
     loader.carry(1.0)
@@ -140,7 +140,7 @@ def test_same_vectors_on_any_number_of_processes(pressed, round_tire):
 def alone(operators: Operators, waves: bool) -> np.ndarray:
     """The modes (nodes, 3, 24) in the lattice's order as one process gets them, of the same state."""
     body = operators.body
-    single = Body(MPI.COMM_SELF, SMALL, Material(**SOFT))
+    single = Body(MPI.COMM_SELF, SMALL, compound(**SOFT))
     single.set_displacement(body.displacement())
     own = Operators(single, INFLATION)
     modes = undamped.solve(own.stiffness, own.mass, 24, sites=sites(own), waves=waves)

@@ -16,7 +16,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.nonlinear import NonlinearTire
@@ -29,7 +29,11 @@ RISE = 4e-3  # m
 def pressed(deflection: float):
     """A loader at a deflection of a standing tire of few elements."""
     section = Torus(0.32, 0.10, 0.012, np.radians(120), 16, 6, 1, 2, footprint_size=0.3)
-    body = Body(MPI.COMM_SELF, section, Material("neo-hookean", 1200.0, 4.8e7, 0.45))
+    body = Body(
+        MPI.COMM_SELF,
+        section,
+        compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45),
+    )
     loader = Loader(Equilibrium(body), lambda progress: None)
     loader.inflate(INFLATION)
     loader.deflect(deflection)

@@ -13,13 +13,14 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.material import Material
+from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
-from tireroad.modal import undamped
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import sites
 
 COMM = MPI.COMM_WORLD
-RUBBER = Material("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
+RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
 
 
 def tire(inflation: float, deflection: float = 0.0, speed: float = 0.0) -> tuple[Body, np.ndarray]:
@@ -34,7 +35,7 @@ def tire(inflation: float, deflection: float = 0.0, speed: float = 0.0) -> tuple
     return body, np.flatnonzero(equilibrium.contact_force() > 0)
 
 
-def solve(operators: Operators, count: int) -> undamped.Modes:
+def solve(operators: Operators, count: int) -> Modes:
     return undamped.solve(operators.stiffness, operators.mass, count, sites=sites(operators))
 
 

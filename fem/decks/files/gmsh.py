@@ -15,29 +15,9 @@ import numpy as np
 from tireroad.fem.decks.deck import ALL_FACES, Deck, Members, Sets
 from tireroad.fem.decks.files.elements import Block, kind
 from tireroad.fem.decks.files.gmsh_numbers import LARGEST, BinaryNumbers, Part, TextNumbers, parts
+from tireroad.fem.decks.files.gmsh_types import FACES, TYPES
 from tireroad.fem.decks.files.numbers import LABEL
 from tireroad.fem.errors import InputError
-
-# Number of the type: dimension, nodes, Abaqus name, which of its nodes in Abaqus's order.
-_HEXAHEDRON = (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)
-_WEDGE = (*range(6), 6, 9, 7, 12, 14, 13, 8, 10, 11)
-_TYPES = {
-    1: (1, 2, "SFMGAX1", (0, 1)),
-    8: (1, 3, "SFMGAX2", (0, 1, 2)),
-    2: (2, 3, "CGAX3", (0, 1, 2)),
-    3: (2, 4, "CGAX4", (0, 1, 2, 3)),
-    9: (2, 6, "CGAX6", tuple(range(6))),
-    10: (2, 9, "CGAX8", tuple(range(8))),
-    16: (2, 8, "CGAX8", tuple(range(8))),
-    5: (3, 8, "C3D8", tuple(range(8))),
-    6: (3, 6, "C3D6", tuple(range(6))),
-    17: (3, 20, "C3D20", _HEXAHEDRON),
-    12: (3, 27, "C3D20", _HEXAHEDRON),
-    18: (3, 15, "C3D15", _WEDGE),
-    13: (3, 18, "C3D15", _WEDGE),
-    15: (0, 1, "", (0,)),
-}
-_FACES = {2: ("M3D3", 3), 3: ("M3D4", 4), 9: ("M3D6", 6), 10: ("M3D9", 9), 16: ("M3D8", 8)}
 
 Elements = list[tuple[int, int, int, np.ndarray]]  # type, physical group, label, nodes
 
@@ -141,12 +121,12 @@ def _elements_4(numbers, groups) -> Elements:
 
 
 def _nodes_of(sort: int, numbers) -> int:
-    if sort not in _TYPES:
+    if sort not in TYPES:
         raise numbers.error(
             f"element type {sort} of Gmsh is not read: lines, triangles, quadrilaterals, hexahedra and "
             "wedges of first and second order are"
         )
-    return _TYPES[sort][1]
+    return TYPES[sort][1]
 
 
 def _nodes_2(numbers):
@@ -180,7 +160,7 @@ def _elements_2(numbers, binary: bool) -> Elements:
 
 
 def _deck(path: Path, labels, points, elements: Elements, names, part: Part) -> Deck:
-    dimension = max((_TYPES[sort][0] for sort, *_ in elements), default=0)
+    dimension = max((TYPES[sort][0] for sort, *_ in elements), default=0)
     order = np.argsort(labels, kind="stable")
     labels, points = labels[order], points[order]
     if len(labels) and (labels[0] < 1 or labels[-1] > LABEL or (np.diff(labels) < 1).any()):
@@ -212,11 +192,11 @@ def _groups(elements: Elements, dimension: int, names, part: Part):
         by_type.setdefault(element[0], []).append(element)
     blocks, sets, surfaces = [], {}, {}
     for sort, those in by_type.items():
-        own, _, name, take = _TYPES[sort]
+        own, _, name, take = TYPES[sort]
         if own not in (dimension, dimension - 1) or own == 0:
             continue
         if own == 2 and dimension == 3:
-            name, count = _FACES[sort]
+            name, count = FACES[sort]
             take = tuple(range(count))
         labels = np.array([e[2] for e in those], np.int64)
         nodes = np.array([e[3] for e in those], np.int64)[:, list(take)]

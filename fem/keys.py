@@ -1,0 +1,104 @@
+"""The description of one parameter: its unit, meaning and range, and how a value is read.
+
+A common root that all packages may import; it needs nothing but the standard library.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import Field, dataclass, fields
+from typing import Any
+
+OnlyFor = tuple[str, tuple[str, ...]] | None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """A range: `least` and `most` belong to it, `above` and `below` do not; None: no limit."""
+
+    least: float | None = None
+    above: float | None = None
+    most: float | None = None
+    below: float | None = None
+
+    def __str__(self) -> str:
+        low = f"≥ {self.least:g}" if self.least is not None else ""
+        low = f"> {self.above:g}" if self.above is not None else low
+        high = f"≤ {self.most:g}" if self.most is not None else ""
+        high = f"< {self.below:g}" if self.below is not None else high
+        return ", ".join(part for part in (low, high) if part) or "any"
+
+    def check(self, value: float, unit: str) -> None:
+        """ValueError for a value outside the range."""
+        inside = (
+            (self.least is None or value >= self.least)
+            and (self.above is None or value > self.above)
+            and (self.most is None or value <= self.most)
+            and (self.below is None or value < self.below)
+        )
+        if not inside:
+            # A whole number may be too large for the format of real ones.
+            written = f"{value:g}" if isinstance(value, float) else described(value)
+            shown = f"{written} {unit}".rstrip(" -")
+            raise ValueError(f"must be {self}{f' {unit}' if unit != '-' else ''}, not {shown}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Key:
+    """One parameter: how to read a value, its unit, meaning and allowed values.
+
+    `values` says in words what is allowed, unless `choices` are the words that are; `limits` is the
+    range of numbers; `optional`: it may be absent (None); `is_file`: the name of a file; `only_for`: (name of the selecting key, its values)
+    where a parameter belongs to some kinds of its table only.
+    """
+
+    read: Callable[[Any], Any]
+    unit: str = "-"
+    doc: str
+    values: str = ""
+    optional: bool = False
+    only_for: OnlyFor = None
+    limits: Limits | None = None
+    choices: Iterable[str] = ()
+    is_file: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """What values it may have."""
+        return self.values or ", ".join(self.choices)
+
+
+def key_of(item: Field) -> Key | None:
+    """The description of a field, None where it is no parameter."""
+    return item.metadata.get("key")
+
+
+def keys(of: type) -> Iterator[tuple[Field, Key]]:
+    """The parameters of a dataclass in their order."""
+    for item in fields(of):
+        key = key_of(item)
+        if key is not None:
+            yield item, key
+
+
+def described(value: Any) -> str:
+    """A value as the user wrote it, short enough for a message."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value[:60]}"'
+    if isinstance(value, dict):
+        return "a table"
+    return str(value)[:60]
+
+
+def finite(value: Any) -> float:
+    """A finite real number as a float (an integer is one, a bool is not), else ValueError."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"must be a number, not {described(value)}")
+    try:
+        result = float(value)
+    except OverflowError:
+        raise ValueError("is too large a number") from None
+    if not math.isfinite(result):
+        raise ValueError(f"must be a finite number, not {described(value)}")
+    return result

@@ -1,0 +1,57 @@
+"""What a material law is: its parameters, and the strain energy that follows from them.
+
+A new law is one file in fem.tire.laws, or a class in a user's own script: parameters with unit and range,
+the energy, and the two moduli at zero strain. The scene's keys, `check`, the key reference and the range
+tests follow from it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from tireroad.fem.parameters import Parameters
+from tireroad.fem.registry import Registry
+
+if TYPE_CHECKING:
+    from ufl.core.expr import Expr
+
+
+class MaterialLaw(Parameters):
+    """Base of hyperelastic laws, each a function of the right Cauchy-Green tensor C alone.
+
+    `coefficients` names the attributes that `energy` takes, in that order; they become fields over the
+    mesh, so that another value compiles nothing.
+    """
+
+    owner = "material"
+    coefficients: ClassVar[tuple[str, ...]]
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus at zero strain, Pa."""
+        raise NotImplementedError
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus at zero strain, Pa."""
+        raise NotImplementedError
+
+    @property
+    def youngs(self) -> float:
+        """Young's modulus at zero strain, Pa: 9 K G / (3 K + G)."""
+        return 9 * self.bulk * self.shear / (3 * self.bulk + self.shear)
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio at zero strain: (3 K - 2 G) / (6 K + 2 G)."""
+        return (3 * self.bulk - 2 * self.shear) / (6 * self.bulk + 2 * self.shear)
+
+    @staticmethod
+    def energy(C: Expr, *coefficients: Expr) -> tuple[Expr, Expr]:
+        """Energy per undeformed volume (J/m3) in UFL as (distortion, dilatation): the two are integrated by
+        different rules (fem.static.equilibrium)."""
+        raise NotImplementedError
+
+
+MATERIALS: Registry[MaterialLaw] = Registry("material model", "tireroad.fem.tire.laws", MaterialLaw)
+material_law = MATERIALS.register

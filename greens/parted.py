@@ -1,0 +1,46 @@
+"""A real block of states parted into those that stay and those that follow their force statically."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+
+@dataclass(frozen=True)
+class Parted:
+    """y' = A y + b f in two blocks without coupling: y = right z + lagging r with z' = block z + left b f and
+    r' = faster r + lagging_left b f. Shapes: `block` (p, p), `right` (n, p), `left` (p, n); `faster`
+    (n - p, n - p), `lagging` (n, n - p), `lagging_left` (n - p, n).
+    """
+
+    block: np.ndarray
+    right: np.ndarray
+    left: np.ndarray
+    faster: np.ndarray
+    lagging: np.ndarray
+    lagging_left: np.ndarray
+
+    def following(self, push: np.ndarray) -> np.ndarray:
+        """What the states that do not stay take off y (n, k) per constant force, for the inputs (n, k):
+        lagging faster^-1 lagging_left b, so that their static answer is its negative."""
+        return self.lagging @ np.linalg.solve(self.faster, self.lagging_left @ push)
+
+
+def parted(block: np.ndarray, values: np.ndarray, stays: np.ndarray) -> Parted:
+    """The block (n, n) split between the eigenvalues (n,) that stay and the others, conjugates together.
+
+    Its real Schur form is cut between the two kinds; Sylvester's equation A X - X B = -C takes the coupling
+    C away. Not collective.
+    """
+
+    def first(re: float, im: float) -> bool:
+        return bool(stays[np.abs(values - complex(re, im)).argmin()])
+
+    schur, turn, p = linalg.schur(block, output="real", sort=first)
+    X = linalg.solve_sylvester(schur[:p, :p], -schur[p:, p:], -schur[:p, p:])
+    right, left = turn.copy(), turn.T.copy()
+    right[:, p:] += turn[:, :p] @ X
+    left[:p] -= X @ turn.T[p:]
+    return Parted(schur[:p, :p], right[:, :p], left[:p], schur[p:, p:], right[:, p:], left[p:])

@@ -1,0 +1,38 @@
+"""The turning wheel of a tire's small motions about its static state."""
+
+from __future__ import annotations
+
+from tireroad.fem.cavity.column import Column
+from tireroad.fem.errors import InputError
+from tireroad.fem.model import SmallMotions
+from tireroad.fem.turning import Turning
+from tireroad.greens.coupling import Wheel
+from tireroad.modal.basis import Projection
+from tireroad.modal.damping import StrainEnergy, beyond
+
+
+def wheel_of(
+    motions: SmallMotions,
+    turning: Turning,
+    air: Column | None = None,
+    projection: Projection | None = None,
+) -> Wheel:
+    """The full matrices of a tire at its static state as the wheel turns, with the `air` in it.
+
+    `projection` on the modes: for damping by strain energy only, which has no full matrices. Collective.
+    """
+    shape, tail = motions.static.rolling, None
+    if shape.speed and (shape.speed, shape.inertia) != (turning.speed, turning.inertia):
+        raise InputError(
+            f"the static state rolls at {shape.speed:g} rad/s with {shape.inertia} inertia, its small motions at "
+            f"{turning.speed:g} rad/s with {turning.inertia}: take one and the same, or a state at rest"
+        )
+    if isinstance(turning.damping, StrainEnergy):
+        if projection is None:
+            raise InputError(
+                "damping by strain energy is known by the modes: give their projection"
+            )
+        tail = beyond(turning.damping, projection)
+    rotation = motions.rotation if turning.speed else None
+    given = turning.speed, turning.damping, turning.inertia
+    return Wheel(motions.operators, rotation, *given, air, tail)

@@ -1,0 +1,106 @@
+"""Fields over all unknowns, spread by rows over the processes, many at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
+
+from tireroad.modal.solver.spectrum import Slice
+
+CHUNK = 64  # columns a matrix product: no second copy of all vectors
+# Vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product.
+_REPAIR = 1e-12
+
+
+def scaled_by(stiffness: PETSc.Mat, mass: np.ndarray) -> PETSc.Mat:
+    """M^-1/2 K M^-1/2 of a diagonal mass (own rows). Collective."""
+    scaled = stiffness.copy()
+    roots = scaled.createVecLeft()
+    roots.array[:] = 1 / np.sqrt(mass)
+    scaled.diagonalScale(roots, roots)
+    scaled.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    roots.destroy()
+    return scaled
+
+
+def everywhere(matrix: PETSc.Mat) -> sparse.csr_matrix:
+    """The whole matrix on every process. Collective."""
+    size = matrix.getSize()[0]
+    every = PETSc.IS().createStride(size, first=0, step=1, comm=PETSc.COMM_SELF)
+    (whole,) = matrix.createSubMatrices(every, every)
+    rows, columns, values = whole.getValuesCSR()
+    every.destroy()
+    whole.destroy()
+    return sparse.csr_matrix((values, columns, rows), (size, size))
+
+
+def collect(matrix: PETSc.Mat, parts, found: list[Slice], order: np.ndarray) -> np.ndarray:
+    """This process's rows of the vectors in the given order, each slice sent by its owner. Collective."""
+    comm = matrix.comm.tompi4py()
+    ranges = np.asarray(matrix.getOwnershipRanges())
+    own = int(ranges[comm.rank + 1] - ranges[comm.rank])
+    column = np.full(sum(len(one.values) for one in found), -1)
+    column[order] = np.arange(len(order))
+    vectors = np.empty((own, len(order)), order="F")
+    start = 0
+    for one in found:
+        place = column[start : start + len(one.values)]
+        start += len(one.values)
+        wanted = place >= 0
+        width = int(wanted.sum())
+        if not width:
+            continue
+        sent, rows = None, np.empty((own, width))
+        if one.owner == comm.rank:
+            fields = parts[one.part].fields(one.vectors)[:, wanted]
+            sent = [
+                np.ascontiguousarray(fields),
+                np.diff(ranges) * width,
+                ranges[:-1] * width,
+                MPI.DOUBLE,
+            ]
+        comm.Scatterv(sent, rows, root=one.owner)
+        vectors[:, place[wanted]] = rows
+    return vectors
+
+
+def multiply(matrix: PETSc.Mat, vectors: np.ndarray) -> np.ndarray:
+    """This process's rows of matrix @ vectors, vectors given by rows (n, m). Collective."""
+    rows, columns = vectors.shape
+    out = np.empty((rows, columns), order="F")
+    for start in range(0, columns, CHUNK):
+        some = np.asfortranarray(vectors[:, start : start + CHUNK])
+        sizes = ((rows, PETSc.DETERMINE), (PETSc.DECIDE, some.shape[1]))
+        dense = PETSc.Mat().createDense(sizes, array=some, comm=matrix.comm)
+        product = matrix.matMult(dense)
+        out[:, start : start + CHUNK] = product.getDenseArray()
+        product.destroy()
+        dense.destroy()
+    return out
+
+
+def gram(comm: MPI.Comm, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """left^T right over all processes, rows distributed alike. Collective."""
+    return comm.allreduce(left.T @ right)
+
+
+def orthonormalise(comm: MPI.Comm, vectors: np.ndarray, part: np.ndarray) -> float:
+    """Worst entry of V^T V - 1 after a correction where slices meet, in place. Collective.
+
+    One Newton-Schulz step V (3 - V^T V) / 2 squares the defect and turns no vector further than it.
+    `part` (m,) says which part each is of: those of different ones are orthogonal by their making.
+    """
+    worst = 0.0
+    for one in np.unique(part):
+        columns = np.flatnonzero(part == one)
+        mine = vectors[:, columns]
+        defect = gram(comm, mine, mine) - np.eye(len(columns))
+        if np.abs(defect).max() > _REPAIR:
+            # What is rounding already stays: mixed in, it would carry stiff modes into soft ones.
+            mine -= mine @ (np.where(np.abs(defect) > _REPAIR / 10, defect, 0.0) / 2)
+            vectors[:, columns] = mine
+            defect = gram(comm, mine, mine) - np.eye(len(columns))
+        worst = max(worst, float(np.abs(defect).max()))
+    return worst

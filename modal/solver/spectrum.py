@@ -1,0 +1,220 @@
+"""The lowest eigenvalues of independent symmetric matrices, sliced by inertia over the processes.
+
+Every process holds all the matrices and solves slices by itself: no communication inside a solve,
+results that do not depend on the number of processes, and cost proportional to the slices' number.
+Memory of one process: the matrices (together as many entries as the whole one), one factor and the
+Krylov basis of one slice at a time, and the vectors of the slices it solved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from mpi4py import MPI
+from scipy import sparse
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.solver.shifted import Shifted
+from tireroad.modal.solver.slices import Interval, eigenpairs
+
+ZERO = 1e-12  # of the matrix norm: eigenvalues nearer to zero are rigid modes, rounding is 1e-16
+_SLICE = 64  # eigenvalues a slice and matrix: the basis stays small, factorisations few
+_PROBES = 8
+_FINEST = 1e-9  # relative width below which a crowded interval counts as one cluster
+_CROWDED = 1.6  # times the wanted number in a step: then a boundary below costs less
+
+
+class Part(Protocol):
+    """An independent part of a symmetric problem: its own sparse `matrix` (d, d), each of whose eigenvalues
+    stands for `copies` equal ones of the whole.
+    """
+
+    matrix: sparse.csr_matrix
+    copies: int
+
+    def fields(self, vectors: np.ndarray) -> np.ndarray:
+        """Orthonormal fields (n, k copies) of the whole, from vectors (d, k) of the part."""
+        ...
+
+
+@dataclass(frozen=True)
+class Slice:
+    """One interval of one part, and its answer: `values` (k,), each as often as the part has copies,
+    and the part's `vectors` (d, k / copies), on `owner` only.
+    """
+
+    part: int
+    interval: Interval
+    owner: int
+    values: np.ndarray
+    vectors: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class Bottom:
+    """Below -`zero` lie `negative` eigenvalues of all parts; `near` (k,) estimates next to zero, ascending."""
+
+    zero: float
+    negative: int
+    near: np.ndarray
+
+    def check_stable(self) -> None:
+        """Raise ConvergenceError if an eigenvalue is negative."""
+        if self.negative:
+            growth = np.sqrt(-min(self.near[0], -self.zero))
+            raise ConvergenceError(
+                f"modes: the tangent stiffness has {self.negative} negative eigenvalue(s) (growth rate "
+                f"about {growth:.3g} 1/s): the state is unstable once the road is replaced by its "
+                "forces: the tire buckles, or topples if its rim is free. Lower the load, raise the "
+                "inflation or stiffen the wall; let a free rim stand on no road."
+            )
+
+
+class Spectrum:
+    """Independent parts of a symmetric problem, the same on all processes of `comm`."""
+
+    def __init__(self, comm: MPI.Comm, parts: list[Part]):
+        self.comm, self.parts = comm, parts
+        norms = [float(abs(part.matrix).sum(axis=1).max()) for part in parts]
+        self.bound = 1.001 * max(norms)
+
+    def _shared(self, work: Callable[[Part], np.ndarray]) -> list[np.ndarray]:
+        """What is computed of each part, on every process, each by one of them. Collective."""
+        size = self.comm.size
+        mine = {k: work(self.parts[k]) for k in range(self.comm.rank, len(self.parts), size)}
+        everyone = self.comm.allgather(mine)
+        return [everyone[k % size][k] for k in range(len(self.parts))]
+
+    def bottom(self) -> Bottom:
+        """Negative eigenvalues by inertia, and rough values of the lowest. Collective."""
+        zero = ZERO * self.bound
+
+        def work(part: Part) -> np.ndarray:
+            shifted = Shifted(part.matrix, -zero)
+            estimates = np.repeat(_near(shifted) - zero, part.copies)
+            negative = part.copies * shifted.negative
+            shifted.destroy()
+            return np.append(estimates, negative)
+
+        found = self._shared(work)
+        negative = int(sum(one[-1] for one in found))
+        return Bottom(zero, negative, np.sort(np.concatenate([one[:-1] for one in found])))
+
+    def below(self, shift: float) -> np.ndarray:
+        """Eigenvalues below the shift, (parts,), copies counted, by inertia. Collective."""
+
+        def work(part: Part) -> int:
+            shifted = Shifted(part.matrix, shift)
+            negative = shifted.negative
+            shifted.destroy()
+            return part.copies * negative
+
+        return np.array(self._shared(work))
+
+    def boundaries(
+        self, bottom: Bottom, count: int, limit: float
+    ) -> list[tuple[float, np.ndarray]]:
+        """(value, eigenvalues below it in each part), ascending, in steps of about one slice.
+
+        From zero up to the first value with `count` eigenvalues below, or to `limit`, if that is less.
+        Collective.
+        """
+        limit = min(limit, self.bound)
+        done = [(-bottom.zero, np.zeros(len(self.parts), int))]
+        largest = _SLICE * len(self.parts)
+        # The density of modes in frequency changes slowly: the last slice tells the next one's width.
+        density = len(bottom.near) / np.sqrt(np.abs(bottom.near).max())
+        ceiling = None  # a value with too many below: the next boundary lies under it
+        while True:
+            low, known = done[-1]
+            remaining = count - known.sum()
+            if remaining <= 0 or low >= limit:
+                return done
+            # Two per cent and two more: a little too far costs less than one step more.
+            goal = min(1.02 * remaining + 2, largest)
+            trial = _next(max(low, 0.0), goal / density)
+            if len(done) == 1 and 2 * goal < len(bottom.near):
+                # Estimates by Ritz values lie above: at least so many eigenvalues lie below.
+                trial = max(bottom.near[int(goal)], 2 * bottom.zero)
+            trial = min(trial, limit)
+            if ceiling and trial >= ceiling[0]:
+                trial = _between(low, known.sum(), *ceiling, goal)
+            below = self.below(trial)
+            new = below.sum() - known.sum()
+            if new > _CROWDED * goal + _PROBES and trial - low > _FINEST * trial:
+                ceiling = (trial, below.sum())
+                continue
+            rise = np.sqrt(trial) - np.sqrt(max(low, 0.0))
+            # No eigenvalue in the step: step wider, twice each time.
+            density = max(new, 0.5 * goal * (new == 0)) / rise if rise else density
+            done.append((trial, below))
+            ceiling = None
+
+    def slices(self, boundaries: list[tuple[float, np.ndarray]]) -> list[Slice]:
+        """All eigenpairs between the boundaries. Collective."""
+        tasks = [
+            (k, Interval(low, high, int(upper[k] - lower[k]) // part.copies))
+            for (low, lower), (high, upper) in zip(boundaries, boundaries[1:], strict=False)
+            for k, part in enumerate(self.parts)
+        ]
+        tasks = [task for task in tasks if task[1].count]
+        owners = _owners([interval.count for _, interval in tasks], self.comm.size)
+        answers, error = {}, None
+        for task, (k, interval) in enumerate(tasks):
+            if owners[task] == self.comm.rank and error is None:
+                try:
+                    answers[task] = eigenpairs(self.parts[k].matrix, interval)
+                except Exception as raised:
+                    error = raised
+        first = next((e for e in self.comm.allgather(error) if e is not None), None)
+        if first is not None:
+            raise first
+        values = {}
+        for part in self.comm.allgather({task: pair[0] for task, pair in answers.items()}):
+            values |= part
+        return [
+            Slice(
+                k,
+                interval,
+                owners[task],
+                np.repeat(values[task], self.parts[k].copies),
+                answers.get(task, (None, None))[1],
+            )
+            for task, (k, interval) in enumerate(tasks)
+        ]
+
+
+def _near(shifted: Shifted) -> np.ndarray:
+    """Rough eigenvalues nearest to the shift, relative to it, by three steps of inverse iteration."""
+    width = min(_PROBES, shifted.size)
+    basis = np.linalg.qr(np.random.default_rng(3).standard_normal((shifted.size, width)))[0]
+    for _ in range(3):
+        moved = shifted.solve(basis)
+        theta = np.linalg.eigvalsh((basis.T @ moved + moved.T @ basis) / 2)
+        basis = np.linalg.qr(moved)[0]
+    return 1 / theta
+
+
+def _next(low: float, step: float) -> float:
+    """A step up in frequency, at most threefold once the first modes are known."""
+    root = np.sqrt(low)
+    return (root + (min(step, 2 * root) if root else step)) ** 2
+
+
+def _between(low: float, known: int, high: float, crowd: int, goal: float) -> float:
+    """Where a straight line in frequency has `goal` more eigenvalues than at `low`, well inside."""
+    share = np.clip(goal / (crowd - known), 0.05, 0.9)
+    root = np.sqrt(max(low, 0.0))
+    return (root + share * (np.sqrt(high) - root)) ** 2
+
+
+def _owners(counts: list[int], processes: int) -> list[int]:
+    """The process of each task: the largest first, each to the one with least to do."""
+    load, owners = np.zeros(processes), [0] * len(counts)
+    for task in sorted(range(len(counts)), key=lambda k: -counts[k]):
+        owners[task] = int(np.argmin(load))
+        load[owners[task]] += counts[task] + _SLICE / 4  # the factorisation counts too
+    return owners

@@ -1,0 +1,214 @@
+"""The first eigenproblem: K Phi = M Phi Lambda, Phi^T M Phi = I, with none of the lowest missing.
+
+The diagonal mass makes it the standard problem of A = M^-1/2 K M^-1/2, which symmetries split: equal
+segments by wave number (circulant), or else mirror planes or a half turn (symmetry). The
+inertia of each part, L D L^T by MUMPS, says how many eigenvalues lie below a value and so where to slice
+(spectrum); SLEPc extracts the eigenpairs of each slice (slices). Residuals and orthonormality
+are then measured on A itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.solver.canonical import ordered, turn_to_rule
+from tireroad.modal.solver.circulant import repeated
+from tireroad.modal.solver.fields import (
+    CHUNK,
+    collect,
+    everywhere,
+    multiply,
+    orthonormalise,
+    scaled_by,
+)
+from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.spectrum import Bottom, Part, Slice, Spectrum
+from tireroad.modal.solver.symmetry import Sites, sectors, symmetries, whole
+
+RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
+MOST = 1e-6  # where rounding alone is more than the tolerance
+ORTHONORMALITY_TOLERANCE = 1e-10
+_SAME = 1e-10  # relative distance of equal eigenvalues, where rounding is not more
+
+
+@dataclass(frozen=True)
+class _Split:
+    """Independent `parts` of the problem, what made them, and what A lacks to be so split, 1/s2."""
+
+    parts: list[Part]
+    defect: float = 0.0
+    segments: int = 1
+    symmetries: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Proof:
+    """What inertia says: next to zero, and how many eigenvalues lie below `top`."""
+
+    bottom: Bottom
+    top: float
+    inertia: int
+
+
+def solve(
+    stiffness: PETSc.Mat,
+    mass: np.ndarray,
+    count: int | None = None,
+    *,
+    up_to: float = np.inf,
+    sites: Sites | None = None,
+    waves: bool = True,
+) -> Modes:
+    """The `count` lowest modes, or all below `up_to` (Hz), of a stiffness (n, n) in N/m and a diagonal
+    mass (own rows) in kg; at least one of the two is given.
+
+    Symmetries are looked for with the `sites` of own unknowns, equal segments unless `waves` is False. A
+    split whose modes are no modes of A is given up for the next. Every process holds a copy of A.
+    Raises ConvergenceError when a mode is missing, inaccurate or unstable. Collective.
+    """
+    comm = stiffness.comm.tompi4py()
+    size = stiffness.getSize()[0]
+    scaled = scaled_by(stiffness, mass)
+    all_sites = None if sites is None else sites.everywhere(comm)
+    rank = np.arange(size) if all_sites is None else all_sites.rank()
+    problem = _Problem(scaled, everywhere(scaled), mass, rank[slice(*scaled.getOwnershipRange())])
+    count, limit = min(count or size, size), (2 * np.pi * up_to) ** 2
+    for split in _splits(problem.whole, all_sites, waves):
+        modes = problem.solve(split, count, limit)
+        if problem.accurate(modes, split.defect):
+            break
+    scaled.destroy()
+    return problem.checked(modes, split.defect)
+
+
+def _splits(matrix: sparse.csr_matrix, sites: Sites | None, waves: bool) -> Iterator[_Split]:
+    """Ways to split the problem, the finest first, the last one not at all."""
+    if sites is not None:
+        ring = repeated(matrix, sites) if waves else None
+        if ring is not None:
+            yield _Split([ring.wave(n) for n in ring.waves], ring.defect, ring.segments)
+        found = symmetries(matrix, sites)
+        if found:
+            parts = sectors(matrix, [one.image for one in found])
+            names = tuple(one.isometry.name for one in found)
+            yield _Split(parts, sum(one.defect for one in found), symmetries=names)
+    yield _Split([whole(matrix)])
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """A distributed and `whole` on each process; own rows' `mass` kg and `rank` by position."""
+
+    scaled: PETSc.Mat
+    whole: sparse.csr_matrix
+    mass: np.ndarray
+    rank: np.ndarray
+
+    @property
+    def comm(self) -> MPI.Comm:
+        return self.scaled.comm.tompi4py()
+
+    def solve(self, split: _Split, count: int, limit: float) -> Modes:
+        """By slices of the parts. Collective."""
+        spectrum = Spectrum(self.comm, split.parts)
+        bottom = spectrum.bottom()
+        bottom.check_stable()
+        boundaries = spectrum.boundaries(bottom, count, limit)
+        proof = _Proof(bottom, boundaries[-1][0], int(boundaries[-1][1].sum()))
+        if proof.inertia == 0:
+            raise ConvergenceError(
+                f"modes: the tire has no mode below {np.sqrt(proof.top) / (2 * np.pi):.4g} Hz. Raise "
+                "modal.up_to."
+            )
+        return self._together(split, spectrum.slices(boundaries), min(count, proof.inertia), proof)
+
+    def _together(self, split: _Split, found: list[Slice], count: int, proof: _Proof) -> Modes:
+        """The lowest `count` modes of all slices, orthonormal and by rule, with residuals. Collective."""
+        parts, bottom = split.parts, proof.bottom
+        values = np.concatenate([one.values for one in found])
+        values[values <= bottom.zero] = 0.0
+        order, group = ordered(values, _families(parts, found), self._same(values))
+        # A group is turned as a whole, also where the last mode cuts it.
+        end = int(np.searchsorted(group, group[count - 1], side="right"))
+        order, group = order[:end], group[:end]
+        vectors = collect(self.scaled, parts, found, order)
+        part = np.concatenate([np.full(len(one.values), one.part) for one in found])[order]
+        defect = orthonormalise(self.comm, vectors, part)
+        vectors /= np.sqrt(self.mass)[:, None]
+        turn_to_rule(self.comm, vectors, self.rank, group)
+        squares, vectors = values[order][:count], vectors[:, :count]
+        return Modes(
+            squares=squares,
+            vectors=vectors,
+            residual=self._residuals(squares, vectors, values[values > 0].min(initial=proof.top)),
+            orthonormality=defect,
+            inertia_count=proof.inertia,
+            counted_below=proof.top,
+            rigid=int((squares == 0).sum()),
+            sectors=tuple(part.matrix.shape[0] * part.copies for part in parts),
+            slices=len(found),
+            segments=split.segments,
+            symmetries=split.symmetries,
+        )
+
+    def _same(self, values: np.ndarray) -> float:
+        return max(_SAME, self._rounding(values))
+
+    def _rounding(self, values: np.ndarray, defect: float = 0.0) -> float:
+        """Of A phi, relative to the lowest eigenvalue (measured: 0.05 to 1 times eps |A|), or of A itself where
+        a symmetry shows it; at most `MOST`.
+        """
+        flexible = values[values > 0]
+        stiff = np.finfo(float).eps * float(abs(self.whole).sum(axis=1).max())
+        return min(max(stiff, defect) / flexible.min(), MOST) if len(flexible) else 0.0
+
+    def _allowed(self, modes: Modes, defect: float) -> float:
+        """Largest residual. Near incompressibility rounding alone is 1e-8 of the softest mode."""
+        return max(RESIDUAL_TOLERANCE, self._rounding(modes.squares, defect))
+
+    def accurate(self, modes: Modes, defect: float) -> bool:
+        """Whether all are modes of the whole matrix."""
+        return bool(modes.residual.max(initial=0.0) <= self._allowed(modes, defect))
+
+    def checked(self, modes: Modes, defect: float) -> Modes:
+        """The modes, or a ConvergenceError where they are not accurate."""
+        if not self.accurate(modes, defect):
+            raise ConvergenceError(
+                f"modes: worst relative residual {modes.residual.max():.1e}, allowed "
+                f"{self._allowed(modes, defect):.0e}: the lowest mode is too soft against the stiffest "
+                "element for the number of digits. Use elements of more equal size."
+            )
+        if not modes.orthonormality <= ORTHONORMALITY_TOLERANCE:
+            raise ConvergenceError(
+                f"modes: orthonormality is lost ({modes.orthonormality:.1e}, allowed "
+                f"{ORTHONORMALITY_TOLERANCE:.0e}). Use elements of more equal size."
+            )
+        return modes
+
+    def _residuals(self, squares: np.ndarray, vectors: np.ndarray, least: float) -> np.ndarray:
+        """(m,) relative; a rigid mode's by the first flexible one's eigenvalue `least`. Collective."""
+        defects = np.empty(len(squares))
+        root = np.sqrt(self.mass)[:, None]
+        for start in range(0, len(squares), CHUNK):
+            some = slice(start, start + CHUNK)
+            shapes = root * vectors[:, some]
+            defects[some] = ((multiply(self.scaled, shapes) - shapes * squares[some]) ** 2).sum(
+                axis=0
+            )
+        return np.sqrt(self.comm.allreduce(defects)) / np.maximum(squares, least)
+
+
+def _families(parts: list[Part], found: list[Slice]) -> np.ndarray:
+    """(k,) a number for each eigenpair: of its part, and of a part's copies first or second."""
+    most = max(part.copies for part in parts)
+    numbers = [
+        most * one.part + np.arange(len(one.values)) % parts[one.part].copies for one in found
+    ]
+    return np.concatenate(numbers)

@@ -1,0 +1,67 @@
+"""What a scene takes beside what the machine has: refused or warned of before it is taken."""
+
+import shutil
+from pathlib import Path
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.process.memory import available_memory
+from tireroad.runs.scene.extent.estimate import KEYS, Estimate
+
+# The estimate may be off by 1.5: beyond that a run cannot succeed, below it it may not.
+CERTAIN, DOUBTFUL = 1.5, 0.8
+LONG = 3600.0  # s: of a run that takes longer the user is warned
+
+
+def check_demand(wanted: Estimate, directory: Path, processes: int = 1) -> list[str]:
+    """Warnings about memory, disk and time. InputError where they cannot suffice.
+
+    `directory`: where results go (it may not exist yet). Every process holds the matrices, their
+    factor and the modes.
+    """
+    memory = processes * sum(wanted.memory.values())
+    free = available_memory()
+    room = shutil.disk_usage(_existing(directory)).free
+    warnings = []
+    for what, where, parts, needed, there in (
+        ("memory", "", wanted.memory, memory, free),
+        ("disk", f" in {directory}", wanted.disk, sum(wanted.disk.values()), float(room)),
+    ):
+        if needed < DOUBTFUL * there:
+            continue
+        text = (
+            f"the run takes about {needed / 1e9:.3g} GB of {what}{where}, and "
+            f"{there / 1e9:.3g} GB are free; most of it for {_largest(parts)}"
+        )
+        if needed > CERTAIN * there:
+            raise InputError(text)
+        warnings.append(text)
+    seconds = sum(wanted.seconds.values())
+    if seconds > LONG:
+        warnings.append(
+            f"the run takes about {duration(seconds)} of one core, most of it for "
+            f"{_largest(wanted.seconds)}"
+        )
+    return warnings
+
+
+def _largest(parts: dict[str, float]) -> str:
+    """The largest part and the keys that make it so."""
+    name = max(parts, key=parts.__getitem__)
+    return f"{name} ({KEYS[name]})" if name in KEYS else name
+
+
+def _existing(directory: Path) -> Path:
+    directory = directory.absolute()
+    return next(one for one in (directory, *directory.parents) if one.exists())
+
+
+def duration(seconds: float) -> str:
+    """A rough time in words: it is within a factor of three."""
+    for unit, size in (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 1.5 * size:
+            return (
+                f"{seconds / size:.1g} {unit}"
+                if seconds < 9.5 * size
+                else f"{seconds / size:.0f} {unit}"
+            )
+    return f"{max(seconds, 1.0):.0f} seconds"

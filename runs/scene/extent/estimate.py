@@ -1,0 +1,165 @@
+"""How much memory, disk and time a scene will take, before anything is computed."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tireroad.runs.scene.extent.sizes import Sizes, sizes
+from tireroad.runs.scene.plan import skipped
+from tireroad.runs.scene.tables.scene import Scene
+
+PROGRAM = 2.1e8
+"""Bytes of one process with all libraries loaded and the mesh made (measured)."""
+MATRICES = 10
+"""Sparse matrices held at the highest: K, its scaled copy and parts, four of rotation, the rolling two."""
+BASES = 3
+"""Copies of all modes held at the highest: slices, the sorted vectors, their products."""
+DENSE = 1000
+"""Contact points up to which a tread's matrix is kept (contact.model.DENSE_POINTS)."""
+BLOCK = 512
+"""Steps of contact results held between two writes (stages.stored.contact_file)."""
+PACKED = 0.3
+"""Size of contact.h5 over its numbers: most forces are 0 (measured: 0.24 on stones, 0.29 on texture)."""
+
+# Keys that make a part large.
+KEYS = {
+    "matrices": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
+    "factor of the stiffness": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
+    "modes": "modal.count or modal.up_to, and the mesh",
+    "rotating pencil": "modal.count or modal.up_to",
+    "flexibility of the patch": "contact.points or the mesh, contact.reach, the road's height",
+    "contact": "contact.points, contact.reach, the road's height",
+    "receptances": "output.receptance.step, output.receptance.to, the number of forces",
+    "time series": "time.duration, time.step",
+    "contact.h5": "time.duration, time.step, contact.points",
+    "contact loop": "time.duration, time.step, contact.points",
+    "modes.h5": "modal.count, and the mesh",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """`memory` of one process at the highest, `disk` of the result folder at the highest (bytes),
+    `seconds` of one core, each by part, and the `sizes` they follow from."""
+
+    sizes: Sizes
+    memory: dict[str, float]
+    disk: dict[str, float]
+    seconds: dict[str, float]
+
+
+def estimate(scene: Scene, until: str | None = None) -> Estimate:
+    """What the stages up to `until` take. Memory within a factor of 1.5 where measured, the rest rougher."""
+    size, left_out = sizes(scene), skipped(scene, until)
+    return Estimate(
+        sizes=size,
+        memory=_memory(scene, size, left_out),
+        disk=_disk(scene, size, left_out),
+        seconds=_seconds(scene, size, left_out),
+    )
+
+
+def memory(scene: Scene) -> dict[str, float]:
+    """Bytes by part, for one process at the highest."""
+    return estimate(scene).memory
+
+
+def turning(scene: Scene) -> bool:
+    """Whether the wheel turns."""
+    return scene.rotation is not None and scene.rotation.speed > 0
+
+
+def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
+    """The factor of the stiffness is that of nested dissection on a surface: 31/4 N log2 N entries for
+    N columns of nodes (George 1973, doi 10.1137/0710032), each a dense block as large as the
+    unknowns of one column, kept in one triangle. MUMPS took 84 MB for 27,225 and 194 MB for 59,697
+    unknowns of second order, this gives 88 MB and 211 MB. A turning tire's has both triangles.
+    """
+    tire, free, count = scene.tire, size.free, size.modes
+    block = 3 * (tire.elements_thickness * tire.order + 1)
+    columns = max(free / block, 2.0)
+    parts = {
+        "program": PROGRAM,
+        "matrices": 12.0 * MATRICES * free * block * _columns_coupled(tire.order),
+        "factor of the stiffness": (8.0 if turning(scene) else 4.0)
+        * 7.75
+        * columns
+        * math.log2(columns)
+        * block**2,
+    }
+    if "modes" not in left_out:
+        parts["modes"] = 8.0 * BASES * free * count
+    if "rotating" not in left_out:
+        parts["rotating pencil"] = 16.0 * 4 * (2 * count) ** 2
+    if "contact" not in left_out:
+        parts |= _contact_memory(scene, size)
+    if "response" not in left_out:
+        k = max(size.driven, 1)
+        parts["receptances"] = 16.0 * 5 * size.frequencies * k**2
+        parts["time series"] = 8.0 * size.steps * (4 * k + 3 * k * k * scene.output.impulse + 6) * 2
+    return parts
+
+
+def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
+    directions = 3 if scene.contact.brush_stiffness is not None else 1
+    loads = directions * size.nodes
+    grid = scene.contact.points != "nodes" and size.points > DENSE
+    parts = {
+        "flexibility of the patch": 8.0 * 2 * size.free * loads,
+        "contact": 16.0 * 4 * loads * 2 * size.modes
+        + 8.0 * 3 * loads**2
+        + (0.0 if grid else 8.0 * 3 * size.points**2)
+        + 8.0 * BLOCK * size.points * (3 + directions),
+        "time series": 8.0 * size.steps * 24,
+    }
+    if scene.time.scheme == "convolution":
+        parts["time series"] += 8.0 * size.steps * loads**2
+    return parts
+
+
+def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
+    """Bytes of files; a checkpoint is a copy of contact.h5 so far."""
+    face = size.free / (3 * (scene.tire.elements_thickness * scene.tire.order + 1)) * 3
+    parts = {"static.h5": 40.0 * size.free}
+    if "modes" not in left_out:
+        parts["modes.h5"] = 8.0 * size.modes * (face + 5 * size.modes)
+    if "contact" not in left_out:
+        numbers = size.points * (3 + 2 * (scene.contact.brush_stiffness is not None)) + 10
+        parts["contact.h5"] = 2 * PACKED * 8.0 * size.steps * numbers
+        parts["greens.h5"] = 16.0 * 2 * size.nodes * (2 * size.modes + size.nodes)
+    if "response" not in left_out:
+        k = max(size.driven, 1)
+        parts["response.h5"] = 8.0 * (
+            size.steps * (4 * k + 3 + k * k * scene.output.impulse) + 2 * size.frequencies * k * k
+        )
+    return parts
+
+
+# Seconds of one core of 2020, measured on the quickstart (27,900 unknowns, 200 modes, 277 nodes) and
+# scaled by the operations that grow fastest.
+def _seconds(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
+    mesh, count = size.free / 27_900, size.modes / 200
+    parts = {"static": 8.0 * mesh**1.2}
+    if "modes" not in left_out:
+        parts["modes"] = 7.0 * mesh**1.2 * count
+    if "rotating" not in left_out:
+        parts["rotating"] = 0.8 * count**3 * (1 + size.speeds)
+    if "contact" not in left_out:
+        loads = size.nodes * (3 if scene.contact.brush_stiffness is not None else 1)
+        parts["greens"] = 3.0 * mesh**1.2 * loads / 277
+        dense = size.points**2 if size.points <= DENSE else 300 * size.points
+        step = 2e-4 + 1e-9 * (4 * loads * size.modes + dense)
+        if scene.time.scheme == "convolution":
+            step += 1e-9 * 0.5 * size.steps * loads**2
+        parts["contact loop"] = size.steps * step
+    if "response" not in left_out:
+        parts["response"] = size.steps * 2e-5 + size.frequencies * (2e-5 + 5e-8 * size.modes)
+    return parts
+
+
+def _columns_coupled(order: int) -> float:
+    """Columns of nodes that share an element with one, on average over an element's own."""
+    own = np.full(order, order + 1.0)  # inside an element
+    own[0] = 2 * order + 1  # between two
+    return float(np.outer(own, own).mean())

@@ -1,0 +1,60 @@
+"""Whether the road of a scene can be driven on, before anything is solved: its file, its length."""
+
+import math
+from functools import lru_cache
+
+from tireroad.contact.roads.kind import RoadKind
+from tireroad.contact.roads.under_tire import Road
+from tireroad.fem.errors import InputError
+from tireroad.runs.scene.tables.scene import Scene
+
+# The effective rolling radius of a pressed tire over its outer radius, at the least; and how far the
+# patch may reach ahead of the axle, m: what is refused here the run would refuse for certain.
+LEAST_RADIUS = 0.85
+AHEAD = 0.5
+
+
+def check_road(scene: Scene) -> None:
+    """InputError where the road's file cannot be used, or is too short for certain. Not collective.
+
+    A road in a text file is read as a whole.
+    """
+    if scene.road is None:
+        return
+    road = made(scene.road.surface)
+    if scene.contact is not None and scene.time is not None:
+        _check_extent(scene, road)
+
+
+@lru_cache(maxsize=1)
+def made(surface: RoadKind) -> Road:
+    """The road of a scene; the last one is kept, as reading a file may take seconds."""
+    return surface.make()
+
+
+def _check_extent(scene: Scene, road: Road) -> None:
+    placed, source = scene.road, getattr(road, "source", "road")
+    (x0, x1), (y0, y1) = road.extent
+    if not y0 <= placed.lateral <= y1:
+        raise InputError(
+            f"{source}: road.lateral = {placed.lateral:g} m lies beside the road, which has y from "
+            f"{y0:.4g} to {y1:.4g} m"
+        )
+    travel = least_travel(scene)
+    if placed.start + travel > x1 or placed.start + travel + AHEAD < x0:
+        raise InputError(
+            f"{source}: the run needs the road from {placed.start:.4g} to about "
+            f"{placed.start + travel:.4g} m (rotation.speed, tire.outer_radius, time.duration), and it "
+            f"has {x0:.4g} to {x1:.4g} m; change [road] start, shorten [time] duration, or continue it "
+            'by end = "mirror"'
+        )
+
+
+def least_travel(scene: Scene) -> float:
+    """Way (m) that the tire rolls in the run, rather too little: the static state is not known yet."""
+    rotation, time = scene.rotation, scene.time
+    if rotation is None or time is None:
+        return 0.0
+    radius = rotation.rolling_radius or LEAST_RADIUS * scene.tire.outer_radius
+    travel = rotation.speed * radius * time.duration
+    return travel if math.isfinite(travel) else 0.0

@@ -1,0 +1,236 @@
+"""What no single key can tell: contradictions between tables, and what this version leaves out."""
+
+from collections.abc import Callable
+from typing import Any
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.keys import described
+from tireroad.runs.scene.extent.tire_section import free_unknowns
+from tireroad.runs.scene.rules.tire import full_matrices, geometry
+from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.tables.cavity import check_cavity
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.tables.stiffness import check_stiffness
+
+Where = Callable[[tuple[str, ...], str], InputError]
+
+# Keys of the public interface that this version does not compute, with the values it does take and
+# what to write instead. A later version takes its lines out.
+LATER: dict[str, tuple[tuple[Any, ...], str]] = {
+    "tire.mesh": ((), 'is not supported: write section = "file" and file = "…"'),
+    "tire.section": (
+        ("torus", "radial", "file"),
+        'is not supported: "torus", "radial" and "file" are',
+    ),
+}
+
+
+MOST_FREQUENCIES = 1_000_000
+MOST_SPEEDS = 10_000
+
+
+def refuse_later(raw: dict[str, Any], source: Source) -> None:
+    """Note the values in `raw` that are of the interface but not of this version, and take them out."""
+    for dotted, (supported, message) in LATER.items():
+        table, key = dotted.split(".")
+        here = raw.get(table)
+        value = here.get(key) if isinstance(here, dict) else None
+        if value is not None and value not in supported:
+            source.add((table, key), f"= {described(value)}: {message}")
+            del here[key]
+
+
+def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
+    """Note every contradiction between keys or tables, one of each rule.
+
+    A rule is left out where something is wrong within a table that it reads: what it would say
+    could be a consequence.
+    """
+    broken = source.broken()
+    for tables, rule in RULES:
+        if broken & set(tables):
+            continue
+        try:
+            rule(scene, raw, source.error)
+        except InputError as error:
+            source.problems.append(((), str(error)))
+
+
+def _modes(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    free = free_unknowns(scene.tire)
+    if scene.modal.up_to is None and scene.modal.count >= free:
+        raise error(
+            ("modal", "count"),
+            f"= {scene.modal.count} must be less than the {free} free unknowns of the mesh",
+        )
+
+
+def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
+    if len(given) > 1:
+        raise error(("static", given[1]), f"and {given[0]} place the road twice: keep one of them")
+
+
+def _rotation(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    rotation = scene.rotation
+    if rotation is None or not any(rotation.window):
+        return
+    low, high = rotation.window
+    if low >= high:
+        raise error(("rotation", "window"), f"= [{low:g}, {high:g}] Hz must ascend")
+    if rotation.method != "full":
+        raise error(
+            ("rotation", "window"), 'is of method = "full": the projected one finds all states'
+        )
+
+
+def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    modal, static, rotation = scene.modal, scene.static, scene.rotation
+    road = (static.load, static.deflection, static.road_height) != (None, None, None)
+    if modal.road == "held" and not road:
+        raise error(("modal", "road"), '= "held" needs a road: add load (N) to [static]')
+    if scene.contact is not None and modal.road == "held":
+        raise error(
+            ("modal", "road"),
+            '= "held" fixes the nodes whose contact is to be computed: [contact] needs "forces"',
+        )
+    if scene.contact is not None and modal.rim == "free":
+        raise error(
+            ("modal", "rim"),
+            '= "free" leaves nothing to carry the load: [contact] needs "fixed"',
+        )
+    if modal.rim == "fixed" or rotation is None or rotation.speed == 0:
+        return
+    if rotation.method == "full":
+        raise error(
+            ("rotation", "method"),
+            '= "full" is solved about K^-1, which a free rim does not have: take "projected"',
+        )
+    if not static.steady_rolling:
+        raise error(
+            ("static", "steady_rolling"),
+            "= false leaves out the centrifugal tension that keeps a free turning wheel upright",
+        )
+    if scene.damping and scene.damping.mass:
+        raise error(
+            ("damping", "mass"),
+            f"= {scene.damping.mass:g} 1/s acts against a wheel that turns about a fixed axle; a free one"
+            " would be driven round by it: take 0, and damping.stiffness (s) instead",
+        )
+    if scene.greens.residual not in ("none", "attachment"):
+        raise error(
+            ("greens", "residual"),
+            f'= "{scene.greens.residual}" needs the static answer of the turning tire, which with a'
+            ' free rim does not exist: take "attachment" or "none"',
+        )
+
+
+def _receptance(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    receptance = scene.output.receptance
+    if receptance is None:
+        return
+    if not scene.force:
+        raise error(("output", "receptance"), "is read at driven points: add a [[force]]")
+    path = "output", "receptance", "step"
+    _count(path, "frequencies", receptance.to, receptance.step, "Hz", MOST_FREQUENCIES, error)
+
+
+def _campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    campbell = scene.rotation.campbell if scene.rotation else None
+    if campbell is not None:
+        path = "rotation", "campbell", "step"
+        _count(path, "speeds", campbell.to, campbell.step, "rad/s", MOST_SPEEDS, error)
+
+
+def _count(path, what: str, to: float, step: float, unit: str, most: int, error: Where) -> None:
+    """A step into a range that makes neither none nor too many."""
+    if step > to:
+        raise error(path, f"= {step:g} {unit} must not be more than to = {to:g} {unit}")
+    if to / step > most:
+        raise error(
+            path,
+            f"= {step:g} {unit} makes {to / step:.3g} {what} up to to = {to:g} {unit}, "
+            f"more than {most}: take a larger step",
+        )
+
+
+def _force(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    receptance = scene.output.receptance
+    for key in ("velocity", "acceleration"):
+        if scene.contact is not None and getattr(scene.output, key):
+            raise error(
+                ("output", key),
+                "is not available in scenes with [contact]: leave it out, or take out [contact]",
+            )
+    if scene.force and scene.time is None and receptance is None:
+        raise error(("force",), "has nothing to drive: add [time] or output.receptance")
+    for number, force in enumerate(scene.force):
+        if not any(force.direction):
+            raise error(("force", str(number), "direction"), "must not be all zeros")
+        if abs(force.arc) >= scene.tire.half_angle:
+            raise error(
+                ("force", str(number), "arc"),
+                f"= {force.arc:g} deg lies beyond the bead at {scene.tire.half_angle:g} deg",
+            )
+
+
+def _greens(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    rotation, residual = scene.rotation, scene.greens.residual
+    full = rotation is not None and rotation.speed > 0 and rotation.method == "full"
+    if full and residual == "attachment":
+        raise error(
+            ("greens", "residual"),
+            '= "attachment" completes the modes: it needs rotation.method = "projected"',
+        )
+
+
+def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    if scene.contact is None:
+        return
+    static = scene.static
+    if scene.road is None:
+        raise error(("contact",), 'needs a road: add [road], e.g. kind = "flat"')
+    if scene.time is None:
+        raise error(("contact",), "needs a time to run: add [time] with duration")
+    if static.load is None and static.deflection is None and static.road_height is None:
+        raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
+    contact = scene.contact
+    if contact.brush_stiffness is None and contact.friction is not None:
+        raise error(("contact", "friction"), "needs brush_stiffness (N/m), which carries it")
+    standing = scene.rotation is None or scene.rotation.speed == 0
+    if any(contact.slip) and (contact.brush_stiffness is None or standing):
+        raise error(("contact", "slip"), "needs brush_stiffness (N/m) and a rolling tire")
+
+
+def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    time = scene.time
+    if time is None or time.step == "auto":
+        return
+    if time.step > time.duration:
+        raise error(
+            ("time", "step"),
+            f"= {time.step:g} s must not be more than duration = {time.duration:g} s",
+        )
+    if time.duration / time.step > 1e8:
+        raise error(
+            ("time", "step"),
+            f"= {time.step:g} s makes {time.duration / time.step:.3g} steps; at most 1e8",
+        )
+
+
+RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
+    (("tire",), geometry),
+    (("static",), _static),
+    (("tire", "modal"), _modes),
+    (("rotation",), _rotation),
+    (("modal", "static", "rotation", "contact", "damping", "greens"), _modal),
+    (("damping", "rotation", "output"), full_matrices),
+    (("contact", "road", "time", "static", "rotation"), _contact),
+    (("output", "force"), _receptance),
+    (("rotation",), _campbell),
+    (("force", "output", "contact", "time", "tire"), _force),
+    (("greens", "rotation"), _greens),
+    (("stiffness", "static"), check_stiffness),
+    (("tire", "rotation", "modal", "greens"), check_cavity),
+    (("time",), _time),
+)

@@ -1,0 +1,1 @@
+"""The tables of a scene, key by key, with units, ranges and defaults."""

@@ -1,0 +1,63 @@
+"""The table of the air inside the tire: its keys, when it is there unasked, what it does not go with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.scene.schema import choice, number
+
+if TYPE_CHECKING:
+    from tireroad.runs.scene.tables.scene import Scene
+
+Where = Callable[[tuple[str, ...], str], InputError]
+
+
+@dataclass(frozen=True)
+class Cavity:
+    gas: str = choice("air", ("air", "none"), "in the tire; none: it weighs and resounds nothing")
+    temperature: float = number(293.15, "K", "of the gas", least=150, most=1000)
+    loss_factor: float | None = number(
+        None, "-", "of its waves; absent: friction at the walls", least=0, most=1
+    )
+    up_to: float | None = number(
+        None,
+        "Hz",
+        "its modes; absent: to the highest of the tire, at most 1000",
+        above=0,
+        most=5000,
+    )
+
+
+def filled(scene: Scene) -> Scene:
+    """The scene with the air that every tire has but the thesis's torus, unless its table says so."""
+    tire = scene.tire
+    if tire.section == "torus" or tire.cavity is not None:
+        return scene
+    return replace(scene, tire=replace(tire, cavity=Cavity()))
+
+
+def has_air(scene: Scene) -> bool:
+    """Whether the air in the tire takes part."""
+    return scene.tire.cavity is not None and scene.tire.cavity.gas != "none"
+
+
+def check_cavity(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Raise InputError for what is not computed with air."""
+    if not has_air(scene):
+        return
+    rotation, residual = scene.rotation, scene.greens.residual
+    if rotation is not None and rotation.speed and rotation.method == "full":
+        raise error(
+            ("rotation", "method"),
+            '= "full" knows no air: take "projected", or tire.cavity.gas = "none"',
+        )
+    used = bool(scene.force) or scene.contact is not None
+    if used and scene.modal.rim == "free" and residual not in ("none", "attachment"):
+        raise error(
+            ("greens", "residual"),
+            f'= "{residual}" of a free rim knows no air: take "attachment" or "none", or '
+            'tire.cavity.gas = "none"',
+        )

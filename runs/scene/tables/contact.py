@@ -1,0 +1,66 @@
+"""The tables of the contact and of the run in time, with units, ranges and defaults."""
+
+from dataclasses import dataclass
+
+from tireroad.contact.tread.law import TREADS, TreadLaw
+from tireroad.fem.parameters import choice, number, vector
+from tireroad.runs.scene.schema import Pitch, Variants, points, registered, variant
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact(Variants):
+    tread: str = registered(TREADS, "half-space", "local compliance of the tread")
+    law: TreadLaw = variant("tread", TREADS)
+    points: str | Pitch = points(
+        "contact points: the nodes of the mesh, or a grid of this pitch", least=1e-5, most=1
+    )
+    brush_stiffness: float | None = number(
+        None,
+        "N/m",
+        "tangential stiffness of a point's bristle; absent: no horizontal forces",
+        least=1e-3,
+        most=1e12,
+    )
+    brush: str = choice(
+        "rolling",
+        ("rolling", "spring"),
+        "bristles that pass through the patch with the tire, or springs fixed at the points",
+    )
+    friction: float | None = number(
+        None,
+        "-",
+        "coefficient of Coulomb friction; absent: the bristles never slip",
+        least=0,
+        most=10,
+    )
+    slip: tuple[float, float] = vector(
+        (0.0, 0.0), "-", "slip of the tire: longitudinal (> 0 drives), lateral", least=-1, most=1
+    )
+    solver: str = choice(
+        "auto",
+        ("auto", "active-set", "projected-cg", "snes-vi"),
+        "solver of the complementarity problem of a step",
+    )
+    reach: float | None = number(
+        None,
+        "m",
+        "static gap up to which points take part; absent: 1.5 times the road's height and 5 mm",
+        least=1e-6,
+        most=1,
+    )
+
+
+@dataclass(frozen=True)
+class Time:
+    duration: float = number(0.1, "s", "duration of the run", least=1e-7, most=1e5)
+    step: float | str = number(
+        "auto", "s", "step of the time integration", least=1e-9, most=1e3, word="auto"
+    )
+    scheme: str = choice(
+        "auto",
+        ("auto", "linear", "constant", "convolution"),
+        "contact force within a step; auto is linear",
+    )
+    checkpoint: float = number(
+        60.0, "s", "wall-clock time between two checkpoints", least=0.1, most=1e6
+    )

@@ -1,0 +1,217 @@
+"""The tables of a scene, key by key, with units, ranges and defaults (contract: Scene)."""
+
+from dataclasses import dataclass
+
+from tireroad.fem.parameters import choice, flag, integer, number, text, vector
+from tireroad.runs.scene.schema import (
+    later,
+    table,
+    tables,
+)
+from tireroad.runs.scene.tables.contact import Contact, Time
+from tireroad.runs.scene.tables.road import Road
+from tireroad.runs.scene.tables.stiffness import Stiffness
+from tireroad.runs.scene.tables.tire import Tire
+
+
+@dataclass(frozen=True)
+class Static:
+    inflation: float = number(
+        2.0e5, "Pa", "inflation pressure on the inner face", least=0, most=1e8
+    )
+    load: float | None = number(
+        None, "N", "vertical load of the tire on the road", least=1e-3, most=1e8
+    )
+    deflection: float | None = number(
+        None,
+        "m",
+        "deflection from the first touch of the inflated tire, instead of load",
+        least=1e-9,
+        most=10,
+    )
+    road_height: float | None = number(
+        None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, below=0
+    )
+    steady_rolling: bool = flag(
+        True, "inertia and material damping of the rolling shape; false: the state at rest"
+    )
+    error_estimate: bool = flag(
+        True,
+        "estimate of the load's discretisation error, by finer elements at the footprint and another order of all",
+    )
+
+
+@dataclass(frozen=True)
+class Modal:
+    count: int = integer(500, "number of modes, from the lowest", least=1, most=100000)
+    up_to: float | None = number(
+        None, "Hz", "all modes below this frequency, instead of count", least=1e-3, most=1e6
+    )
+    rim: str = choice(
+        "fixed",
+        ("fixed", "free"),
+        "bead faces: fixed, or one massless rigid body that is free",
+    )
+    road: str = choice(
+        "forces",
+        ("forces", "held"),
+        "road in the modes: its forces of the static state, or its nodes held in height",
+    )
+
+
+@dataclass(frozen=True)
+class Damping:
+    mass: float = number(500.0, "1/s", "Rayleigh damping γ1, times the mass", least=0, most=1e7)
+    stiffness: float = number(
+        0.0, "s", "Rayleigh damping γ2, times the stiffness", least=0, most=1.0
+    )
+
+
+@dataclass(frozen=True)
+class Campbell:
+    to: float = number(200.0, "rad/s", "highest speed", least=1e-3, most=2000)
+    step: float = number(10.0, "rad/s", "step between two speeds", least=1e-3, most=2000)
+    branches: int = integer(20, "number of branches followed, from the lowest", least=1, most=1000)
+
+
+@dataclass(frozen=True)
+class Rotation:
+    speed: float = number(
+        100.0, "rad/s", "speed of rotation of the wheel; 0: standing", least=0, most=2000
+    )
+    inertia: str = choice(
+        "full",
+        ("full", "doppler"),
+        "inertia forces of rotation: all, or without Coriolis and centrifugal forces",
+    )
+    method: str = choice(
+        "projected",
+        ("projected", "full"),
+        "eigenproblem of the rotating tire: on the modes, or on the finite elements",
+    )
+    count: int = integer(40, "number of pairs of method full", least=1, most=10000)
+    window: tuple[float, float] = vector(
+        (0.0, 0.0),
+        "Hz",
+        "from, to: all states of method full in this band, instead of count; 0, 0: count",
+        least=0,
+        most=1e6,
+    )
+    rolling_radius: float | None = number(
+        None,
+        "m",
+        "effective rolling radius: road speed over speed of rotation; absent: from the static state",
+        least=1e-3,
+        most=10,
+    )
+    campbell: Campbell | None = table(
+        Campbell, "eigenvalues over speed, on the modes of this one static state", optional=True
+    )
+
+
+@dataclass(frozen=True)
+class Greens:
+    residual: str = choice(
+        "static",
+        ("none", "dirac", "static", "second-order", "attachment"),
+        "residual flexibility: what stands for the modes that are left out",
+    )
+    dynamic: int | None = integer(
+        None,
+        "number of states kept dynamic, the others follow statically; absent: all",
+        least=1,
+        most=200000,
+    )
+    choice: str = choice(
+        "participation",
+        ("participation", "frequency"),
+        "selection of the dynamic states: by participation in the band, or lowest first",
+    )
+    band: float | None = number(
+        None,
+        "Hz",
+        "highest frequency of interest; absent: half the highest mode",
+        least=1e-3,
+        most=1e6,
+    )
+
+
+@dataclass(frozen=True)
+class PointForce:
+    angle: float = number(
+        0.0,
+        "deg",
+        "angle around the axle from the lowest point, positive towards +x",
+        least=-360,
+        most=360,
+    )
+    arc: float = number(
+        0.0,
+        "deg",
+        "angle along the section from the crown, positive towards +y",
+        least=-175,
+        most=175,
+    )
+    spread: tuple[float, float] = vector(
+        (0.0, 0.0),
+        "deg",
+        "half widths (angle, arc) of a uniform traction; 0, 0: one point",
+        least=0,
+        most=180,
+    )
+    direction: tuple[float, float, float] = vector(
+        (0.0, 0.0, 1.0), "-", "direction of the force, of any length"
+    )
+    amplitude: float = number(1.0, "N", "amplitude of the force", least=-1e8, most=1e8)
+    frequency: float = number(
+        5.0, "Hz", "frequency of the sine; 0: a constant switched on at t = 0", least=0, most=1e6
+    )
+
+
+@dataclass(frozen=True)
+class Receptance:
+    to: float = number(500.0, "Hz", "highest frequency", least=1e-3, most=1e6)
+    step: float = number(2.0, "Hz", "step between two frequencies", least=1e-4, most=1e6)
+    direct: int = integer(
+        0, "number of frequencies also solved on the full matrices, as a check", least=0, most=1000
+    )
+
+
+@dataclass(frozen=True)
+class Output:
+    spectra: bool = flag(True, "spectra of the contact force and the axle force")
+    axle_force: bool = flag(True, "axle force, from the momentum of the tire")
+    impulse: bool = flag(
+        False, "impulse responses (Green's functions) between the driven points, over [time]"
+    )
+    velocity: bool = flag(False, "velocity of the driven points")
+    acceleration: bool = flag(False, "acceleration of the driven points")
+    vibration: bool = later("u(ω) on the whole tire")
+    fields: bool = later("motion of the whole tire in time, as XDMF")
+    receptance: Receptance | None = table(
+        Receptance, "receptances between the driven points", optional=True
+    )
+
+
+@dataclass(frozen=True)
+class Scene:
+    name: str = text("scene", "name of the scene and its result folder")
+    tire: Tire = table(Tire, "geometry, mesh and materials of the tire")
+    static: Static = table(Static, "inflation and load of the static state")
+    stiffness: Stiffness | None = table(
+        Stiffness, "load over deflection, and the stiffness of the standing tire", optional=True
+    )
+    modal: Modal = table(Modal, "modes at the static state")
+    damping: Damping | None = table(
+        Damping,
+        "Rayleigh damping of the material; absent: by the loss factors of the compounds, where "
+        "there are any, else with its defaults",
+        optional=True,
+    )
+    rotation: Rotation | None = table(Rotation, "rotation of the wheel", optional=True)
+    greens: Greens = table(Greens, "Green's functions")
+    force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")
+    contact: Contact | None = table(Contact, "contact with the road in time", optional=True)
+    road: Road | None = table(Road, "the road driven over", optional=True)
+    time: Time | None = table(Time, "the run in time", optional=True)
+    output: Output = table(Output, "what is computed and kept")

@@ -1,0 +1,147 @@
+"""The air in the tire of a run: made at the static state, stored beside the modes, told in figures."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, ClassVar
+
+import h5py
+import numpy as np
+
+from tireroad.fem.cavity.duct import Duct
+from tireroad.fem.model import SmallMotions
+from tireroad.modal.air import Air
+from tireroad.modal.basis import ModalBasis
+from tireroad.modal.rolling import RollingModes
+from tireroad.runs.files.store import put
+from tireroad.runs.scene.tables.cavity import has_air
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Done, Shared
+
+if TYPE_CHECKING:
+    from tireroad.fem.cavity.column import Column
+
+LIMIT = 1000.0  # Hz: beyond it the section is half a wavelength wide, and the duct no line
+_SHOWN = 4
+_MOSTLY = 0.3  # of a state's energy: then it is one of the air's
+_UNITS = {
+    "circular": "rad/s",
+    "pressure": "m^1/2/kg^1/2 s",
+    "gyroscopic": "1/rad",
+    "convective": "1/rad2",
+    "momentum": "kg^1/2",
+    "loss": "1/s",
+}
+_STATES = {
+    "eigenvalue": "1/s",
+    "right": "-",
+    "left": "s",
+    "block": "1/s",
+    "block_right": "-",
+    "block_left": "s",
+    "residual": "-",
+    "left_residual": "-",
+}
+
+
+def inputs(job: Job) -> dict | None:
+    """What the air depends on besides the static state; None without it."""
+    return asdict(job.scene.tire.cavity) if has_air(job.scene) else None
+
+
+def make_air(job: Job, motions: SmallMotions, highest: float) -> Column | None:
+    """The air at the wall of the static state, or None; `highest` (Hz) of the modes. Collective."""
+    if not has_air(job.scene):
+        return None
+    from tireroad.fem.cavity.column import make_column
+
+    wanted, static = job.scene.tire.cavity, motions.static
+    return make_column(
+        motions.body,
+        motions.operators.unknowns,
+        static.inflation,
+        wanted.temperature,
+        job.speed,
+        wanted.up_to or min(highest, LIMIT),
+        wanted.loss_factor,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class AirColumn(Shared["Column | None"]):
+    """The air at the wall, as the modes were made with it, or once more where they are reused."""
+
+    name: ClassVar[str] = "air"
+    modes: Done[ModalBasis]
+    motions: Done[SmallMotions]
+
+    def make(self) -> Column | None:
+        """Collective."""
+        basis = self.modes.product
+        if basis.column is not None:
+            return basis.column
+        return make_air(self.job, self.motions.product, float(basis.frequency[-1]))
+
+
+def describe_air(record: Record, air: Air) -> None:
+    """The modes of the air that joins those of the tire."""
+    record.headline |= {
+        "air, rigid walls": (_listed(air.duct.frequency[:_SHOWN]), "Hz"),
+        "volume of air": (1e3 * air.duct.volume, "l"),
+    }
+    record.indicators["modes of the air"] = (len(air.duct.circular), "-")
+
+
+def _listed(values: np.ndarray) -> str:
+    return " / ".join(f"{value:.4g}" for value in values)
+
+
+def fill(file: h5py.File, air: Air | None) -> None:
+    """Write the air beside the modes."""
+    if air is None:
+        return
+    put(file, "cavity/frequency", air.duct.frequency, "Hz")
+    for name, unit in _UNITS.items():
+        put(file, f"cavity/{name}", getattr(air.duct, name), unit)
+    put(file, "cavity/coupling", air.coupling, "1/s")
+    file["cavity"].attrs["density"] = air.duct.density
+    file["cavity"].attrs["volume"] = air.duct.volume
+
+
+def read(file: h5py.File) -> Air | None:
+    """The air of a file of modes, None where it has none."""
+    if "cavity" not in file:
+        return None
+    group = file["cavity"]
+    arrays = {name: group[name][:] for name in _UNITS}
+    scalars = {f.name: float(group.attrs[f.name]) for f in fields(Duct) if f.name not in arrays}
+    return Air(Duct(**arrays, **scalars), group["coupling"][:])
+
+
+def fill_states(file: h5py.File, rolling: RollingModes) -> None:
+    """Write the states of a tire with air that stands, which no stage before had to find."""
+    states = rolling.states
+    for name, unit in _STATES.items():
+        put(file, f"states/{name}", getattr(states, name), unit)
+    put(file, "states/frequency", states.eigenvalue.imag / (2 * np.pi), "Hz")
+    put(file, "states/air_share", share(rolling), "-")
+    file["states"].attrs["basis_condition"] = states.condition
+    file["states"].attrs["rigid_states"] = states.rigid
+
+
+def share(rolling: RollingModes) -> np.ndarray:
+    """Part (q,) of each state's kinetic energy that is the air's."""
+    return rolling.basis.projection.air.share(rolling.states.right)
+
+
+def describe(record: Record, rolling: RollingModes) -> None:
+    """Tell the states that are the air's more than any others: the cavity's resonances."""
+    frequency, part = rolling.states.eigenvalue.imag, share(rolling)
+    first = np.argsort(-part * (frequency > 0))[:_SHOWN]
+    first = first[part[first] >= min(_MOSTLY, part[first[0]])]
+    first = first[np.argsort(frequency[first])]
+    record.headline |= {
+        "states mostly of air": (_listed(frequency[first] / (2 * np.pi)), "Hz"),
+        "their share of air": (_listed(part[first]), "-"),
+    }

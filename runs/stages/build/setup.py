@@ -1,0 +1,96 @@
+"""Where a scene's tire meets its road, and where its prescribed forces act: cheap, made in every run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy import sparse
+
+from tireroad.contact.roads.motion import make_motion
+from tireroad.contact.roads.road import make_road
+from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
+from tireroad.fem.matrices import probe
+from tireroad.fem.static.state import StaticState
+from tireroad.runs.stages.build.stepping import run_time
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.stage import Done, Shared
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup(Shared[ContactSetup | None]):
+    """The patch and the road under it; None in a scene without contact."""
+
+    name: ClassVar[str] = "setup"
+    static: Done[StaticState]
+
+    def make(self) -> ContactSetup | None:
+        """From the static state and the scene's road."""
+        job = self.job
+        return scene_setup(job, self.static.product) if job.scene.contact else None
+
+
+def scene_setup(job: Job, state: StaticState) -> ContactSetup:
+    """The patch and the road of the job's scene."""
+    scene, motion = job.scene, job.scene.road.motion
+    points = scene.contact.points
+    return contact_setup(
+        state,
+        job.tire.lattice,
+        make_road(scene.road),
+        Rolled(
+            speed=rolling_speed(job, state),
+            duration=run_time(scene.time),
+            motion=make_motion(motion.kind, motion.amplitude, motion.frequency, motion.duration),
+            lift=abs(motion.amplitude) if motion.kind != "none" else 0.0,
+        ),
+        spacing=None if points == "nodes" else (points.dx, points.dy),
+        reach=scene.contact.reach,
+    )
+
+
+def rolling_speed(job: Job, state: StaticState) -> float:
+    """Speed of the road under the tire, m/s: the wheel's by its effective rolling radius."""
+    given = job.scene.rotation.rolling_radius if job.scene.rotation else None
+    return job.speed * (given or state.rolling_radius())
+
+
+def components(job: Job) -> tuple[int, ...]:
+    """Directions of the contact forces: z, and with a brush x and y after it."""
+    return (2,) if job.scene.contact.brush_stiffness is None else (2, 0, 1)
+
+
+@dataclass(frozen=True)
+class Probes:
+    """What is driven and read, on the outer face: `name` "contact" or "force", `outputs` (r, 3 s) and
+    `loads` (k, 3 s)."""
+
+    name: str
+    outputs: sparse.csr_matrix
+    loads: sparse.csr_matrix
+
+
+def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
+    """Of the contact patch with what prescribed forces add to it, or of the prescribed forces alone."""
+    loads, readings = driven_points(job) if job.scene.force else (None, None)
+    if setup is None:
+        return Probes("force", readings, loads)
+    count, index = len(state.points), setup.patch.index
+    parts = [probe.nodes(index, count, part) for part in components(job)]
+    if job.scene.force:
+        parts += [loads, readings]
+    points = sparse.vstack(parts, format="csr")
+    return Probes("contact", points, points)
+
+
+def driven_points(job: Job) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    """The prescribed forces (k, 3 s), and the readings (3 k, 3 s) of x, y and z at their centres."""
+    lattice, loads, readings = job.tire.lattice, [], []
+    for force in job.scene.force:
+        angles = np.radians([force.angle, force.arc])
+        spread = tuple(np.radians(force.spread))
+        loads.append(probe.directed(probe.spot(lattice, *angles, spread), force.direction))
+        here = probe.spot(lattice, *angles)
+        readings += [probe.directed(here, axis) for axis in np.eye(3)]
+    return sparse.csr_matrix(np.stack(loads)), sparse.csr_matrix(np.stack(readings))

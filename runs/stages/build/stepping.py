@@ -1,0 +1,82 @@
+"""The steps of a run: given by the scene, or found from what has to be resolved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tireroad.contact.steps import equal_steps, steps_of
+from tireroad.greens.convolution import Convolution
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
+from tireroad.runs.process import observe
+from tireroad.runs.scene.tables.contact import Time
+from tireroad.runs.scene.tables.scene import Road
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.record import Record
+
+# Radians a kept mode may turn in one automatic step: 0.3 leaves less than a percent in its phase.
+_TURN = 0.3
+_LEAST_STEPS = 200
+_PER_PERIOD = 16  # steps in the shortest period of the excitation
+
+
+def run_time(time: Time) -> float:
+    """How long the run is, s: whole steps, so a little longer than a duration that is no multiple."""
+    return time.duration if time.step == "auto" else steps_of(time.duration, time.step).duration
+
+
+@dataclass(frozen=True)
+class Integration:
+    """The `tire` in time, taken over `steps` steps of `step` s by a `scheme`."""
+
+    tire: Recursion | Convolution
+    step: float
+    steps: int
+    scheme: str
+
+
+def integration(job: Job, record: Record, response: Response, shortest: float) -> Integration:
+    """For the scene's time table; what was chosen is shown. Collective.
+
+    `shortest` (s): the shortest period in the excitation.
+    """
+    wanted = job.scene.time
+    fastest = np.abs(response.every).max(initial=0.0)
+    if wanted.step == "auto":
+        limits = [wanted.duration / _LEAST_STEPS, shortest / _PER_PERIOD]
+        if fastest > 0:
+            limits.append(_TURN / fastest)
+        steps = equal_steps(wanted.duration, min(limits))
+    else:
+        steps = steps_of(wanted.duration, wanted.step)
+    step, count = steps.size, steps.count
+    scheme = "linear" if wanted.scheme == "auto" else wanted.scheme
+    kept = response.resolved(step)
+    moved = len(response.every) - len(kept.every)
+    observe.say(
+        f"  step {step:.4g} s, {count} steps, scheme {scheme}; fastest mode {fastest:.4g} 1/s, "
+        f"{moved} states too fast for the step follow statically"
+    )
+    if steps.duration > wanted.duration * (1 + 1e-9):
+        observe.say(
+            f"  the run ends at {steps.duration:.6g} s: {wanted.duration:.6g} s is no multiple of the step"
+        )
+    record.indicators["states moved to the residual"] = (moved, "-")
+    if scheme == "convolution":
+        return Integration(Convolution(kept, step, count), step, count, scheme)
+    return Integration(Recursion(kept, step, scheme, job.comm), step, count, scheme)
+
+
+def passing_period(road: Road, spacing: float, speed: float) -> float:
+    """Shortest period (s) of the road as the tire meets it at `speed` (m/s): the shortest wave that its
+    `spacing` (m) resolves, the sine of its motion, or the acceleration of its ramp (one wave long).
+    """
+    motion = road.motion
+    periods = [2 * spacing / speed if speed else np.inf]
+    if motion.kind == "sine":
+        periods.append(1 / motion.frequency)
+    elif motion.kind == "ramp":
+        periods.append(motion.duration)
+    return min(periods)
