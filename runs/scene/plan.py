@@ -9,6 +9,7 @@ STAGES = (
     "rotating",
     "greens",
     "contact",
+    "accuracy",
     "response",
     "spectra",
     "report",
@@ -28,11 +29,13 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
         reasons["response"] = "no [[force]]"
     if scene.contact is None:
         reasons["contact"] = "no [contact]"
-        reasons["spectra"] = "no [contact], hence no contact forces"
+        reasons["accuracy"] = reasons["spectra"] = "no [contact], hence no contact forces"
         if not scene.force:
             reasons["greens"] = "neither [[force]] nor [contact]"
     elif not scene.output.spectra:
         reasons["spectra"] = "output.spectra is false"
+    if "accuracy" not in reasons and not scene.accuracy.estimate:
+        reasons["accuracy"] = "accuracy.estimate is false"
     if until is not None:
         for stage in STAGES[STAGES.index(until) + 1 :]:
             reasons.setdefault(stage, f"--until {until}")

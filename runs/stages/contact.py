@@ -7,23 +7,19 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from typing import ClassVar
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.driven import Driven
-from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.model import solver_name, step_solver
+from tireroad.contact.model import solver_name
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.solver.friction import Friction
 from tireroad.contact.totals import Figures, Totals
-from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
-from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
+from tireroad.runs.stages.build.loop import driven_tire, make_loop
+from tireroad.runs.stages.build.point_forces import shortest_period
 from tireroad.runs.stages.build.stepping import Integration, integration, passing_period
 from tireroad.runs.stages.energy import Losses, describe_energy
 from tireroad.runs.stages.greens import Responses
@@ -71,7 +67,7 @@ class ContactStage(Stage[ContactHistory]):
             setup, rise = setup.settled(response, state.force, self.job.scene.contact)
             if rise:
                 record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
-            driven = self._driven(chosen)
+            driven = driven_tire(self.job, chosen.tire, chosen.step, chosen.steps)
             loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach)
         losses = Losses(chosen.tire, response, self.rotating.product, chosen.step)
@@ -103,32 +99,19 @@ class ContactStage(Stage[ContactHistory]):
         passing = passing_period(scene.road, setup.road.spacing, setup.rolled.speed)
         return min(passing, shortest_period(scene.force))
 
-    def _driven(self, chosen: Integration) -> Driven | None:
-        """The tire under the scene's prescribed forces, where there are any."""
-        forces = self.job.scene.force
-        if not forces:
-            return None
-        time = chosen.step * np.arange(chosen.steps + 1)
-        return Driven(chosen.tire, histories(forces, time), directions(forces))
-
     def _loop(self, record: Record, setup: ContactSetup, tire, step: float) -> Loop:
         """The tire as seen at the patch's points, normal solver, friction; the choice is shown."""
         spec, patch = self.job.scene.contact, setup.patch
-        p = len(patch.index)
-        solver = step_solver(spec, patch, tire.same_step[:p, :p])
+        loop = make_loop(spec, setup, tire, step)
         observe.say(
-            f"  {len(patch.points)} contact points on {p} nodes, tread {spec.tread}, "
+            f"  {len(patch.points)} contact points on {len(patch.index)} nodes, tread {spec.tread}, "
             f"solver {solver_name(spec, patch)}"
         )
-        friction = None
-        if spec.brush_stiffness is not None:
-            friction = _friction(spec, setup, tire, step)
-            limit = friction.largest_unique(patch.force > 0, solver)
+        if loop.friction is not None:
+            limit = loop.friction.largest_unique(patch.force > 0, loop.solver)
             record.indicators["friction up to which a step has one answer"] = (limit, "-")
             record.warnings += beyond_unique(spec.friction, limit)
-        if patch.weights is not None:
-            tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
-        return Loop(tire, solver, friction)
+        return loop
 
     def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, losses, chosen) -> None:
         """Take the steps that are left; stop between two of them when asked to. Collective."""
@@ -171,15 +154,6 @@ def beyond_unique(friction: float | None, limit: float) -> list[str]:
         f"contact.friction = {friction:g} is more than {limit:.3g}, up to which a step is sure to have "
         "one answer: where points slip there may be another; lower it, or take a softer tread"
     ]
-
-
-def _friction(spec, setup: ContactSetup, tire, step: float) -> Friction:
-    """The brush of the scene, at rest."""
-    patch = setup.patch
-    law = BrushLaw(spec.brush_stiffness, spec.friction, spec.slip, spec.brush)
-    brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
-    brush.begin(patch.force > 0)
-    return Friction(brush, tire.same_step, patch.weights)
 
 
 def _describe(record: Record, totals: Figures, solver, chosen: Integration, taken: int) -> None:

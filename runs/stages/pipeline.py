@@ -31,6 +31,7 @@ from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.rules.road import check_road
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages.accuracy import AccuracyStage
 from tireroad.runs.stages.build.cavity import AirColumn
 from tireroad.runs.stages.build.setup import Setup
 from tireroad.runs.stages.contact import ContactStage
@@ -57,6 +58,7 @@ PARTS: tuple[type[Part], ...] = (
     RotatingStage,
     GreensStage,
     ContactStage,
+    AccuracyStage,
     ResponseStage,
     SpectraStage,
 )

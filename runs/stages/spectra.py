@@ -7,12 +7,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from tireroad.contact.limits import Limit, limits, lowest, pitch
+from tireroad.contact.limits import Limit, lowest
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.spectra import amplitudes, third_octaves
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
+from tireroad.runs.stages.accuracy import Accuracy
+from tireroad.runs.stages.build.model_limit import all_limits
+from tireroad.runs.stages.build.run_in import first_step, run_in
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
 from tireroad.runs.stages.stored.contact_file import ContactHistory
@@ -24,7 +27,8 @@ _FEWEST = 32  # steps of which a spectrum says anything
 class Spectra:
     """Complex amplitudes over `frequency` (f,) Hz of the `contact_force` and, where it is kept, of the
     `axle_force`, (f, 3) N; third octaves: band `centre` (b,) Hz, `level` of the axle force and
-    `contact_level` (b, 3) dB re 1 N. The first `left_out` s of the run, its run-in, are not in them, nor
+    `contact_level` (b, 3) dB re 1 N, with their estimated errors `level_error` and `contact_level_error` dB,
+    NaN where unknown, None where they were not wanted. The first `left_out` s of the run, its run-in, are not in them, nor
     is anything beyond the `limit` of the model.
     """
 
@@ -36,6 +40,8 @@ class Spectra:
     contact_level: np.ndarray
     axle_force: np.ndarray | None = None
     level: np.ndarray | None = None
+    level_error: np.ndarray | None = None
+    contact_level_error: np.ndarray | None = None
 
 
 _UNITS = {
@@ -45,6 +51,8 @@ _UNITS = {
     "centre": ("third_octave/centre", "Hz"),
     "level": ("third_octave/level", "dB re 1 N"),
     "contact_level": ("third_octave/contact_level", "dB re 1 N"),
+    "level_error": ("third_octave/level_error", "dB"),
+    "contact_level_error": ("third_octave/contact_level_error", "dB"),
 }
 
 
@@ -56,10 +64,11 @@ class SpectraStage(Computed[Spectra]):
     contact: Done[ContactHistory]
     setup: Done[ContactSetup]
     rotating: Done[RollingModes]
+    accuracy: Done[Accuracy] | None = None
 
     def inputs(self) -> dict:
         """The contact forces: the length of road that is left out as run-in is in them, and the modes."""
-        return {"contact": self.contact.key}
+        return {"contact": self.contact.key, "bars": self.accuracy.key if self.accuracy else None}
 
     def compute(self, record: Record) -> Spectra:
         """Not collective."""
@@ -86,6 +95,10 @@ class SpectraStage(Computed[Spectra]):
                 "level": third_octaves(force, step, limit.frequency)[1],
             }
             _largest(record, frequency[below], amplitude)
+        if self.accuracy is not None:
+            bars = self.accuracy.product
+            axle["level_error"] = bars.levels("axle_force", centre)
+            axle["contact_level_error"] = bars.levels("contact_force", centre)
         return Spectra(
             frequency=frequency[below],
             contact_force=contact[below],
@@ -98,13 +111,7 @@ class SpectraStage(Computed[Spectra]):
 
     def _limit(self, record: Record, step: float) -> Limit:
         """Where the model ends, told with what sets it."""
-        setup, rolling = self.setup.product, self.rotating.product
-        found = limits(
-            step=step,
-            highest=rolling.highest / (2 * np.pi),
-            pitch=pitch(setup.patch),
-            speed=setup.rolled.speed,
-        )
+        found = all_limits(self.setup.product, self.rotating.product, step)
         limit = lowest(found)
         record.headline["an answer up to"] = (limit.frequency, "Hz")
         record.headline["which is"] = (limit.cause, "-")
@@ -122,18 +129,13 @@ class SpectraStage(Computed[Spectra]):
         0, and a warning, when that takes half the run or more: what is left would resolve too little.
         """
         setup, road = self.setup.product, self.job.scene.road
-        speed = setup.rolled.speed
-        if speed == 0 or road.kind == "flat":
-            return 0
-        x0, x1, _, _ = setup.patch.extent
-        run_in = (road.run_in + x1 - x0) / speed
-        start = int(np.searchsorted(time, run_in))
-        if start < len(time) // 2:
+        start, needed = first_step(setup, road, time), run_in(setup, road)
+        if start or not needed:
             return start
         record.warnings.append(
-            f"the spectra hold the run-in: with the patch it takes {run_in:.3g} s of the run's "
+            f"the spectra hold the run-in: with the patch it takes {needed:.3g} s of the run's "
             f"{time[-1]:.3g} s, and half or more cannot be left out; take time.duration above "
-            f"{2 * run_in:.2g} s, or a shorter road.run_in"
+            f"{2 * needed:.2g} s, or a shorter road.run_in"
         )
         return 0
 

@@ -8,6 +8,7 @@ from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.thinned import thinned
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.tread_surface import TreadSurface
@@ -115,6 +116,18 @@ def test_nodes_and_points_exchange_the_same_work(tread) -> None:
     assert tire.force.sum() == pytest.approx(force.sum())
     assert tire.force @ tire.predict() == pytest.approx(force @ on.predict())
     assert np.allclose(on.same_step @ force, patch.weights @ (1e-5 * tire.force))
+
+
+def test_every_other_point_is_a_grid_of_twice_the_pitch(tread) -> None:
+    _, _, fine = patches(tread, 3e-3, 0.004)
+    coarse, (_, _, wanted) = thinned(fine), patches(tread, 3e-3, 0.008)
+    i, j = np.divmod(coarse.places.place, coarse.places.shape[1])
+    places = np.stack([i, j], axis=1) * coarse.places.spacing
+    assert np.ptp(coarse.points[:, :2] - places, axis=0) == pytest.approx(0.0, abs=1e-9)
+    assert coarse.line.tolist() == j.tolist()
+    assert coarse.area == pytest.approx(6.4e-5)
+    near, other = coarse.points[~coarse.edge], wanted.points[~wanted.edge]
+    assert near[np.lexsort(near.T)] == pytest.approx(other[np.lexsort(other.T)], abs=1e-9)
 
 
 def test_a_grid_needs_a_tread_and_a_sane_pitch(tread) -> None:

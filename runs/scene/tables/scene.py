@@ -194,6 +194,15 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Accuracy:
+    estimate: bool = flag(
+        True,
+        "error bars of contact and axle force by cheaper companions of the run: half the elements, fewer "
+        "modes, twice the step, twice the spacing of points",
+    )
+
+
+@dataclass(frozen=True)
 class Scene:
     name: str = text("scene", "name of the scene and its result folder")
     tire: Tire = table(Tire, "geometry, mesh and materials of the tire")
@@ -214,4 +223,5 @@ class Scene:
     contact: Contact | None = table(Contact, "contact with the road in time", optional=True)
     road: Road | None = table(Road, "the road driven over", optional=True)
     time: Time | None = table(Time, "the run in time", optional=True)
+    accuracy: Accuracy = table(Accuracy, "how sure the answer is")
     output: Output = table(Output, "what is computed and kept")
