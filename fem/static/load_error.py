@@ -55,7 +55,7 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
     if not load:
         return "nothing touches the road"
     try:
-        finer = _at_finer_footprint(loader, rolling)
+        finer = at_finer_footprint(loader, rolling)
         bulk = _bulk(loader, rolling)
     except ConvergenceError as error:
         return f"on the companion, {error}"
@@ -69,7 +69,7 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
     )
 
 
-def _at_finer_footprint(loader: Loader, rolling: Rolling) -> Loader:
+def at_finer_footprint(loader: Loader, rolling: Rolling) -> Loader:
     """The same tire on the same road, elements at the footprint cut in two. Collective."""
     lattice, force = loader.body.lattice, _force(loader)
     around = _touched(force.any(axis=1), lattice.ring_corners, lattice, closed=True)

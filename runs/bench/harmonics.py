@@ -109,7 +109,7 @@ def _strains(N: np.ndarray, gradient: np.ndarray, r: np.ndarray, n: int) -> np.n
 
 
 def _hooke(rubber: Rubber) -> np.ndarray:
-    E, nu = rubber.law.youngs_modulus, rubber.law.poisson_ratio
+    E, nu = rubber.youngs_modulus, rubber.poisson_ratio
     shear, lame = E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu))
     D = np.diag([2 * shear] * 3 + [shear] * 3)
     D[:3, :3] += lame

@@ -50,6 +50,7 @@ def run(tmp_path_factory):
 
     def started(name: str, until: str | None, *sets: str):
         scene = load(base / "scene.toml", list(sets))
+        (base / name).mkdir(exist_ok=True)
         with observe.quiet():
             return base / name, run_scene(
                 scene, base / name, MPI.COMM_SELF, until=until, fresh=False, petsc_options=[]
