@@ -36,7 +36,7 @@ def springs(response: Response, force: np.ndarray) -> float:
 class Motion:
     """Coordinates and rates of the modes from the states of a time loop, and what they lose.
 
-    Of a tire that rolls on its own states alone, without air and without a near-defective block.
+    Of a tire that rolls on its own states alone, without air, corner and near-defective block.
     """
 
     def __init__(self, rolling: RollingModes, slow: np.ndarray, step: float) -> None:
@@ -45,12 +45,14 @@ class Motion:
         self._real, self._imaginary = right.real.copy(), right.imag.copy()
         self._eigenvalue = states.eigenvalue[slow][:, None]
         damping = rates(turning.damping, projection)
-        self.losses = Dissipation(damping, turning.speed * projection.body, step)
+        _, _, body = projection.rotating(turning.inertia)
+        self.losses = Dissipation(damping, turning.speed * body, step)
 
     @staticmethod
     def known(rolling: RollingModes, response: Response) -> bool:
         """Whether the losses of these states can be told."""
-        plain = not rolling.full and rolling.basis.projection.air is None
+        projection = rolling.basis.projection
+        plain = not rolling.full and projection.air is None and projection.corner is None
         moving = rolling.turning.speed > 0 and not len(response.block)
         return plain and moving and own_states(response, rolling)
 

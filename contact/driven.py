@@ -15,7 +15,8 @@ class Driven:
     """The tire as the contact sees it, its motion under prescribed forces included.
 
     `history` (n + 1, k) N at the steps from t = 0 on; `directions` (k, 3) of unit length. After each
-    `advance`: `reading` (r,) m, and `work` (J) the prescribed forces did so far (trapezoid).
+    `advance`: `reading` (r,) m, and `work` (J) the prescribed forces did so far (trapezoid),
+    and `lead`, what more they do where each has its new value for the whole step.
     """
 
     def __init__(self, tire: Tire, history: np.ndarray, directions: np.ndarray) -> None:
@@ -25,7 +26,7 @@ class Driven:
         self.same_step = self._same[: self._count, : self._count]
         self._step = 0
         self._along = np.zeros(history.shape[1])
-        self.work = 0.0
+        self.work = self.lead = 0.0
         tire.start(np.concatenate([np.zeros(self._count), history[0]]))
 
     def predict(self) -> np.ndarray:
@@ -43,6 +44,7 @@ class Driven:
         moved = self._free[self._count :] + self._same[self._count :] @ acting
         along, self.reading = np.split(moved, [len(now)])
         self.work += float(0.5 * (before + now) @ (along - self._along))
+        self.lead += float(0.5 * (now - before) @ (along - self._along))
         self._along = along
 
     def inertia_force(self) -> np.ndarray:
@@ -51,11 +53,15 @@ class Driven:
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """The tire's, and how far the prescribed forces are. Collective when the tire's is."""
-        own = {"driven_step": self._step, "driven_along": self._along, "driven_work": self.work}
+        own = {
+            "driven_step": self._step,
+            "driven_along": self._along,
+            "driven_work": [self.work, self.lead],
+        }
         return self._tire.snapshot() | {name: np.array(value) for name, value in own.items()}
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from a snapshot."""
-        self._step, self.work = int(kept["driven_step"]), float(kept["driven_work"])
+        self._step, (self.work, self.lead) = int(kept["driven_step"]), kept["driven_work"].tolist()
         self._along = kept["driven_along"]
         self._tire.restore(kept)

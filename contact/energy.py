@@ -8,35 +8,38 @@ import numpy as np
 class Work:
     """Work (J) of the changes of the contact forces on the tire, summed over the steps.
 
-    Trapezoid: sum (f + f_before).(u - u_before)/2, second order in the step. `total` is what a
-    checkpoint keeps with the last force and displacement.
+    Trapezoid: sum (f + f_before).(u - u_before)/2, second order in the step. `lead`: what more a force does
+    that has its new value for the whole step, sum (f - f_before).(u - u_before)/2. A checkpoint keeps
+    both with the last force and displacement.
     """
 
     def __init__(self) -> None:
-        self.total = 0.0
+        self.total = self.lead = 0.0
         self._force = self._moved = np.zeros(1)
 
     def add(self, change: np.ndarray, moved: np.ndarray) -> None:
         """Count n steps: `change` (n, k) N and `moved` (n, k) m of contact.rolling.Instant."""
         force = np.concatenate([np.broadcast_to(self._force, (1, change.shape[1])), change])
         place = np.concatenate([np.broadcast_to(self._moved, (1, moved.shape[1])), moved])
-        mean = 0.5 * (force[1:] + force[:-1])
+        mean, way = 0.5 * (force[1:] + force[:-1]), np.diff(place, axis=0)
+        ahead = 0.5 * np.diff(force, axis=0)
         # One step after the other: the sum does not depend on how the steps are blocked.
-        for work in (mean * np.diff(place, axis=0)).sum(axis=1).tolist():
+        for work, more in np.stack([mean * way, ahead * way]).sum(axis=2).T.tolist():
             self.total += work
+            self.lead += more
         self._force, self._moved = change[-1], moved[-1]
 
     def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint keeps."""
         return {
-            "work": np.array(self.total),
+            "work": np.array([self.total, self.lead]),
             "work_force": self._force,
             "work_moved": self._moved,
         }
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from `state`."""
-        self.total = float(kept["work"])
+        self.total, self.lead = kept["work"].tolist()
         self._force, self._moved = kept["work_force"], kept["work_moved"]
 
 
@@ -83,30 +86,40 @@ class Circulation:
     """Work (J) of forces against the skew part of a flexibility, int f . G_a df, by the trapezoid rule.
 
     The symmetric part of a residual flexibility stores what it is given; the skew part, which a rolling
-    tire's has, does not: it is what the modes left out lose, less what the drive gives them.
+    tire's has, does not: it is what the modes left out lose, less what the drive gives them. `lead`: work
+    against the symmetric part that it does not store when forces jump, sum (f - f_before).G_s (f - f_before)/2.
     """
 
     def __init__(self, flexibility: np.ndarray) -> None:
         """`flexibility` (k, k) m/N."""
         self._skew = (flexibility - flexibility.T) / 2
-        self.work = 0.0
+        self._even = (flexibility + flexibility.T) / 2
+        self.work = self.lead = 0.0
         self._force = np.zeros(len(flexibility))
 
     def add(self, forces: np.ndarray) -> None:
         """Count n steps: forces (n, k) N at their ends."""
         path = np.concatenate([self._force[None], forces])
         # f_a . G_a (f_b - f_a) = f_a . G_a f_b, for f . G_a f = 0.
-        for work in np.einsum("ni,ni->n", path[:-1], path[1:] @ self._skew.T).tolist():
+        jump = np.diff(path, axis=0)
+        turned = np.einsum("ni,ni->n", path[:-1], path[1:] @ self._skew.T)
+        jumped = np.einsum("ni,ni->n", jump, jump @ self._even) / 2
+        for work, more in zip(turned.tolist(), jumped.tolist(), strict=True):
             self.work += work
+            self.lead += more
         self._force = path[-1]
 
     def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint keeps."""
-        return {"circulation": np.array(self.work), "circulation_force": self._force}
+        return {
+            "circulation": np.array([self.work, self.lead]),
+            "circulation_force": self._force,
+        }
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from `state`."""
-        self.work, self._force = float(kept["circulation"]), kept["circulation_force"]
+        self.work, self.lead = kept["circulation"].tolist()
+        self._force = kept["circulation_force"]
 
 
 def stored(coordinates: np.ndarray, rates: np.ndarray, stiffness: np.ndarray) -> float:

@@ -29,8 +29,13 @@ STEEPEST = 0.25
 class Spec(Protocol):
     """The table [contact] of a scene."""
 
-    law: TreadLaw
-    solver: str
+    @property
+    def law(self) -> TreadLaw:
+        """The tread law."""
+
+    @property
+    def solver(self) -> str:
+        """Its name, or "auto"."""
 
 
 def solver_name(spec: Spec, patch: Patch) -> str:
@@ -63,12 +68,21 @@ def step_solver(spec: Spec, patch: Patch, tire: Array) -> ContactSolver:
     return make_solver(name, matrix)
 
 
-def tread_matrix(spec: Spec, patch: Patch) -> Array:
-    """Compliance of the tread between the points, (c, c) m/N."""
+def tread_matrix(spec: Spec, patch: Patch, index: slice | NDArray[np.intp] = slice(None)) -> Array:
+    """Compliance of the tread between the points, or those of the `index`, (c, c) m/N."""
+    places, sizes = patch.points[index, :2], patch.half_sizes[index]
     try:
-        return spec.law.matrix(patch.points[:, :2], patch.half_sizes, _farthest(patch))
+        return spec.law.matrix(places, sizes, _farthest(patch))
     except InputError as error:
         raise _out_of_reach(patch) or error from None
+
+
+def touching_compliance(spec: Spec, patch: Patch, tire: Array, index: NDArray[np.intp]) -> Array:
+    """W tire W^T + C~ between the points of the `index`, (n, n) m/N, `tire` (p, p) m/N between the nodes."""
+    if patch.weights is None:
+        return tire[np.ix_(index, index)] + tread_matrix(spec, patch, index)
+    rows = patch.weights[index]
+    return rows @ (rows @ tire.T).T + tread_matrix(spec, patch, index)
 
 
 def _out_of_reach(patch: Patch) -> InputError | None:
@@ -97,6 +111,7 @@ def _product(spec: Spec, patch: Patch, tire: Array) -> Compliance:
             "contact.tread: the tread leaves a grid of points without compliance of its own: take "
             'another, e.g. "half-space", or points = "nodes"'
         )
+    assert patch.places is not None, "only a grid of points makes a product"
     influence = spec.law.influence(_farthest(patch))
     return SpreadCompliance(tire, patch.weights, KernelTread(patch.places, influence))
 

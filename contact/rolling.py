@@ -128,10 +128,10 @@ def roll(
     answer = (
         LoadedColumns(tire.same_step) if isinstance(tire.same_step, np.ndarray) else tire.same_step
     )
-    iterated = isinstance(tire, NonlinearTire)
+    settle = tire.settle if isinstance(tire, NonlinearTire) else None
     for time, road in _roads(drive, patch, step, steps, done):
         free = tire.predict()
-        past = friction.state() if friction and iterated else {}
+        past = friction.state() if friction and settle else {}
         while True:
             q = patch.gap + free[:count] - road
             if friction is None:
@@ -141,7 +141,7 @@ def roll(
                 force, horizontal = friction.solve(solver, q, touching, patch.force, free[count:])
                 change = np.concatenate([force - patch.force, *horizontal.T])
             touching = None
-            again = tire.settle(change) if iterated else None
+            again = settle(change) if settle else None
             if again is None:
                 break
             free = again

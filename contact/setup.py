@@ -22,12 +22,18 @@ _MARGIN = 5e-3
 class OuterFace(Protocol):
     """The outer face of a static state (fem.static.state.StaticState)."""
 
-    positions: np.ndarray
-    half_sizes: np.ndarray
-    force: np.ndarray
-    gap: np.ndarray
-    shape: tuple[int, int]
-    road_height: float | None
+    @property
+    def positions(self) -> np.ndarray: ...
+    @property
+    def half_sizes(self) -> np.ndarray: ...
+    @property
+    def force(self) -> np.ndarray: ...
+    @property
+    def gap(self) -> np.ndarray: ...
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def road_height(self) -> float | None: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +98,7 @@ def contact_setup(
     if spacing is not None:
         from tireroad.fem.static.tread_surface import TreadSurface
 
+        assert face.road_height is not None, "contact needs a tire that stands on a road"
         surface = TreadSurface(lattice, face.positions)
         patch = make_grid_patch(surface, face.road_height, patch, spacing, reach)
     return ContactSetup(patch=patch, reach=reach, road=_under(road, patch, rolled), rolled=rolled)

@@ -6,8 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tireroad.contact.chatter import Alternation, Chatter
 from tireroad.contact.energy import Work
 from tireroad.contact.patch import Patch
+
+RUNAWAY = 100.0  # times the patch's reach: half a metre at least
 
 
 @dataclass
@@ -25,15 +28,24 @@ class Figures:
 
 @dataclass
 class Totals:
-    """Figures and work of the steps so far, whose points at the edge are watched (`reach` in m)."""
+    """Figures and work of the steps so far, whose points at the edge are watched (`reach` in m), and, where
+    it is to end a loop that chatters (`watched`), how they alternate."""
 
     patch: Patch
     reach: float
+    watched: bool = False
     figures: Figures = field(default_factory=Figures)
     work: Work = field(default_factory=Work)
+    alternation: Alternation = field(default_factory=Alternation)
 
     def add(self, steps: dict[str, np.ndarray]) -> None:
-        """Count a block as `ContactFile.flush` hands it over. ConvergenceError at a touching edge."""
+        """Count a block as `ContactFile.flush` hands it over. ConvergenceError at a touching edge, Chatter where
+        the motion grows without bound or, where that is `watched`, points open and close from step to step.
+        """
+        self.alternation.add(steps["normal_force"])
+        if self.watched:
+            self.alternation.check()
+        self._check_bounded(steps)
         self.patch.check_edge(steps["normal_force"], steps["time"], self.reach)
         self.work.add(steps["change"], steps["moved"])
         old, load = self.figures, steps["total_force"][:, 2]
@@ -48,11 +60,25 @@ class Totals:
             most_active=max(old.most_active, int(steps["active"].max())),
         )
 
+    def _check_bounded(self, steps: dict[str, np.ndarray]) -> None:
+        """Chatter where a point moved by much more than the road could move it."""
+        far = np.abs(steps["displacement"]).max(axis=1)
+        when = np.flatnonzero(~(far <= RUNAWAY * self.reach))
+        if len(when):
+            raise Chatter(
+                f"contact: at t = {steps['time'][when[0]]:.6g} s a contact point of the tire has moved by "
+                f"{far[when[0]]:.3g} m, {RUNAWAY:g} times the gap within which points take part: the motion grows "
+                'without bound. Take a smaller time.step, or time.scheme = "constant" or "auto"'
+            )
+
     def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint keeps."""
-        return {n: np.array(v) for n, v in vars(self.figures).items()} | self.work.state()
+        return {n: np.array(v) for n, v in vars(self.figures).items()} | (
+            self.work.state() | self.alternation.state()
+        )
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from `state`."""
         self.figures = Figures(**{name: kept[name].item() for name in vars(self.figures)})
         self.work.set_state(kept)
+        self.alternation.set_state(kept)

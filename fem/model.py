@@ -11,6 +11,7 @@ from functools import cached_property
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.operators import Operators, Rotation
+from tireroad.fem.matrices.rim_motion import RimMotion, rim_motion
 from tireroad.fem.matrices.support import Support
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.static.state import StaticState
@@ -71,6 +72,13 @@ class SmallMotions:
         held = {} if self._road == "forces" else {"held": self._touching()}
         support = Support(self.rim, **held)
         return Operators(self.body, self.static.inflation, support, self.static.rolling)
+
+    @cached_property
+    def rim_motion(self) -> RimMotion:
+        """What the rim's motions meet in the matrices of a tire whose rim is held."""
+        self.body.set_displacement(self.static.displacement)
+        shape = self.static.rolling
+        return rim_motion(self.body, self.static.inflation, shape, shape.speed != 0)
 
     def _touching(self):
         face = self.body.surface

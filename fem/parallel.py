@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from tireroad.fem.errors import ConvergenceError, InputError
 
@@ -27,7 +27,8 @@ def on_root(
     Where it fails, every process raises: the same error where it is one of `clear`, or on the others
     ToldByRoot for an error that is a bug. Collective.
     """
-    value, error = None, None
+    value: T | None = None
+    error: Exception | None = None
     if comm.rank == 0:
         try:
             value = function()
@@ -40,4 +41,4 @@ def on_root(
         error = error or told
     if error is not None:
         raise error
-    return value
+    return cast(T, value)  # every process has what the function returned

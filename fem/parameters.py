@@ -6,8 +6,8 @@ key reference and the error messages all follow from them. Like `fem.errors` thi
 that all packages may import; it needs nothing but the standard library.
 """
 
-from dataclasses import field
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, dataclass_transform
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite, keys
@@ -21,6 +21,8 @@ class ParameterError(InputError):
         self.parameter, self.reason = parameter, reason
 
 
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+@dataclass(frozen=True, kw_only=True)
 class Parameters:
     """Base of dataclasses made of parameters: the constructor checks every value, then `validate`.
 
@@ -58,14 +60,12 @@ def number(
     doc: str,
     *,
     least: float | None = None,
-    above: float | None = None,
     most: float | None = None,
-    below: float | None = None,
     word: str | None = None,
     only_for: OnlyFor = None,
 ) -> Any:
     """A finite real number, or the one `word` where given. A default of None makes it optional."""
-    limits = Limits(least, above, most, below)
+    limits = Limits(least, most)
 
     def read(value: Any) -> float | str:
         if word is not None and value == word:

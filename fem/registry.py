@@ -3,8 +3,8 @@
 import importlib
 import pkgutil
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Generic, TypeVar, dataclass_transform
+from dataclasses import dataclass, fields
+from typing import Any, Generic, TypeVar
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import Parameters
@@ -26,7 +26,6 @@ class Registry(Generic[T]):
         self._docs: dict[str, str] = {}
         self._found = False
 
-    @dataclass_transform(frozen_default=True, kw_only_default=True)
     def register(self, name: str, doc: str) -> Callable[[type], type]:
         """Decorator: makes a frozen dataclass of keywords out of a class, known by `name`.
 
@@ -65,6 +64,10 @@ class Registry(Generic[T]):
             raise InputError(f"{self.label} {name!r} is unknown: take one of {', '.join(self)}")
         return self._classes[name]
 
+    def make(self, name: str, **values: Any) -> T:
+        """The variant of that name with these parameters, the others at their defaults."""
+        return self[name](**values)
+
     def __contains__(self, name: object) -> bool:
         self._find()
         return name in self._classes
@@ -80,4 +83,4 @@ class Registry(Generic[T]):
 
     def owners(self, parameter: str) -> list[str]:
         """The variants that have a parameter of that name."""
-        return [name for name in self if parameter in self[name].__dataclass_fields__]
+        return [name for name in self if parameter in {one.name for one in fields(self[name])}]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,13 +26,13 @@ from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.turning import Turning
 from tireroad.greens.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
-from tireroad.greens.basis import Basis, regained
+from tireroad.greens.basis import Basis, Pencil, regained
 from tireroad.greens.response import Response, couple
-from tireroad.greens.second_order import Moments, second_order
+from tireroad.greens.second_order import Moments, modal_moments, second_order
 from tireroad.modal.basis import Projection, project, with_air
-from tireroad.modal.damping import Damping, tail_loss
+from tireroad.modal.damping import Damping, StrainEnergy, tail_loss
 from tireroad.modal.rolling import decouple
-from tireroad.modal.rotating import StateModes, matrices
+from tireroad.modal.rotating import StateModes, held_matrices
 from tireroad.modal.solver.modes import Modes
 
 _SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by their sign at least
@@ -41,8 +42,8 @@ _SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by 
 class Wheel:
     """The full matrices of a tire that turns: `damping` as in modal.damping, `rotation` None when it
     stands. `beyond` (gamma1 1/s, gamma2 s) damps what no mode has, and the full matrices: given where
-    `damping` is by strain energy, of which there are no full matrices. Its properties are collective
-    at their first use."""
+    `damping` is by strain energy, of which there are no full matrices. `corner` joins a wheel that
+    moves to a projection on modes. Its properties are collective at their first use."""
 
     operators: Operators
     rotation: Rotation | None
@@ -51,6 +52,7 @@ class Wheel:
     inertia: str
     air: Column | None = None
     beyond: tuple[float, float] | None = None
+    corner: Callable[[Projection, Modes], Projection] | None = None
 
     @cached_property
     def rotating_stiffness(self):
@@ -69,19 +71,20 @@ class Wheel:
     @property
     def _uniform(self) -> tuple[float, float]:
         """What the full matrices are damped by."""
-        return self.damping if self.beyond is None else self.beyond
+        if self.beyond is not None:
+            return self.beyond
+        assert not isinstance(self.damping, StrainEnergy), "`beyond` is given then"
+        return self.damping
 
     @cached_property
     def _loss(self):
         """sum_r eta_r K_r, or None."""
         return self.operators.loss_stiffness()
 
-    def _pencils(self, projection: Projection) -> tuple:
-        """The projected pencil as the modes are damped, and as the full matrices are."""
-        return tuple(
-            matrices(projection, self.speed, damping, self.inertia)
-            for damping in (self.damping, self._uniform)
-        )
+    def _pencils(self, projection: Projection) -> tuple[Pencil, Pencil]:
+        """With the rim held, the projected pencil as the modes are damped, and as the full matrices are."""
+        true = held_matrices(projection, self.speed, self.damping, self.inertia)
+        return true, held_matrices(projection, self.speed, self._uniform, self.inertia)
 
     def respond(
         self,
@@ -98,10 +101,12 @@ class Wheel:
         """
         if option in ("static", "dirac"):
             return self._with_statics(basis, outputs, loads, pulse=option == "dirac")
-        r, k = outputs.shape[0], loads.shape[0]
-        same = outputs is loads
+        if option == "second-order" and self.corner:
+            raise InputError("greens.residual: second-order knows no wheel that moves")
+        r, k, same = outputs.shape[0], loads.shape[0], outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":
+            assert modes is not None, "attachment modes need the modes on all unknowns"
             whole = self._attached(basis, modes, probes)
         else:
             shapes = self._static_shapes(probes)
@@ -110,10 +115,10 @@ class Wheel:
             carried, loss = basis.projection.carried, None
             if self.beyond is not None:
                 pencils = self._pencils(basis.projection)
-                moments = moments.plus(regained(basis, *pencils, probes, probes))
+                moments = moments.plus(regained(basis.held, *pencils, probes, probes))
                 loss = self.beyond[0], tail_loss(basis.projection)
             whole = second_order(poles, basis.states, basis.seen(probes), carried, moments, loss)
-            whole = self._lacking(whole, moments.momentum)
+            whole = self._lacking(whole, moments.momentum - whole.static_moment())
         return whole if same else whole.between(slice(r), slice(r, r + k))
 
     def _with_statics(self, basis: Basis, outputs, loads, *, pulse: bool) -> Response:
@@ -122,16 +127,26 @@ class Wheel:
         answers = compliance(*given, self.air, moment=True)
         flexibility, moment = answers[: outputs.shape[0]], answers[outputs.shape[0] :]
         if self.beyond is not None:
-            lacking = regained(basis, *self._pencils(basis.projection), outputs, loads)
+            lacking = regained(basis.held, *self._pencils(basis.projection), outputs, loads)
             flexibility, moment = flexibility + lacking.compliance, moment + lacking.momentum
-        response = replace(basis.couple(outputs, loads, flexibility), pulse=pulse)
-        return self._lacking(response, moment)
+        return replace(self._completed(basis, outputs, loads, flexibility, moment), pulse=pulse)
+
+    def _completed(self, basis: Basis, outputs, loads, flexibility, moment) -> Response:
+        """The states with what they lack, the rim held, of a static displacement and a first moment."""
+        if self.corner is None:
+            response = basis.couple(outputs, loads, flexibility)
+            return self._lacking(response, moment - response.static_moment())
+        held = basis.held
+        pencil = held_matrices(basis.projection, self.speed, self.damping, self.inertia)
+        seen = held.seen(outputs), held.seen(loads)
+        known = modal_moments(*pencil, *seen, held.projection.carried)
+        response = basis.couple(outputs, loads)
+        response = replace(response, residual=response.residual + flexibility - known.compliance)
+        return self._lacking(response, moment - known.momentum)
 
     def _lacking(self, response: Response, moment: np.ndarray) -> Response:
-        """The response that knows what its states lack of the static first moment (3, k) kg m/N."""
-        if self.air is not None:  # its own momentum is not in that of the full matrices
-            return response
-        return replace(response, left_out=moment - response.static_moment())
+        """With the static first moment (3, k) kg m/N that the states lack; not with air, whose own is not known."""
+        return replace(response, left_out=moment) if self.air is None else response
 
     def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
         full = self.rotating_stiffness, self.rotating_damping
@@ -145,15 +160,17 @@ class Wheel:
             full = self.operators, self.rotating_stiffness
             shapes, flexibility = loaded_shapes(*full, loads, self.air)
             flexibility = weights @ (weights @ flexibility.T).T
-            missing = flexibility - basis.couple(probes, probes).static()
+            missing = self._completed(basis, probes, probes, flexibility, 0.0).residual
             columns = shapes @ (weights.T @ foremost(missing, np.abs(np.diag(flexibility))))
             grown = self._grown(modes, columns, basis.projection, every=False)
             if self.beyond is not None:
                 pencils = self._pencils(grown.projection)
-                flexibility = flexibility + regained(grown, *pencils, probes, probes).compliance
+                flexibility = (
+                    flexibility + regained(grown.held, *pencils, probes, probes).compliance
+                )
             of_loads = self.operators.body.comm.allreduce(self.operators.carried @ shapes)
             moment = (weights @ of_loads.T).T
-            return self._lacking(grown.couple(probes, probes, flexibility), moment)
+            return self._completed(grown, probes, probes, flexibility, moment)
         return self._standing_attachments(modes, probes).couple(probes, probes)
 
     def _check_same(self, basis: Basis, modes: Modes) -> None:
@@ -191,7 +208,7 @@ class Wheel:
         moment = np.where(np.arange(carried.shape[1]) < grown.projection.own, carried, 0.0)
         response = couple(grown.states, np.vstack([seen[:6], moment]), seen, carried)
         # By strain energy a rigid motion is not damped, so nothing acts against the wheel.
-        turning = self.speed, self.damping[0] if self.beyond is None else 0.0
+        turning = self.speed, self._uniform[0] if self.beyond is None else 0.0
         return axle_transfer(response.receptance(frequency), frequency, *turning)
 
     def _grown(
@@ -208,8 +225,9 @@ class Wheel:
             stays = dynamic(projection, self.speed, len(modes.squares))
             projection, grown = projection.among(stays), grown.among(stays)
         projection = self.with_air(projection, grown)
-        shape = operators.trace(grown.vectors)
-        return Basis(shape, projection, self.decouple(projection, comm))
+        projection = self.corner(projection, grown) if self.corner else projection
+        states = self.decouple(projection, comm)
+        return Basis(operators.trace(grown.vectors), projection, states, self.speed)
 
     @property
     def turning(self) -> Turning:
@@ -221,7 +239,7 @@ class Wheel:
         return with_air(projection, modes, self.air)
 
     def decouple(self, projection: Projection, comm) -> StateModes:
-        """The second eigenproblem, or the closed formula of a tire without air that stands. Collective."""
+        """The second eigenproblem, or the closed formula of a tire that stands. Collective."""
         return decouple(projection, self.turning, comm)
 
     def receptance(

@@ -30,13 +30,13 @@ class Recursion:
     so that processes meet once a step.
     """
 
-    def __init__(self, response: Response, step: float, scheme: str, comm: MPI.Comm):
+    def __init__(self, response: Response, step: float, scheme: str, comm: MPI.Comm) -> None:
         self.comm = comm
         self.step = step
         mine = np.arange(comm.rank, len(response.eigenvalue), comm.size)
         s = response.eigenvalue[mine]
         self._decay = np.exp(s * step)
-        self._old, self._new = _weights(s * step, step, scheme)
+        self._old, self._new = weights(s * step, step, scheme)
         momentum = response.momentum[:, mine]
         # Real arithmetic on (re, im) beside each other, as the states lie in memory.
         output = np.vstack([response.output[:, mine], momentum * s**2])
@@ -158,21 +158,11 @@ class _Block:
     Its last three outputs are the rate of momentum, the jump with the force left out.
     """
 
-    def __init__(self, response: Response, step: float, scheme: str):
+    def __init__(self, response: Response, step: float, scheme: str) -> None:
         block, push = response.block, response.block_input
         self._output = np.vstack([response.block_output, response.block_momentum @ block @ block])
+        self._decay, self._old, self._new = block_steps(block, push, step, scheme)
         size, forces = push.shape
-        # expm of [[T, P, 0], [0, 0, I/h], [0, 0, 0]] h carries e^{Th}, h phi1 P and h phi2 P at once.
-        wide = np.zeros((size + 2 * forces, size + 2 * forces))
-        wide[:size, :size] = block * step
-        wide[:size, size : size + forces] = push * step
-        wide[size : size + forces, size + forces :] = np.eye(forces)
-        moved = linalg.expm(wide)[:size]
-        self._decay = moved[:, :size]
-        first, second = moved[:, size : size + forces], moved[:, size + forces :]
-        self._old, self._new = (
-            (first - second, second) if scheme == "linear" else (0 * first, first)
-        )
         self.state = np.zeros(size)
         self._force = np.zeros(forces)
 
@@ -197,10 +187,26 @@ class _Block:
         self.state, self._force = kept["block_state"], kept["block_force"]
 
 
+def block_steps(
+    block: np.ndarray, push: np.ndarray, step: float, scheme: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """e^{Th} (b, b), and b0 P and b1 P (b, k) of the block T with its input P."""
+    size, forces = push.shape
+    # expm of [[T, P, 0], [0, 0, I/h], [0, 0, 0]] h carries e^{Th}, h phi1 P and h phi2 P at once.
+    wide = np.zeros((size + 2 * forces, size + 2 * forces))
+    wide[:size, :size] = block * step
+    wide[:size, size : size + forces] = push * step
+    wide[size : size + forces, size + forces :] = np.eye(forces)
+    moved = linalg.expm(wide)[:size]
+    first, second = moved[:, size : size + forces], moved[:, size + forces :]
+    old, new = (first - second, second) if scheme == "linear" else (0 * first, first)
+    return moved[:, :size], old, new
+
+
 _NO_BLOCK = {"block_state": np.zeros(0), "block_force": np.zeros(0)}
 
 
-def _weights(x: np.ndarray, step: float, scheme: str) -> tuple[np.ndarray, np.ndarray]:
+def weights(x: np.ndarray, step: float, scheme: str) -> tuple[np.ndarray, np.ndarray]:
     """b0 and b1 for x = s h."""
     phi1, phi2 = _phi(x)
     if scheme == "linear":

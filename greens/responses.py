@@ -92,7 +92,7 @@ def make_response(
 def _made(response: Response, figures: Figures | None = None) -> Made:
     """The response with a warning where its states grow."""
     count, rate = response.growth
-    warnings = ()
+    warnings: tuple[str, ...] = ()
     if count:
         warnings = (
             f"{count} state(s) of the response grow by themselves, the fastest at {rate:.3g} 1/s: lower the "
@@ -101,11 +101,14 @@ def _made(response: Response, figures: Figures | None = None) -> Made:
     return Made(response, figures or {}, warnings)
 
 
-def selected(whole: Response, rolling: RollingModes, wanted: Wanted) -> Response:
-    """The states that stay dynamic; without a residual the others are gone altogether."""
+def selected(
+    whole: Response, rolling: RollingModes, wanted: Wanted, counted: slice = slice(None)
+) -> Response:
+    """The states that stay dynamic; without a residual the others are gone altogether. `counted`: the outputs
+    and forces by which they are chosen."""
     if wanted.dynamic is None:
         return whole
-    kept = keep(whole, wanted.dynamic, band(rolling, wanted), wanted.choice)
+    kept = keep(whole, wanted.dynamic, band(rolling, wanted), wanted.choice, counted)
     return replace(kept, residual=whole.residual) if wanted.residual == "none" else kept
 
 

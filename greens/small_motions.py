@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import InputError
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning
 from tireroad.greens.coupling import Wheel
-from tireroad.modal.basis import Projection
+from tireroad.modal.basis import Projection, with_corner
 from tireroad.modal.damping import StrainEnergy, beyond
+from tireroad.modal.solver.modes import Modes
 
 
 def wheel_of(
@@ -16,10 +18,12 @@ def wheel_of(
     turning: Turning,
     air: Column | None = None,
     projection: Projection | None = None,
+    axle: Axle | None = None,
 ) -> Wheel:
     """The full matrices of a tire at its static state as the wheel turns, with the `air` in it.
 
-    `projection` on the modes: for damping by strain energy only, which has no full matrices. Collective.
+    `projection` on the modes: for damping by strain energy only, which has no full matrices. `axle`: what the
+    wheel moves on, where it does; the full matrices are those of a rim that is held. Collective.
     """
     shape, tail = motions.static.rolling, None
     if shape.speed and (shape.speed, shape.inertia) != (turning.speed, turning.inertia):
@@ -35,4 +39,9 @@ def wheel_of(
         tail = beyond(turning.damping, projection)
     rotation = motions.rotation if turning.speed else None
     given = turning.speed, turning.damping, turning.inertia
-    return Wheel(motions.operators, rotation, *given, air, tail)
+
+    def corner(projection: Projection, modes: Modes) -> Projection:
+        comm, places = motions.body.comm, motions.static.positions
+        return with_corner(projection, modes, axle, motions.rim_motion, places, comm)
+
+    return Wheel(motions.operators, rotation, *given, air, tail, corner if axle else None)

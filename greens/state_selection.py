@@ -39,12 +39,15 @@ def _lost(response: Response, output: np.ndarray, band: float) -> np.ndarray:
     return np.sqrt(np.maximum(loss, 0.0)) / 2
 
 
-def keep(response: Response, count: int, band: float, by: str) -> Response:
+def keep(
+    response: Response, count: int, band: float, by: str, counted: slice = slice(None)
+) -> Response:
     """Response whose `count` foremost states stay dynamic, the others follow statically.
 
     `by` "participation" within the band, or "frequency": the slowest. A state is a pair of complex
-    eigenvalues or one real eigenvalue.
+    eigenvalues or one real eigenvalue; `counted` are the outputs and forces that decide.
     """
-    merit = participation(response, band) if by == "participation" else -np.abs(response.eigenvalue)
+    seen = response.between(counted, counted)
+    merit = participation(seen, band) if by == "participation" else -np.abs(response.eigenvalue)
     foremost = np.argsort(-merit, kind="stable")[:count]
     return response.keeping(np.isin(np.arange(len(merit)), foremost))

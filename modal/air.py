@@ -32,6 +32,6 @@ class Air:
         return self.duct.joined(drag, stiffness, speed, self.coupling)
 
     def share(self, right: np.ndarray) -> np.ndarray:
-        """Part (q,) of the states' kinetic energy that is the air's, from their vectors (m + a, q)."""
-        squares = np.abs(right) ** 2
-        return squares[-self.count :].sum(axis=0) / squares.sum(axis=0)
+        """Part (q,) of the states' kinetic energy that is the air's, from their vectors (m + a or more, q)."""
+        squares, own = np.abs(right) ** 2, self.coupling.shape[1]
+        return squares[own : own + self.count].sum(axis=0) / squares.sum(axis=0)

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
+from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
+from tireroad.fem.errors import InputError
+from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.modal.air import Air
+from tireroad.modal.corner import Corner, meeting
 from tireroad.modal.solver.fields import CHUNK, gram, multiply
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import Labels
@@ -20,7 +25,7 @@ class Projection:
     `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad skew; `convective`, `body_convective`
     (m, m) 1/rad2 symmetric, all four None for a wheel that stands; `momentum` (3, m) kg^1/2:
     int rho phi_k, the mass each mode moves; `loss_factor` (m,) by strain energy (modal.damping), None where
-    no compound has one. `air`: what else takes part, a coordinates after the m.
+    no compound has one. What else takes part: `air`, a coordinates after the m, and a `corner`, c after them.
     """
 
     squares: np.ndarray
@@ -31,36 +36,114 @@ class Projection:
     body_convective: np.ndarray | None = None
     loss_factor: np.ndarray | None = None
     air: Air | None = None
+    corner: Corner | None = None
 
     @property
     def carried(self) -> np.ndarray:
-        """Momentum (3, m + a) kg^1/2 per rate of all coordinates, the air's last."""
+        """Momentum (3, m + a + c) kg^1/2 per rate of all coordinates: of all that the hub has to move."""
+        if self.corner is None:
+            return self.inside
+        whole = self.corner.carried(self.inside, self.air_mass)
+        return whole @ self._change
+
+    @property
+    def inside(self) -> np.ndarray:
+        """Momentum (3, m + a) kg^1/2 per rate of tire and air against the rim."""
         if self.air is None:
             return self.momentum
         return np.hstack([self.momentum, self.air.duct.momentum])
+
+    def pencil(
+        self, drag: np.ndarray, stiffness: np.ndarray, speed: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """D~ (1/s) and K~ (1/s2) of all coordinates, unit mass, from those of tire and air, (m + a, m + a)."""
+        if self.corner is None:
+            return drag, stiffness
+        turn = self._change
+        return tuple(
+            turn.T @ matrix @ turn for matrix in self.corner.joined(drag, stiffness, speed)
+        )
+
+    def seen(self, shapes: np.ndarray, probes) -> np.ndarray:
+        """All coordinates (k, m + a + c) as `probes` read them, `shapes` (k, m) being what they see of the modes:
+        the air's are not seen.
+        """
+        seen = shapes if self.air is None else np.pad(shapes, ((0, 0), (0, self.air.count)))
+        return seen if self.corner is None else self.corner.seen(seen, probes) @ self._change
+
+    def moments(self, speed: float) -> np.ndarray:
+        """The rows (3, 3, m + a + c) of `Corner.moments` on all coordinates."""
+        return self.wheel.moments(self.inside.shape[1], speed) @ self._change
+
+    @property
+    def wheel(self) -> Corner:
+        """The corner, of which there must be one."""
+        assert self.corner is not None, "the axle of this tire is fixed"
+        return self.corner
+
+    @property
+    def adrift(self) -> np.ndarray:
+        """Orthonormal motions (m + a + c, r) of a corner that meet neither stiffness nor damping."""
+        if self.corner is None:
+            return np.zeros((self.inside.shape[1], 0))
+        return self.corner.adrift(*self._moved)
+
+    @property
+    def air_mass(self) -> float:
+        """Of what the rim carries along besides the tire, kg."""
+        return 0.0 if self.air is None else self.air.duct.density * self.air.duct.volume
+
+    @property
+    def rim_momentum(self) -> np.ndarray:
+        """P (7, m + a) kg^1/2 of a corner."""
+        return self.wheel.momentum(None if self.air is None else self.air.duct.momentum)
+
+    @property
+    def _moved(self) -> tuple[np.ndarray, float]:
+        return self.rim_momentum, self.air_mass
+
+    @property
+    def _change(self) -> np.ndarray:
+        return self.wheel.change(*self._moved)
 
     @property
     def own(self) -> int:
         """Coordinates of the tire itself, m."""
         return len(self.squares)
 
+    def rotating(self, inertia: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What multiplies 2 Omega, Omega^2, and Omega times the damping rate, of the inertia "full" or
+        "doppler". InputError where the projection is of a wheel that stands.
+        """
+        full = inertia == "full"
+        gyroscopic = self.gyroscopic if full else self.body
+        convective = self.convective if full else self.body_convective
+        if gyroscopic is None or convective is None or self.body is None:
+            raise InputError("modes: these are of a wheel that stands, and have no rotating states")
+        return gyroscopic, convective, self.body
+
     def first(self, count: int) -> Projection:
         """On the first `count` modes alone."""
-        cut = {"squares": self.squares[:count], "momentum": self.momentum[:, :count]}
+        cut: dict[str, Any] = {
+            "squares": self.squares[:count],
+            "momentum": self.momentum[:, :count],
+        }
         for item in fields(self):
             values = getattr(self, item.name)
             if item.name not in cut and isinstance(values, np.ndarray):
                 cut[item.name] = np.ascontiguousarray(values[(slice(count),) * values.ndim])
         if self.air is not None:
             cut["air"] = replace(self.air, coupling=self.air.coupling[:, :count])
+        if self.corner is not None:
+            cut["corner"] = self.corner.first(count)
         return replace(self, **cut)
 
     def among(self, wanted: np.ndarray) -> Projection:
-        """On the coordinates where `wanted` (m,) is true, before any air joins them."""
-        small = {
+        """On the coordinates where `wanted` (m,) is true, before anything joins them."""
+        small: dict[str, Any] = {
             name: None if value is None else value[np.ix_(*[wanted] * value.ndim)]
             for name, value in vars(self).items()
-            if name not in ("momentum", "air")
+            if name not in ("momentum", "air", "corner")
         }
         return Projection(momentum=self.momentum[:, wanted], **small)
 
@@ -123,6 +206,17 @@ def project(
     )
 
 
+def with_corner(
+    projection: Projection, modes: Modes, axle: Axle | None, rim: RimMotion | None, places, comm
+) -> Projection:
+    """The projection on the modes (all rows), joined by a wheel that moves where there is one; `places` (s, 3) m
+    of the outer face in the static state. Collective."""
+    if axle is None:
+        return projection
+    assert rim is not None, "with an axle that moves come the motions of the rim"
+    return replace(projection, corner=meeting(axle, rim, modes.vectors, places, comm))
+
+
 def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projection:
     """The projection on the modes (all rows), joined by the air where there is any. Collective."""
     if air is None:
@@ -132,7 +226,7 @@ def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projec
 
 def _loss_factors(modes: Modes, loss, comm, known: Projection | None) -> np.ndarray:
     """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of modes of unit mass; 0 of rigid ones. Collective."""
-    done = np.zeros(0) if known is None else known.loss_factor
+    done = np.zeros(0) if known is None or known.loss_factor is None else known.loss_factor
     lost = np.empty(modes.vectors.shape[1] - len(done))
     for start in range(0, len(lost), CHUNK):
         some = modes.vectors[:, len(done) + start : len(done) + start + CHUNK]

@@ -91,7 +91,7 @@ def critical_speed(projection: Projection, inertia: str, free_at: float | None =
     a wave without end. `free_at` (rad/s): the speed of a wheel that nothing holds; moved as a rigid body
     it stands still by itself, K~ is singular at that very speed, and those motions are left out too.
     """
-    convective = projection.convective if inertia == "full" else projection.body_convective
+    _, convective, _ = projection.rotating(inertia)
     flexible = projection.squares > 0
     squares = np.diag(projection.squares[flexible])
     convective = convective[np.ix_(flexible, flexible)]

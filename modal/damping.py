@@ -64,4 +64,5 @@ def beyond(damping: Damping, projection: Projection) -> Proportional:
 
 def tail_loss(projection: Projection) -> float:
     """Loss factor eta_c of motions beyond the modes: the mean of the upper quarter."""
+    assert projection.loss_factor is not None, "rates() refuses modes without loss factors"
     return float(projection.loss_factor[-max(len(projection.squares) // 4, 1) :].mean())

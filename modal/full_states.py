@@ -61,7 +61,8 @@ def full_states(
 
 def _solve(operators, pencil, projected: RollingModes, count: int, window) -> tuple:
     """As many pairs as wanted, or all in the window. Collective."""
-    whole, s = (operators.mass, *pencil), projected.states.eigenvalue
+    drag, full_stiffness = pencil
+    whole, s = (operators.mass, drag, full_stiffness), projected.states.eigenvalue
     if not any(window):
         found = quadratic.solve(*whole, count)
         sizes = np.abs(found.eigenvalue), np.abs(s)

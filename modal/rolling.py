@@ -10,9 +10,17 @@ import numpy as np
 from tireroad.fem.errors import InputError
 from tireroad.fem.parallel import on_root
 from tireroad.fem.turning import Turning
+from tireroad.modal.adrift import beside
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.campbell import Campbell
-from tireroad.modal.rotating import LIMITS, StateModes, checks, matrices, rotating, standing
+from tireroad.modal.rotating import (
+    LIMITS,
+    StateModes,
+    checks,
+    matrices,
+    rotating,
+    standing,
+)
 
 # Largest residual and defect of an identity on a basis that attachment modes joined: those reach up to a
 # hundred times the band, and the vectors of the fastest lose digits (2e-5 seen, with a free rim that turns).
@@ -69,16 +77,18 @@ def _decoupled(
     projection: Projection, turning: Turning, comm, limits: tuple[float, float] = LIMITS
 ) -> tuple[StateModes, dict]:
     """The states and the figures of modal.rotating.checks. Collective."""
-    if turning.speed == 0 and projection.air is None:
+    if turning.speed == 0 and projection.air is None and projection.corner is None:
         return standing(projection, turning.damping), {}
     if turning.speed and projection.gyroscopic is None:
         raise InputError(
             "these modes were projected for a wheel that stands: project the rotation too"
         )
-    given = pencil(projection, turning)
+    if projection.corner is not None:
+        projection.corner.check(turning.speed)
+    given, adrift = pencil(projection, turning), projection.adrift
 
     def solve() -> tuple[StateModes, dict]:
-        states = rotating(*given)
+        states = beside(*given, adrift) if adrift.shape[1] else rotating(*given)
         return states, checks(states, *given, limits)
 
     # One process solves: LAPACK on another could order repeated eigenvalues differently.

@@ -24,28 +24,28 @@ SINGULAR = 1e13  # condition of K~ beyond which it has no inverse
 # States slower than this part of the fastest drift, as rigid modes do, unless their vectors are apart.
 _AT_REST, _SKEWED = 1e-5, 1e2
 
+Pencil = tuple[np.ndarray, np.ndarray]
 
-def matrices(
-    projection: Projection, speed: float, damping: Damping, inertia: str
-) -> tuple[np.ndarray, np.ndarray]:
+
+def matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """D~ (1/s) and K~ (1/s2) of the projected problem; `damping` as in modal.damping."""
+    return projection.pencil(*held_matrices(projection, speed, damping, inertia), speed)
+
+
+def held_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
+    """The same of tire and air with the rim held: without a corner."""
     pencil = _tire_matrices(projection, speed, damping, inertia)
-    air = projection.air
-    return pencil if air is None else air.joined(*pencil, speed)
+    return pencil if projection.air is None else projection.air.joined(*pencil, speed)
 
 
-def _tire_matrices(
-    projection: Projection, speed: float, damping: Damping, inertia: str
-) -> tuple[np.ndarray, np.ndarray]:
+def _tire_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
     """The same of the tire without the air in it."""
     rate = rates(damping, projection)
     stiffness, drag = np.diag(projection.squares), np.diag(rate)
     if speed == 0:
         return drag, stiffness
-    full = inertia == "full"
-    gyroscopic = projection.gyroscopic if full else projection.body
-    convective = projection.convective if full else projection.body_convective
-    turning = speed * rate[:, None] * projection.body
+    gyroscopic, convective, body = projection.rotating(inertia)
+    turning = speed * rate[:, None] * body
     return drag + 2 * speed * gyroscopic, stiffness + speed**2 * convective + turning
 
 
@@ -73,7 +73,7 @@ def standing(projection: Projection, damping: Damping) -> StateModes:
     k = np.arange(len(mode))
     right[mode, k] = weight
     left[k, mode] = 1 / (2 * eigenvalue + 2 * half[mode])
-    block, block_right, block_left = _companion_blocks(defective, squares, half, m)
+    block, block_right, block_left = companion_blocks(defective, squares, half, m)
     none = np.zeros(len(mode))
     worst = float(condition[np.r_[paired, real]].max(initial=1.0))
     drifting = 2 * int(rigid.sum())
@@ -138,7 +138,7 @@ def overlap(one: StateModes, other: StateModes, drag: np.ndarray) -> np.ndarray:
     return one.eigenvalue[:, None] * near + near * other.eigenvalue + one.left @ (drag @ right)
 
 
-def _companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m: int):
+def companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m: int):
     """(T, R_b, L_b) of single modes, critically damped or rigid, each as its own companion matrix."""
     k = 2 * len(modes)
     block, right, left = np.zeros((k, k)), np.zeros((m, k)), np.zeros((k, m))
@@ -168,7 +168,7 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
     good = (condition <= DEFECTIVE) & ~drifting
     block_inverse = block_vectors.T
     if not good.all():
-        block, block_vectors = _invariant(companion, values[~good])
+        block, block_vectors, good = _invariant(companion, values, good)
         values, vectors = values[good], vectors[:, good]
         inverse, block_inverse = _inverse(values, vectors, block_vectors)
     right, left = vectors[:m], inverse[:, m:] / scale
@@ -211,23 +211,26 @@ def _inverse(values, vectors, block_vectors) -> tuple[np.ndarray, np.ndarray]:
     return rows, inverse[count + waves :]
 
 
-def _invariant(companion: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Schur block and orthonormal real basis of the invariant subspace of the chosen eigenvalues.
+def _invariant(
+    companion: np.ndarray, values: np.ndarray, good: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Schur block and orthonormal real basis of the invariant subspace of the eigenvalues that are not `good`,
+    and which are good in the end: what cannot be told from the others goes with them.
 
     Another algorithm finds them again within what a defective one is uncertain by: a small part of
     itself, or, where it is zero, of the matrix.
     """
-    expected = int(np.where(chosen.imag > 0, 2, 1).sum())
-    everything = np.linalg.norm(companion, 2)
+    chosen, everything = values[~good], np.linalg.norm(companion, 2)
     for near in (1e-6 * np.abs(chosen).max(), 1e-7 * everything, 1e-6 * everything):
 
-        def wanted(re, im, near=near):
+        def taken(re: float, im: float, near=near) -> bool:
             both = np.abs([chosen - complex(re, im), chosen - complex(re, -im)])
             return bool(both.min() < near)
 
-        schur, basis, count = linalg.schur(companion, output="real", sort=wanted)
-        if count == expected:
-            return schur[:count, :count], basis[:, :count]
+        within = np.array([taken(v.real, v.imag) for v in values])
+        schur, basis, count = linalg.schur(companion, output="real", sort=taken)
+        if count == np.where(values[within].imag > 0, 2, 1).sum():
+            return schur[:count, :count], basis[:, :count], ~within
     raise ConvergenceError(
         f"rotating: {len(chosen)} eigenvalues next to defective ones ({np.abs(chosen).min():.4g} to "
         f"{np.abs(chosen).max():.4g} 1/s) cannot be told from others. Change the damping or the speed a "

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
-from tireroad.modal.basis import ModalBasis, project, with_air
+from tireroad.modal.basis import ModalBasis, project, with_air, with_corner
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.symmetry import Sites
@@ -23,14 +24,16 @@ def standing_modes(
     up_to: float | None = None,
     rotation: bool = True,
     air: Column | None = None,
+    axle: Axle | None = None,
 ) -> ModalBasis:
     """The `count` lowest modes, or all below `up_to` (Hz), with their fields on all unknowns.
 
     `rotation`: also project the matrices of the rotating frame; without them the wheel can only stand.
-    `air`: what is in the cavity joins the projected problem.
+    `air`: what is in the cavity joins the projected problem, and so does the wheel of an `axle` that moves.
     ConvergenceError when one is missing, inaccurate or unstable. Collective.
     """
-    return projected(motions, solved(motions.operators, count=count, up_to=up_to), rotation, air)
+    modes = solved(motions.operators, count=count, up_to=up_to)
+    return projected(motions, modes, rotation, air, axle)
 
 
 def solved(operators: Operators, *, count: int | None = None, up_to: float | None = None) -> Modes:
@@ -47,7 +50,11 @@ def solved(operators: Operators, *, count: int | None = None, up_to: float | Non
 
 
 def projected(
-    motions: SmallMotions, modes: Modes, rotation: bool, air: Column | None = None
+    motions: SmallMotions,
+    modes: Modes,
+    rotation: bool,
+    air: Column | None = None,
+    axle: Axle | None = None,
 ) -> ModalBasis:
     """The basis of these modes: what they project and show. Collective."""
     operators = motions.operators
@@ -56,10 +63,14 @@ def projected(
     projection = project(modes, matrices, operators.carried, comm, loss=loss)
     if loss is not None:
         loss.destroy()
+    rim = motions.rim_motion if axle else None
+    joined = with_corner(
+        with_air(projection, modes, air), modes, axle, rim, motions.static.positions, comm
+    )
     return ModalBasis(
         frequency=modes.frequency,
         shape=operators.trace(modes.vectors),
-        projection=with_air(projection, modes, air),
+        projection=joined,
         modes=modes,
         column=air,
     )
@@ -72,6 +83,7 @@ def with_fields(
     count: int | None,
     up_to: float | None,
     air: Column | None = None,
+    axle: Axle | None = None,
 ) -> ModalBasis:
     """The basis with its fields on all unknowns: itself, or, of one read from a file, the modes solved
     and projected once more, in place of all its parts. Collective.
@@ -79,7 +91,7 @@ def with_fields(
     if basis.modes is not None:
         return basis
     rotation = basis.projection.gyroscopic is not None
-    again = standing_modes(motions, count=count, up_to=up_to, rotation=rotation, air=air)
+    again = standing_modes(motions, count=count, up_to=up_to, rotation=rotation, air=air, axle=axle)
     top = max(float(basis.frequency.max(initial=0.0)), 1e-300)
     alike = len(again.frequency) == len(basis.frequency)
     if not alike or np.abs(again.frequency - basis.frequency).max(initial=0.0) > _SAME * top:

@@ -1,6 +1,8 @@
 """What the command line takes: commands, options, help."""
 
 import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from tireroad.runs.scene.plan import STAGES
@@ -30,51 +32,58 @@ SET_HELP = (
 )
 
 
-def parser() -> argparse.ArgumentParser:
-    """The parser of all commands."""
-    top = argparse.ArgumentParser(
-        PROGRAM,
-        description=ABOUT,
-        epilog=EXIT,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
-    top.add_argument("--version", action="version", version=f"{PROGRAM} {VERSION}")
-    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+Arguments = Callable[[argparse.ArgumentParser], object]
 
-    def command(name: str, text: str, about: str = "", usage: str | None = None):
-        return commands.add_parser(
-            name,
-            help=text,
-            description=about or text,
-            epilog=EXIT,
-            usage=usage,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-            allow_abbrev=False,
-        )
 
-    _run_arguments(
-        command(
-            "run",
-            "the main job: a scene to its report",
-            RUN,
-            f"{PROGRAM} run SCENE.toml [options] [-- PETSc options]",
-        )
+@dataclass(frozen=True)
+class Command:
+    """A command of the program: its line in the list of commands, and the function that adds its
+    arguments; `about` and `usage` are its own help where they differ from those made of the rest.
+    """
+
+    text: str
+    arguments: Arguments
+    about: str = ""
+    usage: str | None = None
+
+
+def _run(run: argparse.ArgumentParser) -> None:
+    _scene(run)
+    _processes(run)
+    run.add_argument(
+        "--out", type=_folder, metavar="DIR", help="result folder; results/<scene name> by default"
     )
-    resume = command("resume", "go on from the last checkpoint of a result folder")
-    resume.add_argument("directory", type=Path, metavar="DIR")
-    resume.add_argument(
+    run.add_argument(
+        "--until", choices=STAGES, metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
+    )
+    run.add_argument("--fresh", action="store_true", help="compute every stage anew")
+
+
+def _resume(resume: argparse.ArgumentParser) -> None:
+    _directory(resume)
+    _processes(resume)
+
+
+def _scene(command: argparse.ArgumentParser) -> None:
+    command.add_argument("scene", type=Path, metavar="SCENE.toml")
+    command.add_argument("--set", action="append", default=[], metavar="a.b=value", help=SET_HELP)
+
+
+def _directory(command: argparse.ArgumentParser) -> None:
+    command.add_argument("directory", type=Path, metavar="DIR")
+
+
+def _processes(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
         "-n", type=int, metavar="N", dest="processes", help="MPI processes (the launcher's)"
     )
-    check = command("check", "validate a scene; show it resolved, its stages, its memory")
-    check.add_argument("scene", type=Path, metavar="SCENE.toml")
-    check.add_argument("--set", action="append", default=[], metavar="a.b=value", help=SET_HELP)
-    for name, text in (
-        ("report", "(re)make report.html of a result folder"),
-        ("export", "XDMF for ParaView and CSV for spreadsheets from a result folder"),
-    ):
-        command(name, text).add_argument("directory", type=Path, metavar="DIR")
-    sweep = command("sweep", "a family of runs that share what they can, in one table")
+
+
+def _file(info: argparse.ArgumentParser) -> None:
+    info.add_argument("file", type=Path, metavar="FILE")
+
+
+def _sweep(sweep: argparse.ArgumentParser) -> None:
     sweep.add_argument("sweep", type=Path, metavar="SWEEP.toml")
     sweep.add_argument("--local", type=int, default=1, metavar="K", help="K members at a time")
     sweep.add_argument("--slurm", action="store_true", help="write job scripts and submit them")
@@ -82,26 +91,27 @@ def parser() -> argparse.ArgumentParser:
     sweep.add_argument(
         "--out", type=Path, metavar="DIR", help="results/<name of the sweep> by default"
     )
-    compare = command("compare", "two to twelve runs in one page and one table")
+
+
+def _compare(compare: argparse.ArgumentParser) -> None:
     compare.add_argument("directories", type=Path, nargs="+", metavar="DIR")
     compare.add_argument("--out", type=Path, metavar="DIR", default=Path("results/compare"))
-    command("info", "what a result file holds: datasets, shapes, units, provenance").add_argument(
-        "file", type=Path, metavar="FILE"
+
+
+def _bench(bench: argparse.ArgumentParser) -> None:
+    bench.add_argument("names", nargs="*", metavar="NAME", help="all by default")
+    bench.add_argument("--out", type=Path, metavar="FILE.json", help="also a page beside it")
+
+
+def _validate(validate: argparse.ArgumentParser) -> None:
+    _bench(validate)
+    validate.add_argument(
+        "--large", action="store_true", help="on meshes of full size: hours, not minutes"
     )
-    for name, text in (
-        ("bench", "run time against error, scaling and floors, measured on this machine"),
-        ("validate", "against full finite elements, closed forms and stress"),
-    ):
-        some = command(name, text)
-        some.add_argument("names", nargs="*", metavar="NAME", help="all by default")
-        some.add_argument("--out", type=Path, metavar="FILE.json", help="also a page beside it")
-        if name == "validate":
-            some.add_argument(
-                "--large", action="store_true", help="on meshes of full size: hours, not minutes"
-            )
-    test = command("test", "the test suite, serial and on 2 and 3 processes")
+
+
+def _test(test: argparse.ArgumentParser) -> None:
     test.add_argument("arguments", nargs="*", metavar="PYTEST ARGUMENTS")
-    return top
 
 
 def _folder(text: str) -> Path:
@@ -110,16 +120,50 @@ def _folder(text: str) -> Path:
     return Path(text)
 
 
-def _run_arguments(run: argparse.ArgumentParser) -> None:
-    run.add_argument("scene", type=Path, metavar="SCENE.toml")
-    run.add_argument(
-        "-n", type=int, metavar="N", dest="processes", help="MPI processes (the launcher's)"
+COMMANDS = {
+    "run": Command(
+        "the main job: a scene to its report",
+        _run,
+        RUN,
+        f"{PROGRAM} run SCENE.toml [options] [-- PETSc options]",
+    ),
+    "resume": Command("go on from the last checkpoint of a result folder", _resume),
+    "check": Command("validate a scene; show it resolved, its stages, its memory", _scene),
+    "report": Command("(re)make report.html of a result folder", _directory),
+    "export": Command(
+        "XDMF for ParaView and CSV for spreadsheets from a result folder", _directory
+    ),
+    "sweep": Command("a family of runs that share what they can, in one table", _sweep),
+    "compare": Command("two to twelve runs in one page and one table", _compare),
+    "info": Command("what a result file holds: datasets, shapes, units, provenance", _file),
+    "bench": Command(
+        "run time against error, scaling and floors, measured on this machine", _bench
+    ),
+    "validate": Command("against full finite elements, closed forms and stress", _validate),
+    "test": Command("the test suite, serial and on 2 and 3 processes", _test),
+}
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of all commands."""
+    top = _parser(argparse.ArgumentParser, PROGRAM, ABOUT)
+    top.add_argument("--version", action="version", version=f"{PROGRAM} {VERSION}")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, command in COMMANDS.items():
+        about = command.about or command.text
+        one = _parser(commands.add_parser, name, about, help=command.text, usage=command.usage)
+        command.arguments(one)
+    return top
+
+
+def _parser(
+    make: Callable[..., argparse.ArgumentParser], name: str, about: str, **given: str | None
+) -> argparse.ArgumentParser:
+    return make(
+        name,
+        description=about,
+        epilog=EXIT,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+        **given,
     )
-    run.add_argument(
-        "--out", type=_folder, metavar="DIR", help="result folder; results/<scene name> by default"
-    )
-    run.add_argument("--set", action="append", default=[], metavar="a.b=value", help=SET_HELP)
-    run.add_argument(
-        "--until", choices=STAGES, metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
-    )
-    run.add_argument("--fresh", action="store_true", help="compute every stage anew")

@@ -144,7 +144,7 @@ def _compare(args: argparse.Namespace) -> None:
 def _sweep(args: argparse.Namespace) -> None:
     from tireroad.runs.sweep.command import sweep
 
-    sweep(args.sweep, args.out, at_once=args.local, queue=args.slurm, only_gather=args.gather)
+    sweep(args.sweep, args.out, at_once=args.local, batch=args.slurm, only_gather=args.gather)
 
 
 ALONE: dict[str, Callable[[argparse.Namespace], None]] = {

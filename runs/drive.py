@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.chatter import choose, oscillation
 from tireroad.contact.grid_patch import OnPoints
 from tireroad.contact.limits import Limit, limits, lowest, pitch
 from tireroad.contact.model import step_solver
@@ -91,11 +92,13 @@ def drive(
     setup = contact_setup(static, motions.lattice, road, rolled, spacing=spacing)
     loads = probe.nodes(setup.patch.index, len(static.points), 2)
     response = tire.respond(loads, loads, residual)
-    spec = _Spec(law=tread or TREADS["half-space"](youngs_modulus=1e7))
+    spec = _Spec(law=tread or TREADS.make("half-space", youngs_modulus=1e7))
     setup, _ = setup.settled(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     chosen = equal_steps(duration, step or min(duration / _LEAST_STEPS, _TURN / fastest))
-    recursion = Recursion(response.resolved(chosen.size), chosen.size, "linear", motions.body.comm)
+    kept = response.resolved(chosen.size)
+    scheme = choose(oscillation(spec, setup.patch, kept, chosen.size)).scheme
+    recursion = Recursion(kept, chosen.size, scheme, motions.body.comm)
     p = len(setup.patch.index)
     solver = step_solver(spec, setup.patch, recursion.same_step[:p, :p])
     seen = (

@@ -28,7 +28,7 @@ from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.press import press as press_tire
 from tireroad.fem.static.state import StaticState
-from tireroad.fem.static.virtual_work import AT_REST, Rolling
+from tireroad.fem.static.virtual_work import AT_REST
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import Material, compound
 from tireroad.fem.turning import Turning
@@ -39,6 +39,7 @@ from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes
+from tireroad.runs.stages.build.turning import rolling_shape
 
 Array = NDArray[np.float64]
 
@@ -100,18 +101,13 @@ def press(
     `turning`: also the inertia and damping of the steadily rolling shape. ConvergenceError when the
     tire finds no balance.
     """
-    rolling = (
-        Rolling(turning.speed, *turning.damping, turning.inertia)
-        if turning is not None and turning.speed
-        else AT_REST
-    )
     return press_tire(
         tire,
         inflation=inflation,
         load=load,
         deflection=deflection,
         road_height=road_height,
-        rolling=rolling,
+        rolling=AT_REST if turning is None else rolling_shape(turning),
     )
 
 

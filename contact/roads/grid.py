@@ -169,6 +169,7 @@ class Grid:
             )
 
     def _refuse_holes(self, window: Window, row: int, column: int) -> None:
+        assert window.hole is not None, "no height is missing"
         i, j = window.hole
         raise InputError(
             f"{self.source}: {window.missing} heights are missing in the strip driven over, "

@@ -66,11 +66,11 @@ def _csv_rows(file: Path, lines: Iterator[Line]) -> tuple[Array, Array, Rows]:
         count += len(table)
         check_count(file, count)
         positions.append(table if listed else table[:, 0])
-        if not listed and axis.size:
+        if axis is not None and axis.size:
             spool.add(table[:, 1:])
     if count < 2:
         raise InputError(f"road.file {file}: {count + 1} lines of data, at least 3 are needed")
-    if listed:
+    if axis is None:
         x, y, z = _points(file, np.concatenate(positions))
         return x, y, ArrayRows(z)
     return np.concatenate(positions), axis, spool.rows()

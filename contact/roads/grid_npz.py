@@ -4,7 +4,7 @@ import struct
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import IO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ def read_npz(file: Path) -> tuple[Array, Array, Rows]:
             raise InputError(f"road.file {file}: x, y and z must hold numbers ({error})") from error
 
 
-def _header(stream: BinaryIO, info: zipfile.ZipInfo, name: str) -> _Header:
+def _header(stream: IO[bytes], info: zipfile.ZipInfo, name: str) -> _Header:
     """ValueError where the header is none of numbers, or does not fit the size of the member."""
     version = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0
@@ -83,16 +83,17 @@ def _rows(file: Path, archive: zipfile.ZipFile) -> Rows:
             check_count(file, header.shape[0] * header.shape[1])
             numbers = np.frombuffer(stream.read(), header.kind)
             return ArrayRows(numbers.reshape(header.shape, order="F").astype(float))
-        packed = Packed(header.start, header.kind, header.shape)
+        rows, width = header.shape
+        packed = Packed(header.start, header.kind, (rows, width))
         stored = info.compress_type == zipfile.ZIP_STORED
-        spool = Spool(f"road.file {file}", 0 if stored else header.shape[0] * header.shape[1])
+        spool = Spool(f"road.file {file}", 0 if stored else rows * width)
         for block in _blocks(stream, packed):
             if not stored:
                 spool.add(block)
     return _stored(file, info, packed) if stored else spool.rows()
 
 
-def _blocks(stream: BinaryIO, packed: Packed) -> Iterator[Array]:
+def _blocks(stream: IO[bytes], packed: Packed) -> Iterator[Array]:
     """Blocks of rows in their order; beyond the last, the archive checks its sum."""
     (count, width), size = packed.shape, packed.kind.itemsize
     most = max(PIECE // width, 1)

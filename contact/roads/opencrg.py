@@ -59,7 +59,7 @@ def read_opencrg(file: Path, holes: str = "refuse", end: str = "refuse") -> Grid
         raise InputError(f"{file}: {count} cross sections, at least 2 are needed")
     _check_line(file, channels, parameters, table, step)
     v, columns = _sections(file, channels, parameters)
-    u = step * np.arange(count)
+    u = step * np.arange(count, dtype=float)
     return Grid(u, v, Columns(table, columns), holes=holes, end=end, source=f"road.file {file}")
 
 
@@ -137,7 +137,9 @@ def _sections(
     file: Path, channels: list[Channel], parameters: dict[str, float]
 ) -> tuple[Array, list[int]]:
     """Ascending v (m) of the long sections, and their columns in the data."""
-    places, numbers, columns = [], [], []
+    places: list[float] = []
+    numbers: list[float] = []
+    columns: list[int] = []
     for column, (line, name, unit) in enumerate(channels):
         if not name.startswith("long section"):
             continue

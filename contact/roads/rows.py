@@ -46,7 +46,7 @@ class ArrayRows:
     """Rows in memory."""
 
     def __init__(self, values: Array) -> None:
-        self._values, self.shape = values, values.shape
+        self._values, self.shape = values, (len(values), values.shape[1])
 
     def read(self, i0: int, i1: int) -> Array:
         """A view."""
@@ -150,7 +150,7 @@ class Spool:
         self._check_room(self._held)
         self._written += self._held
         for block in self._blocks:
-            data = memoryview(np.ascontiguousarray(block, dtype=float)).cast("B")
+            data = np.ascontiguousarray(block, dtype=float).data.cast("B")
             while data:
                 data = data[os.write(self._open, data) :]
         self._blocks, self._held = [], 0

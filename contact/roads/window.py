@@ -18,15 +18,18 @@ class Window:
     holes in them are filled. `missing` counts all holes, `hole` is the first (row, column) or None.
     """
 
-    def __init__(self, rows: Rows, place: tuple[int, slice], x: Array, y: Array, source: str):
+    def __init__(
+        self, rows: Rows, place: tuple[int, slice], x: Array, y: Array, source: str
+    ) -> None:
         self._rows, (self._first, self._columns), self._source = rows, place, source
         self._x, self._y = x, y
         # As many rows as are read at a time: whole rows come from the file, a part of each is kept.
         self._most = max(PIECE // rows.shape[1], 2)
         self._begin, self._z = 0, np.empty((0, len(y)))
         self._corners: tuple[Array, ...] = ()
-        self._known: NDArray[np.bool_] | None = None
-        self.missing, self.hole = 0, None
+        self._known = np.zeros(0, dtype=bool)
+        self.missing = 0
+        self.hole: tuple[int, int] | None = None
 
     def scan(self) -> None:
         """Look for holes, all through once. InputError when there is no height at all."""
@@ -82,7 +85,7 @@ class Window:
         begin = max(low - margin, 0)
         end = min(max(begin + self._most, high), len(self._x))
         z = self._read(begin, end)
-        if self._known is not None and self.missing:
+        if len(self._known) and self.missing:
             z = self._without_holes(z, begin, end)
         # Four views in which one index finds the corners of a cell.
         self._begin, self._z = begin, np.ascontiguousarray(z)

@@ -79,7 +79,7 @@ class ActiveSet:
             force, gap = self._at(active, q, reference)
             scale = largest + self._scale * float(np.abs(force).max())
             wrong = np.where(active, force * self._diagonal, gap) < -ROUNDING * scale
-            count = np.count_nonzero(wrong)
+            count = int(np.count_nonzero(wrong))
             if count == 0:
                 return self._finish(active, force, gap, scale)
             if count < best:
@@ -105,7 +105,8 @@ class ActiveSet:
     def set_state(self, kept: dict[str, Array | Mask]) -> None:
         """Go on from `state`."""
         self.active = np.asarray(kept["active"], dtype=bool)
-        self._signs, self._before = kept["signs"], kept["signs_before"]
+        self._signs = np.asarray(kept["signs"], dtype=float)
+        self._before = np.asarray(kept["signs_before"], dtype=float)
         self._factor.rebase(np.asarray(kept["factorised"], dtype=bool))
 
     @property

@@ -61,7 +61,8 @@ class Product:
         if self._scale is None:
             return self._through(self._compliance.precondition, right) * self._unit
         own = np.broadcast_to(self._compliance.diagonal, self._whole.shape)[self._index]
-        return right / (self._scale * own / self._unit + self._added)
+        added = 0.0 if self._added is None else self._added
+        return right / (self._scale * own / self._unit + added)
 
     def _through(self, product, values: Array) -> Array:
         self._whole[:] = 0.0

@@ -69,11 +69,11 @@ class Brush:
         self.deflection = -force / self.law.stiffness
         self._moved, self._touched = moved, touching
 
-    def state(self) -> dict[str, Array]:
+    def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint keeps of the brush."""
         return {"deflection": self.deflection, "moved": self._moved, "touched": self._touched}
 
-    def set_state(self, kept: dict[str, Array]) -> None:
+    def set_state(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from `state`."""
         self.deflection, self._moved = kept["deflection"], kept["moved"]
         self._touched = np.asarray(kept["touched"], dtype=bool)

@@ -30,7 +30,7 @@ class CavityTrace:
     """The inner face of a body at its present displacement, over `count` waves, or as many as its
     mesh can tell apart. Collective."""
 
-    def __init__(self, body: Body, count: int | None = None):
+    def __init__(self, body: Body, count: int | None = None) -> None:
         # More waves than a quarter of the nodes around are the mesh's own ripples.
         self.count = count or max(min(WAVES, len(body.lattice.ring) // 4), 2)
         self._body = body

@@ -28,8 +28,14 @@ def drawn(path: Path) -> tuple[SectionMesh, tuple[Rubber, ...], tuple[Ply, ...]]
 def _rubber(construction: Construction, name: str) -> Rubber:
     values = construction.compounds[name]
     coefficients = {key: values[key] for key in ("youngs_modulus", "poisson_ratio")}
-    given = {key: values[key] for key in ("density", "dynamic", "loss_factor")}
-    return Rubber(name=name, model="neo-hookean", coefficients=coefficients, **given)
+    return Rubber(
+        name=name,
+        model="neo-hookean",
+        coefficients=coefficients,
+        density=values["density"],
+        dynamic=values["dynamic"],
+        loss_factor=values["loss_factor"],
+    )
 
 
 def _ply(line, mesh: SectionMesh) -> Ply:

@@ -98,9 +98,9 @@ def _section(deck: Deck, ring_angles, wishes: Wishes) -> OwnSection:
     }
     quads = _both_halves(quads, wishes)
     laid = {name: one.mirrored() if wishes.mirror else one for name, one in laid.items()}
-    shape = faces.faces(
-        quads, *(_sides(quads, named[key], key) for key in ("rim", "inner", "tread"))
-    )
+    rim, inner, tread = (_sides(quads, named[key], key) for key in ("rim", "inner", "tread"))
+    assert rim is not None, "_names() refuses a deck without a rim"
+    shape = faces.faces(quads, rim, inner, tread)
     layers = _cords(deck, quads, laid, units)
     lines = {ply.name: ply.sides for ply in layers} | _lines(deck, quads, edges, origins, wishes)
     compounds = _rubbers(deck, found, units, wishes)

@@ -35,7 +35,9 @@ def regions(deck: Deck) -> Regions:
     labels = np.sort(np.concatenate([block.labels for block in blocks]))
     if not deck.solids:
         return _by_set(deck, blocks, labels)
-    names, materials, places, of = [], [], [], {}
+    names: list[str] = []
+    of: dict[int, int] = {}
+    materials, places = [], []
     for solid in deck.solids:
         mine = np.intersect1d(deck.element_sets.labels(solid.elements, solid.place), labels)
         if not len(mine):
@@ -63,7 +65,8 @@ def _by_set(deck: Deck, blocks, labels: np.ndarray) -> Regions:
         name: np.intersect1d(deck.element_sets.labels(name), labels)
         for name in deck.element_sets.names
     }
-    names, of = [], {}
+    names: list[str] = []
+    of: dict[int, int] = {}
     for name, mine in sorted(sets.items(), key=lambda item: len(item[1])):
         new = [label for label in mine.tolist() if label not in of]
         if new:

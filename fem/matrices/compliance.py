@@ -26,6 +26,7 @@ def rotating_stiffness(
     if speed == 0:
         stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # not every copy knows it
         return stiffness
+    assert rotation is not None, "a speed needs the matrices of the rotating frame"
     different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
     convective = rotation.convective if inertia == "full" else rotation.body_convective
     stiffness.axpy(speed**2, convective, different)
@@ -52,6 +53,7 @@ def rotating_damping(
     matrix = operators.stiffness.copy()
     matrix.scale(damping[1])
     if speed:
+        assert rotation is not None, "a speed needs the matrices of the rotating frame"
         gyroscopic = rotation.gyroscopic if inertia == "full" else rotation.body
         matrix.axpy(2 * speed, gyroscopic, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     add_diagonal(matrix, damping[0] * operators.mass)

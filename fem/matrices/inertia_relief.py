@@ -88,7 +88,7 @@ def relieved(operators: Operators, loads: sparse.csr_matrix) -> np.ndarray:
 def _determinate(operators: Operators, rigid: np.ndarray) -> np.ndarray:
     """Own rows, all of the rim, that hold the rigid motions and no more."""
     rim, count = operators.unknowns.rim, rigid.shape[1]
-    if not rim.mine:
+    if rim is None or not rim.mine:
         return np.zeros(0, PETSc.IntType)
     chosen = linalg.qr(rigid[-6:].T, pivoting=True)[2][:count]
     return (len(rigid) - 6 + np.sort(chosen)).astype(PETSc.IntType)

@@ -18,7 +18,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from tireroad.fem import compat, kinematics
-from tireroad.fem.matrices.support import FIXED, Support, Unknowns
+from tireroad.fem.matrices.support import FIXED, Rim, Support, Unknowns
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,
@@ -56,18 +56,18 @@ class Operators:
         inflation: float,
         support: Support = FIXED,
         rolling: Rolling = AT_REST,
-    ):
+    ) -> None:
         self.body = body
         self.unknowns = Unknowns(body, support)
         self.mass, self.carried = self.unknowns.mass, self.unknowns.carried
         self.stiffness = self._assemble(self._tangent(inflation))
         if self.unknowns.rim:
-            self._add_turning(inflation, rolling)
+            self._add_turning(self.unknowns.rim, inflation, rolling)
         self.stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
-    def _add_turning(self, inflation: float, rolling: Rolling) -> None:
+    def _add_turning(self, rim: Rim, inflation: float, rolling: Rolling) -> None:
         """What the rim's static forces add to the stiffness of its rotations. Collective."""
-        body, rim = self.body, self.unknowns.rim
+        body = self.body
         pressure = fem.Constant(body.mesh, inflation)
         out = fem.petsc.assemble_vector(compat.form(static_residual(body, pressure, rolling)))
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)

@@ -44,7 +44,7 @@ class Unknowns:
     `component` (n,) 0, 1, 2 for x, y, z and 3, 4, 5 for rotations; `carried` (3, n) kg: momentum per rate.
     """
 
-    def __init__(self, body: Body, support: Support):
+    def __init__(self, body: Body, support: Support) -> None:
         self._body = body
         rim = body.rim[body.rim < body.nodes]
         known = np.zeros((body.nodes, 3), bool)
@@ -64,13 +64,13 @@ class Unknowns:
         if self.rim:
             moved = self.rim.momentum()
             self.carried = np.hstack([self.carried, moved[:, : 6 if self.rim.mine else 0]])
-        self._prolongation = self._make_prolongation() if self.rim else None
+        self._prolongation = self._make_prolongation(self.rim) if self.rim else None
         first = 3 * body.space.dofmap.index_map.local_range[0]
         self._rows = PETSc.IS().createGeneral(
             (self.free + first).astype(PETSc.IntType), comm=body.comm
         )
 
-    def _make_prolongation(self) -> PETSc.Mat:
+    def _make_prolongation(self, rim: Rim) -> PETSc.Mat:
         """T as a distributed matrix. Collective."""
         comm, rows = self._body.comm, 3 * self._body.nodes
         own = len(self.mass)
@@ -79,8 +79,8 @@ class Unknowns:
         unit = sparse.csr_matrix(
             (np.ones(len(self.free)), (self.free, first + np.arange(len(self.free)))), (rows, last)
         )
-        columns = np.tile(np.arange(last - 6, last), len(self.rim.dofs))
-        values = (self.rim.shape.ravel(), (np.repeat(self.rim.dofs, 6), columns))
+        columns = np.tile(np.arange(last - 6, last), len(rim.dofs))
+        values = (rim.shape.ravel(), (np.repeat(rim.dofs, 6), columns))
         csr = sparse.csr_matrix(unit + sparse.csr_matrix(values, (rows, last)))
         index = [part.astype(PETSc.IntType) for part in (csr.indptr, csr.indices)]
         sizes = ((rows, PETSc.DETERMINE), (own, PETSc.DETERMINE))
@@ -97,7 +97,7 @@ class Unknowns:
         out = np.zeros((3 * self._body.nodes, *values.shape[1:]))
         out[self.free] = values[: len(self.free)]
         if self.rim:
-            out[self.rim.dofs] = self.rim.shape @ self._rim_values(values)
+            out[self.rim.dofs] = self.rim.shape @ self.rim.shared(values[len(self.free) :])
         return out.reshape(self._body.nodes, 3, *values.shape[1:])
 
     def restrict(self, nodal: np.ndarray) -> np.ndarray:
@@ -109,13 +109,10 @@ class Unknowns:
         on_rim = self.rim.unknowns(flat[self.rim.dofs])
         return np.concatenate([own, on_rim]) if self.rim.mine else own
 
-    def _rim_values(self, values: np.ndarray) -> np.ndarray:
-        """The rim's six unknowns (6, ...), on every process. Collective."""
-        return self.rim.shared(values[len(self.free) :])
-
     def rim_motion(self, values: np.ndarray) -> np.ndarray:
         """Translation of the axle's centre and rotation of the rim (6, ...), on every process. Collective."""
-        return self.rim.coordinates @ self._rim_values(values)
+        assert self.rim is not None, "only a free rim moves"
+        return self.rim.coordinates @ self.rim.shared(values[len(self.free) :])
 
     def loads(
         self, nodal: sparse.csr_matrix, on_rim: np.ndarray | None = None
@@ -138,7 +135,7 @@ class Rim:
     `coordinates` (6, 6): translation and rotation per unknown. `mine`: this process has the unknowns.
     """
 
-    def __init__(self, body: Body, nodes: np.ndarray, mass: np.ndarray):
+    def __init__(self, body: Body, nodes: np.ndarray, mass: np.ndarray) -> None:
         self._comm = body.comm
         self._points = body.lattice.points(body.ids[nodes])
         self._mass = np.repeat(mass, 3)

@@ -59,7 +59,10 @@ class CordLine:
 
 @dataclass(frozen=True, kw_only=True)
 class Construction:
-    """`tread` m: the road can touch |s| up to there. `compounds` by name: what a `Material` takes."""
+    """`tread` m: the road can touch |s| up to there. `compounds` by name: what a `Material` takes.
+
+    `held` m: the rim holds the outer face from |s| = held on, beside the ends; None: the ends alone.
+    """
 
     outline: Outline
     layers: Sequence[Layer]
@@ -67,6 +70,7 @@ class Construction:
     cords: Sequence[CordLine] = ()
     compounds: Mapping[str, Mapping[str, float]]
     tread: float
+    held: float | None = None
 
     def section(self, elements: int, order: int = 2) -> SectionMesh:
         """Its elements: one a layer through the wall, about `elements` bead to bead, edges at every edge.
@@ -90,12 +94,17 @@ class Construction:
             patches.insert(number, Patch(layer.compound, ((-length, length),), self._depth(number)))
         plies = [self._ply(line) for line in self.cords]
         ends = [end for part in self.parts for end in part.along] + [line.to for line in self.cords]
-        fixed = [end for end in [*ends, self.tread] if end < length * (1 - 1e-9)]
-        both = np.concatenate([fixed, np.negative(fixed)])
+        ends += [self.tread, self._held]
+        fixed = [end for end in ends if end < length * (1 - 1e-9)]
+        both = [*fixed, *(-end for end in fixed)]
         wall = np.linspace(0.0, 1.0, levels + 1)
         arc = corners(elements, lambda s: 1 / self._size(s, elements), -length, length, both)
         mesh = product(order=order, wall=wall, arc=arc, place=place, patches=patches, plies=plies)
-        return _named(mesh, arc, self.tread)
+        return _named(mesh, arc, self.tread, self._held)
+
+    @property
+    def _held(self) -> float:
+        return self.outline.length if self.held is None else self.held
 
     def ring(
         self, segments: int, elements: int, order: int = 2, footprint_size: float = 1.0
@@ -128,10 +137,15 @@ class Construction:
                     raise InputError(
                         f"section: {kind} of layer {name!r}; there are {', '.join(names)}"
                     )
-        for item in (*self.layers, *self.parts):
-            if item.compound not in self.compounds:
+        for compound in [one.compound for one in self.layers] + [p.compound for p in self.parts]:
+            if compound not in self.compounds:
                 known = ", ".join(self.compounds)
-                raise InputError(f"section: no compound {item.compound!r}; there are {known}")
+                raise InputError(f"section: no compound {compound!r}; there are {known}")
+
+        if not self.tread < self._held:
+            raise InputError(
+                f"section: the tread reaches to {self.tread:g} m, the rim holds the face from {self._held:g} m on"
+            )
 
     def _surfaces(self):
         """Depths (k, layers + 1) m of outer face and inner sides of the layers at lengths (k,) >= 0."""
@@ -176,9 +190,11 @@ class Construction:
 
     def _size(self, s: np.ndarray, count: int) -> np.ndarray:
         """Relative element size: geometric to the beads, smaller at the ends of cords."""
-        length = self.outline.length
+        length = self._held
         thickness = self._surfaces()(np.array([length]))[0, -1]
-        size = bead.size(length - np.abs(s), 2 * length, count, bead.LEAST * thickness / count)
+        distance = np.maximum(length - np.abs(s), 0.0)
+        size = bead.size(distance, 2 * length, count, bead.LEAST * thickness / count)
+        size = np.where(np.abs(s) < length, size, self.outline.length)  # what is held: one element
         ends = np.array([line.to for line in self.cords if line.to < length])
         if not len(ends):
             return size
@@ -189,8 +205,8 @@ class Construction:
 _ENDS, _ENDS_DEPTH = 0.06, 0.6  # of the half section: where a belt ends, as for the torus
 
 
-def _named(mesh: SectionMesh, arc: np.ndarray, tread: float) -> SectionMesh:
-    """Regions of one compound as one, without the empty ones; the tread up to its edge."""
+def _named(mesh: SectionMesh, arc: np.ndarray, tread: float, held: float) -> SectionMesh:
+    """Regions of one compound as one, without the empty ones; the tread up to its edge, the rim's hold."""
     from dataclasses import replace
 
     used = [mesh.regions[i] for i in np.unique(mesh.region)]
@@ -198,4 +214,5 @@ def _named(mesh: SectionMesh, arc: np.ndarray, tread: float) -> SectionMesh:
     number = {name: i for i, name in enumerate(names)}
     region = np.array([number[mesh.regions[i]] for i in mesh.region])
     middle = np.abs(arc[1:] + arc[:-1]) / 2
-    return replace(mesh, region=region, regions=names, tread=mesh.outer[middle < tread])
+    rim = np.concatenate([mesh.rim, mesh.outer[middle > held]])
+    return replace(mesh, region=region, regions=names, tread=mesh.outer[middle < tread], rim=rim)

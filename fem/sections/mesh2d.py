@@ -51,7 +51,7 @@ class SectionMesh:
     plies: Mapping[str, np.ndarray] = field(default_factory=dict)
     position: Position | None = field(default=None, compare=False, repr=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         from tireroad.fem.sections.checks import check
 
         check(self)

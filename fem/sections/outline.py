@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from tireroad.fem.errors import InputError
@@ -20,7 +19,7 @@ class Outline:
     crown. `length` m from the crown to the bead.
     """
 
-    def __init__(self, points: np.ndarray):
+    def __init__(self, points: np.ndarray) -> None:
         points = np.asarray(points, float)
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 4:
             raise InputError("section: an outline needs four points (r, y) or more")
@@ -54,9 +53,9 @@ class Outline:
         return np.stack([-y / size, np.sign(s) * r / size], axis=-1)
 
 
-def arcs(points: Sequence[Sequence[float]]) -> np.ndarray:
+def arcs(through: npt.ArrayLike) -> np.ndarray:
     """Points on circular arcs, each from the end of the last through a point to an end: start, then pairs."""
-    points = np.asarray(points, float)
+    points = np.asarray(through, float)
     if points.ndim != 2 or len(points) < 3 or len(points) % 2 == 0:
         raise InputError("section: arcs are a start and two points (on the way, end) for each arc")
     found = [points[:1]]

@@ -2,57 +2,77 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import Construction, CordLine, Layer, Part
 from tireroad.fem.sections.outline import Outline
 from tireroad.fem.sections.tire_size import Size, size
 
-STEEL, STEEL_AREA, STEEL_SPACING = 190e9, 0.246e-6, 1.25e-3
+STEEL = {"youngs_modulus": 190e9, "area": 0.246e-6, "spacing": 1.25e-3, "density": 7850.0}
+NYLON = {"youngs_modulus": 3e9, "area": 0.33e-6, "spacing": 1.0e-3, "density": 1140.0}
+POLYESTER = {
+    "youngs_modulus": 7e9,
+    "area": 0.35e-6,
+    "spacing": 1.0e-3,
+    "density": 1380.0,
+    "compression": 0.1,
+}
 BELT_ANGLE = np.radians(24)
-NYLON, NYLON_AREA, NYLON_SPACING = 3e9, 0.33e-6, 1.0e-3
-POLYESTER, POLYESTER_AREA, POLYESTER_SPACING = 7e9, 0.35e-6, 1.0e-3
 
 # E Pa, Poisson's ratio, kg/m3, dynamic over static modulus, loss factor.
-_COMPOUNDS = {
-    "tread": (5.0e6, 0.49, 1150.0, 1.4, 0.25),
-    "skim": (9.0e6, 0.49, 1200.0, 1.4, 0.15),
-    "ply": (4.5e6, 0.49, 1150.0, 1.4, 0.15),
-    "sidewall": (3.0e6, 0.49, 1120.0, 1.4, 0.15),
-    "apex": (36e6, 0.49, 1200.0, 1.4, 0.15),
-    "liner": (3.0e6, 0.49, 1150.0, 1.4, 0.2),
+COMPOUNDS = {
+    "tread": (4.2e6, 0.49, 850.0, 1.5, 0.25),
+    "skim": (9.0e6, 0.49, 1200.0, 1.5, 0.15),
+    "ply": (4.6e6, 0.49, 1150.0, 1.5, 0.15),
+    "sidewall": (3.2e6, 0.49, 1120.0, 1.5, 0.15),
+    "apex": (40e6, 0.49, 1200.0, 1.5, 0.15),
+    "bead": (400e6, 0.49, 2200.0, 1.0, 0.05),
 }
+
+FLANGE = 0.016  # m above the rim: from there down the rim holds the tire
+RIM, WIDEST, APEX = 0.40, 0.55, 0.8
+FALL = 0.03
+LEAST_HEIGHT = 0.055  # m of a section: below, no sidewall is left above the flange
+
+
+class _Stations(NamedTuple):
+    """Lengths s (m) on the outer face from the crown."""
+
+    belt: float
+    shoulder: float
+    widest: float
+    apex: float
+    held: float
+    end: float
 
 
 def radial(text: str) -> Construction:
-    """The construction of a size."""
+    """The construction of a size. InputError for a size that is none, or too low."""
     tire = size(text)
+    if tire.height < LEAST_HEIGHT:
+        raise InputError(
+            f'tire.size = "{text[:40]}": its section is {1e3 * tire.height:.0f} mm high; the built-in '
+            f"construction needs {1e3 * LEAST_HEIGHT:.0f} mm"
+        )
     outline = Outline(_outline(tire))
-    belt, shoulder, widest, end = _stations(tire, outline)
-    mm = 1e-3
-
-    def layer(name: str, compound: str, *values: float) -> Layer:
-        places = (0.0, 0.8 * belt, shoulder, widest, 0.5 * (widest + end), end)
-        pairs = tuple((s, v * mm) for s, v in zip(places, values, strict=True))
-        return Layer(name, compound, pairs)
-
+    at = _stations(tire, outline)
     return Construction(
         outline=outline,
-        layers=(
-            layer("tread", "tread", 8.5, 8.7, 8.5, 1.7, 2.2, 3.0),
-            layer("belt skim", "skim", 1.3, 1.3, 2.0, 0.6, 1.0, 1.6),
-            layer("belt base", "skim", 1.5, 1.7, 3.0, 1.0, 2.0, 4.4),
-            layer("carcass", "ply", 2.0, 2.0, 2.0, 1.7, 1.8, 2.0),
-        ),
+        layers=_layers(at),
         parts=(
-            Part("tread", "sidewall", (shoulder, end)),
-            Part("belt skim", "sidewall", (shoulder, end)),
-            Part("belt base", "sidewall", (shoulder, 0.5 * (widest + end))),
-            Part("belt base", "apex", (0.5 * (widest + end), end)),
+            Part("tread", "sidewall", (at.shoulder, at.end)),
+            Part("belt skim", "sidewall", (at.shoulder, at.end)),
+            Part("belt base", "sidewall", (at.shoulder, at.apex)),
+            Part("belt base", "apex", (at.apex, at.held)),
+            Part("belt base", "bead", (at.held, at.end)),
         ),
-        cords=_cords(belt, end),
-        compounds={name: _rubber(values) for name, values in _COMPOUNDS.items()},
-        tread=shoulder,
+        cords=_cords(at),
+        compounds={name: _rubber(values) for name, values in COMPOUNDS.items()},
+        tread=at.shoulder,
+        held=at.held,
     )
 
 
@@ -61,65 +81,74 @@ def _rubber(values: tuple[float, ...]) -> dict[str, float]:
     return dict(zip(names, values, strict=True))
 
 
-def _outline(tire: Size) -> np.ndarray:
-    """Points (r, y) of the outer face from the crown to where the rim's flange holds it."""
-    top, w, h = tire.rim + tire.height, tire.width, tire.height
-    rim = 0.37 * w
-    flange = tire.rim + 0.012
-    widest = tire.rim + 0.53 * h
-    flat = _flat(tire)
-    upper = top - widest
-    return np.array(
-        [
-            (top, 0.0),
-            (top - 0.022 * upper, 0.5 * flat),
-            (top - 0.09 * upper, flat),
-            (top - 0.31 * upper, flat + 0.66 * (0.475 * w - flat)),
-            (widest + 0.42 * upper, 0.482 * w),
-            (widest, 0.5 * w),
-            (widest - 0.2 * h, 0.482 * w),
-            (flange, rim + 0.012),
-        ]
+def _layers(at: _Stations) -> tuple[Layer, ...]:
+    """Thickness in mm at the crown, under the belt's edge, at the tread's edge, at the widest point, half way
+    from there to the flange, at the flange and at the heel.
+    """
+    places = (
+        0.0,
+        0.8 * at.belt,
+        at.shoulder,
+        at.widest,
+        (at.widest + at.held) / 2,
+        at.held,
+        at.end,
+    )
+
+    def layer(name: str, compound: str, *values: float) -> Layer:
+        return Layer(name, compound, tuple(zip(places, np.multiply(1e-3, values), strict=True)))
+
+    return (
+        layer("tread", "tread", 8.0, 8.0, 7.0, 1.7, 2.0, 2.8, 3.0),
+        layer("belt skim", "skim", 1.3, 1.3, 2.0, 0.6, 1.4, 1.8, 2.0),
+        layer("belt base", "skim", 1.5, 1.6, 2.5, 1.0, 3.0, 5.5, 9.0),
+        layer("carcass", "ply", 2.0, 2.0, 2.0, 1.7, 1.6, 1.9, 2.0),
     )
 
 
+def _outline(tire: Size) -> np.ndarray:
+    """Points (r, y) of the outer face from the crown to the heel of the bead."""
+    top, w, flat = tire.rim + tire.height, tire.width, _flat(tire)
+    widest, rim = tire.rim + WIDEST * tire.height, RIM * tire.width
+    upper = top - widest
+    y = flat * np.array([0, 0.25, 0.5, 0.75, 0.92])
+    crown = np.stack([top - FALL * upper * (y / flat) ** 2, y], axis=-1)
+    middle = np.array([widest, 0.5 * w])
+    above = _leaving(middle, np.array([widest + 0.62 * upper, 0.47 * w]))
+    lean = min(0.009, 0.044 * w)  # of the flange, outwards
+    below = _leaving(middle, np.array([tire.rim + FLANGE, rim + lean]))
+    seat = [(tire.rim + FLANGE / 2, rim + lean / 3), (tire.rim, rim)]
+    return np.concatenate([crown, above[::-1], [middle], below, seat])
+
+
+def _leaving(middle: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Points of the circle through the widest point, upright there, to another point."""
+    rise, back = end[0] - middle[0], middle[1] - end[1]
+    radius = (rise**2 + back**2) / (2 * back)
+    angle = np.arcsin(rise / radius) * np.array([0.4, 0.7, 1.0])
+    return middle + radius * np.stack([np.sin(angle), np.cos(angle) - 1], axis=-1)
+
+
 def _flat(tire: Size) -> float:
-    """Half width of the tread up to its rounded shoulder, m."""
-    return 0.345 * tire.width
+    """Half width of the tread up to its rounded shoulder, m: low tires have it wider."""
+    ratio = tire.height / tire.width
+    return float(np.clip(0.325 + 0.3 * (0.6 - ratio), 0.30, 0.42)) * tire.width
 
 
-def _stations(tire: Size, outline: Outline) -> tuple[float, float, float, float]:
-    """Lengths s (m) of the belt's edge, the tread's edge, the widest point and the end."""
-    s = np.linspace(0.0, outline.length, 2001)
+def _stations(tire: Size, outline: Outline) -> _Stations:
+    s = np.linspace(0.0, outline.length, 4001)
     r, y = outline.at(s).T
     widest = float(s[y.argmax()])
     edge = float(s[np.argmax(y > _flat(tire))])
-    return 0.97 * edge, edge + 0.25 * (widest - edge), widest, outline.length
+    held = float(s[np.flatnonzero(r > tire.rim + FLANGE)[-1]])
+    shoulder, apex = edge + 0.25 * (widest - edge), held - APEX * (held - widest)
+    return _Stations(0.97 * edge, shoulder, widest, apex, held, outline.length)
 
 
-def _cords(belt: float, end: float) -> tuple[CordLine, ...]:
-    steel = {
-        "youngs_modulus": STEEL,
-        "area": STEEL_AREA,
-        "spacing": STEEL_SPACING,
-        "density": 7850.0,
-    }
-    nylon = {
-        "youngs_modulus": NYLON,
-        "area": NYLON_AREA,
-        "spacing": NYLON_SPACING,
-        "density": 1140.0,
-    }
-    polyester = {
-        "youngs_modulus": POLYESTER,
-        "area": POLYESTER_AREA,
-        "spacing": POLYESTER_SPACING,
-        "density": 1380.0,
-        "compression": 0.1,
-    }
+def _cords(at: _Stations) -> tuple[CordLine, ...]:
     return (
-        CordLine(name="cap ply", under="tread", to=belt, angle=0.0, **nylon),
-        CordLine(name="belt 2", under="tread", to=0.95 * belt, angle=-BELT_ANGLE, **steel),
-        CordLine(name="belt 1", under="belt skim", to=belt, angle=BELT_ANGLE, **steel),
-        CordLine(name="carcass", under="belt base", to=end, angle=np.pi / 2, **polyester),
+        CordLine(name="cap ply", under="tread", to=at.belt, angle=0.0, **NYLON),
+        CordLine(name="belt 2", under="tread", to=0.95 * at.belt, angle=-BELT_ANGLE, **STEEL),
+        CordLine(name="belt 1", under="belt skim", to=at.belt, angle=BELT_ANGLE, **STEEL),
+        CordLine(name="carcass", under="belt base", to=at.end, angle=np.pi / 2, **POLYESTER),
     )

@@ -14,7 +14,7 @@ from tireroad.fem.sections.outline import Outline, arcs
 
 UNITS = {"m": 1.0, "mm": 1e-3}
 LARGEST = 1_000_000  # bytes
-_TABLES = {"name", "unit", "tread", "outline", "layer", "part", "cords", "compound"}
+_TABLES = {"name", "unit", "tread", "held", "outline", "layer", "part", "cords", "compound"}
 _COMPOUND = {
     "youngs_modulus": None,
     "poisson_ratio": 0.49,
@@ -49,6 +49,7 @@ def _construction(raw: dict[str, Any]) -> Construction:
     if unit not in UNITS:
         raise InputError(f'unit = "{unit}": must be "m" or "mm"')
     scale = UNITS[unit]
+    held = scale * _number(raw, "held", "the file") if "held" in raw else None
     return Construction(
         outline=_outline(_table(raw, "outline"), scale),
         layers=[_layer(one, scale) for one in _tables(raw, "layer", least=1)],
@@ -56,6 +57,7 @@ def _construction(raw: dict[str, Any]) -> Construction:
         cords=[_cords(one, scale) for one in _tables(raw, "cords")],
         compounds={name: _compound(name, one) for name, one in _table(raw, "compound").items()},
         tread=scale * _number(raw, "tread", "the file"),
+        held=held,
     )
 
 
@@ -163,7 +165,7 @@ def _tables(raw: dict[str, Any], key: str, least: int = 0) -> list[dict[str, Any
 
 
 def _number(table: dict[str, Any], key: str, where: str, default: float | None = None) -> float:
-    value = table.get(key, default)
+    value: Any = table.get(key, default)
     right = isinstance(value, int | float) and not isinstance(value, bool)
     if not right or not np.isfinite(value):
         raise InputError(

@@ -41,7 +41,7 @@ class Equilibrium:
     `cost`: seconds by part.
     """
 
-    def __init__(self, body: Body, rolling: Rolling = AT_REST):
+    def __init__(self, body: Body, rolling: Rolling = AT_REST) -> None:
         self.body, self.rolling = body, rolling
         self.cost = Timing()
         self.road_height: float | None = None

@@ -30,7 +30,9 @@ class HeldSystem:
     `raising` that of all held dofs by one.
     """
 
-    def __init__(self, comm: MPI.Comm, matrix: PETSc.Mat, factorisation: str, timing: Timing):
+    def __init__(
+        self, comm: MPI.Comm, matrix: PETSc.Mat, factorisation: str, timing: Timing
+    ) -> None:
         self._comm, self._timing = comm, timing
         self._ksp = _solver(comm, matrix, factorisation)
         self._right, self._x = matrix.createVecs()
@@ -92,6 +94,7 @@ class HeldSystem:
         if moved is not None:
             change += moved.change
             self._x.array[:] = change
+        assert self._reaction is not None, "solve() before take()"
         force = self._reaction.createVecLeft()
         self._reaction.mult(self._x, force)
         at_held = force.array_r.copy()

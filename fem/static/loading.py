@@ -58,12 +58,12 @@ class LoadingStopped(ConvergenceError):
 class Loader:
     """Brings the body of one equilibrium problem to the wanted state. All methods are collective."""
 
-    def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]):
+    def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]) -> None:
         self.equilibrium = equilibrium
         self.body = equilibrium.body
         self.report = report
         self.newton_steps = 0
-        self.touch: float | None = None
+        self._touch: float | None = None
 
     def inflate(self, pressure: float) -> None:
         """Inflation from 0 to `pressure` (Pa), without a road; also the steady-rolling loads alone."""
@@ -73,7 +73,19 @@ class Loader:
             return self.equilibrium.solve()
 
         self._march(attempt, 0.0, 1.0, 1.0, "inflation", pressure, "Pa")
-        self.touch = self.lowest()
+        self._touch = self.lowest()
+
+    @property
+    def touch(self) -> float:
+        """Height of a road that just touches the inflated tire, m."""
+        assert self._touch is not None, "inflate() comes before the road"
+        return self._touch
+
+    @property
+    def deflection(self) -> float:
+        """How far the road has been raised from first touch, m."""
+        assert self.equilibrium.road_height is not None, "there is no road"
+        return self.equilibrium.road_height - self.touch
 
     def lowest(self) -> float:
         """Height of the lowest point of the outer face between its nodes, m. Collective."""
@@ -104,7 +116,7 @@ class Loader:
                 return trial
             trial = self._next_deflection(known, load)
             if trial < _REACH * max(k.deflection for k in known) and self._meet(load, trial, known):
-                return self.equilibrium.road_height - self.touch
+                return self.deflection
         nearest = min(known, key=lambda k: abs(k.load - load))
         raise ConvergenceError(
             f"static: the load of {load:g} N was not met in 60 trials; nearest is {nearest.load:g} N. "
@@ -117,7 +129,7 @@ class Loader:
         step = self.equilibrium.solve(self.touch + trial, load)
         self.newton_steps += step.iterations
         if step.converged:
-            self._report("deflection", self.equilibrium.road_height - self.touch, "m", step)
+            self._report("deflection", self.deflection, "m", step)
         return step.converged
 
     def _guess(self, trial: float, known: list[_Known]) -> bool:

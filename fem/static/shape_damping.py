@@ -23,7 +23,7 @@ class ShapeDamping:
     `update` must be called before `work` is assembled. All methods are collective.
     """
 
-    def __init__(self, body: Body, pressure, rolling: Rolling):
+    def __init__(self, body: Body, pressure, rolling: Rolling) -> None:
         self._body = body
         self._rate = fem.Function(body.space)
         self._factor = float(rolling.speed * rolling.stiffness_damping)

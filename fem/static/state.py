@@ -100,13 +100,16 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         if road_height is not None
         else np.zeros(len(face))
     )
+    half_sizes, ring_rate, shape = _surface_metric(body.lattice, points + moved)
     return StaticState(
         displacement,
         points,
         moved,
         force,
         nodal_area(body.lattice, points + moved),
-        *_surface_metric(body.lattice, points + moved),
+        half_sizes,
+        ring_rate,
+        shape,
         touch_height=touch_height,
         road_height=road_height,
         inflation=float(equilibrium.pressure.value),
@@ -116,7 +119,9 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
     )
 
 
-def _surface_metric(lattice: Lattice, positions: np.ndarray):
+def _surface_metric(
+    lattice: Lattice, positions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
     """Half sizes of each node's rectangle, dx/dtheta, and the shape (around, along) of the face."""
     shape = lattice.face_shape
     grid = positions.reshape(*shape, 3)

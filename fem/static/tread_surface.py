@@ -21,7 +21,7 @@ _CLOSE_ANGLE = (
 class TreadSurface:
     """The outer face of a lattice with its nodes at `positions` (s, 3) m. Not collective."""
 
-    def __init__(self, lattice: Lattice, positions: np.ndarray):
+    def __init__(self, lattice: Lattice, positions: np.ndarray) -> None:
         self._lattice, self._positions = lattice, positions
         self._shape = lattice.face_shape
 

@@ -36,10 +36,11 @@ class Body:
         material: Material | Mapping[str, Material],
         regions: Sequence[Region] = (),
         cords: Sequence[Cords] = (),
-    ):
+    ) -> None:
         self.comm = comm
         if isinstance(tire, Torus):
             tire = tire.ring([region.patch(i) for i, region in enumerate(regions)])
+        if isinstance(material, Material):
             material = compounds(material, tuple(regions))
         self.materials = material
         self.tire = build(comm, tire)

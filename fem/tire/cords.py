@@ -36,7 +36,7 @@ class Cords:
     compression: float = 1.0
     drum_radius: float | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for key in ("youngs_modulus", "area", "spacing"):
             if not getattr(self, key) > 0:
                 raise InputError(f"cords {self.name!r}: {key} must be above 0")

@@ -42,7 +42,7 @@ def face_points(axis: int, side: int, line: np.ndarray) -> np.ndarray:
 class Face:
     """The face of all cells of a mesh where reference coordinate `axis` is `side` (0 or 1)."""
 
-    def __init__(self, mesh, axis: int, side: int, order: int):
+    def __init__(self, mesh, axis: int, side: int, order: int) -> None:
         self.mesh, self.axis, self.side, self._order = mesh, axis, side, order
         reference = np.zeros(AXES)
         reference[axis] = 2 * side - 1

@@ -30,7 +30,7 @@ class Lattice:
     section angles (rad) of its nodes bead to bead.
     """
 
-    def __init__(self, tire: Ring | Torus, edge: np.ndarray):
+    def __init__(self, tire: Ring | Torus, edge: np.ndarray) -> None:
         tire = tire.ring() if isinstance(tire, Torus) else tire
         self.tire, self.edge = tire, edge
         self.ring_corners, self.arc_corners = tire.ring_corners, tire.arc_corners

@@ -48,7 +48,9 @@ class Sheet:
     `owner` (cells,) is the number of the ply, or -1; no two of `laid` have a cell in common.
     """
 
-    def __init__(self, face: Face, count: int, laid: Sequence[Laid], cords: Sequence[Cords]):
+    def __init__(
+        self, face: Face, count: int, laid: Sequence[Laid], cords: Sequence[Cords]
+    ) -> None:
         self.face, self.owner = face, np.full(count, -1)
         # Where there is no ply: nothing, along a unit vector.
         values = dict.fromkeys(("stiffness", "mass", "slack", "sine"), 0.0) | {"cosine": 1.0}
@@ -76,7 +78,7 @@ class Sheet:
 class Plies:
     """All cords of a body, `order` that of its elements; without any, every form is 0. Collective to make."""
 
-    def __init__(self, mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]):
+    def __init__(self, mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]) -> None:
         self.cords = tuple(cords)
         self.sheets = _sheets(mesh, order, self.cords, laid)
 

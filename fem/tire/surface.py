@@ -12,7 +12,7 @@ class Gather:
     Arguments: the ids of this process's owned nodes, and the ids wanted (the same on all).
     """
 
-    def __init__(self, comm: MPI.Comm, owned: np.ndarray, wanted: np.ndarray):
+    def __init__(self, comm: MPI.Comm, owned: np.ndarray, wanted: np.ndarray) -> None:
         self.comm = comm
         self.ids = wanted
         self.local = np.flatnonzero(np.isin(owned, wanted))  # owned blocks that were asked for

@@ -50,7 +50,7 @@ class Wall:
     InputError for a region without a material.
     """
 
-    def __init__(self, tire: TireMesh, materials: Mapping[str, Material]):
+    def __init__(self, tire: TireMesh, materials: Mapping[str, Material]) -> None:
         self._space = compat.cell_space(tire.mesh)
         section = tire.ring.section
         missing = [name for name in section.regions if name not in materials]

@@ -26,7 +26,7 @@ class AirStep:
         air: Column,
         solve: Callable[[np.ndarray], np.ndarray],
         weights: tuple[float, float],
-    ):
+    ) -> None:
         self._air, self._comm = air, air.comm
         self.mine = air.comm.rank == air.comm.size - 1
         self.count = len(air.duct.circular)

@@ -49,7 +49,7 @@ class FullTire:
         spectral_radius: float = 0.0,
         air: Column | None = None,
         modal: ModalDamping | None = None,
-    ):
+    ) -> None:
         self._set_scheme(step, spectral_radius)
         self._operators, self._comm, self._step = operators, operators.body.comm, step
         self._mass, self._carried = operators.mass, operators.carried

@@ -30,7 +30,7 @@ class ModalDamping:
         excess: np.ndarray,
         body: PETSc.Mat | None = None,
         speed: float = 0.0,
-    ):
+    ) -> None:
         self._comm, self._fields = operators.body.comm, fields
         self._weighted = operators.mass[:, None] * fields
         self._push = self._weighted * excess

@@ -47,7 +47,7 @@ class NonlinearTire(FullTire):
         loads: sparse.csr_matrix,
         spectral_radius: float = 0.0,
         modal: ModalDamping | None = None,
-    ):
+    ) -> None:
         if operators.unknowns.rim:
             raise InputError('nonlinear tire in time: modal.rim = "free" is linear; take "fixed"')
         super().__init__(

@@ -16,7 +16,7 @@ class Shifted:
     tells that sigma is an eigenvalue to rounding, so that the inverse must not be used.
     """
 
-    def __init__(self, matrix: sparse.csr_matrix, shift: float):
+    def __init__(self, matrix: sparse.csr_matrix, shift: float) -> None:
         self.size, self.shift = matrix.shape[0], shift
         csr = (_index(matrix.indptr), _index(matrix.indices), matrix.data)
         shifted = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)

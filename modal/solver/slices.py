@@ -80,7 +80,8 @@ def _search(matrix, shifted: Shifted, interval: Interval) -> tuple[np.ndarray, n
     operator.setUp()
     start = operator.createVecRight()
     start.array[:] = np.random.default_rng(7).standard_normal(shifted.size)
-    values, vectors, inside = np.zeros(0), [], 0
+    values, inside = np.zeros(0), 0
+    vectors: list[PETSc.Vec] = []
     for search in range(_SEARCHES):
         # The start is the same each time: equal runs give equal vectors.
         more = _nearest(operator, interval.count - inside, [start] if search == 0 else [], vectors)
@@ -105,7 +106,7 @@ def _within(values: np.ndarray, interval: Interval) -> np.ndarray:
 class _Inverse:
     """(A - sigma I)^-1 as PETSc applies it."""
 
-    def __init__(self, shifted: Shifted):
+    def __init__(self, shifted: Shifted) -> None:
         self._shifted = shifted
 
     def mult(self, _, right: PETSc.Vec, out: PETSc.Vec) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -19,6 +19,8 @@ from scipy import sparse
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver.shifted import Shifted
 from tireroad.modal.solver.slices import Interval, eigenpairs
+
+T = TypeVar("T")
 
 ZERO = 1e-12  # of the matrix norm: eigenvalues nearer to zero are rigid modes, rounding is 1e-16
 _SLICE = 64  # eigenvalues a slice and matrix: the basis stays small, factorisations few
@@ -32,8 +34,10 @@ class Part(Protocol):
     stands for `copies` equal ones of the whole.
     """
 
-    matrix: sparse.csr_matrix
-    copies: int
+    @property
+    def matrix(self) -> sparse.csr_matrix: ...
+    @property
+    def copies(self) -> int: ...
 
     def fields(self, vectors: np.ndarray) -> np.ndarray:
         """Orthonormal fields (n, k copies) of the whole, from vectors (d, k) of the part."""
@@ -76,12 +80,12 @@ class Bottom:
 class Spectrum:
     """Independent parts of a symmetric problem, the same on all processes of `comm`."""
 
-    def __init__(self, comm: MPI.Comm, parts: list[Part]):
+    def __init__(self, comm: MPI.Comm, parts: list[Part]) -> None:
         self.comm, self.parts = comm, parts
         norms = [float(abs(part.matrix).sum(axis=1).max()) for part in parts]
         self.bound = 1.001 * max(norms)
 
-    def _shared(self, work: Callable[[Part], np.ndarray]) -> list[np.ndarray]:
+    def _shared(self, work: Callable[[Part], T]) -> list[T]:
         """What is computed of each part, on every process, each by one of them. Collective."""
         size = self.comm.size
         mine = {k: work(self.parts[k]) for k in range(self.comm.rank, len(self.parts), size)}
@@ -172,7 +176,7 @@ class Spectrum:
         first = next((e for e in self.comm.allgather(error) if e is not None), None)
         if first is not None:
             raise first
-        values = {}
+        values: dict[int, Any] = {}
         for part in self.comm.allgather({task: pair[0] for task, pair in answers.items()}):
             values |= part
         return [

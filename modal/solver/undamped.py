@@ -96,7 +96,7 @@ def _splits(matrix: sparse.csr_matrix, sites: Sites | None, waves: bool) -> Iter
             yield _Split([ring.wave(n) for n in ring.waves], ring.defect, ring.segments)
         found = symmetries(matrix, sites)
         if found:
-            parts = sectors(matrix, [one.image for one in found])
+            parts: list[Part] = [*sectors(matrix, [one.image for one in found])]
             names = tuple(one.isometry.name for one in found)
             yield _Split(parts, sum(one.defect for one in found), symmetries=names)
     yield _Split([whole(matrix)])

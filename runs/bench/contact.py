@@ -179,15 +179,16 @@ def _friction() -> Table:
 def _on_a_grid(shape: tuple[int, int], modes: int, finer: int, brush: float | None):
     """The loop on a grid `finer` times as fine as the nodes that carry it."""
     patch, tire, _, _ = _parts(shape, modes, True)
-    count, counts = len(patch.points), [(n - 1) * finer + 1 for n in shape]
+    count = len(patch.points)
+    counts = (shape[0] - 1) * finer + 1, (shape[1] - 1) * finer + 1
     spacing = 0.15 / shape[0] / finer, 0.12 / shape[1] / finer
-    points = oval_patch(tuple(counts), spacing, 500.0)
+    points = oval_patch(counts, spacing, 500.0)
     along, across = (
         np.maximum(1 - np.abs(np.arange(c)[:, None] / finer - np.arange(n)), 0.0)
         for c, n in zip(counts, shape, strict=True)
     )
     weights = sparse.csr_matrix(np.kron(along, across))
-    places = GridPlaces(tuple(counts), spacing, np.arange(len(points.points)))
+    places = GridPlaces(counts, spacing, np.arange(len(points.points)))
     kernel = KernelTread(
         places, partial(half_space_influence, youngs_modulus=ELASTIC[0], poisson_ratio=ELASTIC[1])
     )

@@ -130,7 +130,7 @@ def _plain(comm: MPI.Comm, operators) -> Table:
     """The same modes by SLEPc's interval slicing of the whole standard problem, on one process. Collective."""
     from tireroad.modal.solver import undamped
     from tireroad.modal.solver.fields import everywhere, scaled_by
-    from tireroad.runs.stages.modes import sites
+    from tireroad.modal.standing import sites
 
     observe.say(f"{RATIO} modes by SLEPc's interval slicing ...")
     own, found = _timed(

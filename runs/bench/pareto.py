@@ -112,10 +112,12 @@ def _full(given: Prepared, exact: History, mesh: str, step: float) -> Choice:
     """Every degree of freedom of the same mesh in time."""
     from tireroad.fem.matrices.probe import nodes
     from tireroad.fem.transient.linear import FullTire
+    from tireroad.modal.damping import StrainEnergy
 
     observe.say(f"  full finite elements, {step:g} s ...")
     wheel = given.run.wheel
     points = nodes(given.trial.setup.patch.index, len(given.run.static.points))
+    assert not isinstance(wheel.damping, StrainEnergy), "the scene gives [damping]"
     turning = wheel.rotation, wheel.speed, wheel.damping
     tire = FullTire(wheel.operators, *turning, step, points, points)
     with threadpool_limits(1, "blas"):

@@ -64,7 +64,7 @@ def run() -> list[Table]:
 
 def _tire(comm: MPI.Comm, segments: int, elements_arc: int) -> SmallMotions:
     """An inflated torus of 48 MPa. Collective."""
-    section = Torus(0.32, 0.10, 0.012, np.radians(120), segments, elements_arc, 1, 2)
+    section = Torus(0.32, 0.10, 0.012, np.radians(120), segments, elements_arc, 1, 2).ring()
     rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     tire = TireModel(section, lambda: Body(comm, section, rubber))
     loader = Loader(Equilibrium(tire.body), lambda progress: None)

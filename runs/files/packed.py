@@ -68,4 +68,4 @@ class Packer:
 def _packed(values: np.ndarray, kind: np.dtype) -> bytes:
     """HDF5's shuffle (first bytes of all values, then second ones, ...) and deflate."""
     octets = np.ascontiguousarray(values, kind).view(np.uint8).reshape(-1, kind.itemsize)
-    return zlib.compress(np.ascontiguousarray(octets.T), LEVEL)
+    return zlib.compress(np.ascontiguousarray(octets.T).data, LEVEL)

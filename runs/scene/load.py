@@ -71,7 +71,8 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
 def _with_damping(scene: Scene) -> Scene:
     """The default damping in proportion, where neither it nor the loss factor of a compound is given."""
     tire = scene.tire
-    loses = any(part.loss_factor for part in (tire, *tire.region)) or file_has_losses(tire)
+    compounds = tire.loss_factor, *(part.loss_factor for part in tire.region)
+    loses = any(compounds) or file_has_losses(tire)
     return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
 
 
@@ -120,7 +121,7 @@ def _without_checks(of: type, values: dict[str, Any]) -> Any:
 def _kind(of: type, item: Field, values: dict[str, Any]) -> type:
     """The class that a key of the table names; the default one where the name is wrong."""
     part = variant_of(item)
-    default = next(f.default for f in fields(of) if f.name == part.selector)
+    default: Any = next(f.default for f in fields(of) if f.name == part.selector)
     selected = values.get(part.selector, default)
     return part.registry[default if selected is _WRONG else selected]
 

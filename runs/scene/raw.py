@@ -43,21 +43,22 @@ def override(raw: dict[str, Any], item: str) -> tuple[str, ...]:
     if not equals or not all(path):
         raise InputError(f"--set {item[:80]}: must be table.key=value, e.g. static.load=400")
     here: Any = raw
+    at: Any  # a key of a table, or a number in an array of tables
     for depth, part in enumerate(path):
-        last = depth == len(path) - 1
+        last, at = depth == len(path) - 1, part
         if isinstance(here, list):
             if not part.isdigit() or int(part) >= len(here):
                 name = ".".join(path[:depth])
                 raise InputError(f"--set {dotted}: {name} has the numbers 0 to {len(here) - 1}")
-            part = int(part)
+            at = int(part)
         elif not isinstance(here, dict):
             raise InputError(f"--set {dotted}: {'.'.join(path[:depth])} is not a table")
         if not last:
-            here = here[part] if isinstance(here, list) else here.setdefault(part, {})
+            here = here[at] if isinstance(here, list) else here.setdefault(part, {})
         elif value.strip():
-            here[part] = _value(value.strip())
+            here[at] = _value(value.strip())
         elif isinstance(here, list):
-            del here[part]
+            del here[at]
         else:
             here.pop(part, None)
     return path

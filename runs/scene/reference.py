@@ -47,11 +47,11 @@ def _tables(of: type, path: str, doc: str, many: bool, written: dict[type, str])
         if part is not None:
             yield from _variants(part, path)
     for item in fields(of):
-        part = table_of(item)
-        if part is not None:
+        table = table_of(item)
+        if table is not None:
             inner = f"{path}.{item.name}" if path else item.name
-            about = f"{part.doc}; absent by default" if part.optional else part.doc
-            yield from _tables(part.of, inner, about, part.many, written)
+            about = f"{table.doc}; absent by default" if table.optional else table.doc
+            yield from _tables(table.of, inner, about, table.many, written)
 
 
 def _variants(part: Variant, path: str) -> Iterator[str]:

@@ -137,6 +137,7 @@ class AccuracyStage(Computed[Accuracy]):
             rolling=self.rotating.product,
             step=self.contact.product.step,
             steps=steps,
+            scheme="constant" if self.contact.product.scheme == "constant" else "linear",
         )
 
     def write(self, file, product: Accuracy) -> None:

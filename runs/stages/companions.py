@@ -43,7 +43,7 @@ LEAST = (8, 4)  # elements around and along that a companion has
 @dataclass(frozen=True, kw_only=True)
 class Given:
     """A run: its `job`, the static forces of the outer face (s,) N, patch and road (not settled), response
-    and rolling modes, and the first `steps` of `step` s of its loop that companions repeat."""
+    and rolling modes, and the first `steps` of `step` s of its loop, by a `scheme`, that companions repeat."""
 
     job: Job
     nodal_force: np.ndarray
@@ -52,6 +52,7 @@ class Given:
     rolling: RollingModes
     step: float
     steps: int
+    scheme: str = "linear"
 
     @cached_property
     def settled(self) -> ContactSetup:
@@ -60,7 +61,8 @@ class Given:
 
     def repeated(self, setup: ContactSetup, response: Response, coarser: int = 1) -> Forces:
         """The loop by another setup (settled), response or a step `coarser` times as long. Collective."""
-        return forces(self.job, setup, response, coarser * self.step, self.steps // coarser)
+        steps = coarser * self.step, self.steps // coarser
+        return forces(self.job, setup, response, *steps, self.scheme)
 
 
 def settled(job: Job, setup: ContactSetup, response: Response, force: np.ndarray) -> ContactSetup:
@@ -108,7 +110,7 @@ def coarser_mesh(given: Given) -> Forces:
             done[kind.name] = found
     response, state = done["greens"].product.contact, done["static"].product
     setup = settled(job, done["setup"].product, response, state.force)
-    return forces(job, setup, response, given.step, given.steps)
+    return forces(job, setup, response, given.step, given.steps, given.scheme)
 
 
 def coarser_job(job: Job) -> Job:

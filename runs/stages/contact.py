@@ -9,10 +9,11 @@ from typing import ClassVar
 
 from threadpoolctl import threadpool_limits
 
+from tireroad.contact.chatter import LIMIT, Chatter, Chosen, warning
 from tireroad.contact.model import solver_name
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.totals import Figures, Totals
+from tireroad.contact.totals import Totals
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
@@ -20,12 +21,24 @@ from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
 from tireroad.runs.stages.build.loop import driven_tire, make_loop
 from tireroad.runs.stages.build.point_forces import shortest_period
-from tireroad.runs.stages.build.stepping import Integration, integration, passing_period
-from tireroad.runs.stages.energy import Losses, describe_energy
+from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, told
+from tireroad.runs.stages.build.stepping import (
+    Integration,
+    Planned,
+    integration,
+    passing_period,
+    planned,
+)
+from tireroad.runs.stages.energy import Losses, describe_energy, works
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Done, Stage
-from tireroad.runs.stages.stored.contact_file import ContactFile, ContactHistory
+from tireroad.runs.stages.stored.contact_file import (
+    ContactFile,
+    ContactHistory,
+    begun_with,
+    forget_checkpoint,
+)
 from tireroad.runs.stages.watch import Watch
 
 
@@ -59,17 +72,47 @@ class ContactStage(Stage[ContactHistory]):
         return self.stored()
 
     def _roll(self, key: str, record: Record) -> None:
-        """The time loop, block by block into the file. Collective."""
+        """The time loop by the scheme that the contact asks for; by the other one where it chatters all the
+        same. Collective.
+        """
         response, setup = self.greens.product.contact, self.setup.product
-        chosen = integration(self.job, record, response, self._shortest_period())
+        plan = planned(self.job, record, response, self._shortest_period())
         with record.timing("tread and solver"):
-            state = self.static.product
-            setup, rise = setup.settled(response, state.force, self.job.scene.contact)
+            setup, rise = setup.settled(response, self.static.product.force, self.job.scene.contact)
             if rise:
                 record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
+            begun = begun_with(self.job, key)
+            chosen = chosen_scheme(self.job, record, setup, plan, begun)
+        spec, patch = self.job.scene.contact, setup.patch
+        observe.say(
+            f"  {len(patch.points)} contact points on {len(patch.index)} nodes, tread {spec.tread}, "
+            f"solver {solver_name(spec, patch)}"
+        )
+        doubtful = self.job.scene.time.scheme == "auto" and chosen.scheme == "linear"
+        try:
+            self._attempt(key, record, setup, plan, chosen.scheme, doubtful)
+        except Chatter:
+            if not doubtful:
+                raise
+            forget_checkpoint(self.job)
+            chosen = told(record, Chosen(*WATCHED))
+            self._attempt(key, record, setup, plan, chosen.scheme, False)
+
+    def _attempt(
+        self,
+        key: str,
+        record: Record,
+        setup: ContactSetup,
+        plan: Planned,
+        scheme: str,
+        watched: bool,
+    ) -> None:
+        """The time loop, block by block into the file; Chatter ends it where it is `watched`. Collective."""
+        response, chosen = self.greens.product.contact, integration(self.job, plan, scheme)
+        with record.timing("tread and solver"):
             driven = driven_tire(self.job, chosen.tire, chosen.step, chosen.steps)
             loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
-        totals = Totals(setup.patch, setup.reach)
+        totals = Totals(setup.patch, setup.reach, watched)
         losses = Losses(chosen.tire, response, self.rotating.product, chosen.step)
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme}
@@ -87,9 +130,9 @@ class ContactStage(Stage[ContactHistory]):
             busy = (time.thread_time() - began) / max(chosen.steps - done, 1)
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
-        _describe(record, totals.figures, loop.solver, chosen, chosen.steps - done)
+        _describe(record, totals, loop.solver, chosen, chosen.steps - done)
         if chosen.scheme != "convolution":
-            work = totals.work.total, driven.work if driven else None
+            work = works(chosen.scheme, totals.work, driven if self.job.scene.force else None)
             given = self.rotating.product, response, loop.tire.snapshot(), work
             describe_energy(record, *given, losses, chosen.step)
 
@@ -101,16 +144,14 @@ class ContactStage(Stage[ContactHistory]):
 
     def _loop(self, record: Record, setup: ContactSetup, tire, step: float) -> Loop:
         """The tire as seen at the patch's points, normal solver, friction; the choice is shown."""
-        spec, patch = self.job.scene.contact, setup.patch
+        spec = self.job.scene.contact
         loop = make_loop(spec, setup, tire, step)
-        observe.say(
-            f"  {len(patch.points)} contact points on {len(patch.index)} nodes, tread {spec.tread}, "
-            f"solver {solver_name(spec, patch)}"
-        )
         if loop.friction is not None:
-            limit = loop.friction.largest_unique(patch.force > 0, loop.solver)
+            limit = loop.friction.largest_unique(setup.patch.force > 0, loop.solver)
             record.indicators["friction up to which a step has one answer"] = (limit, "-")
-            record.warnings += beyond_unique(spec.friction, limit)
+            record.warnings += [
+                text for text in beyond_unique(spec.friction, limit) if text not in record.warnings
+            ]
         return loop
 
     def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, losses, chosen) -> None:
@@ -156,8 +197,9 @@ def beyond_unique(friction: float | None, limit: float) -> list[str]:
     ]
 
 
-def _describe(record: Record, totals: Figures, solver, chosen: Integration, taken: int) -> None:
+def _describe(record: Record, counted: Totals, solver, chosen: Integration, taken: int) -> None:
     """`taken`: the steps of this run, without those before its checkpoint."""
+    totals, chattering = counted.figures, counted.alternation.worst
     record.headline |= {
         "mean load": (float(totals.sum / totals.steps), "N"),
         "least load": (float(totals.least), "N"),
@@ -171,6 +213,9 @@ def _describe(record: Record, totals: Figures, solver, chosen: Integration, take
         "worst complementarity residual": (float(totals.residual), "-"),
         "largest penetration": (float(totals.penetration), "m"),
         "factorisations": (solver.factorisations, "-"),
+        "points that change back from step to step, at worst": (chattering, "-"),
     }
+    if chattering > LIMIT:
+        record.warnings.append(warning(chattering))
     if totals.least == 0:
         record.warnings.append("the tire lost contact with the road for a while")

@@ -11,12 +11,12 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.response import Response
-from tireroad.greens.responses import Wanted, judged, make_response, selected
+from tireroad.greens.responses import Wanted, band, judged, make_response, selected
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.cavity import has_air
-from tireroad.runs.stages.build import cavity
+from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.setup import components, probes
 from tireroad.runs.stages.build.turning import turning_of
 from tireroad.runs.stages.record import Record
@@ -54,6 +54,7 @@ class GreensStage(Computed[Responses]):
         scene, setup = self.job.scene, self.setup.product
         return {
             "modes": self.rotating.key,
+            "axle": corner.inputs(self.job),
             "damping": repr(turning_of(self.job).damping),
             "greens": asdict(scene.greens),
             "forces": [asdict(force) for force in scene.force],
@@ -81,8 +82,12 @@ class GreensStage(Computed[Responses]):
             cavity.describe(record, rolling)
         points = probes(self.job, self.static.product, self.setup.product)
         whole = self._whole(record, rolling, points, wanted.residual)
-        response = selected(whole, rolling, wanted)
-        record.indicators |= judged(points.name, whole, response, rolling, wanted)
+        response = selected(whole, rolling, wanted, points.counted)
+        seen, kept = (one.between(points.counted, points.counted) for one in (whole, response))
+        record.indicators |= judged(points.name, seen, kept, rolling, wanted)
+        if rolling.basis.projection.corner is not None:
+            loads, top = points.loads[points.counted], band(rolling, wanted)
+            corner.check_blocked(record, rolling, loads, top)
         responses = Responses(**self._apart(points.name, response))
         self._describe(record, responses)
         return responses
@@ -108,14 +113,15 @@ class GreensStage(Computed[Responses]):
     def _apart(self, name: str, whole: Response) -> dict[str, Response]:
         """The contact's response, the prescribed forces among its inputs (contact.driven), and theirs."""
         forces = len(self.job.scene.force)
-        if name == "force" or not forces:
+        if name == "force" or not (forces or self.job.axle):
             return {name: whole}
         count = len(components(self.job)) * len(self.setup.product.patch.index)
         inputs = count + forces
-        return {
-            "contact": whole.between(slice(None), slice(inputs)),
-            "force": whole.between(slice(inputs, None), slice(count, inputs)),
-        }
+        contact = {"contact": whole.between(slice(None), slice(inputs))}
+        if not forces:
+            return contact
+        readings = slice(inputs, inputs + 3 * forces)
+        return contact | {"force": whole.between(readings, slice(count, inputs))}
 
     def _describe(self, record: Record, responses: Responses) -> None:
         scene, setup = self.job.scene, self.setup.product

@@ -10,10 +10,12 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
+from tireroad.fem.axle import Axle
 from tireroad.fem.model import TireModel
 from tireroad.runs.files import store
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.tables.axle import axle_of
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.build.tire import make_tire
 
@@ -33,6 +35,11 @@ class Job:
     def speed(self) -> float:
         """Speed of rotation, rad/s; 0 when the wheel stands."""
         return self.scene.rotation.speed if self.scene.rotation else 0.0
+
+    @cached_property
+    def axle(self) -> Axle | None:
+        """The wheel that moves; None where it is held."""
+        return axle_of(self.scene)
 
     @cached_property
     def tire(self) -> TireModel:

@@ -17,7 +17,7 @@ from tireroad.modal.standing import projected, solved, with_fields
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.stages.build import cavity
+from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.turning import damping_of
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done, Shared
@@ -63,6 +63,7 @@ class ModesStage(Computed[ModalBasis]):
             "modal": asdict(self.job.scene.modal),
             "rotating": self.job.speed != 0,
             "cavity": cavity.inputs(self.job),
+            "moving rim": self.job.axle is not None,
         }
 
     def compute(self, record: Record) -> ModalBasis:
@@ -75,7 +76,7 @@ class ModesStage(Computed[ModalBasis]):
         with record.timing("air"):
             air = cavity.make_air(self.job, motions, float(modes.frequency[-1]))
         with record.timing("projection"):
-            basis = projected(motions, modes, self.job.speed != 0, air)
+            basis = projected(motions, modes, self.job.speed != 0, air, self.job.axle)
             labels = _labels(motions, modes.vectors)
         _describe(record, modes)
         record.headline["damping"] = (_damping(damping_of(self.job), basis.projection), "-")
@@ -99,7 +100,9 @@ class ModesStage(Computed[ModalBasis]):
         return ModalBasis(
             frequency=file["frequency"][:],
             shape=shape,
-            projection=Projection(**matrices, air=cavity.read(file)),
+            projection=Projection(
+                **matrices, air=cavity.read(file), corner=corner.read(file, self.job.axle)
+            ),
         )
 
 
@@ -115,11 +118,18 @@ class Fields(Shared[ModalBasis]):
     def make(self) -> ModalBasis:
         """Collective."""
         wanted = self.job.scene.modal
-        given = self.modes.product, self.motions.product
-        if given[0].modes is not None:
-            return given[0]
-        sizes = {"count": wanted.count, "up_to": wanted.up_to}
-        return with_fields(*given, **sizes, air=self.air.product)
+        basis = self.modes.product
+        if basis.modes is not None:
+            return basis
+        motions, air = self.motions.product, self.air.product
+        return with_fields(
+            basis,
+            motions,
+            count=wanted.count,
+            up_to=wanted.up_to,
+            air=air,
+            axle=self.job.axle,
+        )
 
 
 def _describe(record: Record, modes: Modes) -> None:
@@ -147,7 +157,8 @@ def _damping(given: Damping, projection: Projection) -> str:
     """Which damping acts, in words."""
     if not isinstance(given, StrainEnergy):
         unused = "" if projection.loss_factor is None else "; the loss factors do not act"
-        return f"γ1 = {given.mass:g} 1/s, γ2 = {given.stiffness:g} s{unused}"
+        mass, stiffness = given
+        return f"γ1 = {mass:g} 1/s, γ2 = {stiffness:g} s{unused}"
     low, high = projection.loss_factor.min(), projection.loss_factor.max()
     return f"modal strain energy, loss factors {low:.3g} to {high:.3g}"
 
@@ -192,5 +203,6 @@ def _fill(file, basis: ModalBasis, points: np.ndarray) -> None:
         if getattr(basis.projection, name) is not None:
             put(file, f"projected/{name}", getattr(basis.projection, name), unit)
     cavity.fill(file, basis.projection.air)
+    corner.fill(file, basis.projection.corner)
     file.attrs["inertia_count"] = modes.inertia_count
     file.attrs["rigid_modes"] = modes.rigid

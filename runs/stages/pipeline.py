@@ -163,7 +163,7 @@ def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done |
     part = kind.taken(job, done)
     if isinstance(part, Shared):
         return Done("", part.make)
-    return None if part is None else _run(part, summary)
+    return _run(part, summary) if isinstance(part, Stage) else None
 
 
 def _run(stage: Stage, summary: Summary) -> Done:

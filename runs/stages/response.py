@@ -14,7 +14,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.build.setup import driven_points
-from tireroad.runs.stages.build.stepping import Integration, integration
+from tireroad.runs.stages.build.stepping import Integration, integration, planned
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
@@ -54,7 +54,8 @@ class ResponseStage(Computed[PointResponse]):
 
     def compute(self, record: Record) -> PointResponse:
         """Integrate and sweep. Collective."""
-        scene, curves = self.job.scene, {}
+        scene = self.job.scene
+        curves: dict[str, tuple[np.ndarray, str]] = {}
         if self.contact:
             curves |= self._in_contact(record, self.contact.product)
         elif scene.time:
@@ -82,7 +83,7 @@ class ResponseStage(Computed[PointResponse]):
     @property
     def _drifts(self) -> bool:
         """Whether a constant force moves the tire ever further: it has no receptance at 0 Hz then."""
-        return self.job.scene.modal.rim == "free"
+        return self.job.scene.modal.rim == "free" or self._response.rigid > 0
 
     def _in_contact(self, record: Record, history: ContactHistory) -> Curves:
         """What the contact loop found at the driven points, contact included."""
@@ -100,7 +101,10 @@ class ResponseStage(Computed[PointResponse]):
     def _in_time(self, record: Record) -> Curves:
         """Displacements and axle force of the prescribed forces. Collective."""
         forces = self.job.scene.force
-        chosen = integration(self.job, record, self._response, shortest_period(forces))
+        plan = planned(self.job, record, self._response, shortest_period(forces))
+        wanted = self.job.scene.time.scheme
+        # Given forces have no contact to chatter: linear over the step is of the higher order.
+        chosen = integration(self.job, plan, "linear" if wanted == "auto" else wanted)
         time = chosen.step * np.arange(chosen.steps + 1)
         force = histories(forces, time)
         displacement, axle = self._marched(record, chosen, force)
@@ -114,7 +118,9 @@ class ResponseStage(Computed[PointResponse]):
             "force": (force, "N"),
             "displacement": (displacement.reshape(len(time), -1, 3), "m"),
         }
-        if self.job.scene.output.axle_force and not self._drifts:  # nothing holds the axle then
+        if (
+            self.job.scene.output.axle_force and self.job.scene.modal.rim != "free"
+        ):  # else nothing holds the axle
             curves["axle_force"] = axle, "N"
         return curves | self._rates(time, chosen)
 

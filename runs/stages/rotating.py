@@ -20,7 +20,7 @@ from tireroad.modal.full_states import full_states
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.rotating import StateModes
 from tireroad.runs.files.store import put
-from tireroad.runs.stages.build import cavity
+from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.turning import turning_of
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
@@ -52,7 +52,8 @@ class FullMatrices(Shared[Wheel]):
         turning, projection = turning_of(self.job), None
         if isinstance(turning.damping, StrainEnergy):
             projection = self.modes.product.projection
-        return wheel_of(self.motions.product, turning, self.air.product, projection)
+        given = self.motions.product, turning, self.air.product, projection
+        return wheel_of(*given, self.job.axle)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +77,7 @@ class RotatingStage(Computed[RollingModes]):
         wanted, turning = self.job.scene.rotation, turning_of(self.job)
         return {
             "modes": self.modes.key,
+            "axle": corner.inputs(self.job),
             "damping": repr(turning.damping),
             "speed": turning.speed,
             "inertia": turning.inertia,
@@ -122,7 +124,8 @@ class RotatingStage(Computed[RollingModes]):
         if wanted is None:
             return None
         speeds = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
-        given = self.modes.product.projection, turning.damping, turning.inertia
+        held = replace(self.modes.product.projection, corner=None)
+        given = held, turning.damping, turning.inertia
         with record.timing("campbell"):
             lines = on_root(self.job.comm, lambda: sweep(*given, speeds, wanted.branches))
         least = float(np.nanmin(lines.similarity))
@@ -136,7 +139,8 @@ class RotatingStage(Computed[RollingModes]):
     def read(self, file) -> tuple[StateModes, dict]:
         """The states, and fields of their own, shape and momentum, where they have them."""
         values = {name: file[name][:] for name in _UNITS}
-        states = StateModes(condition=float(file.attrs["basis_condition"]), **values)
+        known = float(file.attrs["basis_condition"]), int(file.attrs["rigid_states"])
+        states = StateModes(condition=known[0], rigid=known[1], **values)
         own = file.get("basis", {})
         return states, {name: own[name][:] for name in own}
 
@@ -169,6 +173,8 @@ def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
     }
     if rolling.basis.projection.air is not None:
         cavity.describe(record, rolling)
+    if rolling.basis.projection.corner is not None:
+        corner.describe(record, rolling)
     if len(oscillating):
         record.headline["lowest"] = (float(oscillating.imag.min() / (2 * np.pi)), "Hz")
     record.indicators |= {
@@ -214,3 +220,4 @@ def _fill(file, rolling: RollingModes) -> None:
     file.attrs["speed"] = rolling.turning.speed
     file.attrs["basis_condition"] = states.condition
     file.attrs["first_unstable"] = states.unstable
+    file.attrs["rigid_states"] = states.rigid

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +14,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.stages.accuracy import Accuracy
+from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.model_limit import all_limits
 from tireroad.runs.stages.build.run_in import first_step, run_in
 from tireroad.runs.stages.record import Record
@@ -29,7 +30,8 @@ class Spectra:
     `axle_force`, (f, 3) N; third octaves: band `centre` (b,) Hz, `level` of the axle force and
     `contact_level` (b, 3) dB re 1 N, with their estimated errors `level_error` and `contact_level_error` dB,
     NaN where unknown, None where they were not wanted. The first `left_out` s of the run, its run-in, are not in them, nor
-    is anything beyond the `limit` of the model.
+    is anything beyond the `limit` of the model. `wheel`: the motions of a wheel that moves and the moments on its
+    hub, (f, 3) or (f, 1), by the names of runs.stages.build.corner.
     """
 
     frequency: np.ndarray
@@ -38,6 +40,7 @@ class Spectra:
     limit: Limit
     centre: np.ndarray
     contact_level: np.ndarray
+    wheel: dict[str, np.ndarray] = field(default_factory=dict)
     axle_force: np.ndarray | None = None
     level: np.ndarray | None = None
     level_error: np.ndarray | None = None
@@ -99,11 +102,16 @@ class SpectraStage(Computed[Spectra]):
             bars = self.accuracy.product
             axle["level_error"] = bars.levels("axle_force", centre)
             axle["contact_level_error"] = bars.levels("contact_force", centre)
+        wheel = {
+            name: amplitudes(values[start:].reshape(len(total), -1), step)[1][below]
+            for name, values in history.wheel.items()
+        }
         return Spectra(
             frequency=frequency[below],
             contact_force=contact[below],
             left_out=start * step,
             limit=limit,
+            wheel=wheel,
             centre=centre,
             contact_level=contact_level,
             **axle,
@@ -144,6 +152,8 @@ class SpectraStage(Computed[Spectra]):
         for name, (stored, unit) in _UNITS.items():
             if getattr(product, name) is not None:
                 put(file, stored, getattr(product, name), unit)
+        for name, values in product.wheel.items():
+            put(file, name, values, corner.UNITS[name])
         file.attrs["left_out"] = product.left_out
         file.attrs["limit"] = product.limit.frequency
         file.attrs["limit_cause"] = product.limit.cause
@@ -152,7 +162,9 @@ class SpectraStage(Computed[Spectra]):
         """The same."""
         kept = {name: file[stored][:] for name, (stored, _) in _UNITS.items() if stored in file}
         limit = Limit(float(file.attrs["limit"]), str(file.attrs["limit_cause"]))
-        return Spectra(left_out=float(file.attrs["left_out"]), limit=limit, **kept)
+        wheel = {name: file[name][:] for name in corner.UNITS if name in file}
+        left_out = float(file.attrs["left_out"])
+        return Spectra(left_out=left_out, limit=limit, wheel=wheel, **kept)
 
 
 def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:

@@ -21,6 +21,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.extent.own_tire import fingerprint
+from tireroad.runs.stages.build.turning import rolling_shape, turning_of
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed
@@ -34,9 +35,7 @@ def steady_rolling(job: Job) -> Rolling:
     scene = job.scene
     if not scene.static.steady_rolling or job.speed == 0:
         return AT_REST
-    # By strain energy there is no damping before there are modes: the shape has inertia alone.
-    damping = (scene.damping.mass, scene.damping.stiffness) if scene.damping else (0.0, 0.0)
-    return Rolling(job.speed, *damping, scene.rotation.inertia)
+    return rolling_shape(turning_of(job))
 
 
 @dataclass(frozen=True, kw_only=True)

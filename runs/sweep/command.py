@@ -10,13 +10,13 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.store import stage_hash
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.sweep import local, slurm
+from tireroad.runs.sweep import local, queue
 from tireroad.runs.sweep.definition import Member, Sweep, read
 from tireroad.runs.sweep.gather import gather, write
 from tireroad.runs.sweep.page import write_page
 
 
-def sweep(path: Path, out: Path | None, *, at_once: int, queue: bool, only_gather: bool) -> None:
+def sweep(path: Path, out: Path | None, *, at_once: int, batch: bool, only_gather: bool) -> None:
     """Run the sweep of a file. Not collective: members are processes of their own.
 
     ConvergenceError, after all is gathered, when a member did not end well: the same command runs those
@@ -25,7 +25,7 @@ def sweep(path: Path, out: Path | None, *, at_once: int, queue: bool, only_gathe
     family = read(path)
     folder = out or Path("results") / family.name
     folder.mkdir(parents=True, exist_ok=True)
-    if queue:
+    if batch:
         _queue(family, folder, path)
         return
     failed: list[str] = []
@@ -56,17 +56,18 @@ def _gather(family: Sweep, folder: Path, failed: Sequence[str]) -> None:
 def _queue(family: Sweep, folder: Path, source: Path) -> None:
     """Scripts on disk, and in the queue."""
     first, rest = shared_first(family)
-    scripts = slurm.write_scripts(family, folder, first, rest, source)
+    scripts = queue.write_scripts(family, folder, first, rest, source)
     for script in scripts.values():
         observe.say(f"{script}")
-    jobs = slurm.submit(scripts, {"first": len(first), "rest": len(rest)})
+    jobs = queue.submit(family, scripts, {"first": len(first), "rest": len(rest)})
     observe.say("submitted: " + ", ".join(f"{name} as job {job}" for name, job in jobs.items()))
 
 
 def shared_first(family: Sweep) -> tuple[list[Member], list[Member]]:
     """(one member of each group that shares its static state and modes, all others)."""
     seen: set[str] = set()
-    first, rest = [], []
+    first: list[Member] = []
+    rest: list[Member] = []
     for member in family.members:
         key = _group(family.load(member))
         (rest if key in seen else first).append(member)

@@ -13,7 +13,8 @@
     name = "soft"
     set = { "tire.material.youngs_modulus" = 30e6 }
 
-`samples` and `seed` belong to the latin hypercube.
+`samples` and `seed` belong to the latin hypercube. [slurm] holds options of sbatch (account, partition,
+time); [queue] names the template and the commands of another batch system (runs.sweep.queue).
 """
 
 from __future__ import annotations
@@ -37,7 +38,18 @@ from tireroad.runs.scene.tables.scene import Scene
 PLANS = ("grid", "list", "latin-hypercube")
 MOST = 10_000
 FILES = ("road.file", "tire.file")  # keys that name files, relative to the sweep file
-_KEYS = {"name", "scene", "plan", "axis", "member", "samples", "seed", "slurm", "processes"}
+_KEYS = {
+    "name",
+    "scene",
+    "plan",
+    "axis",
+    "member",
+    "samples",
+    "seed",
+    "slurm",
+    "queue",
+    "processes",
+}
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,79}")
 
 
@@ -56,7 +68,7 @@ class Member:
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """A sweep as read: `axes` are the keys that vary, in the order of the file."""
+    """A sweep as read: `axes` are the keys that vary, in the order of the file; `folder` is the file's."""
 
     name: str
     scene: Path
@@ -64,6 +76,8 @@ class Sweep:
     members: tuple[Member, ...]
     processes: int = 1
     slurm: Mapping[str, Any] = field(default_factory=dict)
+    queue: Mapping[str, Any] = field(default_factory=dict)
+    folder: Path = Path(".")
 
     def load(self, member: Member) -> Scene:
         """The member's scene, checked. InputError names the member."""
@@ -99,11 +113,20 @@ def read(path: Path) -> Sweep:
         axes=axes,
         members=tuple(Member(m.name, _absolute(m.settings, path.parent)) for m in members),
         processes=_whole(path, raw, "processes", 1, 1, 9999),
-        slurm=dict(raw.get("slurm", {})),
+        slurm=_table(path, raw, "slurm"),
+        queue=_table(path, raw, "queue"),
+        folder=path.parent,
     )
     for member in sweep.members:
         sweep.load(member)
     return sweep
+
+
+def _table(path: Path, raw: Mapping[str, Any], key: str) -> dict[str, Any]:
+    found = raw.get(key, {})
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: {key} must be a table, written [{key}]")
+    return found
 
 
 def _planned(path: Path, raw: Mapping[str, Any]) -> tuple[tuple[str, ...], list[Member]]:

@@ -149,8 +149,8 @@ def cases() -> Iterator[Case]:
         yield Case(f"damping {damping:g} 1/s", Strip(speed=20.0, damping=damping), drive=waves)
     spike = Cleat(height=0.010, length=0.002, ramp=0.001).make()
     yield Case("spike of 10 mm, 2 mm long", drive=Drive(spike.height, lambda t: 0.0, 20.0))
-    step = Step(height=0.010, ramp=0.0).make()
-    yield Case("step of 10 mm", drive=Drive(step.height, lambda t: 0.0, 20.0))
+    edge = Step(height=0.010, ramp=0.0).make()
+    yield Case("step of 10 mm", drive=Drive(edge.height, lambda t: 0.0, 20.0))
     yield Case("road falls away for 20 ms and comes back", drive=Drive(
         Flat().height, lambda t: -0.1 if 0.01 < t < 0.03 else 0.0, 20.0))  # fmt: skip
     for friction in (0.0, 0.5, 1.0, 2.0):
@@ -215,7 +215,7 @@ def many_points(steps: int = 150) -> Ended:
     weights = sparse.csr_matrix(np.where(weights > 1e-3, weights, 0.0))
     weights = sparse.diags(1 / weights.sum(axis=1).A1) @ weights
     places = GridPlaces((200, 100), (0.6e-3, 1.2e-3), np.arange(20_000))
-    kernel = KernelTread(places, lambda *where: half_space_influence(*where, 5e6, 0.45))
+    kernel = KernelTread(places, lambda x, y, a, b: half_space_influence(x, y, a, b, 5e6, 0.45))
     response = Strip(speed=20.0).response(PATCH.points, 6, 3, residual=5)
     step = 2e-4
     tire = Recursion(response.resolved(step), step, "linear", MPI.COMM_SELF)

@@ -121,9 +121,18 @@ class Tires:
         wheel, points = self.wheel, self.probes
         began = time.perf_counter()
         damping, modal = self._damping()
-        given = wheel.operators, wheel.rotation, wheel.speed, damping, step
-        given = *given, points.outputs, points.loads, wheel.inertia
-        tire = FullTire(*given, spectral_radius=radius, modal=modal)
+        tire = FullTire(
+            wheel.operators,
+            wheel.rotation,
+            wheel.speed,
+            damping,
+            step,
+            points.outputs,
+            points.loads,
+            wheel.inertia,
+            spectral_radius=radius,
+            modal=modal,
+        )
         return tire, step, time.perf_counter() - began
 
     def _damping(self) -> tuple[tuple[float, float], ModalDamping | None]:
@@ -141,7 +150,14 @@ class Tires:
         points, static = self.probes, self.run.static
         began = time.perf_counter()
         damping, modal = self._damping()
-        given = self.motions.operators, static.inflation, damping, step
-        given = *given, points.outputs, points.loads
-        tire = NonlinearTire(*given, spectral_radius=RADIUS, modal=modal)
+        tire = NonlinearTire(
+            self.motions.operators,
+            static.inflation,
+            damping,
+            step,
+            points.outputs,
+            points.loads,
+            spectral_radius=RADIUS,
+            modal=modal,
+        )
         return tire, step, time.perf_counter() - began

@@ -87,6 +87,7 @@ def test_a_section_file_is_built_as_drawn(tmp_path):
         ("arcs = [", "arcs = [[1]", "TOML"),
         ("density = 1000", "density = 0", "above 0"),
         ("along = [50, 100]", "along = [100, 50]", "ascend"),
+        ("tread = 60.0", "tread = 60.0\nheld = 50.0", "the rim holds the face from 0.05 m"),
     ],
 )
 def test_what_is_wrong_in_a_section_file_is_told(tmp_path, old, new, message):
@@ -109,10 +110,26 @@ def test_sizes_build(text, order):
     )  # maybe no node there
     assert np.ptp(line[:, 1]) == pytest.approx(tire.width, rel=0.01)
     assert set(mesh.plies) == {"cap ply", "belt 1", "belt 2", "carcass"}
-    assert set(mesh.regions) == {"tread", "skim", "ply", "sidewall", "apex"}
+    assert set(mesh.regions) == {"tread", "skim", "ply", "sidewall", "apex", "bead"}
     distance, image = cKDTree(mesh.nodes).query(mesh.nodes * [1, -1])
     assert distance.max() < 1e-14
     assert len(np.unique(image)) == len(image)
+
+
+def test_the_flange_holds_the_outer_face_down_to_the_heel():
+    """All of it from 16 mm above the rim, and nothing above; the bead behind it is part of the mass."""
+    mesh = radial("205/60 R15").section(26)
+    line = mesh.chain(mesh.outer)
+    held = np.isin(line, mesh.side(mesh.rim))
+    height = mesh.nodes[line, 0] - 0.1905
+    assert height[held].max() == pytest.approx(0.016, abs=1e-4)
+    assert height[~held].min() > 0.016
+    assert held[0] and held[-1]
+
+
+def test_a_section_too_low_for_the_flange_is_told():
+    with pytest.raises(InputError, match=r"tire\.size = \"145/30 R14\": its section is 44 mm high"):
+        radial("145/30 R14")
 
 
 @pytest.mark.parametrize("text", ["", "205", "205/60 15", "999/99 R99", "205/60 R15 extra"])

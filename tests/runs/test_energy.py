@@ -38,10 +38,12 @@ def run(tmp_path_factory, launch):
     """The indicators and warnings of the contact stage, with more of a scene."""
     folder = tmp_path_factory.mktemp("energy")
 
-    def started(name: str, more: str) -> tuple[dict[str, float], list[str]]:
+    def started(name: str, more: str, *sets: str) -> tuple[dict[str, float], list[str]]:
         scene = folder / f"{name}.toml"
         scene.write_text(SCENE + more)
-        done = launch("-m", "runs", "run", scene, "--out", folder / name, "--until", "contact")
+        options = [part for one in sets for part in ("--set", one)]
+        start = "-m", "runs", "run", scene, "--out", folder / name, "--until", "contact"
+        done = launch(*start, *options)
         assert done.returncode == 0, done.stderr + done.stdout
         entry = json.loads((folder / name / "summary.json").read_text())["stages"]["contact"]
         return {k: v["value"] for k, v in entry["indicators"].items()}, entry["warnings"]
@@ -75,3 +77,32 @@ def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run) -> None:
     assert abs(off) < 0.002 * lost
     assert abs(off) < 0.2 * abs(beyond)  # without that term it would not add up
     assert not any("add up" in text for text in warnings)
+
+
+STIFF = (
+    "greens.residual=none",
+    "contact.youngs_modulus=3.4e8",
+    "road.motion.frequency=150",
+    "road.motion.amplitude=5e-4",
+    "time.step=4e-4",
+)
+
+
+@pytest.mark.parametrize("scheme", ["linear", "constant", "auto"])
+def test_a_stiff_tread_on_long_steps_chatters_where_forces_are_linear(run, scheme: str) -> None:
+    """The balance fails then; forces constant over the step, which "auto" takes, balance with what they take."""
+    more = "[damping]\nmass = 100.0\n[rotation]\nspeed = 50.0\n"
+    found, warnings = run(f"stiff-{scheme}", more, *STIFF, f"time.scheme={scheme}")
+    moved = max(
+        abs(found[f"energy {part}"]) for part in ("lost in the material", "that the scheme takes")
+    )
+    share = abs(found["energy that does not add up"]) / moved
+    assert found["steps in the fastest oscillation of the contact"] < 3.0
+    failed = any("add up" in text for text in warnings)
+    if scheme == "linear":
+        assert share > 0.02 and failed
+        assert found["energy that the scheme takes"] == 0.0
+    else:
+        assert not failed
+        assert abs(found["energy that the scheme takes"]) > 1e-3 * moved
+    assert ("chatter" in found["reason for the scheme"]) == (scheme == "auto")

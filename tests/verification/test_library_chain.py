@@ -26,8 +26,10 @@ from tireroad.fem.turning import Turning
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.responses import make_response
 from tireroad.greens.small_motions import wheel_of
+from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.standing import standing_modes
+from tireroad.runs.stages.build.turning import rolling_shape
 
 SCENE = """
 name = "chain"
@@ -119,3 +121,10 @@ def test_what_does_not_fit_together_is_refused(tire) -> None:
             Turning(**wrong)
     with pytest.raises(InputError, match="fixed or free"):
         SmallMotions(tire, static, rim="loose")
+
+
+def test_by_strain_energy_the_rolling_shape_has_inertia_alone() -> None:
+    turning = Turning(speed=SPEED, damping=StrainEnergy())
+    assert rolling_shape(turning) == Rolling(SPEED, 0.0, 0.0, "full")
+    turning = Turning(speed=SPEED, damping=(500.0, 1e-6), inertia="doppler")
+    assert rolling_shape(turning) == Rolling(SPEED, 500.0, 1e-6, "doppler")

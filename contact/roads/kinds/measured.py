@@ -29,6 +29,13 @@ class Measured(Levelled):
     end: str = choice(
         "refuse", ("refuse", "mirror"), "a run longer than the road: an error, or the road mirrored"
     )
+    file: str | None  # each kind of file has its own description of it
+
+    @property
+    def path(self) -> Path:
+        """Where the file is."""
+        assert self.file is not None, "validate() asks for it"
+        return Path(self.file)
 
     def validate(self) -> None:
         """A file is named."""
@@ -52,7 +59,7 @@ class GridFile(Measured):
     def make(self) -> Grid:
         """The road in the file; InputError where it cannot be used."""
         return read_grid(
-            Path(self.file),
+            self.path,
             holes=self.holes,
             end=self.end,
             length_unit=self.length_unit,
@@ -69,4 +76,4 @@ class CrgFile(Measured):
 
     def make(self) -> Grid:
         """The road in the file; InputError where it cannot be used."""
-        return read_opencrg(Path(self.file), holes=self.holes, end=self.end)
+        return read_opencrg(self.path, holes=self.holes, end=self.end)

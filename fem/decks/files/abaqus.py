@@ -48,7 +48,7 @@ def read(path: Path) -> Deck:
 class _Reader:
     """Keeps the data of a keyword that is used until the next one begins, and then reads it."""
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path) -> None:
         self.path = path
         self.card: Card | None = None
         self.lines: list[Data] = []
@@ -157,9 +157,10 @@ class _Reader:
     def finish(self) -> Deck:
         """The deck, once the file has ended."""
         self._end()
-        if self.step or self.part:
-            what, place = ("STEP", self.step) if self.step else ("PART", self.part)
-            raise place.error(f"*{what} has no *END {what}: is the deck cut short?")
+        open_ = self.step or self.part
+        if open_:
+            what = "STEP" if self.step else "PART"
+            raise open_.error(f"*{what} has no *END {what}: is the deck cut short?")
         if self.card is None:
             raise InputError(f"{self.path}: no keyword in it: this is no Abaqus deck")
         labels, points = self._all_nodes()

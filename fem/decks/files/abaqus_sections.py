@@ -6,7 +6,7 @@ from collections import Counter
 
 from tireroad.fem.decks.deck import Compound, Embedded, Layer, Orientation, Solid
 from tireroad.fem.decks.files.abaqus_sets import data_lines
-from tireroad.fem.decks.files.lines import Card, Data
+from tireroad.fem.decks.files.lines import Card, Data, Place
 from tireroad.fem.decks.files.numbers import number
 
 # Suboptions of *MATERIAL that are read; others of a material are listed as not used by the reader.
@@ -23,7 +23,7 @@ SUBOPTIONS = (
 class SectionReader:
     """What the elements are made of, as the deck says it."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.solids: list[Solid] = []
         self.layers: list[Layer] = []
         self.embedded: list[Embedded] = []
@@ -32,7 +32,7 @@ class SectionReader:
         self.unused: list[str] = []
         self._membranes: str | None = None
         self._material: str | None = None
-        self._materials: dict[str, tuple[list, object]] = {}
+        self._materials: dict[str, tuple[list, Place]] = {}
         self.handlers = {
             "SOLID SECTION": self._solid,
             "SURFACE SECTION": self._membrane,

@@ -29,7 +29,7 @@ class SetReader:
     `scopes` is the number of the part of each instance: sets of an assembly name their instance.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.node_sets: dict[str, Members] = {}
         self.element_sets: dict[str, Members] = {}
         self.surfaces: dict[str, list] = {}

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tireroad.fem.decks.files.lines import Place
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -76,6 +78,13 @@ def kind(name: str) -> Kind | None:
     return None
 
 
+def used_kind(name: str) -> Kind:
+    """The shape of a type that is known to be used."""
+    found = kind(name)
+    assert found is not None, f"{name} is not among the types that are used"
+    return found
+
+
 @dataclass(frozen=True)
 class Block:
     """Elements of one type: labels (n,), nodes (n, k) by label, and the line that began them."""
@@ -84,4 +93,4 @@ class Block:
     kind: Kind
     labels: np.ndarray
     nodes: np.ndarray
-    place: object
+    place: Place

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.fem.decks.deck import ALL_FACES, Deck, Members, Sets
-from tireroad.fem.decks.files.elements import Block, kind
+from tireroad.fem.decks.files.elements import Block, used_kind
 from tireroad.fem.decks.files.gmsh_numbers import LARGEST, BinaryNumbers, Part, TextNumbers, parts
 from tireroad.fem.decks.files.gmsh_types import FACES, TYPES
 from tireroad.fem.decks.files.numbers import LABEL
@@ -63,7 +63,9 @@ def _format(found: dict[str, Part], path: Path) -> tuple[str, bool]:
 def _names(part: Part | None) -> dict[tuple[int, int], str]:
     """(dimension, number) -> name of the physical groups."""
     names: dict[tuple[int, int], str] = {}
-    for offset, line in enumerate(part.text.splitlines() if part else ()):
+    if part is None:
+        return names
+    for offset, line in enumerate(part.text.splitlines()):
         words = line.decode("utf-8", "replace").split(None, 2)
         if len(words) < 3:
             continue
@@ -190,7 +192,9 @@ def _groups(elements: Elements, dimension: int, names, part: Part):
     by_type: dict[int, list] = {}
     for element in elements:
         by_type.setdefault(element[0], []).append(element)
-    blocks, sets, surfaces = [], {}, {}
+    blocks: list[Block] = []
+    sets: dict[str, Members] = {}
+    surfaces: dict[str, np.ndarray] = {}
     for sort, those in by_type.items():
         own, _, name, take = TYPES[sort]
         if own not in (dimension, dimension - 1) or own == 0:
@@ -200,7 +204,7 @@ def _groups(elements: Elements, dimension: int, names, part: Part):
             take = tuple(range(count))
         labels = np.array([e[2] for e in those], np.int64)
         nodes = np.array([e[3] for e in those], np.int64)[:, list(take)]
-        blocks.append(Block(name, kind(name), labels, nodes, part.place))
+        blocks.append(Block(name, used_kind(name), labels, nodes, part.place))
         group = np.array([e[1] for e in those])
         for number in np.unique(group):
             title = names.get((own, int(number)), f"{'group' if number else 'no group'} {number}")

@@ -45,7 +45,9 @@ def parts(data: bytes, name: str) -> dict[str, Part]:
 class _Numbers:
     """Numbers of a part, taken one after the other. Raises InputError where there are too few."""
 
-    def __init__(self, part: Part):
+    binary: bool
+
+    def __init__(self, part: Part) -> None:
         self.part = part
 
     def error(self, message: str) -> InputError:
@@ -63,7 +65,7 @@ class TextNumbers(_Numbers):
 
     binary = False
 
-    def __init__(self, part: Part):
+    def __init__(self, part: Part) -> None:
         super().__init__(part)
         self._at = 0
         with warnings.catch_warnings():
@@ -101,7 +103,7 @@ class BinaryNumbers(_Numbers):
 
     binary = True
 
-    def __init__(self, part: Part):
+    def __init__(self, part: Part) -> None:
         super().__init__(part)
         self._at = 0
 

@@ -75,12 +75,12 @@ def cards(path: Path) -> Iterator[Card | Data]:
 
 def _file(path: Path, asked: Place | None, reading: _Reading) -> Iterator[Card | Data]:
     """The contents of one file, `asked` for by an include."""
-    if path in reading.open:
+    if asked and path in reading.open:
         raise asked.error(
             f"{path.name} includes itself: {' > '.join(p.name for p in reading.open)}"
         )
     reading.files += 1
-    if reading.files > _INCLUDES:
+    if asked and reading.files > _INCLUDES:
         raise asked.error(f"more than {_INCLUDES} files are included")
     reading.open.append(path)
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -147,8 +148,10 @@ def _whole(flat: np.ndarray) -> bool:
     return bool((np.isfinite(flat) & (flat == np.floor(flat)) & (np.abs(flat) <= LABEL)).all())
 
 
-def _slow_records(data: list[Data], width: int):
-    begun, where, found = [], None, []
+def _slow_records(data: list[Data], width: int) -> Iterator[np.ndarray]:
+    begun: list[int] = []
+    found: list[list[int]] = []
+    where = Place("", 0)  # of the first line of the record that is being read
     for part in data:
         for offset, line in enumerate(part.text.split(b"\n")):
             if not line.strip():
@@ -173,8 +176,9 @@ def _slow_records(data: list[Data], width: int):
 def labels(part: Data) -> np.ndarray | None:
     """All labels in the lines of a set, or None where they hold anything but labels."""
     flat = fast(part.text)
-    good = flat is not None and _whole(flat) and (flat >= 0).all()
-    return flat.astype(np.int64) if good else None
+    if flat is None or not _whole(flat) or (flat < 0).any():
+        return None
+    return flat.astype(np.int64)
 
 
 def label(text: str, place: Place) -> int:

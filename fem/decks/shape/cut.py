@@ -18,7 +18,7 @@ Marks = dict[
 class Origins:
     """Numbers of edges: the deck's, and those made later. A part of an edge knows which it is part of."""
 
-    def __init__(self, count: int):
+    def __init__(self, count: int) -> None:
         self._first = count
         self._parent: list[int] = []
 

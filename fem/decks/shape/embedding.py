@@ -20,7 +20,7 @@ def lay_all(
 
     Membranes whose nodes are those of the solids lie on sides already; others are looked for by place.
     """
-    done: dict[str, Laid] = {}
+    done: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for layer in deck.layers:
         if layer.elements in done:
             continue

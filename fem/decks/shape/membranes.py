@@ -98,7 +98,7 @@ def _cut_at_end(quads: Quads, line: Line, end: float) -> tuple[Quads, float]:
     matrix, slope = rates(quads.points[quads.cells[[cell]]], where)[0], line.slope(end)
     along = int(np.argmax(np.abs(np.linalg.solve(matrix, slope))))
     t = float(where[0, along])
-    cell_length = np.linalg.norm(matrix[:, along]) / np.linalg.norm(slope)
+    cell_length = float(np.linalg.norm(matrix[:, along]) / np.linalg.norm(slope))
     if not _SNAP_END < t < 1 - _SNAP_END:
         return quads, 1.1 * _SNAP_END * cell_length
     sides = quads.sides()[cell, [2, 3] if along == 0 else [0, 1]]
@@ -172,7 +172,9 @@ def _follow(quads: Quads, line: Line, stations: list[_Station]):
     ):
         for node in corners + middles:
             at[node].add(cell)
-    marks, path, whole = {}, {}, []
+    marks: dict[int, float] = {}
+    path: dict[int, tuple[_Station, _Station]] = {}
+    whole: list[int] = []
     for a, b in zip(stations[:-1], stations[1:], strict=True):
         names = [one.node if one.node >= 0 else one.side for one in (a, b)]
         shared = at[names[0]] & at[names[1]]
@@ -218,7 +220,7 @@ def _half_way(quads: Quads, path: dict, line: Line) -> dict[int, float]:
     """Where the line is, across each cell, half way along: by the parabola through three of its points."""
     cells = np.array(list(path), np.int64)
     middle = line.at(np.array([(a.s + b.s) / 2 for a, b in path.values()]))
-    places, _ = inverse(quads.points[quads.cells[cells]], middle) if len(cells) else ([], None)
+    places = inverse(quads.points[quads.cells[cells]], middle)[0] if len(cells) else cells
     found = {}
     for cell, (a, b), where in zip(path, path.values(), places, strict=True):
         sides = quads.sides_of(cell)

@@ -76,13 +76,12 @@ def _raw(deck: Deck, blocks: list[Block], corners: int, region_of) -> Raw:
         ends.append(rows[:, :corners])
         none = np.full((len(rows), corners), -1)
         middles.append(rows[:, corners:] if block.kind.nodes > corners else none)
-    labels = np.concatenate(labels)
-    empty = np.empty((0, corners), np.int64)
+    every, empty = np.concatenate(labels), np.empty((0, corners), np.int64)
     return Raw(
-        labels,
+        every,
         np.concatenate([empty, *ends]),
         np.concatenate([empty, *middles]),
-        np.array([region_of[label] for label in labels.tolist()], np.int64),
+        np.array([region_of[label] for label in every.tolist()], np.int64),
     )
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tireroad.fem.decks.deck import SCOPE, Deck, Members, Sets
-from tireroad.fem.decks.files.elements import Block, kind
+from tireroad.fem.decks.files.elements import Block, used_kind
 from tireroad.fem.decks.solids.revolved_cords import meridian_layers
 from tireroad.fem.decks.solids.rings import Rings, find_rings
 from tireroad.fem.errors import InputError
@@ -99,8 +99,8 @@ def _sections(deck: Deck, block: Block, rows: np.ndarray, section: _Section) -> 
         section.faces[label] = [frozenset(ring[list(f)].tolist()) for f in shape.faces]
     made = []
     for size, those in cells.items():
-        labels, nodes = np.array([c[0] for c in those]), np.array([c[1] for c in those]) + 1
-        made.append(Block(f"CGAX{size}", kind(f"CGAX{size}"), labels, nodes, block.place))
+        own, corners = np.array([c[0] for c in those]), np.array([c[1] for c in those]) + 1
+        made.append(Block(f"CGAX{size}", used_kind(f"CGAX{size}"), own, corners, block.place))
     return made
 
 
@@ -184,7 +184,9 @@ def _membranes(deck: Deck, section: _Section) -> tuple[list[Block], dict]:
             senses[label] = _sense(deck.points[rows[:4]], rings, rows[:4], ends)
         if labels:
             blocks.append(
-                Block("SFMGAX1", kind("SFMGAX1"), np.array(labels), np.array(nodes), block.place)
+                Block(
+                    "SFMGAX1", used_kind("SFMGAX1"), np.array(labels), np.array(nodes), block.place
+                )
             )
     return blocks, senses
 

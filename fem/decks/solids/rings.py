@@ -27,14 +27,14 @@ class Rings:
 
 def find_rings(deck: Deck, corners: np.ndarray) -> Rings:
     """The axis about which the corner nodes are rings of equal angles."""
-    best = None
+    best: tuple[int, int, int] = (len(corners) + 1, 0, 0)  # more places than there can be
     for axis in (1, 2, 0):
         rings = _rings(deck.points, axis, corners)
         pairs = np.unique(rings.ring[corners] * len(rings.angles) + rings.angle[corners])
         places, angles = (len(np.unique(part[corners])) for part in (rings.ring, rings.angle))
         if len(pairs) == len(corners) == places * angles and angles >= 3:
             return rings
-        if best is None or places < best[0]:
+        if places < best[0]:
             best = (places, angles, axis)
     raise InputError(
         f"{deck.file}: not a body of revolution about x, y or z through the origin: its {len(corners)} corner "

@@ -121,7 +121,7 @@ def _steps(scene: Scene, modes: int) -> int:
     time = scene.time
     if time is None:
         return 0
-    if time.step != "auto":
+    if not isinstance(time.step, str):
         return math.ceil(time.duration / time.step)
     step = min(time.duration / 200, TURN / (2 * math.pi * highest_frequency(scene, modes)))
     travel = least_travel(scene)

@@ -36,13 +36,14 @@ def with_elements(scene: Scene) -> Scene:
     order = tire.order or (2 if counted or tire.section != "torus" else 3)
     segments, along = {"file": (OWN_SEGMENTS, 1), "radial": RADIAL}.get(tire.section, MESHES[order])
     road = (static.load, static.deflection, static.road_height) != (None, None, None)
-    chosen = {
-        "order": order,
-        "segments": tire.segments or segments,
-        "elements_arc": tire.elements_arc or along,
-        "footprint_size": tire.footprint_size or (NEAR_ROAD if road else 1.0),
-    }
-    return replace(scene, tire=replace(tire, **chosen))
+    chosen = replace(
+        tire,
+        order=order,
+        segments=tire.segments or segments,
+        elements_arc=tire.elements_arc or along,
+        footprint_size=tire.footprint_size or (NEAR_ROAD if road else 1.0),
+    )
+    return replace(scene, tire=chosen)
 
 
 def built(tire: Tire) -> Construction:

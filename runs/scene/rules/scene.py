@@ -8,6 +8,7 @@ from tireroad.fem.keys import described
 from tireroad.runs.scene.extent.tire_section import free_unknowns
 from tireroad.runs.scene.rules.tire import full_matrices, geometry
 from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.tables.axle import check_axle
 from tireroad.runs.scene.tables.cavity import check_cavity
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.tables.stiffness import check_stiffness
@@ -204,7 +205,7 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     time = scene.time
-    if time is None or time.step == "auto":
+    if time is None or isinstance(time.step, str):
         return
     if time.step > time.duration:
         raise error(
@@ -232,5 +233,6 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("greens", "rotation"), _greens),
     (("stiffness", "static"), check_stiffness),
     (("tire", "rotation", "modal", "greens"), check_cavity),
+    (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
     (("time",), _time),
 )

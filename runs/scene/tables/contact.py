@@ -59,7 +59,7 @@ class Time:
     scheme: str = choice(
         "auto",
         ("auto", "linear", "constant", "convolution"),
-        "contact force within a step; auto is linear",
+        "contact force within a step; auto: linear where the steps resolve the contact, else constant",
     )
     checkpoint: float = number(
         60.0, "s", "wall-clock time between two checkpoints", least=0.1, most=1e6

@@ -8,6 +8,7 @@ from tireroad.runs.scene.schema import (
     table,
     tables,
 )
+from tireroad.runs.scene.tables.axle import AxleTable
 from tireroad.runs.scene.tables.contact import Contact, Time
 from tireroad.runs.scene.tables.road import Road
 from tireroad.runs.scene.tables.stiffness import Stiffness
@@ -26,11 +27,11 @@ class Static:
         None,
         "m",
         "deflection from the first touch of the inflated tire, instead of load",
-        least=1e-9,
+        least=1e-6,
         most=10,
     )
     road_height: float | None = number(
-        None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, below=0
+        None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, most=-1e-3
     )
     steady_rolling: bool = flag(
         True, "inertia and material damping of the rolling shape; false: the state at rest"
@@ -218,6 +219,7 @@ class Scene:
         optional=True,
     )
     rotation: Rotation | None = table(Rotation, "rotation of the wheel", optional=True)
+    axle: AxleTable = table(AxleTable, "what holds the wheel")
     greens: Greens = table(Greens, "Green's functions")
     force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")
     contact: Contact | None = table(Contact, "contact with the road in time", optional=True)

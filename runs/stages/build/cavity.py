@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import h5py
 import numpy as np
@@ -114,9 +114,9 @@ def read(file: h5py.File) -> Air | None:
     if "cavity" not in file:
         return None
     group = file["cavity"]
-    arrays = {name: group[name][:] for name in _UNITS}
-    scalars = {f.name: float(group.attrs[f.name]) for f in fields(Duct) if f.name not in arrays}
-    return Air(Duct(**arrays, **scalars), group["coupling"][:])
+    parts: dict[str, Any] = {name: group[name][:] for name in _UNITS}
+    parts |= {f.name: float(group.attrs[f.name]) for f in fields(Duct) if f.name not in parts}
+    return Air(Duct(**parts), group["coupling"][:])
 
 
 def fill_states(file: h5py.File, rolling: RollingModes) -> None:

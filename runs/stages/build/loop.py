@@ -21,9 +21,9 @@ from tireroad.runs.stages.job import Job
 
 
 def driven_tire(job: Job, tire, step: float, steps: int) -> Driven | None:
-    """The tire under the scene's prescribed forces, where there are any."""
+    """The tire under the scene's prescribed forces, and with a wheel that is read, where there is either."""
     forces = job.scene.force
-    if not forces:
+    if not forces and job.axle is None:
         return None
     time = step * np.arange(steps + 1)
     return Driven(tire, histories(forces, time), directions(forces))
@@ -58,12 +58,14 @@ class Forces(NamedTuple):
     step: float
 
 
-def forces(job: Job, setup: ContactSetup, response: Response, step: float, steps: int) -> Forces:
+def forces(
+    job: Job, setup: ContactSetup, response: Response, step: float, steps: int, scheme: str
+) -> Forces:
     """The loop of the job's scene by another response, step or setup (settled), kept in memory. Collective.
 
-    ConvergenceError where the road touches beyond the patch.
+    `scheme` "linear" or "constant". ConvergenceError where the road touches beyond the patch.
     """
-    tire = Recursion(response.resolved(step), step, "linear", job.comm)
+    tire = Recursion(response.resolved(step), step, scheme, job.comm)
     loop = make_loop(job.scene.contact, setup, driven_tire(job, tire, step, steps) or tire, step)
     contact, axle = np.zeros((2, steps, 3))
     given = setup.patch, setup.drive, step, steps

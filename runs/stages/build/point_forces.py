@@ -9,14 +9,15 @@ from tireroad.runs.scene.tables.scene import PointForce
 
 def directions(forces: Sequence[PointForce]) -> np.ndarray:
     """Unit vectors of the forces, (k, 3)."""
-    given = np.array([force.direction for force in forces])
+    given = np.array([force.direction for force in forces]).reshape(-1, 3)
     return given / np.linalg.norm(given, axis=1, keepdims=True)
 
 
 def histories(forces: Sequence[PointForce], time: np.ndarray, order: int = 0) -> np.ndarray:
     """amplitude sin(2 pi f t), or the constant amplitude from t = 0 on, N (nt, k); or the order-th
     rate of it, N/s^order."""
-    return np.stack([_history(force, time, order) for force in forces], axis=-1)
+    columns = [_history(force, time, order) for force in forces]
+    return np.stack(columns, axis=-1) if columns else np.zeros((len(time), 0))
 
 
 def shortest_period(forces: Sequence[PointForce]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -13,6 +13,8 @@ from tireroad.contact.roads.road import make_road
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
+from tireroad.runs.scene.schema import Pitch
+from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.stepping import run_time
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.stage import Done, Shared
@@ -45,7 +47,7 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
             motion=make_motion(motion.kind, motion.amplitude, motion.frequency, motion.duration),
             lift=abs(motion.amplitude) if motion.kind != "none" else 0.0,
         ),
-        spacing=None if points == "nodes" else (points.dx, points.dy),
+        spacing=(points.dx, points.dy) if isinstance(points, Pitch) else None,
         reach=scene.contact.reach,
     )
 
@@ -64,11 +66,12 @@ def components(job: Job) -> tuple[int, ...]:
 @dataclass(frozen=True)
 class Probes:
     """What is driven and read, on the outer face: `name` "contact" or "force", `outputs` (r, 3 s) and
-    `loads` (k, 3 s)."""
+    `loads` (k, 3 s), or wider with a wheel that moves; `counted` of both are displacements at loads."""
 
     name: str
     outputs: sparse.csr_matrix
     loads: sparse.csr_matrix
+    counted: slice = field(default_factory=lambda: slice(None))
 
 
 def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
@@ -81,16 +84,20 @@ def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
     if job.scene.force:
         parts += [loads, readings]
     points = sparse.vstack(parts, format="csr")
-    return Probes("contact", points, points)
+    if job.axle is None:
+        return Probes("contact", points, points)
+    points, last = corner.widened(points), points.shape[0]
+    return Probes("contact", points, points, slice(last))
 
 
 def driven_points(job: Job) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
     """The prescribed forces (k, 3 s), and the readings (3 k, 3 s) of x, y and z at their centres."""
     lattice, loads, readings = job.tire.lattice, [], []
     for force in job.scene.force:
-        angles = np.radians([force.angle, force.arc])
-        spread = tuple(np.radians(force.spread))
-        loads.append(probe.directed(probe.spot(lattice, *angles, spread), force.direction))
-        here = probe.spot(lattice, *angles)
+        angle, arc = np.radians([force.angle, force.arc])
+        spread = np.radians(force.spread[0]), np.radians(force.spread[1])
+        direction = np.array(force.direction)
+        loads.append(probe.directed(probe.spot(lattice, angle, arc, spread), direction))
+        here = probe.spot(lattice, angle, arc)
         readings += [probe.directed(here, axis) for axis in np.eye(3)]
     return sparse.csr_matrix(np.stack(loads)), sparse.csr_matrix(np.stack(readings))

@@ -24,7 +24,18 @@ _PER_PERIOD = 16  # steps in the shortest period of the excitation
 
 def run_time(time: Time) -> float:
     """How long the run is, s: whole steps, so a little longer than a duration that is no multiple."""
-    return time.duration if time.step == "auto" else steps_of(time.duration, time.step).duration
+    if isinstance(time.step, str):
+        return time.duration
+    return steps_of(time.duration, time.step).duration
+
+
+@dataclass(frozen=True)
+class Planned:
+    """`steps` steps of `step` s, and the `response` of the states that they resolve."""
+
+    response: Response
+    step: float
+    steps: int
 
 
 @dataclass(frozen=True)
@@ -37,26 +48,24 @@ class Integration:
     scheme: str
 
 
-def integration(job: Job, record: Record, response: Response, shortest: float) -> Integration:
-    """For the scene's time table; what was chosen is shown. Collective.
+def planned(job: Job, record: Record, response: Response, shortest: float) -> Planned:
+    """The steps of the scene's time table; what was chosen is shown. Collective.
 
     `shortest` (s): the shortest period in the excitation.
     """
     wanted = job.scene.time
     fastest = np.abs(response.every).max(initial=0.0)
-    if wanted.step == "auto":
+    if isinstance(wanted.step, str):
         limits = [wanted.duration / _LEAST_STEPS, shortest / _PER_PERIOD]
         if fastest > 0:
             limits.append(_TURN / fastest)
         steps = equal_steps(wanted.duration, min(limits))
     else:
         steps = steps_of(wanted.duration, wanted.step)
-    step, count = steps.size, steps.count
-    scheme = "linear" if wanted.scheme == "auto" else wanted.scheme
-    kept = response.resolved(step)
+    kept = response.resolved(steps.size)
     moved = len(response.every) - len(kept.every)
     observe.say(
-        f"  step {step:.4g} s, {count} steps, scheme {scheme}; fastest mode {fastest:.4g} 1/s, "
+        f"  step {steps.size:.4g} s, {steps.count} steps; fastest mode {fastest:.4g} 1/s, "
         f"{moved} states too fast for the step follow statically"
     )
     if steps.duration > wanted.duration * (1 + 1e-9):
@@ -64,9 +73,16 @@ def integration(job: Job, record: Record, response: Response, shortest: float) -
             f"  the run ends at {steps.duration:.6g} s: {wanted.duration:.6g} s is no multiple of the step"
         )
     record.indicators["states moved to the residual"] = (moved, "-")
+    return Planned(kept, steps.size, steps.count)
+
+
+def integration(job: Job, plan: Planned, scheme: str) -> Integration:
+    """The tire at t = 0, to be taken over the planned steps. Collective."""
     if scheme == "convolution":
-        return Integration(Convolution(kept, step, count), step, count, scheme)
-    return Integration(Recursion(kept, step, scheme, job.comm), step, count, scheme)
+        tire = Convolution(plan.response, plan.step, plan.steps)
+    else:
+        tire = Recursion(plan.response, plan.step, scheme, job.comm)
+    return Integration(tire, plan.step, plan.steps, scheme)
 
 
 def passing_period(road: Road, spacing: float, speed: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.turning import Turning
 from tireroad.modal.damping import Damping, Proportional, StrainEnergy
 from tireroad.runs.stages.job import Job
@@ -11,6 +12,15 @@ def damping_of(job: Job) -> Damping:
     """In proportion where the scene says so, else by the loss factors of the compounds."""
     given = job.scene.damping
     return StrainEnergy() if given is None else Proportional(given.mass, given.stiffness)
+
+
+def rolling_shape(turning: Turning) -> Rolling:
+    """The steady rolling of the static state of a wheel that turns so; at rest where it stands."""
+    if turning.speed == 0:
+        return AT_REST
+    # By strain energy there is no damping before there are modes: the shape has inertia alone.
+    mass, stiffness = (0.0, 0.0) if isinstance(turning.damping, StrainEnergy) else turning.damping
+    return Rolling(turning.speed, mass, stiffness, turning.inertia)
 
 
 def turning_of(job: Job) -> Turning:

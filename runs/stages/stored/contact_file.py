@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import h5py
@@ -18,6 +18,7 @@ from tireroad.runs.files.checksum import seal
 from tireroad.runs.files.disk import part_of, replacing
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.job import Job
 
 BLOCK = 512  # steps kept in memory between two writes
@@ -36,12 +37,16 @@ _LAYOUT: dict[str, tuple[tuple, str]] = {
     "residual": ((), "-"),
 }
 DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, where a scene has them
+_OF_WHEEL = {
+    name: ((3,) if name != "body/height" else (), unit) for name, unit in corner.UNITS.items()
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class ContactHistory:
     """What the road did to the tire, n steps of `step` s at the times `time` (n,): `total_force` (n, 3) N,
-    `axle_force` (n, 3) N where it is kept, displacement (n, k, 3) m at `driven` points, where there are any.
+    `axle_force` (n, 3) N where it is kept, displacement (n, k, 3) m at `driven` points, where there are any, and by the names of runs.stages.corner the
+    motions and moments of a `wheel` that moves.
     """
 
     step: float
@@ -50,6 +55,7 @@ class ContactHistory:
     total_force: np.ndarray
     axle_force: np.ndarray | None = None
     driven: np.ndarray | None = None
+    wheel: dict[str, np.ndarray] = field(default_factory=dict)
 
     @staticmethod
     def of(file: h5py.File) -> ContactHistory:
@@ -61,7 +67,26 @@ class ContactHistory:
             time=file["time"][:],
             total_force=file["total_force"][:],
             **{name: file[stored][:] for name, stored in kept.items() if stored in file},
+            wheel={name: file[name][:] for name in corner.UNITS if name in file},
         )
+
+
+def begun_with(job: Job, key: str) -> str | None:
+    """The scheme of the checkpoint that a loop of these inputs goes on from, or None. Collective."""
+
+    def found() -> str | None:
+        path = job.directory / CHECKPOINT
+        if job.fresh or store.why_not(path, job.provenance("contact", key).input_hash, "contact"):
+            return None
+        with store.opened(path) as file:
+            return str(file.attrs["scheme"])
+
+    return on_root(job.comm, found)
+
+
+def forget_checkpoint(job: Job) -> None:
+    """The loop begins at t = 0 again. Collective."""
+    on_root(job.comm, lambda: (job.directory / CHECKPOINT).unlink(missing_ok=True))
 
 
 class ContactFile:
@@ -117,7 +142,8 @@ class ContactFile:
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
         forces = len(self._job.scene.force)
-        driven = {DRIVEN: ((forces, 3), "m")} if forces else {}
+        driven: dict[str, tuple[tuple, str]] = {DRIVEN: ((forces, 3), "m")} if forces else {}
+        driven |= _OF_WHEEL if self._job.axle else {}
         # A chunk of many points would be many megabytes: 4 MB at most is read at once.
         rows = 2 ** int(np.log2(np.clip(500_000 // max(c, 1), 1, BLOCK)))
         for name, (shape, unit) in (self._layout | driven).items():
@@ -131,10 +157,10 @@ class ContactFile:
         self._file.attrs.update(self._attributes)
 
     def add(self, instant, reading: np.ndarray | None = None) -> bool:
-        """Keep a step, with the driven points' displacement. Whether it is time to `flush`."""
+        """Keep a step, with what was read of driven points and wheel. Whether it is time to `flush`."""
         self._stack.append(instant)
         if reading is not None:
-            self._readings.append(reading.reshape(-1, 3))
+            self._readings.append(reading)
         return (self._done + len(self._stack)) % BLOCK == 0
 
     def flush(self, count: Callable[[dict[str, np.ndarray]], None]) -> None:
@@ -151,7 +177,7 @@ class ContactFile:
 
     def _write(self, steps: dict[str, np.ndarray]) -> None:
         self._packer.wait()
-        driven = {DRIVEN: np.stack(self._readings)} if self._readings else {}
+        driven = self._read()
         for name in self._layout | driven:
             dataset, values = self._file[name], (steps | driven)[name]
             if name == "horizontal_force" and not self._rubs:
@@ -161,6 +187,17 @@ class ContactFile:
             else:
                 dataset.resize(self._done + len(values), axis=0)
                 dataset[self._done :] = values
+
+    def _read(self) -> dict[str, np.ndarray]:
+        """What was read beside the contact since the last time, name by name."""
+        if not self._readings:
+            return {}
+        readings, forces = np.stack(self._readings), len(self._job.scene.force)
+        points, wheel = np.split(readings, [3 * forces], axis=1)
+        driven = {DRIVEN: points.reshape(-1, forces, 3)} if forces else {}
+        if self._job.axle is None:
+            return driven
+        return driven | corner.parts(wheel, corner.standing_moment(self._patch))
 
     def checkpoint(self, state: dict[str, np.ndarray]) -> None:
         """Keep the steps flushed so far and the loop's state, whole or not at all. Collective."""

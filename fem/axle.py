@@ -1,0 +1,99 @@
+"""What holds the wheel: nothing that gives way, a corner of a car, or a constant force alone.
+
+The wheel with its brake is one rigid body at the rim; springs and dampers lead from it to a body that moves
+up and down, or to the ground. In all other directions the body goes on at the car's own constant speed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tireroad.fem.errors import InputError
+
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+_VERTICAL = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axle:
+    """A wheel that moves in the directions that are not `locked`.
+
+    `wheel_mass` kg; `wheel_inertia` (3,) kg m2 about x, y, z; `stiffness` and `damping` (6, 6): N/m and N s/m
+    for the three translations of the axle's centre, N m/rad and N m s/rad for the rotations, between wheel
+    and body; `body_mass` kg, None: springs and dampers to the ground. A static force holds the load.
+    """
+
+    wheel_mass: float
+    wheel_inertia: tuple[float, float, float]
+    stiffness: np.ndarray
+    damping: np.ndarray
+    body_mass: float | None = None
+    locked: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        unknown = set(self.locked) - set(DIRECTIONS)
+        if unknown:
+            raise InputError(
+                f"axle: locked {sorted(unknown)} unknown: take {', '.join(DIRECTIONS)}"
+            )
+        for name in ("stiffness", "damping"):
+            matrix = np.asarray(getattr(self, name), float)
+            matrix = np.diag(matrix) if matrix.ndim == 1 else matrix
+            least = np.linalg.eigvalsh(matrix)[0] if np.isfinite(matrix).all() else -math.inf
+            if np.abs(matrix - matrix.T).max() > 1e-12 * np.abs(matrix).max() or (
+                least < -1e-9 * np.abs(matrix).max()
+            ):
+                raise InputError(f"axle: {name} must be symmetric and not give energy (6 x 6)")
+            object.__setattr__(self, name, matrix)
+        moving = (
+            self.wheel_mass,
+            *np.asarray(self.wheel_inertia)[[d - 3 for d in self.moving if d > 2]],
+        )
+        if min(moving) <= 0 or (self.body_mass is not None and self.body_mass <= 0):
+            raise InputError("axle: what moves needs a mass, and what turns an inertia, above 0")
+
+    @property
+    def moving(self) -> list[int]:
+        """Directions (of six) in which the wheel moves."""
+        return [k for k, name in enumerate(DIRECTIONS) if name not in self.locked]
+
+    @property
+    def has_body(self) -> bool:
+        """Whether a body moves beside the wheel."""
+        return self.body_mass is not None and _VERTICAL in self.moving
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Of the wheel, (6, 6): kg, kg m2."""
+        return np.diag([*[self.wheel_mass] * 3, *self.wheel_inertia])
+
+    @property
+    def gyroscopic(self) -> np.ndarray:
+        """Moments (6, 6) per rate of the wheel's tilts, kg m2, at 1 rad/s: I_yy (w e_y) x the rate."""
+        out = np.zeros((6, 6))
+        out[3, 5], out[5, 3] = -self.wheel_inertia[1], self.wheel_inertia[1]
+        return out
+
+    @property
+    def adrift(self) -> np.ndarray:
+        """Motions (6 + 1, r) of wheel and body, by columns, that no spring knows: with a body the two
+        together in height; translations without a spring to the ground.
+        """
+        columns = []
+        for k in self.moving:
+            alone = not (self.stiffness[k].any() or self.damping[k].any())
+            together = k == _VERTICAL and self.has_body
+            if k < 3 and (alone or together):
+                column = np.zeros(7)
+                column[k] = 1.0
+                column[6] = together
+                columns.append(column)
+        return np.array(columns).reshape(-1, 7).T
+
+    def joined(self, matrix: np.ndarray) -> np.ndarray:
+        """A matrix (6, 6) of springs or dampers on wheel and body (7, 7): e = wheel - body in height."""
+        apart = np.hstack([np.eye(6), -np.eye(6)[:, [_VERTICAL]]])
+        return apart.T @ matrix @ apart

@@ -1,0 +1,189 @@
+"""A wheel that moves, joined to the modes of the tire with a fixed rim (Craig and Bampton 1968).
+
+    u = Phi eta + R xi:  the tire's motion against its rim, and the rim's, the tire carried along as a rigid body,
+
+    [1    P^T] eta''   [D   2 Om G] eta'   [K~  k ] eta
+    [P    J  ] xi''  + [-2 Om G^T C] xi' + [k^T K_h] xi = forces,      P = R^T M Phi,   G = Phi^T G R,
+                                                                       k = Phi^T (K + Om^2 S) R,
+    J = R^T M R + wheel,   C = hub dampers + 2 Om R^T G R + Om wheel's gyroscopic matrix,
+    K_h = hub springs + R^T (K + Om^2 S) R.
+
+The material's damping acts on eta alone: the tire against its wheel. With L L^T = J - P P^T, the mass that the
+modes do not carry, the coordinates  xi = L^-T x,  eta = q - P^T xi  have unit mass; all further steps
+take them as they take modes. Air in the cavity is carried along by its momentum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from scipy import linalg
+
+from tireroad.fem.axle import DIRECTIONS, Axle
+from tireroad.fem.errors import InputError
+from tireroad.fem.matrices.rim_motion import RimMotion
+
+BODY = 6  # place of the body's height after the rim's six motions
+SEEN = (
+    7  # motions that probes can read or load after the outer face: the rim's six, the body's height
+)
+MOMENTS = slice(3, 6)  # of the six: after the motions probes can read the moments on the hub, N m
+
+
+@dataclass(frozen=True, kw_only=True)
+class Corner:
+    """`axle`; of m modes  `mass` P^T, `stiffness`, `gyroscopic`, `convective` (m, 6), and of the rim's motions
+    alone `own_...` (6, 6), Omega taken out; `places` (s, 3) m of the outer face in the static state.
+    Gyroscopic and convective ones are zero for a wheel that stands.
+    """
+
+    axle: Axle
+    places: np.ndarray
+    mass: np.ndarray
+    stiffness: np.ndarray
+    gyroscopic: np.ndarray
+    convective: np.ndarray
+    own_mass: np.ndarray
+    own_stiffness: np.ndarray
+    own_gyroscopic: np.ndarray
+    own_convective: np.ndarray
+
+    @property
+    def taking_part(self) -> list[int]:
+        """Which of the seven motions of rim and body are coordinates."""
+        return self.axle.moving + [BODY] * self.axle.has_body
+
+    @property
+    def count(self) -> int:
+        """Coordinates that join."""
+        return len(self.taking_part)
+
+    def first(self, count: int) -> Corner:
+        """With the first `count` modes alone."""
+        cut = {name: getattr(self, name)[:count] for name in _PER_MODE}
+        return replace(self, **cut)
+
+    def momentum(self, air: np.ndarray | None) -> np.ndarray:
+        """P (7, m + a) kg^1/2 of the modes and of the air, whose own momentum (3, a) is `air`."""
+        rows = self.mass.T
+        if air is not None:
+            rows = np.hstack([rows, np.vstack([air, np.zeros((3, air.shape[1]))])])
+        return np.vstack([rows, np.zeros((1, rows.shape[1]))])
+
+    def inertia(self, air_mass: float = 0.0) -> np.ndarray:
+        """J (7, 7) of tire, wheel, `air_mass` (kg) and body."""
+        out = np.zeros((SEEN, SEEN))
+        out[:BODY, :BODY] = self.own_mass + self.axle.mass
+        out[range(3), range(3)] += air_mass
+        out[BODY, BODY] = self.axle.body_mass or 1.0
+        return out
+
+    def change(self, momentum: np.ndarray, air_mass: float = 0.0) -> np.ndarray:
+        """T (n + c, n + c) with (eta, xi) = T (q, x), `momentum` as P above."""
+        part, n = self.taking_part, momentum.shape[1]
+        p = momentum[part]
+        left = self.inertia(air_mass)[np.ix_(part, part)] - p @ p.T
+        upper = np.linalg.inv(np.linalg.cholesky(left)).T
+        out = np.eye(n + self.count)
+        out[:n, n:], out[n:, n:] = -p.T @ upper, upper
+        return out
+
+    def joined(
+        self, drag: np.ndarray, stiffness: np.ndarray, speed: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Damping and stiffness (n + c, n + c) in (eta, xi) from those of tire and air (n, n)."""
+        part, n, m = self.taking_part, len(drag), len(self.mass)
+        axle = self.axle
+        across = np.zeros((2, n, SEEN))
+        across[0, :m, :BODY] = 2 * speed * self.gyroscopic
+        across[1, :m, :BODY] = self.stiffness + speed**2 * self.convective
+        own = np.stack([axle.joined(axle.damping), axle.joined(axle.stiffness)])
+        own[0, :BODY, :BODY] += speed * (2 * self.own_gyroscopic + axle.gyroscopic)
+        own[1, :BODY, :BODY] += self.own_stiffness + speed**2 * self.own_convective
+        (d, k), (own_d, own_k) = across[:, :, part], own[:, part][:, :, part]
+        return (
+            np.block([[drag, d], [-d.T, own_d]]),
+            np.block([[stiffness, k], [k.T, own_k]]),
+        )
+
+    def check(self, speed: float) -> None:
+        """InputError where the hub's springs are softer than what the tire's static loads turn the wheel by."""
+        part = [k for k in self.axle.moving if k >= MOMENTS.start]
+        rows = np.ix_(part, part)
+        needed = -(self.own_stiffness + speed**2 * self.own_convective)[rows]
+        values = linalg.eigvalsh(self.axle.stiffness[rows] - needed) if part else np.zeros(1)
+        if values[0] < 0:
+            worst = ", ".join(f"{DIRECTIONS[k]} {needed[i, i]:.4g}" for i, k in enumerate(part))
+            raise InputError(
+                "axle.stiffness: the corner is unstable: its springs are softer than the static loads of "
+                f"the tire turn the wheel by, which takes more than (N m/rad): {worst}; or lock it"
+            )
+
+    def adrift(self, momentum: np.ndarray, air_mass: float = 0.0) -> np.ndarray:
+        """Orthonormal motions (n + c, r), in (q, x), that no spring or damper knows."""
+        part = self.taking_part
+        drifts = self.axle.adrift[part]
+        p = momentum[part]
+        lower = np.linalg.cholesky(self.inertia(air_mass)[np.ix_(part, part)] - p @ p.T)
+        return linalg.qr(np.vstack([p.T @ drifts, lower.T @ drifts]), mode="economic")[0]
+
+    def seen(self, tire: np.ndarray, probes) -> np.ndarray:
+        """What the probes (k, 3 s) or wider see of (eta, xi): (k, n + c), `tire` (k, n) being the first."""
+        return np.hstack([tire, self.rigid(probes)[:, self.taking_part]])
+
+    def rigid(self, probes) -> np.ndarray:
+        """What they see of the motions of rim and body, (k, 7): m per m and rad; transposed, the forces N and
+        moments N m on the axle's centre by unit loads at the probes."""
+        s = len(self.places)
+        weights = probes[:, : 3 * s].tocsr()
+        seen = np.zeros((probes.shape[0], SEEN))
+        for k in range(3):
+            seen[:, k] = np.asarray(weights[:, k::3].sum(axis=1)).ravel()
+        moment = [
+            weights[:, k::3] @ self.places for k in range(3)
+        ]  # of component k: x_j in column j
+        for k in range(3):
+            j, i = (k + 1) % 3, (k + 2) % 3
+            seen[:, 3 + k] = moment[i][:, j] - moment[j][:, i]
+        if probes.shape[1] > 3 * s:
+            seen += probes[:, 3 * s : 3 * s + SEEN].toarray()
+        return seen
+
+    def moments(self, n: int, speed: float) -> np.ndarray:
+        """A (3, 3, n + c): the hub carries the moments of the loads less  A_2 q'' + A_1 q' + A_0 q,  q = (eta, xi)
+        of n coordinates and c; N m.
+        """
+        zero, m = np.zeros((n, n)), len(self.mass)
+        held = replace(
+            self, axle=replace(self.axle, stiffness=np.zeros(6), damping=np.zeros(6), locked=())
+        )
+        drag, stiffness = held.joined(zero, zero, speed)
+        mass = np.zeros((3, n + SEEN))
+        mass[:, :m] = self.mass.T[MOMENTS]
+        mass[:, n:] = self.inertia()[MOMENTS]
+        rows = slice(n + MOMENTS.start, n + MOMENTS.stop)
+        whole = np.zeros((3, 3, n + SEEN))
+        for place, part in enumerate((stiffness[rows], drag[rows], mass)):
+            whole[place, :, : part.shape[1]] = part
+        return whole[:, :, [*range(n), *(n + k for k in self.taking_part)]]
+
+    def carried(self, tire: np.ndarray, air_mass: float = 0.0) -> np.ndarray:
+        """Momentum (3, n + c) of tire, air and wheel per rate of (eta, xi), `tire` (3, n) that of the first."""
+        whole = self.inertia(air_mass)[:3]
+        return np.hstack([tire, whole[:, self.taking_part]])
+
+
+_PER_MODE = ("mass", "stiffness", "gyroscopic", "convective")
+ARRAYS = tuple(item.name for item in fields(Corner) if item.name != "axle")
+
+
+def meeting(axle: Axle, rim: RimMotion, vectors: np.ndarray, places: np.ndarray, comm) -> Corner:
+    """The corner on fields `vectors` (own rows (n, m)) of unit mass. Collective."""
+    nothing = np.zeros((vectors.shape[1], 6))
+    per_mode = {
+        name: comm.allreduce(vectors.T @ rim.rows[name]) if name in rim.rows else nothing
+        for name in _PER_MODE
+    }
+    own = {f"own_{name}": rim.whole.get(name, np.zeros((6, 6))) for name in _PER_MODE}
+    return Corner(axle=axle, places=places, **per_mode, **own)

@@ -1,0 +1,91 @@
+"""A wheel that moves in a run: what its modes hold for it, and what a contact loop tells of it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import h5py
+import numpy as np
+from scipy import sparse
+
+from tireroad.contact.patch import Patch
+from tireroad.fem.axle import Axle
+from tireroad.greens.basis import Basis
+from tireroad.greens.blocked import disagreement
+from tireroad.modal.corner import ARRAYS, SEEN, Corner
+from tireroad.modal.rolling import RollingModes
+from tireroad.runs.files.store import put
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.record import Record
+
+READINGS = SEEN + 3  # motions of wheel and body, moments on the hub
+UNITS = {
+    "wheel/translation": "m",
+    "wheel/rotation": "rad",
+    "body/height": "m",
+    "hub_moment": "N m",
+}
+_PLACES = {
+    "wheel/translation": slice(0, 3),
+    "wheel/rotation": slice(3, 6),
+    "body/height": slice(6, 7),
+    "hub_moment": slice(7, 10),
+}
+_FREQUENCIES, _LOADS = 25, 20
+
+
+def inputs(job: Job) -> dict | None:
+    """What depends on the axle; None where the wheel is held."""
+    return asdict(job.scene.axle) if job.axle else None
+
+
+def fill(file: h5py.File, corner: Corner | None) -> None:
+    """Write what the rim's motions meet beside the modes; the axle itself is the scene's."""
+    for name in ARRAYS if corner else ():
+        put(file, f"corner/{name}", getattr(corner, name), "kg, m, N, rad")
+
+
+def read(file: h5py.File, axle: Axle | None) -> Corner | None:
+    """The corner of a file of modes, with the scene's axle."""
+    if axle is None:
+        return None
+    return Corner(axle=axle, **{name: file[f"corner/{name}"][:] for name in ARRAYS})
+
+
+def widened(probes: sparse.csr_matrix) -> sparse.csr_matrix:
+    """Probes (k, 3 s) of the outer face, with those of wheel, body and hub after them, (k + 10, 3 s + 10)."""
+    return sparse.block_diag([probes, sparse.identity(READINGS)], format="csr")
+
+
+def standing_moment(patch: Patch) -> np.ndarray:
+    """Moment (3,) N m of the static contact forces about the axle's centre."""
+    up = np.zeros((len(patch.force), 3))
+    up[:, 2] = patch.force
+    return np.cross(patch.points, up).sum(axis=0)
+
+
+def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
+    """Datasets of contact.h5 (n, ...) from readings (n, 10); `static` N m as above."""
+    out = {name: readings[:, place] for name, place in _PLACES.items()}
+    out["body/height"] = out["body/height"][:, 0]
+    out["hub_moment"] = out["hub_moment"] + static
+    return out
+
+
+def check_blocked(record: Record, rolling: RollingModes, loads, highest: float) -> None:
+    """Put the force on the hub beside that by the blocked force (greens.blocked), up to `highest` Hz."""
+    basis, some = Basis.of(rolling), loads[:: -(-loads.shape[0] // _LOADS)]
+    frequency = np.linspace(0, highest, _FREQUENCIES + 1)[1:]
+    off = disagreement(basis, rolling.turning, some, frequency)
+    name = f"force on the hub off that by the blocked force, up to {highest:.4g} Hz"
+    record.indicators[name] = (off, "-")
+
+
+def describe(record: Record, rolling: RollingModes) -> None:
+    """The axle in figures: the slowest motions of wheel and body."""
+    values = rolling.states.eigenvalue
+    slow = values[np.argsort(np.abs(values))][:3]
+    record.headline["slowest motions of tire, wheel and body"] = (
+        ", ".join(f"{abs(s) / (2 * np.pi):.3g} Hz (decay {-s.real:.3g} 1/s)" for s in slow),
+        "-",
+    )

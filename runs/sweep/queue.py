@@ -1,0 +1,172 @@
+"""A sweep through Slurm, or through another queue by a template: scripts on disk, then submitted.
+
+Members share stages through the cache in the sweep's folder. A first job computes one member of each
+group that shares a static state and modes; an array job runs the rest when it has ended, and a last
+job gathers.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.files.disk import write_text
+from tireroad.runs.sweep.definition import Member, Sweep
+from tireroad.runs.sweep.local import command
+
+WARNING = 120  # s before the time limit at which a job is signalled to write a checkpoint
+_DIRECTIVE = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
+SLURM = """\
+#!/bin/bash
+#SBATCH --job-name=$name
+#SBATCH --output=$logs/$name-%A_%a.txt
+#SBATCH --open-mode=append
+#SBATCH --ntasks=$processes
+#SBATCH --signal=B:USR1@$warning
+#SBATCH --requeue
+$directives
+# A warning before the time limit: the run writes a checkpoint, and the job is queued again.
+export TIREROAD_CACHE=$cache OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
+child=
+again() { [ -n "$$child" ] && kill -USR1 "$$child"; }
+trap again USR1
+$body
+wait "$$child"
+status=$$?
+while kill -0 "$$child" 2>/dev/null; do wait "$$child"; status=$$?; done
+if [ "$$status" = 4 ]; then
+    scontrol requeue "$${SLURM_ARRAY_JOB_ID:+$${SLURM_ARRAY_JOB_ID}_}$${SLURM_ARRAY_TASK_ID:-$$SLURM_JOB_ID}"
+fi
+exit "$$status"
+"""
+_TABLE = {"template", "task", "submit", "array", "after"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Queue:
+    """How a batch system is spoken to. By default Slurm.
+
+    `template`: text of a job script with $name, $logs, $processes, $cache, $directives, $warning and
+    $body, which starts the run in the background and sets `child`. `task`: the environment variable of
+    the task's number in an array. `submit`: the command; it prints the job's number. `array` with
+    {count}, `after` with {jobs}: its options, the jobs joined by ":".
+    """
+
+    template: str = SLURM
+    task: str = "SLURM_ARRAY_TASK_ID"
+    submit: str = "sbatch --parsable"
+    array: str = "--array=1-{count}"
+    after: str = "--dependency=afterany:{jobs}"
+    directives: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, sweep: Sweep) -> Queue:
+        """The queue of the sweep's [queue] table, or Slurm with the lines of its [slurm] table."""
+        given = dict(sweep.queue)
+        if not given:
+            return cls(directives=sweep.slurm)
+        missing, unknown = sorted(_TABLE - given.keys()), sorted(given.keys() - _TABLE)
+        if missing or unknown:
+            wrong = f"needs {missing[0]}" if missing else f"has no key {unknown[0]}"
+            raise InputError(f"sweep: [queue] {wrong}; its keys are {', '.join(sorted(_TABLE))}")
+        path = sweep.folder / str(given["template"])
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"sweep: queue.template {path} cannot be read: {error}") from None
+        return cls(**{**{k: str(v) for k, v in given.items()}, "template": text})
+
+    def submission(self, script: Path, count: int | None, before: Sequence[str]) -> list[str]:
+        """The command line that submits a script as an array of `count`, after the jobs `before`."""
+        line = shlex.split(self.submit)
+        if count is not None:
+            line += shlex.split(self.array.format(count=count))
+        if before:
+            line += shlex.split(self.after.format(jobs=":".join(before)))
+        return [*line, str(script)]
+
+
+def write_scripts(
+    sweep: Sweep, folder: Path, first: Sequence[Member], rest: Sequence[Member], source: Path
+) -> dict[str, Path]:
+    """The scripts of the jobs, by name: `first`, `rest` (where there are any) and `gather`."""
+    queue, scripts = Queue.of(sweep), {}
+    for name, members in (("first", first), ("rest", rest)):
+        if members:
+            body = _members(sweep, folder, members, queue.task)
+            scripts[name] = _script(sweep, folder, name, body, queue)
+    again = [sys.executable, "-P", "-m", "tireroad.runs", "sweep", str(source.resolve())]
+    body = f"{shlex.join([*again, '--out', str(folder.resolve()), '--gather'])} &\nchild=$!"
+    scripts["gather"] = _script(sweep, folder, "gather", body, queue, processes=1)
+    return scripts
+
+
+def submit(sweep: Sweep, scripts: Mapping[str, Path], counts: Mapping[str, int]) -> dict[str, str]:
+    """Hand the scripts to the queue, each after the ones before; the job numbers by name."""
+    queue = Queue.of(sweep)
+    jobs: dict[str, str] = {}
+    for name, script in scripts.items():
+        line = queue.submission(script, counts.get(name), list(jobs.values()))
+        try:
+            done = subprocess.run(line, capture_output=True, text=True)
+        except FileNotFoundError:
+            raise InputError(
+                f"sweep: {line[0]} is not on this machine; the scripts are in {script.parent}"
+            ) from None
+        if done.returncode:
+            raise ConvergenceError(f"sweep: {shlex.join(line)}: {done.stderr.strip()}")
+        jobs[name] = done.stdout.strip().partition(";")[0]
+    return jobs
+
+
+def _script(
+    sweep: Sweep, folder: Path, name: str, body: str, queue: Queue, processes: int | None = None
+) -> Path:
+    """Write one job script; its path."""
+    jobs = folder / "jobs"
+    jobs.mkdir(parents=True, exist_ok=True)
+    try:
+        text = Template(queue.template).substitute(
+            name=f"{sweep.name}-{name}",
+            logs=shlex.quote(str(jobs.resolve())),
+            processes=processes or sweep.processes,
+            warning=WARNING,
+            directives=_directives(queue.directives),
+            cache=shlex.quote(str((folder / "cache").resolve())),
+            body=body,
+        )
+    except (KeyError, ValueError) as error:
+        raise InputError(
+            f"sweep: queue.template: {error}: $name, $logs, $processes, $cache, $directives, $warning and "
+            "$body are filled in; write $$ for a dollar of the shell"
+        ) from None
+    path = jobs / f"{name}.sh"
+    write_text(path, text)
+    path.chmod(0o755)
+    return path
+
+
+def _directives(given: Mapping[str, Any]) -> str:
+    """The lines of the [slurm] table: account, partition, time, ..."""
+    lines = []
+    for key, value in given.items():
+        if not _DIRECTIVE.fullmatch(key) or "\n" in str(value):
+            raise InputError(f"sweep: slurm.{key} = {value!r} is no option of sbatch on one line")
+        lines.append(f"#SBATCH --{key}={value}")
+    return "\n".join(lines)
+
+
+def _members(sweep: Sweep, folder: Path, members: Sequence[Member], task: str) -> str:
+    """The shell's choice of a member by the number of its task in the array."""
+    lines = [f'case "${{{task}:-1}}" in']
+    for number, member in enumerate(members, start=1):
+        lines.append(f"{number}) {shlex.join(command(sweep, member, folder.resolve()))} & ;;")
+    return "\n".join([*lines, "esac", "child=$!"])

@@ -1,0 +1,86 @@
+"""The course of contact forces within a step: what is chosen on soft and stiff treads, against finer steps."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+
+from tireroad.contact.chatter import choose, oscillation
+from tireroad.fem.errors import ConvergenceError
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.validation.comparison import digits
+from tireroad.runs.validation.histories import BAND, History, distance, follow
+from tireroad.runs.validation.rolling import ROADS, SCENE
+from tireroad.runs.validation.tires import Tires
+
+ABOUT = "the scheme chosen on treads of 10 and 340 MPa, against a finer step, and what the other one gives"
+
+MESH = {"segments": 24, "elements_arc": 8, "modes": 100}
+TREADS = (1e7, 3.4e8)  # Pa
+RESIDUALS = ("none", "static", "attachment")
+STEPS = (4e-4, 2e-4, 1e-4, 5e-5)  # s
+FINEST = 6.25e-6  # s
+SCHEMES = ("linear", "constant")
+ROAD = "cobblestones, joints of 0.5 mm"
+
+
+def run() -> list[Table]:
+    """All treads, residuals and steps in one table."""
+    return tables(MESH, RESIDUALS, STEPS, FINEST)
+
+
+def tables(mesh: dict[str, int], residuals, steps, finest: float) -> list[Table]:
+    """`finest`: the step (s) of the reference, with forces linear over it."""
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        tires = None
+        for tread in TREADS:
+            scene = SCENE.format(road=ROADS[ROAD], **mesh)
+            scene = scene.replace("youngs_modulus = 1e7", f"youngs_modulus = {tread:g}")
+            tires = tires or Tires(scene, Path(folder))
+            tires.change(scene)
+            for residual in residuals:
+                response = tires.response(mesh["modes"], residual)
+                exact = _follow(tires, response, finest, "linear")
+                rows += [_row(tires, response, exact, tread, residual, step) for step in steps]
+    columns = [("tread", "MPa"), ("residual", ""), ("step", "s"), ("steps an oscillation", "-"),
+               ("chosen", ""), ("its error", "%"), ("linear", "%"), ("constant", "%")]  # fmt: skip
+    notes = [
+        f"Rolling over {ROAD}, points at the nodes, {mesh['modes']} modes. Errors: contact force, relative L2 "
+        f"of what varies up to {BAND:g} Hz, against forces linear over steps of {finest:g} s. Steps an "
+        "oscillation: of the fastest one that the points touching at rest can make. A tread of 340 MPa on "
+        "tires without residual, or whose attachment modes move, bounces on its own at several kHz: forces "
+        "constant over the step damp that away, and are compared with a run that has it.",
+    ]
+    return [Table("Forces linear or constant over the step", columns, rows, notes)]
+
+
+def _follow(tires: Tires, response: Response, step: float, scheme: str) -> History | None:
+    """None where the motion grew without bound."""
+    tire = Recursion(response.resolved(step), step, scheme, tires.job.comm)
+    try:
+        return follow(tires.trial, tire, step, 0.0)
+    except ConvergenceError:
+        return None
+
+
+def _row(tires: Tires, response: Response, exact: History, tread, residual, step) -> list:
+    trial = tires.trial
+    count = oscillation(trial.spec, trial.setup.patch, response.resolved(step), step)
+    off = {
+        scheme: _off(trial.duration, exact, _follow(tires, response, step, scheme))
+        for scheme in SCHEMES
+    }
+    chosen = choose(count).scheme
+    shown = digits(count) if math.isfinite(count) else "none"
+    return [tread / 1e6, residual, step, shown, chosen, off[chosen], *off.values()]
+
+
+def _off(duration: float, exact: History, found: History | None) -> float | str:
+    if found is None:
+        return "unbounded"
+    values = (history.values["contact force"] for history in (exact, found))
+    return digits(100 * distance(*values, duration).mean)

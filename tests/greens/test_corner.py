@@ -1,0 +1,275 @@
+"""A wheel that moves: the golden car's poles, full matrices of a free rim, substructuring, and the fixed limit."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy import optimize, sparse
+
+from tireroad.fem.axle import Axle
+from tireroad.fem.errors import InputError
+from tireroad.fem.matrices import probe
+from tireroad.fem.matrices.compliance import on_own_rows
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.rim_motion import rim_motion
+from tireroad.fem.matrices.support import Support, rigid_motions
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.virtual_work import Rolling
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.material import compound
+from tireroad.fem.tire.mesh import Torus
+from tireroad.fem.turning import Turning
+from tireroad.greens.basis import Basis
+from tireroad.greens.blocked import disagreement
+from tireroad.greens.coupling import Wheel
+from tireroad.greens.recursion import Recursion
+from tireroad.modal.basis import Projection, project, with_corner
+from tireroad.modal.corner import Corner
+from tireroad.modal.rolling import decouple
+from tireroad.modal.solver import undamped
+from tireroad.modal.solver.fields import everywhere
+from tireroad.modal.standing import sites
+
+COMM = MPI.COMM_WORLD
+RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
+SPOTS = [(0.0, 0.0), (0.15, 0.1), (-0.2, -0.3), (1.0, 0.5)]
+DAMPING = (60.0, 1e-6)
+FREQUENCY = np.array([0.7, 5.0, 40.0, 130.0])
+GOLDEN = 653.0, 63.3, 6.0, 0.15  # k_t, k_s 1/s2, c 1/s, m_u of a body of 1 kg
+
+
+def golden_car() -> tuple[Axle, Basis]:
+    """Wheel and body without any tire, read and loaded at one point under the axle."""
+    k_t, k_s, c, m_u = GOLDEN
+    axle = Axle(
+        wheel_mass=m_u,
+        wheel_inertia=(1.0, 1.0, 1.0),
+        stiffness=np.array([0, 0, k_s, 0, 0, 0]),
+        damping=np.array([0, 0, c, 0, 0, 0]),
+        body_mass=1.0,
+        locked=("x", "y", "rx", "ry", "rz"),
+    )
+    nothing, own = np.zeros((0, 6)), np.zeros((6, 6))
+    corner = Corner(
+        axle=axle, places=np.array([[0.0, 0.0, -0.3]]),
+        mass=nothing, stiffness=nothing, gyroscopic=nothing, convective=nothing,
+        own_mass=own, own_stiffness=own, own_gyroscopic=own, own_convective=own,
+    )  # fmt: skip
+    projection = Projection(np.zeros(0), np.zeros((3, 0)), corner=corner)
+    states = decouple(projection, Turning(damping=(0.0, 0.0)), COMM)
+    return axle, Basis(np.zeros((3, 0)), projection, states)
+
+
+def test_the_golden_car_on_its_tire() -> None:
+    """Where the road holds a massless tire's spring, H(s) + 1/k_t = 0: published poles, and the polynomial's."""
+    k_t, k_s, c, m_u = GOLDEN
+    _, basis = golden_car()
+    point = sparse.csr_matrix([[0.0, 0.0, 1.0]])
+    response = basis.couple(point, point)
+    assert response.rigid == 2  # wheel and body fall together
+    # (m_u s2 + c s + k_s + k_t)(s2 + c s + k_s) = (c s + k_s)^2
+    spring = np.array([c, k_s])
+    exact = np.polysub(np.polymul([m_u, c, k_s + k_t], [1.0, c, k_s]), np.polymul(spring, spring))
+    exact = np.roots(exact)
+
+    def closed(s):
+        return response.receptance(np.array([s / (2j * np.pi)]))[0, 0, 0] + 1 / k_t
+
+    # `receptance` adds the mirror poles, so it is H(s) off the imaginary axis too.
+    for published in (-2.590 + 7.323j, -20.410 + 64.423j):
+        found = optimize.newton(closed, published, x1=published * 1.0001, tol=1e-13)
+        assert abs(found - exact[np.abs(exact - found).argmin()]) < 1e-9 * abs(found)
+        assert found == pytest.approx(published, abs=1e-3)  # three decimals are published
+
+
+def test_the_golden_car_in_time() -> None:
+    """A push on the wheel under a free corner: momentum by impulse, and springs by the exact recursion."""
+    _, basis = golden_car()
+    point = sparse.csr_matrix([[0.0, 0.0, 1.0]])
+    reading = sparse.hstack([sparse.csr_matrix((2, 3)), sparse.csr_matrix(np.eye(7)[[2, 6]])])
+    response = basis.couple(reading.tocsr(), point)
+    step, m_u, body = 1e-3, GOLDEN[3], 1.0
+    tire = Recursion(response, step, "linear", COMM)
+    tire.start(np.ones(1))
+    places = []
+    for _ in range(3000):
+        free = tire.predict()
+        tire.advance(np.ones(1))
+        places.append(free + tire.same_step @ np.ones(1))
+    wheel, car = places[-1]
+    centre = (m_u * wheel + body * car) / (m_u + body)
+    assert centre == pytest.approx(0.5 * 3.0**2 / (m_u + body), rel=1e-9)
+    # Carried along at a / (m_u + 1), the spring holds the body's share of the force.
+    assert wheel - car == pytest.approx(body / (m_u + body) / GOLDEN[1], rel=1e-4)
+
+
+@lru_cache(maxsize=2)
+def body(speed: float) -> Body:
+    """An inflated soft torus on the road, turning or not."""
+    made = Body(COMM, Torus(0.32, 0.10, 0.012, np.radians(120), 8, 2, 1, 2), RUBBER)
+    loader = Loader(Equilibrium(made, Rolling(speed)), lambda progress: None)
+    loader.inflate(2e5)
+    loader.deflect(0.01)
+    return made
+
+
+def places(speed: float) -> np.ndarray:
+    """Deformed outer face (s, 3) m."""
+    made = body(speed)
+    return made.surface(made.lattice.points(made.ids) + made.owned(made.u.x.array))
+
+
+def six_ways(body_mass: float | None = 300.0) -> Axle:
+    """A wheel on springs and dampers in all directions, two of them coupled."""
+    stiffness = np.diag([1e5, 2e5, 3e4, 2e3, 1e4, 3e3])
+    stiffness[0, 4] = stiffness[4, 0] = 3e3
+    return Axle(
+        wheel_mass=15.0,
+        wheel_inertia=(0.4, 0.8, 0.5),
+        stiffness=stiffness,
+        damping=np.diag([100.0, 200.0, 1500.0, 10.0, 20.0, 30.0]),
+        body_mass=body_mass,
+    )
+
+
+@lru_cache(maxsize=6)
+def wheel(speed: float, count: int, axle_at: int = 0):
+    """The full matrices of a held rim, the modes, and the basis that a corner has joined."""
+    axle = (six_ways(), replace(six_ways(None), locked=("rx", "ry", "rz")), None)[axle_at]
+    made, rolling = body(speed), Rolling(speed)
+    operators = Operators(made, 2e5, Support("fixed"), rolling)
+    rotation = operators.rotation() if speed else None
+    modes = undamped.solve(operators.stiffness, operators.mass, count, sites=sites(operators))
+    projection = project(modes, rotation, operators.carried, COMM)
+    motion = rim_motion(made, 2e5, rolling, speed != 0)
+
+    def corner(projection, modes):
+        return with_corner(projection, modes, axle, motion, places(speed), COMM)
+
+    full = Wheel(operators, rotation, speed, DAMPING, "full", corner=corner if axle else None)
+    projection = corner(projection, modes)
+    states = full.decouple(projection, COMM)
+    return full, modes, Basis(operators.trace(modes.vectors), projection, states, speed)
+
+
+def loads(speed: float, extra: int) -> sparse.csr_matrix:
+    """Forces on the outer face, then unit forces on what moves besides."""
+    weights = [probe.spot(body(speed).lattice, *spot) for spot in SPOTS]
+    directions = [(0, 0, 1.0), (1.0, 0, 0), (0, 1.0, 0.3), (1.0, 0.2, 0)]
+    pairs = zip(weights, directions, strict=True)
+    face = sparse.csr_matrix(np.stack([probe.directed(w, d) for w, d in pairs]))
+    return sparse.block_diag([face, sparse.identity(extra)], format="csr")
+
+
+def dense_receptance(speed: float, axle: Axle) -> np.ndarray:
+    """H (f, 11, 11) of the full matrices of a rim that is free, with wheel and body on it: no modes, no corner.
+
+    The material's damping acts on the motion against the rim.
+    """
+    held = Operators(body(speed), 2e5, Support("fixed"), Rolling(speed))
+    free = Operators(body(speed), 2e5, Support("free"), Rolling(speed))
+    n, rim = len(held.mass), free.unknowns.rim.coordinates
+    points = body(speed).lattice.points(body(speed).ids) + body(speed).owned(body(speed).u.x.array)
+    rigid = rigid_motions(points)[free.unknowns.free]
+    against = np.hstack([np.eye(n), -rigid @ rim, np.zeros((n, 1))])
+    moved = np.zeros((7, n + 7))
+    moved[:6, n : n + 6], moved[6, -1] = rim, 1.0
+    stiffness = everywhere(held.stiffness).toarray()
+    drag = DAMPING[0] * np.diag(held.mass) + DAMPING[1] * stiffness
+    D = against.T @ drag @ against + moved.T @ axle.joined(axle.damping) @ moved
+    K = moved.T @ axle.joined(axle.stiffness) @ moved
+    K[:-1, :-1] += everywhere(free.stiffness).toarray()
+    if speed:
+        turning, rate = free.rotation(), everywhere(held.rotation().body).toarray()
+        K[:-1, :-1] += speed**2 * everywhere(turning.convective).toarray()
+        K += against.T @ (speed * drag @ (rate / held.mass[:, None])) @ against
+        D[:-1, :-1] += 2 * speed * everywhere(turning.gyroscopic).toarray()
+        D += moved[:6].T @ (speed * axle.gyroscopic) @ moved[:6]
+    M = np.diag(np.append(free.mass, axle.body_mass))
+    M += moved[:6].T @ axle.mass @ moved[:6]
+    face = loads(speed, 6)
+    load = np.zeros((n + 7, 11))
+    load[:-1, :4] = on_own_rows(free, face).toarray()[:, :4]
+    load[:, 4:] = moved.T
+    s = 2j * np.pi * FREQUENCY
+    return np.stack([load.T @ np.linalg.solve(z * z * M + z * D + K, load) for z in s])
+
+
+@pytest.mark.parametrize("speed", [0.0, 60.0])
+def test_all_modes_with_a_corner_are_the_full_matrices_of_a_free_rim(speed) -> None:
+    """Six directions, a body, gyroscopic torque, a loaded tire: nothing is left out, so nothing differs."""
+    if COMM.size > 1:
+        pytest.skip("dense matrices")
+    _, _, basis = wheel(speed, 10**6)
+    assert basis.states.rigid == 2
+    exact = dense_receptance(speed, six_ways())
+    probes = loads(speed, 7)
+    found = basis.couple(probes, probes).receptance(FREQUENCY)
+    size = np.abs(np.einsum("fii->fi", exact)) ** 0.5
+    off = np.abs(found - exact) / (size[:, :, None] * size[:, None, :])
+    assert off.max() < 1e-8
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("speed", [0.0, 60.0])
+def test_hub_by_the_blocked_force_and_its_moments_by_the_springs(speed) -> None:
+    _, _, basis = wheel(speed, 60)
+    turning = Turning(speed=speed, damping=DAMPING)
+    probes = loads(speed, 0)
+    assert disagreement(basis, turning, probes, FREQUENCY) < 1e-9
+    axle, wide = basis.projection.corner.axle, loads(speed, 10)
+    H = basis.couple(wide[4:], wide[:4]).receptance(FREQUENCY)
+    for s, h in zip(2j * np.pi * FREQUENCY, H, strict=True):
+        stretch = h[:6].copy()
+        stretch[2] -= h[6]
+        force = (axle.stiffness + s * axle.damping) @ stretch
+        assert np.abs(force[3:] - h[7:]).max() < 1e-9 * np.abs(force[3:]).max()
+
+
+@pytest.mark.mpi
+def test_residuals_with_a_corner_are_those_of_the_held_rim() -> None:
+    """Static: all that 60 modes lack of the held tire, whatever the corner does. And attachment comes closer.
+
+    In translations: turned wheels turn static loads too, which modes left out do not know (1 % here).
+    """
+    speed = 60.0
+    full, modes, basis = wheel(speed, 60, 1)
+    plain, _, held = wheel(speed, 60, 2)
+    face = loads(speed, 0)
+    static = full.respond(basis, modes, face, face, "static")
+    alone = plain.respond(held, modes, face, face, "static")
+    assert static.residual == pytest.approx(alone.residual, rel=1e-6, abs=1e-14)
+    assert static.left_out == pytest.approx(alone.left_out, rel=1e-6, abs=1e-12)
+    exact = wheel(speed, 10**6, 1)[2].couple(face, face).receptance(FREQUENCY)
+    off = {}
+    for option in ("none", "static", "attachment"):
+        found = basis.couple(face, face) if option == "none" else None
+        found = found or full.respond(basis, modes, face, face, option)
+        error = np.abs(found.receptance(FREQUENCY) - exact)
+        off[option] = error.max(axis=(1, 2)) / np.abs(exact).max(axis=(1, 2))
+    assert off["attachment"].max() < 0.02
+    assert (off["static"][:2] < 0.01 * off["none"][:2]).all()
+    with pytest.raises(InputError, match="second-order"):
+        full.respond(basis, modes, face, face, "second-order")
+
+
+def test_a_corner_softer_than_its_load_is_told() -> None:
+    """The static load, 0.3 m under the axle, turns the wheel over."""
+    corner = wheel(60.0, 60)[2].projection.corner
+    soft = np.diag([1e5, 2e5, 3e4, 100.0, 1e4, 3e3])
+    axle = Axle(wheel_mass=15.0, wheel_inertia=(0.4, 0.8, 0.5), stiffness=soft, damping=0 * soft)
+    with pytest.raises(InputError, match="unstable"):
+        replace(corner, axle=axle).check(60.0)
+
+
+def test_what_is_no_axle() -> None:
+    six, mass = np.ones(6), {"wheel_mass": 1.0, "wheel_inertia": (1.0, 1.0, 1.0)}
+    with pytest.raises(InputError, match="symmetric"):
+        Axle(stiffness=np.triu(np.ones((6, 6))), damping=six, **mass)
+    with pytest.raises(InputError, match="locked"):
+        Axle(stiffness=six, damping=six, locked=("w",), **mass)
+    with pytest.raises(InputError, match="mass"):
+        Axle(stiffness=six, damping=six, wheel_mass=1.0, wheel_inertia=(0.0, 1.0, 1.0))

@@ -1,0 +1,133 @@
+"""A wheel that moves through all stages: limits, what is written and told, what is reused and refused."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.scene.load import load
+from tireroad.runs.scene.tables.axle import axle_of
+
+SCENE = """
+[tire]
+segments = 20
+elements_arc = 6
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 500.0
+error_estimate = false
+[modal]
+count = 60
+[rotation]
+speed = 50.0
+[contact]
+points = "nodes"
+youngs_modulus = 1e7
+reach = 0.02
+[road]
+kind = "sine"
+amplitude = 0.5e-3
+wavelength = 0.2
+[time]
+duration = 0.04
+step = 2e-4
+"""
+CAR = """
+[axle]
+kind = "corner"
+body_mass = 300.0
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, launch):
+    base = tmp_path_factory.mktemp("axle")
+    folder = base / "wheel"
+
+    def started(text, *options, status=0):
+        scene = base / "wheel.toml"
+        scene.write_text(f'name = "wheel"\n{text}')
+        done = launch("-m", "runs", "run", scene, "--out", folder, *options)
+        assert done.returncode == status, done.stderr + done.stdout
+        summary = json.loads((folder / "summary.json").read_text())["stages"]
+        with h5py.File(folder / "contact.h5") as file:
+            names: list[str] = []
+            file.visit(names.append)
+            kept = {n: file[n][:] for n in names if isinstance(file[n], h5py.Dataset)}
+        return kept, summary, folder
+
+    return started
+
+
+def test_corner_free_wheel_and_the_fixed_axle_as_its_limit(run):
+    """In one folder, so that what does not depend on the axle is computed once."""
+    car, summary, folder = run(SCENE + CAR)
+    wheel, body = car["wheel/translation"], car["body/height"]
+    assert car["hub_moment"].shape == wheel.shape == (200, 3)
+    assert np.abs(wheel[:, :2]).max() == 0.0
+    # The hub's force is that of its spring and damper, here by differences over two steps.
+    stretch = wheel[:, 2] - body
+    rate = np.gradient(stretch, car["time"])
+    spring = 500.0 + 25e3 * stretch + 2.4e3 * rate
+    change = np.ptp(car["axle_force"][:, 2])
+    assert np.abs(spring - car["axle_force"][:, 2])[2:-2].max() < 0.01 * change
+    # Of the force on the hub the body alone has the change: m_b times its acceleration.
+    share = np.gradient(np.gradient(body, car["time"]), car["time"])[3:-3]
+    assert 300.0 * share == pytest.approx(car["axle_force"][3:-3, 2] - 500.0, abs=0.02 * change)
+    told = summary["greens"]["indicators"]
+    off = [v["value"] for k, v in told.items() if "blocked force" in k]
+    assert off
+    assert off[0] < 1e-6
+    assert "Wheel and body" in (folder / "report.html").read_text()
+    with h5py.File(folder / "spectra.h5") as file:
+        assert file["wheel/translation"].shape == file["axle_force"].shape
+        assert file["body/height"].attrs["unit"] == "m"
+
+    short = ("--until", "contact")
+    limit = ("axle.stiffness=[0,0,1e17,0,0,0]", "axle.wheel_mass=1e5", "axle.body_mass=")
+    stiff, again, _ = run(SCENE + CAR, *(f"--set={one}" for one in limit), *short)
+    assert again["modes"]["status"] == "reused"
+    fixed, _, _ = run(SCENE, *short)
+    for name in ("axle_force", "total_force"):
+        vary = np.ptp(fixed[name], axis=0).max()
+        assert np.abs(stiff[name] - fixed[name]).max() < 1e-6 * vary, name
+    assert np.abs(car["axle_force"] - fixed["axle_force"]).max() > 0.1 * vary
+    assert "hub_moment" not in fixed
+
+    free, _, _ = run(SCENE + '[axle]\nkind = "free"\n', *short)
+    assert free["axle_force"][:, 2] == pytest.approx(500.0, rel=1e-12)
+    assert np.ptp(free["total_force"][:, 2]) > 1.0
+
+
+@pytest.mark.parametrize(
+    ("axle", "told"),
+    [
+        ("stiffness = [0, 0, 0, 0, 0, 0]", "carries the static load: the corner is unstable"),
+        ('locked = ["x", "y", "ry", "rz"]', "no spring along rx"),
+        ("stiffness = [1, 2, 3]", "6 numbers"),
+        ("stiffness = [0, 0, -1.0, 0, 0, 0]", "symmetric and not give energy"),
+        ('locked = ["w"]', "must be a list of x, y, z"),
+        ('body_mass = 3.0\nlocked = ["x", "y", "z", "rx", "rz"]', "no part where z is locked"),
+        ('body_mass = 3.0\n[greens]\nresidual = "second-order"', "knows no [axle]"),
+        ('body_mass = 3.0\n[modal]\nrim = "free"\n[damping]\nmass = 0.0', "massless|without mass"),
+    ],
+)
+def test_a_corner_that_cannot_be_is_refused(tmp_path, axle, told):
+    scene = tmp_path / "bad.toml"
+    text = SCENE if "[modal]" not in axle else SCENE.replace("[modal]\ncount = 60\n", "")
+    scene.write_text(text + f'[axle]\nkind = "corner"\n{axle}\n')
+    with pytest.raises(InputError) as error:
+        load(scene)
+    assert any(one in str(error.value) for one in told.split("|"))
+
+
+def test_springs_are_a_diagonal_or_a_matrix(tmp_path):
+    scene = tmp_path / "good.toml"
+    rows = np.diag([0, 0, 2e4, 0, 0, 0]).tolist()
+    scene.write_text(SCENE + f'[axle]\nkind = "corner"\nstiffness = {rows}\n')
+    one = load(scene)
+    scene.write_text(SCENE + '[axle]\nkind = "corner"\nstiffness = [0, 0, 2e4, 0, 0, 0]\n')
+    assert (axle_of(one).stiffness == axle_of(load(scene)).stiffness).all()

@@ -1,0 +1,169 @@
+"""A sweep through a real Slurm of one node: shared stages first, the rest after, a table at the end."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from one_node import ended, slurm
+from started import environment
+
+import tireroad
+
+SCENE = """
+name = "base"
+[tire]
+segments = 12
+elements_arc = 4
+order = 2
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 300.0
+error_estimate = false
+[modal]
+count = 8
+[rotation]
+speed = 20.0
+[contact]
+tread = "winkler"
+[road]
+kind = "sine"
+[time]
+duration = {duration}
+step = 1e-4
+checkpoint = 3600.0
+"""
+FAMILY = """
+scene = "base.toml"
+[[axis]]
+key = "road.amplitude"
+values = [1e-4, 2e-4, 3e-4]
+[slurm]
+time = "00:30:00"
+"""
+
+
+@pytest.fixture(scope="module")
+def queue(tmp_path_factory):
+    with slurm(tmp_path_factory.mktemp("slurm")) as found:
+        yield environment() | {k: found[k] for k in ("PATH", "SLURM_CONF")}
+
+
+def family(folder: Path, duration: float) -> Path:
+    (folder / "base.toml").write_text(SCENE.format(duration=duration))
+    (folder / "family.toml").write_text(FAMILY)
+    return folder / "family.toml"
+
+
+def test_a_sweep_through_slurm(tmp_path: Path, launch, queue) -> None:
+    out = tmp_path / "out"
+    sweep = family(tmp_path, 0.01)
+    done = launch("-m", "runs", "sweep", sweep, "--out", out, "--slurm", env=queue)
+    assert done.returncode == 0, done.stderr
+    assert "submitted: first as job" in done.stdout
+    ended(queue, 600)
+    with (out / "sweep.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 3 and all(row["modes: lowest (Hz)"] for row in rows)
+    assert len({row["modes: lowest (Hz)"] for row in rows}) == 1
+    # One member computed what all share; the others, in a later job, took it.
+    logs = [file.read_text() for file in sorted((out / "jobs").glob("*.txt"))]
+    assert sum("modes     done" in text for text in logs) == 1
+    assert sum("modes     reused" in text for text in logs) == 2
+
+
+def test_a_warning_requeues_the_job_and_it_goes_on(tmp_path: Path, launch, queue) -> None:
+    """Slurm's signal before the time limit, sent by hand: checkpoint, requeue, and the same end."""
+    out = tmp_path / "out"
+    sweep = family(tmp_path, 1.0)
+    done = launch("-m", "runs", "sweep", sweep, "--out", out, "--slurm", env=queue)
+    job = done.stdout.partition("first as job ")[2].partition(",")[0]
+    member = out / "members" / "1_amplitude-0.0001"
+    _until(lambda: "greens    done" in _said(out))
+    time.sleep(1)
+    subprocess.run(["scancel", "--batch", "--signal=USR1", f"{job}_1"], env=queue, check=True)
+    _until(lambda: "Restarts=1" in _shown(queue, job))
+    # Slurm waits two minutes; at once it would still refuse the credential of the job as it was.
+    sooner = ["scontrol", "update", f"JobId={job}_1", "StartTime=now+4seconds"]
+    subprocess.run(sooner, env=queue, check=True)
+    assert "stopped by SIGUSR1" in _said(out)
+    for name in ("family-rest", "family-gather"):
+        subprocess.run(["scancel", f"--name={name}"], env=queue, check=True)
+    ended(queue, 600)
+    results = tireroad.load(member)
+    assert len(results["contact/time"]) == 10000
+
+
+TEMPLATE = """#!/bin/sh
+#PBS -N $name
+#PBS -l select=1:ncpus=$processes
+export TIREROAD_CACHE=$cache
+$body
+wait "$$child"
+"""
+QUEUE = """
+[queue]
+template = "pbs.sh"
+task = "PBS_ARRAY_INDEX"
+submit = "./qsub -V"
+array = "-J 1-{count}"
+after = "-W depend=afterany:{jobs}"
+"""
+QSUB = """#!/bin/sh
+echo "$*" >> qsub.txt
+echo "$(wc -l < qsub.txt).server"
+"""
+
+
+def test_another_queue_by_a_template(tmp_path: Path, launch) -> None:
+    sweep = family(tmp_path, 0.01)
+    sweep.write_text(sweep.read_text().partition("[slurm]")[0] + QUEUE)
+    (tmp_path / "pbs.sh").write_text(TEMPLATE)
+    (tmp_path / "qsub").write_text(QSUB)
+    (tmp_path / "qsub").chmod(0o755)
+    done = launch("-m", "runs", "sweep", sweep, "--out", "out", "--slurm", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    jobs = "out/jobs"
+    assert (tmp_path / "qsub.txt").read_text().splitlines() == [
+        f"-V -J 1-1 {jobs}/first.sh",
+        f"-V -J 1-2 -W depend=afterany:1.server {jobs}/rest.sh",
+        f"-V -W depend=afterany:1.server:2.server {jobs}/gather.sh",
+    ]
+    script = (tmp_path / jobs / "rest.sh").read_text()
+    assert "#PBS -N family-rest" in script and "PBS_ARRAY_INDEX" in script
+    assert subprocess.run(["sh", "-n", str(tmp_path / jobs / "rest.sh")]).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("task", "tasks"), "[queue] needs task"),
+        (('"pbs.sh"', '"other.sh"'), "queue.template"),
+    ],
+)
+def test_mistakes_in_a_queue(tmp_path: Path, launch, change, words) -> None:
+    sweep = family(tmp_path, 0.01)
+    sweep.write_text(sweep.read_text().partition("[slurm]")[0] + QUEUE.replace(*change))
+    (tmp_path / "pbs.sh").write_text("$nothing")
+    done = launch("-m", "runs", "sweep", sweep, "--out", tmp_path / "out", "--slurm")
+    assert done.returncode == 2 and words in done.stderr
+
+
+def _said(out: Path) -> str:
+    return "".join(file.read_text() for file in (out / "jobs").glob("*first*.txt"))
+
+
+def _shown(queue, job: str) -> str:
+    line = ["scontrol", "show", "job", f"{job}_1"]
+    return subprocess.run(line, env=queue, capture_output=True, text=True).stdout
+
+
+def _until(condition, seconds: float = 300) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.2)
