@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.static.held_system import HeldSystem, Moved
+from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.shape_damping import ShapeDamping
 from tireroad.fem.static.step import Step
 from tireroad.fem.static.virtual_work import (
@@ -68,8 +68,10 @@ class Equilibrium:
         self._force = np.zeros(len(body.tread))
         self._scale, self._stiffness = self._yardsticks()
         damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
-        kind = "lu" if damped else "cholesky"
-        self._system = HeldSystem(body.comm, self.matrix, kind, self.cost)
+        self._system = self._make_system("lu" if damped else "cholesky")
+
+    def _make_system(self, kind: str) -> System:
+        return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
 
     @property
     def rounding(self) -> float:

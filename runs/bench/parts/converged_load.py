@@ -70,7 +70,8 @@ def pressed(loader, estimate: float | None = None) -> Pressed:
     """Load and footprint of a tire on the road. Collective."""
     from tireroad.fem.static.state import static_state
 
-    extent = static_state(loader.equilibrium, loader.touch).footprint()
+    # Of a companion the first touch is not known; the footprint does not ask for it.
+    extent = static_state(loader.equilibrium, 0.0).footprint()
     return Pressed(loader.load(), extent.length, extent.width, estimate)
 
 
