@@ -12,6 +12,8 @@ STAGES = (
     "accuracy",
     "response",
     "spectra",
+    "vibration",
+    "motion",
     "report",
 )
 
@@ -36,6 +38,10 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
         reasons["spectra"] = "output.spectra is false"
     if "accuracy" not in reasons and not scene.accuracy.estimate:
         reasons["accuracy"] = "accuracy.estimate is false"
+    if not scene.output.vibration:
+        reasons["vibration"] = "output.vibration is false"
+    if not scene.output.fields:
+        reasons["motion"] = "output.fields is false"
     if until is not None:
         for stage in STAGES[STAGES.index(until) + 1 :]:
             reasons.setdefault(stage, f"--until {until}")

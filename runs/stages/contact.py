@@ -19,6 +19,8 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
+from tireroad.runs.stages.build import pattern
+from tireroad.runs.stages.build.energy import Losses, describe_energy, works
 from tireroad.runs.stages.build.loop import driven_tire, make_loop
 from tireroad.runs.stages.build.point_forces import shortest_period
 from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, told
@@ -29,7 +31,7 @@ from tireroad.runs.stages.build.stepping import (
     passing_period,
     planned,
 )
-from tireroad.runs.stages.energy import Losses, describe_energy, works
+from tireroad.runs.stages.build.watch import Watch
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Done, Stage
@@ -39,7 +41,6 @@ from tireroad.runs.stages.stored.contact_file import (
     begun_with,
     forget_checkpoint,
 )
-from tireroad.runs.stages.watch import Watch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +59,7 @@ class ContactStage(Stage[ContactHistory]):
         return {
             "greens": self.greens.key,
             "contact": asdict(scene.contact),
-            "road": asdict(scene.road),
+            "road": [asdict(scene.road), pattern.inputs(self.job)],
             "file": store.file_hash(scene.road.file) if scene.road.file else None,
             "speed": self.setup.product.rolled.speed,
             "axle_force": scene.output.axle_force,
@@ -84,10 +85,8 @@ class ContactStage(Stage[ContactHistory]):
             begun = begun_with(self.job, key)
             chosen = chosen_scheme(self.job, record, setup, plan, begun)
         spec, patch = self.job.scene.contact, setup.patch
-        observe.say(
-            f"  {len(patch.points)} contact points on {len(patch.index)} nodes, tread {spec.tread}, "
-            f"solver {solver_name(spec, patch)}"
-        )
+        count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
+        observe.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
         doubtful = self.job.scene.time.scheme == "auto" and chosen.scheme == "linear"
         try:
             self._attempt(key, record, setup, plan, chosen.scheme, doubtful)
@@ -131,6 +130,7 @@ class ContactStage(Stage[ContactHistory]):
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
         _describe(record, totals, loop.solver, chosen, chosen.steps - done)
+        pattern.describe(record, setup)
         if chosen.scheme != "convolution":
             work = works(chosen.scheme, totals.work, driven if self.job.scene.force else None)
             given = self.rotating.product, response, loop.tire.snapshot(), work
@@ -158,7 +158,7 @@ class ContactStage(Stage[ContactHistory]):
         """Take the steps that are left; stop between two of them when asked to. Collective."""
         done, steps = totals.figures.steps, chosen.steps
         given = setup.patch, setup.drive, chosen.step, steps
-        instants = roll(loop.tire, loop.solver, *given, loop.friction, done)
+        instants = roll(loop.tire, loop.solver, *given, loop.friction, done, loop.memory)
         watch = Watch(self.job.comm, self.job.scene.time.checkpoint)
         with (
             Deferred() as deferred,

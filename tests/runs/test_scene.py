@@ -161,8 +161,6 @@ def test_contradictions_need_both_sides(scene_file) -> None:
     [
         "tire.mesh=tire.msh",
         "tire.section=car",
-        "output.vibration=true",
-        "output.fields=true",
     ],
 )
 def test_what_this_version_lacks_is_refused(scene_file, item: str) -> None:

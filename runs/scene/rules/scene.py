@@ -6,10 +6,13 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.fem.keys import described
 from tireroad.runs.scene.extent.tire_section import free_unknowns
+from tireroad.runs.scene.rules.output import check_campbell, check_receptance, check_vibration
 from tireroad.runs.scene.rules.tire import full_matrices, geometry
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.axle import check_axle
 from tireroad.runs.scene.tables.cavity import check_cavity
+from tireroad.runs.scene.tables.contact import check_tread
+from tireroad.runs.scene.tables.pattern import check_pattern
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.tables.stiffness import check_stiffness
 
@@ -24,10 +27,6 @@ LATER: dict[str, tuple[tuple[Any, ...], str]] = {
         'is not supported: "torus", "radial" and "file" are',
     ),
 }
-
-
-MOST_FREQUENCIES = 1_000_000
-MOST_SPEEDS = 10_000
 
 
 def refuse_later(raw: dict[str, Any], source: Source) -> None:
@@ -74,7 +73,14 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 def _rotation(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     rotation = scene.rotation
-    if rotation is None or not any(rotation.window):
+    if rotation is None:
+        return
+    given = raw.get("rotation", {}).get("speed")
+    if rotation.travel_speed is not None and given not in (None, rotation.speed):
+        raise error(
+            ("rotation", "travel_speed"), "and speed give the wheel's speed twice: keep one of them"
+        )
+    if not any(rotation.window):
         return
     low, high = rotation.window
     if low >= high:
@@ -126,35 +132,6 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         )
 
 
-def _receptance(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    receptance = scene.output.receptance
-    if receptance is None:
-        return
-    if not scene.force:
-        raise error(("output", "receptance"), "is read at driven points: add a [[force]]")
-    path = "output", "receptance", "step"
-    _count(path, "frequencies", receptance.to, receptance.step, "Hz", MOST_FREQUENCIES, error)
-
-
-def _campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    campbell = scene.rotation.campbell if scene.rotation else None
-    if campbell is not None:
-        path = "rotation", "campbell", "step"
-        _count(path, "speeds", campbell.to, campbell.step, "rad/s", MOST_SPEEDS, error)
-
-
-def _count(path, what: str, to: float, step: float, unit: str, most: int, error: Where) -> None:
-    """A step into a range that makes neither none nor too many."""
-    if step > to:
-        raise error(path, f"= {step:g} {unit} must not be more than to = {to:g} {unit}")
-    if to / step > most:
-        raise error(
-            path,
-            f"= {step:g} {unit} makes {to / step:.3g} {what} up to to = {to:g} {unit}, "
-            f"more than {most}: take a larger step",
-        )
-
-
 def _force(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     receptance = scene.output.receptance
     for key in ("velocity", "acceleration"):
@@ -196,11 +173,8 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     if static.load is None and static.deflection is None and static.road_height is None:
         raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
     contact = scene.contact
-    if contact.brush_stiffness is None and contact.friction is not None:
-        raise error(("contact", "friction"), "needs brush_stiffness (N/m), which carries it")
     standing = scene.rotation is None or scene.rotation.speed == 0
-    if any(contact.slip) and (contact.brush_stiffness is None or standing):
-        raise error(("contact", "slip"), "needs brush_stiffness (N/m) and a rolling tire")
+    check_tread(contact, standing, error)
 
 
 def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
@@ -227,12 +201,14 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("modal", "static", "rotation", "contact", "damping", "greens"), _modal),
     (("damping", "rotation", "output"), full_matrices),
     (("contact", "road", "time", "static", "rotation"), _contact),
-    (("output", "force"), _receptance),
-    (("rotation",), _campbell),
+    (("output", "force"), check_receptance),
+    (("rotation",), check_campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),
     (("stiffness", "static"), check_stiffness),
     (("tire", "rotation", "modal", "greens"), check_cavity),
+    (("pattern", "contact"), check_pattern),
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
+    (("output", "time", "contact", "force", "rotation"), check_vibration),
     (("time",), _time),
 )

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from tireroad.contact.driven import Driven
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.model import step_solver
+from tireroad.contact.model import step_solver, tread_memory
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.friction import Friction
@@ -33,18 +33,21 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
     """The tire as seen at the patch's points, normal solver and friction of the table [contact]."""
     patch = setup.patch
     p = len(patch.index)
-    solver, friction = step_solver(spec, patch, tire.same_step[:p, :p]), None
-    if spec.brush_stiffness is not None:
+    memory = tread_memory(spec, patch, setup.rolled.speed, step)
+    at_once = memory.at_once if memory else 1.0
+    solver, friction = step_solver(spec, patch, tire.same_step[:p, :p], at_once), None
+    if spec.rubs:
         friction = _friction(spec, setup, tire, step)
     if patch.weights is not None:
         tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
-    return Loop(tire, solver, friction)
+    return Loop(tire, solver, friction, memory)
 
 
 def _friction(spec, setup: ContactSetup, tire, step: float) -> Friction:
     """The brush of the scene, at rest."""
     patch = setup.patch
-    law = BrushLaw(spec.brush_stiffness, spec.friction, spec.slip, spec.brush)
+    stiffness = spec.brush_stiffness or spec.brush_stiffness_per_area * patch.area
+    law = BrushLaw(stiffness, spec.friction, spec.slip, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0)
     return Friction(brush, tire.same_step, patch.weights)
@@ -70,7 +73,9 @@ def forces(
     contact, axle = np.zeros((2, steps, 3))
     given = setup.patch, setup.drive, step, steps
     with threadpool_limits(1, "blas"):
-        for k, instant in enumerate(roll(loop.tire, loop.solver, *given, loop.friction)):
+        for k, instant in enumerate(
+            roll(loop.tire, loop.solver, *given, loop.friction, 0, loop.memory)
+        ):
             contact[k, :2] = instant.horizontal.sum(axis=0)
             contact[k, 2], axle[k] = instant.force.sum(), instant.axle_force
             if instant.force[setup.patch.edge].any():
