@@ -14,7 +14,7 @@ from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite, keys
 
 
 class ParameterError(InputError):
-    """A parameter that does not fit; `parameter` is its name, `reason` what is wrong."""
+    """A parameter out of its range or type; `parameter` is its name, `reason` what is wrong."""
 
     def __init__(self, parameter: str, reason: str, owner: str = "") -> None:
         super().__init__(f"{owner}: {parameter} {reason}" if owner else f"{parameter} {reason}")

@@ -54,7 +54,9 @@ class StaticStage(Computed[StaticState]):
             "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
             "file": fingerprint(scene.tire),
             "static": asdict(scene.static),
-            "rolling": asdict(steady_rolling(self.job, scene.rotation and scene.rotation.speed)),
+            "rolling": asdict(
+                steady_rolling(self.job, scene.rotation.speed if scene.rotation else None)
+            ),
             "travel": [scene.rotation.travel_speed, scene.rotation.rolling_radius]
             if scene.rotation
             else None,

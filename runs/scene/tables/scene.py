@@ -34,7 +34,8 @@ class Static:
         None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, most=-1e-3
     )
     steady_rolling: bool = flag(
-        True, "inertia and material damping of the rolling shape; false: the state at rest"
+        True,
+        "include the inertia and material damping of the rolling shape; false: the state at rest",
     )
     error_estimate: bool = flag(
         True, "estimate of the load's discretisation error, by a solution on coarser elements"
@@ -55,7 +56,7 @@ class Modal:
     road: str = choice(
         "forces",
         ("forces", "held"),
-        "road in the modes: its forces of the static state, or its nodes held in height",
+        "road in the modes: replaced by its static forces, or the touching nodes held in height",
     )
 
 
@@ -121,11 +122,11 @@ class Greens:
     residual: str = choice(
         "static",
         ("none", "dirac", "static", "second-order", "attachment"),
-        "residual flexibility: what stands for the modes that are left out",
+        "residual flexibility, which represents the modes that are left out",
     )
     dynamic: int | None = integer(
         None,
-        "number of states kept dynamic, the others follow statically; absent: all",
+        "number of states kept dynamic; the others respond statically; absent: all",
         least=1,
         most=200000,
     )
