@@ -9,8 +9,8 @@ import numpy as np
 from mpi4py import MPI
 
 from tireroad.fem.sections.torus import Torus
-from tireroad.runs.bench.harmonics import Rubber, lowest
 from tireroad.runs.bench.parts import converged_load
+from tireroad.runs.bench.series.harmonics import Rubber, lowest
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
 
