@@ -18,6 +18,7 @@ import socket
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -29,6 +30,7 @@ from tireroad.fem.errors import InputError
 
 DONE = ".c.cached"  # FFCx's mark of a module that is compiled
 _LOCK = "in-use"
+_ABANDONED = 3600.0  # s without a lock, of a folder of another machine
 _PATIENCE = 2.0  # s of compilation before it is announced
 _LIBRARY = tuple(EXTENSION_SUFFIXES)
 
@@ -113,13 +115,37 @@ def _sweep(kept: Path) -> None:
     """Remove the folders of processes that have ended without doing so."""
     for folder in kept.glob("run-*"):
         with suppress(OSError):
+            if _unlocked(folder):
+                _remove(folder)
+                continue
             handle = os.open(folder / _LOCK, os.O_RDWR | os.O_CLOEXEC)
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                end_compilers(folder)
-                shutil.rmtree(folder, ignore_errors=True)
+                _remove(folder)
             finally:
                 os.close(handle)
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder in which compilers may still write until they have died."""
+    end_compilers(folder)
+    for _ in range(10):
+        shutil.rmtree(folder, ignore_errors=True)
+        if not folder.exists():
+            return
+        time.sleep(0.1)
+
+
+def _unlocked(folder: Path) -> bool:
+    """Whether a folder has no lock and nobody who is about to make it: its process was killed before, or while
+    it removed the folder.
+    """
+    if (folder / _LOCK).exists():
+        return False
+    process = folder.name.removeprefix(f"run-{socket.gethostname()}-").partition("-")[0]
+    if process.isdigit():
+        return not Path("/proc", process).exists()
+    return time.time() - folder.stat().st_mtime > _ABANDONED  # of another machine
 
 
 def _forms(folder: Path) -> dict[str, list[str]]:

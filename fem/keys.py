@@ -13,27 +13,20 @@ OnlyFor = tuple[str, tuple[str, ...]] | None
 
 @dataclass(frozen=True)
 class Limits:
-    """A range: `least` and `most` belong to it, `above` and `below` do not; None: no limit."""
+    """A range, both ends in it; None: no limit. A size ends at the least that makes sense, not at 0."""
 
     least: float | None = None
-    above: float | None = None
     most: float | None = None
-    below: float | None = None
 
     def __str__(self) -> str:
         low = f"≥ {self.least:g}" if self.least is not None else ""
-        low = f"> {self.above:g}" if self.above is not None else low
         high = f"≤ {self.most:g}" if self.most is not None else ""
-        high = f"< {self.below:g}" if self.below is not None else high
         return ", ".join(part for part in (low, high) if part) or "any"
 
     def check(self, value: float, unit: str) -> None:
         """ValueError for a value outside the range."""
-        inside = (
-            (self.least is None or value >= self.least)
-            and (self.above is None or value > self.above)
-            and (self.most is None or value <= self.most)
-            and (self.below is None or value < self.below)
+        inside = (self.least is None or value >= self.least) and (
+            self.most is None or value <= self.most
         )
         if not inside:
             # A whole number may be too large for the format of real ones.

@@ -60,14 +60,12 @@ def number(
     doc: str,
     *,
     least: float | None = None,
-    above: float | None = None,
     most: float | None = None,
-    below: float | None = None,
     word: str | None = None,
     only_for: OnlyFor = None,
 ) -> Any:
     """A finite real number, or the one `word` where given. A default of None makes it optional."""
-    limits = Limits(least, above, most, below)
+    limits = Limits(least, most)
 
     def read(value: Any) -> float | str:
         if word is not None and value == word:

@@ -67,6 +67,11 @@ class Basis:
             residual=response.residual + wanted @ moment.T,
         )
 
+    @property
+    def coordinates(self) -> int:
+        """How many there are: m + a + c."""
+        return self.projection.carried.shape[1]
+
     def seen(self, probes: sparse.csr_matrix) -> np.ndarray:
         """All coordinates (k, m + a + c) as the probes read them (modal.basis.Projection.seen)."""
         return self.projection.seen(self._of_modes(probes), probes)

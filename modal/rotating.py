@@ -4,8 +4,7 @@
 
 (thesis (2.1)-(2.5), put right; the doppler form takes B for G and S_B for S). Its response to modal
 forces is kept as  eta(t) = Re[R z(t)] + R_b y(t),  z' = s z + L f,  y' = T y + L_b f:  one complex
-state per conjugate pair or real eigenvalue, and a real block for eigenvalues too close to defective
-to have usable vectors of their own.
+state per conjugate pair or real eigenvalue, and a real block for those too close to defective.
 """
 
 from __future__ import annotations
@@ -170,7 +169,7 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
     good = (condition <= DEFECTIVE) & ~(rest & ((condition > _SKEWED) | (rest.sum() > 1)))
     block_inverse = block_vectors.T
     if not good.all():
-        block, block_vectors = _invariant(companion, values[~good])
+        block, block_vectors, good = _invariant(companion, values, good)
         if rest[~good].all():
             block, block_vectors = at_rest(companion, block_vectors, slow)
         values, vectors = values[good], vectors[:, good]
@@ -217,23 +216,26 @@ def _inverse(values, vectors, block_vectors) -> tuple[np.ndarray, np.ndarray]:
     return rows, inverse[count + waves :]
 
 
-def _invariant(companion: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Schur block and orthonormal real basis of the invariant subspace of the chosen eigenvalues.
+def _invariant(
+    companion: np.ndarray, values: np.ndarray, good: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Schur block and orthonormal real basis of the invariant subspace of the eigenvalues that are not `good`,
+    and which are good in the end: what cannot be told from the others goes with them.
 
     Another algorithm finds them again within what a defective one is uncertain by: a small part of
     itself, or, where it is zero, of the matrix.
     """
-    expected = int(np.where(chosen.imag > 0, 2, 1).sum())
-    everything = np.linalg.norm(companion, 2)
+    chosen, everything = values[~good], np.linalg.norm(companion, 2)
     for near in (1e-6 * np.abs(chosen).max(), 1e-7 * everything, 1e-6 * everything):
 
-        def wanted(re, im, near=near):
+        def taken(re: float, im: float, near=near) -> bool:
             both = np.abs([chosen - complex(re, im), chosen - complex(re, -im)])
             return bool(both.min() < near)
 
-        schur, basis, count = linalg.schur(companion, output="real", sort=wanted)
-        if count == expected:
-            return schur[:count, :count], basis[:, :count]
+        within = np.array([taken(v.real, v.imag) for v in values])
+        schur, basis, count = linalg.schur(companion, output="real", sort=taken)
+        if count == np.where(values[within].imag > 0, 2, 1).sum():
+            return schur[:count, :count], basis[:, :count], ~within
     raise ConvergenceError(
         f"rotating: {len(chosen)} eigenvalues next to defective ones ({np.abs(chosen).min():.4g} to "
         f"{np.abs(chosen).max():.4g} 1/s) cannot be told from others. Change the damping or the speed a "

@@ -7,11 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 
 GROWS = 1e-9  # of the largest |s|: a growth rate below is rounding, an undamped state's is 0 with either sign
+ROUNDING = (
+    1e3 * np.finfo(float).eps
+)  # of the largest |s|^2: what rounding of the pencil may add to an s^2
 
 
 def growing(eigenvalue: np.ndarray) -> np.ndarray:
-    """Which of the eigenvalues (q,) 1/s of one problem belong to a growing motion: Re s beyond rounding."""
-    return eigenvalue.real > GROWS * np.abs(eigenvalue).max(initial=1.0)
+    """Which of the eigenvalues (q,) 1/s of one problem belong to a growing motion: Re s beyond rounding.
+
+    Rounding changes s^2 by a part of the largest one, hence s by that over 2 |s|: much where s is next to 0. A
+    rigid motion, s^2 = 0, comes out with s^2 of 1e-10 1/s^2 and either sign, and drifts but does not grow.
+    """
+    size = np.abs(eigenvalue)
+    largest = size.max(initial=1.0)
+    rate = eigenvalue.real
+    return (rate > GROWS * largest) & (rate * size > ROUNDING * largest**2)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ class Ring:
     """The section revolved about the axle (y) in `segments` elements around, all of the section's order.
 
     `ring_corners` (segments + 1,) rad: the angles of the element corners, ascending from 0, the lowest
-    point, towards +x, to 2 pi. `arc_corners` (k + 1,) rad: the section angle, ascending, where the k
+    point, towards +x, to 2 pi; of a sector, to less. `arc_corners` (k + 1,) rad: the section angle, ascending, where the k
     edges of the outer face start and end; 0 is the crown, y > 0 positive. `thickness` m of a typical
     wall and `height` m of the section: the scale of motions. `coarser`: the same tire of elements about
     twice the size, None where there is none.
@@ -38,6 +38,11 @@ class Ring:
     def order(self) -> int:
         """Of the elements."""
         return self.section.order
+
+    @property
+    def closed(self) -> bool:
+        """Whether it goes all the way round, and is no sector."""
+        return bool(self.ring_corners[-1] - self.ring_corners[0] > 2 * np.pi * (1 - 1e-9))
 
     @property
     def elements(self) -> int:

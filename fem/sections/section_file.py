@@ -23,6 +23,15 @@ _COMPOUND = {
     "loss_factor": 0.0,
 }
 
+# As those of [tire.material] and [[tire.region]].
+_RANGES = {
+    "youngs_modulus": (1e3, 1e13),
+    "poisson_ratio": (-0.99, 0.4999),
+    "density": (1.0, 3e4),
+    "dynamic": (0.01, 100.0),
+    "loss_factor": (0.0, 2.0),
+}
+
 
 def read(path: Path | str) -> Construction:
     """The construction of a file. InputError, with the file, for all that is not as documented."""
@@ -132,14 +141,9 @@ def _compound(name: str, table: Any) -> dict[str, float]:
         raise InputError(f"{where} must be a table")
     _known(table, set(_COMPOUND), where)
     found = {key: _number(table, key, where, default) for key, default in _COMPOUND.items()}
-    if (
-        found["youngs_modulus"] <= 0
-        or found["density"] <= 0
-        or not -1 < found["poisson_ratio"] < 0.5
-    ):
-        raise InputError(
-            f"{where}: modulus and density above 0, Poisson's ratio between -1 and 0.5"
-        )
+    for key, (least, most) in _RANGES.items():
+        if not least <= found[key] <= most:
+            raise InputError(f"{where}: {key} = {found[key]:g} must lie from {least:g} to {most:g}")
     return found
 
 

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from tireroad.fem import compat, kinematics
-from tireroad.fem.static.held_system import HeldSystem, Moved
+from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.shape_damping import ShapeDamping
 from tireroad.fem.static.virtual_work import (
     AT_REST,
@@ -78,8 +78,10 @@ class Equilibrium:
         self._force = np.zeros(len(body.tread))
         self._scale, self._stiffness = self._yardsticks()
         damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
-        kind = "lu" if damped else "cholesky"
-        self._system = HeldSystem(body.comm, self.matrix, kind, self.cost)
+        self._system = self._make_system("lu" if damped else "cholesky")
+
+    def _make_system(self, kind: str) -> System:
+        return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
 
     @property
     def rounding(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -20,6 +21,21 @@ class Moved:
 
     change: np.ndarray
     force: np.ndarray
+
+
+class System(Protocol):
+    """The linearised equilibrium as Newton's method needs it; as `HeldSystem` says."""
+
+    closing: Moved
+    raising: Moved
+
+    def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
+        """Factorise; False when the matrix is singular. Collective."""
+        ...
+
+    def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Motion (m) of the owned dofs under forces (N), and force (N) at the held ones. Collective."""
+        ...
 
 
 class HeldSystem:

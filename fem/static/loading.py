@@ -1,7 +1,6 @@
 """Load steps to a wanted state: inflation, then the road by height, deflection or load.
 
-Steps are cut back when Newton fails and grow again when it is easy; a step that cannot be made
-small enough is an error that names the last good state.
+Steps are cut back when Newton fails and grow when it is easy; one too small is an error with the last good state.
 """
 
 from __future__ import annotations
@@ -12,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.parallel import on_root
 from tireroad.fem.static.equilibrium import Equilibrium, Step
+from tireroad.fem.static.round import RoundEquilibrium
 from tireroad.fem.static.tread_surface import TreadSurface
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
@@ -65,14 +66,39 @@ class Loader:
         self._touch: float | None = None
 
     def inflate(self, pressure: float) -> None:
-        """Inflation from 0 to `pressure` (Pa), without a road; also the steady-rolling loads alone."""
+        """Inflation from 0 to `pressure` (Pa), without a road; also the steady-rolling loads alone.
 
+        By the round shape of one section, where that is near enough for Newton; else in steps.
+        """
+        if not (self.body.plies.cords and self._start_round(pressure)):
+            self._inflate_in_steps(pressure)
+        self._touch = self.lowest()
+
+    def _start_round(self, pressure: float) -> bool:
+        """Whether equilibrium is found from the round shape. Collective."""
+
+        def shape() -> np.ndarray:
+            section = RoundEquilibrium(self.body, self.equilibrium.rolling)
+            Loader(section, self.report)._inflate_in_steps(pressure)
+            return section.on(self.body.lattice)
+
+        before = self.body.u.x.array.copy()
+        self.body.set_displacement(on_root(self.body.comm, shape))
+        self.equilibrium.pressure.value = pressure
+        step = self.equilibrium.solve()
+        self.newton_steps += step.iterations
+        if step.converged:
+            self._report("inflation", pressure, "Pa", step)
+        else:
+            self.body.u.x.array[:] = before
+        return step.converged
+
+    def _inflate_in_steps(self, pressure: float) -> None:
         def attempt(fraction: float) -> Step:
             self.equilibrium.pressure.value = fraction * pressure
             return self.equilibrium.solve()
 
         self._march(attempt, 0.0, 1.0, 1.0, "inflation", pressure, "Pa")
-        self._touch = self.lowest()
 
     @property
     def touch(self) -> float:

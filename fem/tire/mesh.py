@@ -34,7 +34,8 @@ class Lattice:
         tire = tire.ring() if isinstance(tire, Torus) else tire
         self.tire, self.edge = tire, edge
         self.ring_corners, self.arc_corners = tire.ring_corners, tire.arc_corners
-        self.ring = _subdivide(tire.ring_corners, edge)[:-1]
+        angles = _subdivide(tire.ring_corners, edge)
+        self.ring = angles[:-1] if tire.closed else angles
         self.arc = _subdivide(tire.arc_corners, edge)
         self.section, self.cells_2d = tire.section.on_nodes(tire.order, edge)
         self.shape = len(self.ring), len(self.section)

@@ -140,6 +140,23 @@ def response(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     return files
 
 
+def vibration(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """vibration.csv: third-octave levels of the outer face."""
+    names = {
+        "velocity level [dB re 1 nm/s]": "velocity_level",
+        "radiated power [dB re 1 pW]": "radiated_power_level",
+        "radiated power, A-weighted [dB(A) re 1 pW]": "radiated_power_level_a_weighted",
+    }
+    columns = {"band centre [Hz]": file["third_octave/centre"][()]}
+    columns |= {label: file[f"third_octave/{name}"][()] for label, name in names.items()}
+    return _table("vibration.csv", columns)
+
+
+def motion(file: h5py.File) -> dict[str, Callable[[Path], object]]:
+    """motion.xdmf: the outer face in time, for ParaView."""
+    return _page("motion.xdmf", xdmf.motion(file))
+
+
 def _page(name: str, text: str | None) -> dict[str, Callable[[Path], object]]:
     return {} if text is None else {name: partial(Path.write_text, data=text, encoding="utf-8")}
 
@@ -150,4 +167,6 @@ READERS: dict[str, Callable[[h5py.File], dict[str, Callable[[Path], object]]]] =
     "contact.h5": contact,
     "spectra.h5": spectra,
     "response.h5": response,
+    "vibration.h5": vibration,
+    "motion.h5": motion,
 }

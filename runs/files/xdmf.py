@@ -47,6 +47,21 @@ def contact(file: h5py.File) -> str | None:
     return _document(series + "\n".join(grids) + "</Grid>")
 
 
+def motion(file: h5py.File) -> str | None:
+    """The outer face over time: warp it by its displacement beyond the static state."""
+    time, moved = file["time"][()], file["displacement"]
+    if not len(time):
+        return None
+    geometry, topology = _surface(file)
+    grids = []
+    for row, value in enumerate(time):
+        field = _attribute("displacement", "Vector", _row(moved, row))
+        instant = f'<Time Value="{value:.10g}"/>'
+        grids.append(_grid(f"instant {row}", geometry, topology, instant + field))
+    series = '<Grid Name="motion" GridType="Collection" CollectionType="Temporal">'
+    return _document(series + "\n".join(grids) + "</Grid>")
+
+
 def _surface(file: h5py.File) -> tuple[str, str]:
     """Geometry and topology of the outer face; its quads are kept in static.h5 alone."""
     points = file["surface/points"]

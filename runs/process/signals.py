@@ -55,8 +55,12 @@ class _Heard:
     supervisor: int | None = None
 
 
-def tell_when_heard(descriptor: int) -> None:
-    """Write a byte there when a stop signal has reached Python: it has not while a library works."""
+DEFERRED = b"d"
+"""What the supervisor is told of a request that the loop has noted, and ends of by itself."""
+
+
+def tell_when_deferred(descriptor: int) -> None:
+    """Write DEFERRED there when a stop signal has been noted, and b"!" when it has been raised instead."""
     _Heard.supervisor = descriptor
 
 
@@ -80,11 +84,12 @@ def _stop(number: int, _frame: Any) -> None:
     if now - before < TOGETHER:
         return
     _Heard.at = now
+    name, current = signal.Signals(number).name, Deferred._current
+    defers = current is not None and not current.asked
     if _Heard.supervisor is not None:
         with suppress(OSError):  # the supervisor may be what has ended
-            os.write(_Heard.supervisor, b"!")
-    name, current = signal.Signals(number).name, Deferred._current
-    if current is None or current.asked:
+            os.write(_Heard.supervisor, DEFERRED if defers else b"!")
+    if not defers:
         _Heard.raised = name
         raise Stopped(name)
     current.asked = name

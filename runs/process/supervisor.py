@@ -25,7 +25,8 @@ from tireroad.runs.process.statuses import (
 )
 
 PATIENCE = 8.0
-"""Seconds in which a stop must have been heard; then the worker is killed."""
+"""Seconds from a request to the end; then the worker is killed. A loop that has noted the request writes its
+checkpoint first, however long that takes; elsewhere files are whole or absent, and nothing is lost."""
 
 _AGAIN = "what was finished is kept, the same command or resume goes on"
 _PR_SET_PDEATHSIG = 1
@@ -39,7 +40,7 @@ def supervise() -> None:
     worker = os.fork()
     if worker == 0:
         os.close(hears)
-        signals.tell_when_heard(tells)
+        signals.tell_when_deferred(tells)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGCHLD})
         _end_with(supervisor)
         return
@@ -75,17 +76,17 @@ def _watch(worker: int, hears: int) -> int:
             deadline = min(deadline, time.monotonic() + PATIENCE)
             os.kill(worker, caught.si_signo)
         if time.monotonic() >= deadline:
-            if _heard(hears):
-                deadline = float("inf")  # it is stopping in order, however long that takes
+            if _deferred(hears):
+                deadline = float("inf")
             else:
                 return _killed(worker, asked)
 
 
-def _heard(descriptor: int) -> bool:
-    """Whether the worker has told of a signal since this was last asked."""
+def _deferred(descriptor: int) -> bool:
+    """Whether the last that the worker has told since this was last asked is that its loop will stop."""
     os.set_blocking(descriptor, False)
     try:
-        return bool(os.read(descriptor, 4096))
+        return os.read(descriptor, 4096).endswith(signals.DEFERRED)
     except BlockingIOError:
         return False
 

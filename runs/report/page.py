@@ -12,7 +12,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.read import Absent, Results, Section
-from tireroad.runs.report import force_sections, stiffness, tire_sections
+from tireroad.runs.report import force_sections, stiffness, tire_sections, vibration
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.report.verdicts import verdicts
 from tireroad.runs.scene.plan import STAGES
@@ -28,6 +28,7 @@ SECTIONS: Mapping[str, Callable[[Results], Section]] = {
     "response.h5": force_sections.response,
     "contact.h5": force_sections.contact,
     "spectra.h5": force_sections.spectra,
+    "vibration.h5": vibration.vibration,
 }
 
 

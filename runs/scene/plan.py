@@ -11,6 +11,8 @@ STAGES = (
     "contact",
     "response",
     "spectra",
+    "vibration",
+    "motion",
     "report",
 )
 
@@ -33,6 +35,10 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
             reasons["greens"] = "neither [[force]] nor [contact]"
     elif not scene.output.spectra:
         reasons["spectra"] = "output.spectra is false"
+    if not scene.output.vibration:
+        reasons["vibration"] = "output.vibration is false"
+    if not scene.output.fields:
+        reasons["motion"] = "output.fields is false"
     if until is not None:
         for stage in STAGES[STAGES.index(until) + 1 :]:
             reasons.setdefault(stage, f"--until {until}")

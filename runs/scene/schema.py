@@ -78,19 +78,6 @@ def points(doc: str, *, least: float, most: float) -> Any:
     )
 
 
-def later(doc: str) -> Any:
-    """A key of the public interface that this version does not compute: false is its only value."""
-
-    def read(value: Any) -> bool:
-        if value is not False:
-            raise ValueError(
-                f"must be false, the only value supported in this version, not {described(value)}"
-            )
-        return value
-
-    return parameter(Key(read=read, doc=f"{doc}: not in this version", values="false"), False)
-
-
 def table(of: type, doc: str, *, optional: bool = False) -> Any:
     """A nested table; absent it is None where optional, else all its defaults."""
     meta = {"table": Table(of, doc, optional)}
@@ -214,7 +201,6 @@ __all__ = [
     "flag",
     "integer",
     "key_of",
-    "later",
     "names",
     "number",
     "owners",

@@ -24,6 +24,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
+from tireroad.runs.stages.build.energy import Losses, describe_energy, works
 from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, told
 from tireroad.runs.stages.build.stepping import (
@@ -33,7 +34,7 @@ from tireroad.runs.stages.build.stepping import (
     passing_period,
     planned,
 )
-from tireroad.runs.stages.energy import Losses, describe_energy, works
+from tireroad.runs.stages.build.watch import Watch
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Done, Stage
@@ -43,7 +44,6 @@ from tireroad.runs.stages.stored.contact_file import (
     begun_with,
     forget_checkpoint,
 )
-from tireroad.runs.stages.watch import Watch
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -31,36 +31,11 @@ from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.rules.road import check_road
 from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.build.cavity import AirColumn
-from tireroad.runs.stages.build.setup import Setup
-from tireroad.runs.stages.contact import ContactStage
-from tireroad.runs.stages.greens import GreensStage, Responses
+from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.modes import Fields, ModesStage, Motions
+from tireroad.runs.stages.parts import PARTS
 from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.response import ResponseStage
-from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
-from tireroad.runs.stages.spectra import SpectraStage
 from tireroad.runs.stages.stage import Done, Part, Shared, Stage
-from tireroad.runs.stages.static import StaticStage
-from tireroad.runs.stages.stiffness import StiffnessStage
-
-PARTS: tuple[type[Part], ...] = (
-    StaticStage,
-    StiffnessStage,
-    Motions,
-    Setup,
-    ModesStage,
-    AirColumn,
-    Fields,
-    FullMatrices,
-    RotatingStage,
-    GreensStage,
-    ContactStage,
-    ResponseStage,
-    SpectraStage,
-)
-"""In their order: each takes, by name, what stands before it."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy import sparse
+from scipy import sparse, special
+from scipy.interpolate import CubicSpline
 
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.grid_compliance import MatrixCompliance, SpreadCompliance
@@ -47,7 +48,7 @@ def patch_compliance(tire_scale: float):
 @pytest.mark.parametrize("thickness", [None, 0.004])
 def test_convolution_is_the_matrix(thickness) -> None:
     places, points = oval()
-    influence = half_space if thickness is None else LayerInfluence(5e6, 0.45, thickness, 0.1)
+    influence = half_space if thickness is None else LayerInfluence(5e6, 0.45, thickness)
     halves = np.tile(np.array(SPACING) / 2, (len(points), 1))
     matrix = dense_compliance(points, halves, influence)
     kernel = KernelTread(places, influence)
@@ -121,9 +122,46 @@ def test_layer_under_even_pressure_and_deep_layer() -> None:
     n, d = 81, 0.004
     x, y = np.meshgrid((np.arange(n) - n // 2) * d, (np.arange(n) - n // 2) * d)
     half = np.full(x.shape, d / 2)
-    sink = LayerInfluence(young, nu, h, 0.3)(x, y, half, half).sum() * d * d
+    sink = LayerInfluence(young, nu, h)(x, y, half, half).sum() * d * d
     assert sink == pytest.approx(h * (1 + nu) * (1 - 2 * nu) / (young * (1 - nu)), rel=1e-3)
-    deep = LayerInfluence(5e6, 0.45, 100.0, 0.1)(x, y, half, half)
+    deep = LayerInfluence(5e6, 0.45, 100.0)(x, y, half, half)
     assert np.allclose(deep, half_space(x, y, half, half), rtol=0, atol=2e-3 * deep.max())
     with pytest.raises(InputError, match="thickness"):
-        LayerInfluence(young, nu, 0.0, 0.1)
+        LayerInfluence(young, nu, 0.0)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
+@pytest.mark.parametrize("thickness", [1e-4, 1e-3, 5e-3, 1.0])
+def test_layer_is_positive_definite(nu: float, thickness: float) -> None:
+    """Rectangles of any shape, a hundredth to 500 times as wide as the layer is thick: it never pulls."""
+    layer = LayerInfluence(5e6, nu, thickness)
+    for spacing in ((1e-3, 1e-3), (0.02, 0.02), (0.05, 0.05), (5e-3, 0.05), (0.03, 1e-3)):
+        places = np.stack(np.indices((4, 4)), axis=-1).reshape(-1, 2) * spacing
+        halves = np.tile(np.array(spacing) / 2, (len(places), 1))
+        matrix = dense_compliance(places, halves, layer)
+        values = np.linalg.eigvalsh(matrix)
+        assert values[0] > 0.03 * values[-1], spacing
+        half = dense_compliance(places, halves, lambda *w: half_space_influence(*w, 5e6, nu))
+        assert np.all(matrix.diagonal() < half.diagonal()), spacing
+
+
+@pytest.mark.parametrize("sides", [(0.01, 0.01), (0.05, 0.08), (0.004, 0.12)])
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.006, 0.003), (0.03, -0.1)])
+def test_layer_under_a_rectangle(sides, place) -> None:
+    """Against the correction of a point force, summed over small squares of the rectangle."""
+    young, nu, h = 5e6, 0.4, 0.01
+    m = (np.arange(4000) + 0.5) * 0.01
+    ratio = 0.01 * (transform_ratio(m, nu) - 1.0) * (1 - nu**2) / (np.pi * young * h)
+    r = np.linspace(0.0, 0.2, 800)
+    point = CubicSpline(r, [special.j0(m * s / h) @ ratio for s in r])
+    a, b = np.array(sides) / 2
+    s, t = np.meshgrid(*((np.arange(400) + 0.5) / 400 * 2 * side - side for side in (a, b)))
+    summed = point(np.hypot(place[0] - s, place[1] - t)).mean()
+    where = [np.array([value]) for value in (*place, a, b)]
+    found = LayerInfluence(young, nu, h)(*where) - half_space_influence(*where, young, nu)
+    assert found[0] == pytest.approx(summed, abs=1e-4 * abs(point(0.0)))
+
+
+def test_an_incompressible_layer_much_thinner_than_its_points_is_refused() -> None:
+    with pytest.raises(InputError, match="closer contact.points, or a smaller contact.poisson"):
+        LayerInfluence(5e6, 0.5, 1e-4)(*(np.array([v]) for v in (0.0, 0.0, 0.01, 0.01)))

@@ -143,3 +143,17 @@ def test_a_long_compilation_is_announced(monkeypatch: pytest.MonkeyPatch) -> Non
 
     assert form_cache.compiled(MPI.COMM_SELF, make) == "made"
     assert len(said) == 1 and str(form_cache.kept_in()) in said[0]
+
+
+def test_folders_without_a_lock_are_removed_when_nobody_makes_them(tmp_path: Path) -> None:
+    """A process killed between making its folder and the lock in it; one that is just there; another machine's."""
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    names = [form_cache.folder_prefix(n) + "x" for n in (dead.pid, os.getpid())]
+    folders = [tmp_path / name for name in (*names, "run-elsewhere-12-x", "run-elsewhere-13-x")]
+    for folder in folders:
+        folder.mkdir()
+    (folders[0] / "libffcx_forms_1.c").write_text("half a form")
+    os.utime(folders[3], (1e9, 1e9))
+    form_cache._sweep(tmp_path)
+    assert [folder.exists() for folder in folders] == [False, True, True, False]

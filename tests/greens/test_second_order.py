@@ -105,3 +105,20 @@ def test_momentum_of_the_residual_states() -> None:
     carried = -((response.momentum / response.eigenvalue) @ response.input).real
     exact = moments(system).momentum
     assert np.abs(carried - exact).max() < 1e-9 * np.abs(exact).max()
+
+
+def test_what_is_left_when_rolling_is_the_coupling_with_kept_modes() -> None:
+    """Coriolis and convective terms between kept modes and those left out are no residual's: without them the
+    error falls to that of a standing wheel; attachment modes, which are coupled, have them.
+    """
+    system = make(m=40, points=5, speed=60.0, damping=50.0)
+    drag, stiffness = system.drag.copy(), system.stiffness.copy()
+    for matrix in (drag, stiffness):
+        matrix[:KEPT, KEPT:] = matrix[KEPT:, :KEPT] = 0.0
+    apart = type(system)(drag, stiffness, system.shape)
+    standing = make(m=40, points=5, speed=0.0, damping=50.0)
+    coupled, alone, still = (
+        error(one, "second-order", band(one)).max() for one in (system, apart, standing)
+    )
+    assert alone < 2 * still
+    assert coupled > 5 * alone

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from rings import inextensional_ring, random_tire, wave_ring
+from scipy import linalg
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.basis import Projection
 from tireroad.modal.campbell import critical_speed, growth, onset, sweep
-from tireroad.modal.rotating import checks, matrices, rotating, standing
+from tireroad.modal.rotating import _invariant, checks, matrices, rotating, standing
 from tireroad.modal.states import growing
 
 WAVES = {0: 300.0, 1: 420.0, 2: 500.0, 3: 800.0, 4: 1300.0}
@@ -211,3 +212,27 @@ def test_states_come_in_one_order_and_phase():
     right[mixed], left[:, mixed] = other.right, other.left
     np.testing.assert_allclose(right, plain.right, atol=1e-9)
     np.testing.assert_allclose(left, plain.left, atol=1e-9 * np.abs(left).max())
+
+
+def test_rigid_motions_drift_and_do_not_grow():
+    """s^2 = 0 of a free wheel, computed among modes of up to 1250 1/s: +-1e-5 1/s, on two of its motions."""
+    rigid = np.array([1.04e-5, -1.04e-5, 3e-6j, -3e-6j])
+    assert not growing(np.concatenate([rigid, [88j, -88j, 1254j, -1254j]])).any()
+    for rate in (0.01, 1e-3 + 88j, 1e-3 + 1254j):
+        assert growing(np.array([rate, 88j, 1254j])).sum() == 1
+
+
+def test_a_slow_state_between_drifting_ones_goes_with_them():
+    """What a free wheel without damping has: s^2 = 0 within rounding, and between it and a slow state one more
+    whose vector is fine. Another algorithm could not tell it from the zeros, and the run ended.
+    """
+    pairs = [[0, 5510.0], [1.6e-15, 0]], [[0, 5.4e-4], [-5.4e-4, 0]], [[0, 0.0157], [-0.0157, 0]]
+    turn = np.linalg.qr(np.random.default_rng(3).standard_normal((8, 8)))[0]
+    companion = turn @ linalg.block_diag(*pairs, [[0, 2400.0], [-2400.0, 0]]) @ turn.T
+    values = linalg.eigvals(companion)
+    values = values[values.imag >= 0]
+    size = np.abs(values)
+    good = (size > 1.0) | ((size > 3e-4) & (size < 1e-2))
+    block, basis, good = _invariant(companion, values, good)
+    assert block.shape == (6, 6) and good.sum() == 1
+    np.testing.assert_allclose(companion @ basis, basis @ block, atol=1e-11 * 5510.0)

@@ -91,7 +91,7 @@ def test_integers_are_numbers(scene_file) -> None:
         ("[road]\nkind = 'wavy'\n", ["road.kind", "one of", "cobblestones", "wavy"]),
         ("[road]\nkind = 'flat'\nseed = 1\n", ["line 3", "road.seed", "cobblestones", "flat"]),
         ("[tire.material]\nc10 = 1e6\n", ["c10", "mooney-rivlin", "neo-hookean"]),
-        ("[tire.material]\npoisson_ratio = 0.5\n", ["poisson_ratio", "< 0.5"]),
+        ("[tire.material]\npoisson_ratio = 0.5\n", ["poisson_ratio", "≤ 0.4999"]),
         ("[road]\nkind = 'crg'\n", ["line 1", "crg", "file"]),
         ("[road]\nkind = 'crg'\nfile = 'no.crg'\n", ["line 3", "road.file", "no.crg"]),
         ("[road]\nkind = 'crg'\nfile = ''\n", ["road.file", "text"]),
@@ -161,8 +161,6 @@ def test_contradictions_need_both_sides(scene_file) -> None:
     [
         "tire.mesh=tire.msh",
         "tire.section=car",
-        "output.vibration=true",
-        "output.fields=true",
     ],
 )
 def test_what_this_version_lacks_is_refused(scene_file, item: str) -> None:

@@ -50,6 +50,20 @@ with open(name, "w"):
     sum(range(10**13))  # a library that does not come back to Python; signals are still blocked
 """
 
+SWALLOWS = """
+import os, sys, time
+from tireroad.runs.process import signals, supervisor
+supervisor.PATIENCE = 1.0
+supervisor.supervise()
+signals.stop_on_signals()
+while True:
+    try:
+        print("begun", flush=True)
+        time.sleep(3600)
+    except:  # as a library that catches all
+        pass
+"""
+
 DIES = """
 import os, sys
 from tireroad.runs.process import supervisor
@@ -122,6 +136,15 @@ def test_deaf_worker_is_ended(tmp_path: Path) -> None:
     assert process.returncode == 4, error
     assert "stopped by SIGTERM in the middle of a library's work" in error
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_request_that_a_library_swallows_ends_the_worker(tmp_path: Path) -> None:
+    with begin([sys.executable, "-P", "-c", SWALLOWS], cwd=tmp_path) as process:
+        assert process.stdout.readline() == "begun\n"
+        process.send_signal(signal.SIGTERM)
+        _, error = process.communicate(timeout=LONG)
+    assert process.returncode == 4, error
+    assert "stopped by SIGTERM in the middle of a library's work" in error
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,9 @@
     PYTHONPATH=.:tests:tests/stress python3 tests/stress/kills.py --kills 100 --seed 1 [--processes 2] [--compile]
 
 Signals: SIGKILL to the launcher's process, to one of the program's, or to all of them, SIGTERM, SIGHUP,
-SIGINT. With --compile every run begins without compiled forms. On several processes the stages
-before the loop are copied from the unbroken run, whose round-off a fresh one does not repeat.
+SIGINT. With --compile every run begins without compiled forms. On several processes half of the runs
+find the stages before the loop, those of the unbroken run, and must give its bits; the others begin
+afresh, which does not repeat round-off, and must agree to that. Every fourth run makes a report too.
 """
 
 import argparse
@@ -16,10 +17,12 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 from attack import (
+    apart,
     command,
     content,
     differences,
@@ -48,7 +51,7 @@ def attack(
     dice, failures, done = random.Random(seed), [], 0
     scene, whole = write_scene(folder), folder / "whole"
     began = time.monotonic()
-    status, text = finished(command("run", scene, "--out", whole, processes=processes))
+    status, text = finished(_line(scene, whole, processes, report=False))
     if status:
         return [f"the unbroken run ended with {status}: {text}"]
     length = time.monotonic() - began
@@ -57,20 +60,27 @@ def attack(
     while done < kills:
         trial += 1
         out = folder / f"broken{trial}"
-        if processes > 1:
+        same = processes == 1 or trial % 2 == 0
+        if processes > 1 and same:
             out.mkdir()
             for name in BEFORE_THE_LOOP:
                 shutil.copy(whole / name, out / name)
         extra = {"XDG_CACHE_HOME": str(folder / f"cache{trial}")} if fresh_forms else {}
+        line = _line(scene, out, processes, report=trial % 4 == 3)
         for _ in range(min(dice.randint(1, 5), kills - done)):
             wait = dice.uniform(0, length) * (4 if fresh_forms else 1)
-            line = command("run", scene, "--out", out, processes=processes)
             done += _killed(line, out, wait, dice, failures, extra)
-        failures += _recovered(scene, out, processes, wanted, extra)
+        failures += _recovered(line, out, (wanted, differences if same else apart), extra)
         print(*failures[-3:], sep="\n", end="\n" if failures else "")
         print(f"{done} kills, {len(failures)} failures", flush=True)
-        shutil.rmtree(out, ignore_errors=True)
+        for path in (out, *extra.values()):
+            shutil.rmtree(path, ignore_errors=True)
     return failures
+
+
+def _line(scene: Path, out: Path, processes: int, report: bool) -> list[str]:
+    last = () if report else ("--until", "spectra")
+    return command("run", scene, "--out", out, *last, processes=processes)
 
 
 def _killed(
@@ -108,13 +118,14 @@ def _strike(process: subprocess.Popen, out: Path, how: str, dice: random.Random)
 
 
 def _recovered(
-    scene: Path, out: Path, processes: int, wanted: dict, extra: dict[str, str]
+    line: list[str], out: Path, unbroken: tuple[dict, Callable], extra: dict[str, str]
 ) -> list[str]:
-    """Let the run go on to its end; what is not as in the unbroken one."""
-    status, text = finished(command("run", scene, "--out", out, processes=processes), **extra)
+    """Let the run go on to its end; what is not as in the unbroken one, by the function given with it."""
+    status, text = finished(line, **extra)
     if status or "Traceback" in text:
         return [f"{out.name} did not recover, status {status}: {text}"]
-    found = [f"{out.name} differs: {name}" for name in differences(wanted, content(out))]
+    wanted, compare = unbroken
+    found = [f"{out.name} differs: {name}" for name in compare(wanted, content(out))]
     found += [f"left behind: {path}" for path in out.glob(".*.part")]
     for cache in extra.values():
         found += [f"left behind: {path}" for path in Path(cache).glob("tireroad/*/run-*")]

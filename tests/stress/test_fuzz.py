@@ -3,7 +3,8 @@
 from pathlib import Path
 
 import pytest
-from fuzz_scenes import fuzz_check, fuzz_road, fuzz_run, road_files
+from damaged_roads import fuzz_road, road_files
+from fuzz_scenes import fuzz_check, fuzz_run
 
 
 def test_random_scenes_through_check(tmp_path: Path) -> None:
@@ -19,8 +20,7 @@ def test_damaged_road_files(tmp_path: Path) -> None:
         assert end in ("refused", "driven"), f"case {number}, {tried}: {end}"
 
 
-@pytest.mark.parametrize("number", range(2))
-def test_random_scenes_through_run(tmp_path: Path, monkeypatch, root: Path, number: int) -> None:
-    monkeypatch.setenv("PYTHONPATH", str(root))
+@pytest.mark.parametrize("number", range(3))
+def test_random_scenes_through_run(tmp_path: Path, number: int) -> None:
     end, tried = fuzz_run(tmp_path, 11, number)
     assert end in ("exit 0", "exit 2", "exit 3", "exit 4"), f"{tried}: {end}"

@@ -5,7 +5,7 @@ import pytest
 
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.sections.torus import Torus
-from tireroad.runs.bench.harmonics import Membrane, Rubber, frequencies
+from tireroad.runs.bench.series.harmonics import Membrane, Rubber, frequencies
 
 HALF = np.radians(120)
 

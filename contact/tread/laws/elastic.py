@@ -45,4 +45,4 @@ class Layer(Elastic):
         """The half-space's with a correction; see contact.tread.layer."""
         from tireroad.contact.tread.layer import LayerInfluence  # scipy, not needed to read a scene
 
-        return LayerInfluence(self.youngs_modulus, self.poisson_ratio, self.thickness, farthest)
+        return LayerInfluence(self.youngs_modulus, self.poisson_ratio, self.thickness)

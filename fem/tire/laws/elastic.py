@@ -13,7 +13,9 @@ class Elastic(MaterialLaw):
     youngs_modulus: float = number(
         4.8e8, "Pa", "Young's modulus at small strain", least=1e3, most=1e13
     )
-    poisson_ratio: float = number(0.45, "-", "Poisson's ratio at small strain", above=-1, below=0.5)
+    poisson_ratio: float = number(
+        0.45, "-", "Poisson's ratio at small strain", least=-0.9, most=0.4999
+    )
 
     coefficients = ("shear", "bulk")
 

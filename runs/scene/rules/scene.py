@@ -6,6 +6,7 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.fem.keys import described
 from tireroad.runs.scene.extent.tire_section import free_unknowns
+from tireroad.runs.scene.rules.output import check_campbell, check_receptance, check_vibration
 from tireroad.runs.scene.rules.tire import full_matrices, geometry
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.axle import check_axle
@@ -24,10 +25,6 @@ LATER: dict[str, tuple[tuple[Any, ...], str]] = {
         'is not supported: "torus", "radial" and "file" are',
     ),
 }
-
-
-MOST_FREQUENCIES = 1_000_000
-MOST_SPEEDS = 10_000
 
 
 def refuse_later(raw: dict[str, Any], source: Source) -> None:
@@ -126,35 +123,6 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         )
 
 
-def _receptance(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    receptance = scene.output.receptance
-    if receptance is None:
-        return
-    if not scene.force:
-        raise error(("output", "receptance"), "is read at driven points: add a [[force]]")
-    path = "output", "receptance", "step"
-    _count(path, "frequencies", receptance.to, receptance.step, "Hz", MOST_FREQUENCIES, error)
-
-
-def _campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    campbell = scene.rotation.campbell if scene.rotation else None
-    if campbell is not None:
-        path = "rotation", "campbell", "step"
-        _count(path, "speeds", campbell.to, campbell.step, "rad/s", MOST_SPEEDS, error)
-
-
-def _count(path, what: str, to: float, step: float, unit: str, most: int, error: Where) -> None:
-    """A step into a range that makes neither none nor too many."""
-    if step > to:
-        raise error(path, f"= {step:g} {unit} must not be more than to = {to:g} {unit}")
-    if to / step > most:
-        raise error(
-            path,
-            f"= {step:g} {unit} makes {to / step:.3g} {what} up to to = {to:g} {unit}, "
-            f"more than {most}: take a larger step",
-        )
-
-
 def _force(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     receptance = scene.output.receptance
     for key in ("velocity", "acceleration"):
@@ -227,12 +195,13 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("modal", "static", "rotation", "contact", "damping", "greens"), _modal),
     (("damping", "rotation", "output"), full_matrices),
     (("contact", "road", "time", "static", "rotation"), _contact),
-    (("output", "force"), _receptance),
-    (("rotation",), _campbell),
+    (("output", "force"), check_receptance),
+    (("rotation",), check_campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),
     (("stiffness", "static"), check_stiffness),
     (("tire", "rotation", "modal", "greens"), check_cavity),
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
+    (("output", "time", "contact", "force", "rotation"), check_vibration),
     (("time",), _time),
 )

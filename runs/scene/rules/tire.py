@@ -31,6 +31,12 @@ def check_cords(tire: Tire, error: Where) -> None:
                 f"= {cords.depth:g} m lies outside the wall: at most "
                 f"tire.thickness = {tire.thickness:g} m",
             )
+        if cords.area / cords.spacing > tire.thickness:
+            raise error(
+                (*place, "area"),
+                f"= {cords.area:g} m² every {cords.spacing:g} m is more cord than the wall of "
+                f"{tire.thickness:g} m has room for",
+            )
         if any(other.name == cords.name for other in tire.cords[:number]):
             raise error((*place, "name"), f'= "{cords.name}" is taken: give each line its own')
         if "/" in cords.name or cords.name in (".", ".."):

@@ -10,7 +10,7 @@ import numpy as np
 
 from tireroad.fem.axle import DIRECTIONS, Axle
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Key, OnlyFor, described, finite
+from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite
 from tireroad.fem.parameters import parameter
 from tireroad.runs.scene.schema import choice, number, vector
 
@@ -19,9 +19,16 @@ if TYPE_CHECKING:
 
 Where = Callable[[tuple[str, ...], str], InputError]
 Springs = tuple[float, ...] | tuple[tuple[float, ...], ...]
+_SPRINGS = Limits(least=-1e12, most=1e12)  # N/m, N m/rad and per unit of velocity
 _HELD = tuple(name for name in DIRECTIONS if name != "z")
 _MOVING: OnlyFor = ("kind", ("corner", "free"))
 _SPRUNG: OnlyFor = ("kind", ("corner",))
+
+
+def _entry(value: Any) -> float:
+    number = finite(value)
+    _SPRINGS.check(number, "")
+    return number
 
 
 def _springs(default: Springs, doc: str) -> Any:
@@ -32,13 +39,13 @@ def _springs(default: Springs, doc: str) -> Any:
         if not whole:
             raise ValueError(f"must be 6 numbers, or 6 rows of 6, not {described(value)}")
         if not any(isinstance(part, list | tuple) for part in value):
-            return tuple(finite(part) for part in value)
+            return tuple(_entry(part) for part in value)
         rows = [part if isinstance(part, list | tuple) else () for part in value]
         if any(len(row) != 6 for row in rows):
             raise ValueError("must be 6 numbers, or 6 rows of 6")
-        return tuple(tuple(finite(part) for part in row) for row in rows)
+        return tuple(tuple(_entry(part) for part in row) for row in rows)
 
-    values = "6 numbers ≥ 0, or a symmetric matrix of 6 rows"
+    values = "6 numbers ≥ 0, or a symmetric matrix of 6 rows, each ≤ 1e+12"
     key = Key(read=read, unit="N, m, s, rad", doc=doc, values=values, only_for=_SPRUNG)
     return parameter(key, default)
 
@@ -64,7 +71,7 @@ class AxleTable:
         15.0,
         "kg",
         "rim, brake and what moves with them, without the tire",
-        above=0,
+        least=0.01,
         most=1e6,
         only_for=_MOVING,
     )
@@ -83,7 +90,7 @@ class AxleTable:
         None,
         "kg",
         "of the car's body on this corner, which moves up and down; absent: springs to the ground",
-        above=0,
+        least=0.1,
         most=1e8,
         only_for=_SPRUNG,
     )

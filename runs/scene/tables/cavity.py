@@ -26,7 +26,7 @@ class Cavity:
         None,
         "Hz",
         "its modes; absent: to the highest of the tire, at most 1000",
-        above=0,
+        least=1,
         most=5000,
     )
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from tireroad.fem.parameters import choice, flag, integer, number, text, vector
 from tireroad.runs.scene.schema import (
-    later,
     table,
     tables,
 )
@@ -27,11 +26,11 @@ class Static:
         None,
         "m",
         "deflection from the first touch of the inflated tire, instead of load",
-        least=1e-9,
+        least=1e-6,
         most=10,
     )
     road_height: float | None = number(
-        None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, below=0
+        None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, most=-1e-3
     )
     steady_rolling: bool = flag(
         True, "inertia and material damping of the rolling shape; false: the state at rest"
@@ -186,8 +185,12 @@ class Output:
     )
     velocity: bool = flag(False, "velocity of the driven points")
     acceleration: bool = flag(False, "acceleration of the driven points")
-    vibration: bool = later("u(ω) on the whole tire")
-    fields: bool = later("motion of the whole tire in time, as XDMF")
+    vibration: bool = flag(
+        False, "vibration of the outer face in frequency, and its equivalent radiated power"
+    )
+    fields: bool = flag(
+        False, "motion of the outer face at the end of the run, also as XDMF for ParaView"
+    )
     receptance: Receptance | None = table(
         Receptance, "receptances between the driven points", optional=True
     )

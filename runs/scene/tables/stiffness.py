@@ -43,10 +43,10 @@ class Stiffness:
     deflections: tuple[float, ...] = _ascending(
         "at which load and footprint are found; empty: steps up to up_to",
         "m",
-        Limits(above=0, most=10),
+        Limits(least=1e-6, most=10),
     )
     up_to: float | None = number(
-        None, "m", "largest deflection; absent: 1.5 times the scene's own", above=0, most=10
+        None, "m", "largest deflection; absent: 1.5 times the scene's own", least=1e-6, most=10
     )
     steps: int = integer(6, "equal ones up to up_to", least=1, most=_MOST)
     which: str = choice(

@@ -26,11 +26,13 @@ RADIAL, MESHED = ("section", ("radial",)), ("section", ("torus", "radial"))
 class Material(Variants):
     model: str = registered(MATERIALS, "neo-hookean", "strain energy")
     law: MaterialLaw = variant("model", MATERIALS)
-    density: float = number(1200.0, "kg/m³", "density, undeformed", above=0, most=1e5)
+    density: float = number(1200.0, "kg/m³", "density, undeformed", least=1, most=3e4)
 
 
 def _dynamic():
-    return number(1.0, "-", "modulus of the modes over that of the static state", above=0, most=100)
+    return number(
+        1.0, "-", "modulus of the modes over that of the static state", least=0.01, most=100
+    )
 
 
 def _loss_factor():
@@ -66,10 +68,10 @@ class Cords:
     angle: float = number(
         20.0, "deg", "from the circumference, at the lowest point +x to +y", least=-90, most=90
     )
-    youngs_modulus: float = number(172.2e9, "Pa", "of a cord in tension", above=0, most=1e13)
-    area: float = number(2.118e-7, "m²", "cross-section of one cord", above=0, most=1)
-    spacing: float = number(1.16e-3, "m", "between cords, across them", above=0, most=1)
-    density: float = number(0.0, "kg/m³", "of the cords", least=0, most=1e5)
+    youngs_modulus: float = number(172.2e9, "Pa", "of a cord in tension", least=1e3, most=1e13)
+    area: float = number(2.118e-7, "m²", "cross-section of one cord", least=1e-12, most=1e-3)
+    spacing: float = number(1.16e-3, "m", "between cords, across them", least=1e-6, most=0.1)
+    density: float = number(0.0, "kg/m³", "of the cords", least=0, most=3e4)
     compression: float = number(
         1.0, "-", "modulus in compression over that in tension", least=0, most=1
     )
@@ -77,13 +79,13 @@ class Cords:
         None,
         "m",
         "angle and spacing are those on this building drum; absent: those in the tire",
-        above=0,
+        least=0.01,
         most=10,
     )
 
 
 # The mesh's defaults: largest error of the 28 lowest frequencies of the torus without loads, E = 480 MPa, against
-# Fourier series around (bench.harmonics): 30 x 14 of order 3, 44,280 unknowns, 0.16 %; 24 x 12, 30,240: 0.22 %;
+# Fourier series around (bench.series.harmonics): 30 x 14 of order 3, 44,280 unknowns, 0.16 %; 24 x 12, 30,240: 0.22 %;
 # 100 x 16 of order 2, 55,800: 1.4 to 1.75 %, as much processor time as 24 x 14 of order 3. Load at z = -0.31 m, soft
 # torus, footprint_size 0.2 on 30 x 14: 2001.6 N, where 2000 N is known to 0.15 %.
 @dataclass(frozen=True)
@@ -92,11 +94,11 @@ class Tire:
     size: str = text(
         "205/60 R15", "of the built-in passenger tire (docs/radial-tire.md)", only_for=RADIAL
     )
-    outer_radius: float = number(0.32, "m", "axle to crown", above=0, most=10, only_for=TORUS)
+    outer_radius: float = number(0.32, "m", "axle to crown", least=0.01, most=10, only_for=TORUS)
     minor_radius: float = number(
-        0.10, "m", "of the section, to its outer face", above=0, most=10, only_for=TORUS
+        0.10, "m", "of the section, to its outer face", least=1e-3, most=10, only_for=TORUS
     )
-    thickness: float = number(0.012, "m", "of the wall", above=0, most=5, only_for=TORUS)
+    thickness: float = number(0.012, "m", "of the wall", least=1e-4, most=5, only_for=TORUS)
     half_angle: float = number(
         120.0, "deg", "arc from the crown to each bead", least=10, most=175, only_for=TORUS
     )

@@ -1,0 +1,66 @@
+"""What the report says of the vibration of the tire."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.runs.files.read import Results, Section
+from tireroad.runs.report.figures import COLOURS, RANGE_DB, canvas, encode, nominal, styled
+
+
+def vibration(results: Results) -> Section:
+    """How the outer face vibrates, and what power it would radiate at most (vibration.h5)."""
+    name = "vibration.h5"
+    section = Section(
+        "Vibration of the outer face",
+        "Normal to the surface, by the modes under the forces of the run. The equivalent radiated power is "
+        "that of a surface which radiates as a plate larger than the sound's wave: an upper bound.",
+    )
+    frequency = results.array(name, "frequency")
+    centre = results.array(name, "third_octave/centre")
+    if len(frequency) < 2:
+        section.notes.append("The run is too short for a line within the band.")
+        return section
+    level = 10 * np.log10(np.maximum(results.array(name, "mean_square_velocity"), 1e-300) / 1e-18)
+    section.figures.append(
+        (
+            level_lines(frequency, level, "dB re 1 nm/s"),
+            "Mean square velocity, line by line.",
+        )
+    )
+    if not len(centre):
+        section.notes.append("Too few lines for a third-octave band.")
+        return section
+    plain = results.array(name, "third_octave/radiated_power_level")
+    weighted = results.array(name, "third_octave/radiated_power_level_a_weighted")
+    picture = radiated_power(centre, plain, weighted)
+    section.figures.append((picture, "Equivalent radiated power in third-octave bands."))
+    return section
+
+
+@styled
+def level_lines(frequency: NDArray, level: NDArray, unit: str) -> str:
+    """A level (f,) over frequency (f,) Hz."""
+    figure, ((axes,),) = canvas(9.5, 2.8)
+    axes.plot(frequency, level, color=COLOURS[0], linewidth=1.0)
+    top = float(level.max())
+    axes.set(xlabel="frequency in Hz", ylabel=f"level in {unit}", ylim=(top - RANGE_DB, top + 5))
+    axes.margins(x=0)
+    return encode(figure)
+
+
+@styled
+def radiated_power(centre: NDArray, plain: NDArray, weighted: NDArray) -> str:
+    """Levels (b,) dB re 1 pW, as they are and A-weighted, over band centres (b,) Hz."""
+    figure, ((axes,),) = canvas(9.5, 3.0)
+    place, top = np.arange(len(centre)), float(plain.max())
+    floor = 10.0 * np.floor((top - RANGE_DB) / 10.0)
+    for column, (level, name) in enumerate(((plain, "unweighted"), (weighted, "A-weighted"))):
+        height = np.maximum(level - floor, 0.0)
+        where = place + 0.4 * (column - 0.5)
+        axes.bar(where, height, 0.38, bottom=floor, color=COLOURS[column], label=name)
+    axes.set_xticks(place, [f"{value:g}" for value in nominal(centre)], rotation=45)
+    axes.grid(axis="x", visible=False)
+    axes.set(xlabel="third-octave band in Hz", ylabel="level in dB re 1 pW")
+    axes.margins(x=0.01)
+    axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return encode(figure)

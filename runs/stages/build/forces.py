@@ -1,0 +1,73 @@
+"""All forces on the tire of a finished run, as they push its coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+from scipy import sparse
+
+from tireroad.contact.setup import ContactSetup
+from tireroad.fem.static.state import StaticState
+from tireroad.runs.stages.build.point_forces import histories
+from tireroad.runs.stages.build.setup import components, probes
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.stored.contact_file import ContactHistory
+
+_ROWS = 4096  # steps read at once
+
+
+def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sparse.csr_matrix:
+    """The driven points (k, 3 s): the patch's nodes in all components, then the prescribed forces."""
+    loads = probes(job, state, setup).loads
+    if setup is None:
+        return loads
+    patch = len(components(job)) * len(setup.patch.index)
+    return loads[: patch + len(job.scene.force)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forces:
+    """Of the steps that end at `time` (n,) s, `step` s apart; `seen` (k, m) kg^-1/2 is what the driven points
+    see of the coordinates."""
+
+    job: Job
+    setup: ContactSetup | None
+    time: np.ndarray
+    step: float
+    seen: np.ndarray
+
+    @staticmethod
+    def of(
+        job: Job, setup: ContactSetup | None, history: ContactHistory | None, seen: np.ndarray
+    ) -> Forces:
+        """From the file of the contact, or of the prescribed forces. Root process only."""
+        if history is not None:
+            time, step = history.time, history.step
+        else:
+            with h5py.File(job.path("response")) as file:
+                time = file["time"][1:]  # the ends of the steps
+            step = float(time[0])
+        return Forces(job=job, setup=setup, time=time, step=step, seen=seen)
+
+    def pushes(self, start: int = 0, still: bool = False) -> Iterator[np.ndarray]:
+        """Modal forces (n, m) N kg^-1/2 from step `start` on, block by block; with `still` those of the static
+        state are taken off. Root process only."""
+        for first in range(start, len(self.time), _ROWS):
+            yield self._force(slice(first, first + _ROWS), still) @ self.seen
+
+    def _force(self, some: slice, still: bool) -> np.ndarray:
+        """(n, k) N in the order of the driven points."""
+        prescribed = histories(self.job.scene.force, self.time[some])
+        if self.setup is None:
+            return prescribed
+        patch = self.setup.patch
+        with h5py.File(self.job.path("contact")) as file:
+            parts = [file["normal_force"][some] - still * patch.force]
+            if len(components(self.job)) > 1:
+                parts += [file["horizontal_force"][some, :, k] for k in (0, 1)]
+        if patch.weights is not None:
+            parts = [(patch.weights.T @ part.T).T for part in parts]
+        return np.hstack([*parts, prescribed])

@@ -1,0 +1,116 @@
+"""motion: the outer face in time, at the end of a run, for films."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import h5py
+import numpy as np
+from mpi4py import MPI
+
+from tireroad.contact.setup import ContactSetup
+from tireroad.fem.static.state import StaticState
+from tireroad.greens.basis import Basis
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import couple
+from tireroad.greens.responses import Wanted, band
+from tireroad.modal.rolling import RollingModes
+from tireroad.runs.files.store import put
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.build.forces import Forces, driven_loads
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.stored.contact_file import ContactHistory
+
+_INSTANTS = 400  # at most, the last of the run
+_PER_PERIOD = 8  # of the end of the band
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """At the instants `time` (g,) s the `displacement` (g, s, 3) m of the outer face beyond its static state,
+    whose nodes are at `points` (s, 3) m. Seen by the modes: the residual flexibility at the points is not in it.
+    """
+
+    time: np.ndarray
+    displacement: np.ndarray
+    points: np.ndarray
+
+
+_UNITS = {
+    "time": ("time", "s"),
+    "displacement": ("displacement", "m"),
+    "points": ("surface/points", "m"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionStage(Computed[Motion]):
+    """The states of the modes once more under the forces of the run, which are known by now."""
+
+    name: ClassVar[str] = "motion"
+    static: Done[StaticState]
+    rotating: Done[RollingModes]
+    setup: Done[ContactSetup | None]
+    contact: Done[ContactHistory] | None = None
+
+    def inputs(self) -> dict:
+        """The forces in time, the states, and the band."""
+        scene = self.job.scene
+        return {
+            "modes": self.rotating.key,
+            "contact": self.contact.key if self.contact else None,
+            "forces": [vars(force) for force in scene.force],
+            "time": vars(scene.time),
+            "band": scene.greens.band,
+        }
+
+    def compute(self, record: Record) -> Motion | None:
+        """On the root process, None on the others. Collective."""
+        made: list[Motion] = []
+        rolling, state = self.rotating.product, self.static.product
+        loads = driven_loads(self.job, state, self.setup.product)
+
+        def compute() -> dict[str, tuple[float, str]]:
+            basis = Basis.of(rolling)
+            contact = self.contact.product if self.contact else None
+            forces = Forces.of(self.job, self.setup.product, contact, basis.seen(loads))
+            time, q = _replayed(
+                basis, forces, band(rolling, Wanted(band=self.job.scene.greens.band))
+            )
+            shape = basis.shape[: 3 * len(state.points)]
+            field = (q[:, : shape.shape[1]] @ shape.T).reshape(len(time), -1, 3)
+            made.append(Motion(time=time, displacement=field.astype("f4"), points=state.points))
+            size = float(np.linalg.norm(field, axis=2).max(initial=0.0))
+            return {"instants": (len(time), "-"), "largest displacement of the face": (size, "m")}
+
+        record.headline |= on_root(self.job.comm, compute)
+        return made[0] if made else None
+
+    def write(self, file: h5py.File, product: Motion) -> None:
+        """All there is."""
+        for name, (stored, unit) in _UNITS.items():
+            put(file, stored, getattr(product, name), unit)
+
+    def read(self, file: h5py.File) -> Motion:
+        """The same."""
+        return Motion(**{name: file[stored][:] for name, (stored, _) in _UNITS.items()})
+
+
+def _replayed(basis: Basis, forces: Forces, top: float) -> tuple[np.ndarray, np.ndarray]:
+    """Instants (g,) s, and the coordinates (g, m) at them."""
+    unit = np.eye(basis.coordinates)
+    response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
+    tire = Recursion(response, forces.step, "linear", MPI.COMM_SELF)
+    stride = max(int(1 / (_PER_PERIOD * top * forces.step)), 1)
+    kept = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS]
+    wanted, found, number = set(kept), [], 0
+    for block in forces.pushes(still=True):
+        for push in block:
+            q = tire.predict() + tire.same_step @ push if number in wanted else tire.predict()
+            tire.advance(push)
+            if number in wanted:
+                found.append(q)
+            number += 1
+    return forces.time[sorted(kept)], np.array(found)

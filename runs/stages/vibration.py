@@ -1,0 +1,177 @@
+"""vibration: the whole tire in frequency, under the forces of the run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import h5py
+import numpy as np
+
+from tireroad.contact.levels import a_weighting, band_sums
+from tireroad.contact.setup import ContactSetup
+from tireroad.contact.spectra import amplitudes
+from tireroad.fem.static.state import StaticState
+from tireroad.greens.basis import Basis
+from tireroad.greens.responses import Wanted, band
+from tireroad.greens.vibration import Surface, coordinates, mean_square_velocity, radiated_power
+from tireroad.modal.rolling import RollingModes
+from tireroad.runs.files.store import put
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.build.forces import Forces, driven_loads
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.spectra import Spectra
+from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.stored.contact_file import ContactHistory
+
+VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: references of the levels, ISO 1683
+_LARGEST = 2e8  # bytes of displacement fields kept
+HANN = 1.5  # lines of its window that share what one sine holds: mean of w^2 over the square of its mean
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vibration:
+    """On the outer face, up to the band of the Green's functions.
+
+    `frequency` (f,) Hz; `velocity` (f,) m2/s2, mean square normal to the surface, of each line; `centre` (b,) Hz
+    with the third-octave `velocity_level` dB re 1 nm/s, `power_level` dB re 1 pW and `weighted` dB(A) (b,).
+    `shapes_at` (g,) Hz: the lines whose `displacement` (g, s, 3) m, complex amplitudes at the `points` (s, 3) m,
+    is kept: all, or the strongest that fit in 200 MB.
+    """
+
+    frequency: np.ndarray
+    velocity: np.ndarray
+    centre: np.ndarray
+    velocity_level: np.ndarray
+    power_level: np.ndarray
+    weighted: np.ndarray
+    shapes_at: np.ndarray
+    displacement: np.ndarray
+    points: np.ndarray
+
+
+_UNITS = {
+    "frequency": ("frequency", "Hz"),
+    "velocity": ("mean_square_velocity", "m2/s2"),
+    "centre": ("third_octave/centre", "Hz"),
+    "velocity_level": ("third_octave/velocity_level", "dB re 1 nm/s"),
+    "power_level": ("third_octave/radiated_power_level", "dB re 1 pW"),
+    "weighted": ("third_octave/radiated_power_level_a_weighted", "dB(A) re 1 pW"),
+    "shapes_at": ("surface/frequency", "Hz"),
+    "displacement": ("surface/displacement", "m"),
+    "points": ("surface/points", "m"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class VibrationStage(Computed[Vibration]):
+    """From the forces in the contact's file and the prescribed ones, by the states of the modes."""
+
+    name: ClassVar[str] = "vibration"
+    static: Done[StaticState]
+    rotating: Done[RollingModes]
+    setup: Done[ContactSetup | None]
+    contact: Done[ContactHistory] | None = None
+    spectra: Done[Spectra] | None = None
+
+    def inputs(self) -> dict:
+        """The forces in time, the states, and the band."""
+        scene = self.job.scene
+        return {
+            "modes": self.rotating.key,
+            "contact": self.contact.key if self.contact else None,
+            "spectra": self.spectra.key if self.spectra else None,
+            "forces": [vars(force) for force in scene.force],
+            "time": vars(scene.time),
+            "band": scene.greens.band,
+        }
+
+    def compute(self, record: Record) -> Vibration | None:
+        """On the root process, None on the others. Collective."""
+        made: list[Vibration] = []
+        rolling, state = self.rotating.product, self.static.product
+        loads = driven_loads(self.job, state, self.setup.product)
+        left_out = self.spectra.product.left_out if self.spectra else 0.0
+
+        def compute() -> dict[str, tuple[float, str]]:
+            basis = Basis.of(rolling)
+            contact = self.contact.product if self.contact else None
+            forces = Forces.of(self.job, self.setup.product, contact, basis.seen(loads))
+            frequency, a = self._coordinates(basis, forces, left_out)
+            surface = Surface.of(state.points, self.job.tire.lattice.quads())
+            made.append(_seen(basis.shape[: 3 * len(state.points)], surface, state, frequency, a))
+            return _headline(made[0], surface)
+
+        record.headline |= on_root(self.job.comm, compute)
+        return made[0] if made else None
+
+    def _coordinates(
+        self, basis: Basis, forces: Forces, left_out: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Lines (f,) Hz up to the end of the model, and a (f, m) at them. Root process only."""
+        start = round(left_out / forces.step)
+        pushed = np.concatenate(list(forces.pushes(start)))
+        frequency, amplitude = amplitudes(pushed, forces.step)
+        top = self._top
+        below = (frequency > 0) & (frequency <= top)
+        return frequency[below], coordinates(basis.states, amplitude[below], frequency[below])
+
+    @property
+    def _top(self) -> float:
+        return band(self.rotating.product, Wanted(band=self.job.scene.greens.band))
+
+    def write(self, file: h5py.File, product: Vibration) -> None:
+        """All there is."""
+        for name, (stored, unit) in _UNITS.items():
+            put(file, stored, getattr(product, name), unit)
+
+    def read(self, file: h5py.File) -> Vibration:
+        """The same."""
+        return Vibration(**{name: file[stored][:] for name, (stored, _) in _UNITS.items()})
+
+
+def _seen(
+    shape: np.ndarray, surface: Surface, state: StaticState, frequency: np.ndarray, a: np.ndarray
+) -> Vibration:
+    """What the coordinates `a` (f, m) mean on the outer face, whose shapes are (3 s, m)."""
+    own = a[:, : shape.shape[1]]
+    velocity = mean_square_velocity(own, surface.gram(shape), surface.area, frequency)
+    # Amplitudes are scaled to show a sine whole: of a band of lines each holds as much too much.
+    lines = velocity / HANN
+    centre, square = band_sums(frequency, lines)
+    _, weighted = band_sums(frequency, lines * 10 ** (a_weighting(frequency) / 10))
+    power, heard = (radiated_power(part, surface.area) for part in (square, weighted))
+    fits = max(int(_LARGEST // (16 * shape.shape[0])), 1)
+    kept = np.sort(np.argsort(-velocity)[:fits])
+    return Vibration(
+        frequency=frequency,
+        velocity=velocity,
+        centre=centre,
+        velocity_level=_level(square, VELOCITY**2),
+        power_level=_level(power, POWER),
+        weighted=_level(heard, POWER),
+        shapes_at=frequency[kept],
+        displacement=(own[kept] @ shape.T).reshape(len(kept), -1, 3),
+        points=state.points,
+    )
+
+
+def _level(square: np.ndarray, reference: float) -> np.ndarray:
+    """dB."""
+    return 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference)
+
+
+def _headline(found: Vibration, surface: Surface) -> dict[str, tuple[float, str]]:
+    """The sums over all bands."""
+
+    def total(level: np.ndarray) -> float:
+        return float(10 * np.log10((10 ** (level / 10)).sum())) if len(level) else -np.inf
+
+    strongest = int(found.velocity.argmax()) if len(found.velocity) else 0
+    return {
+        "area of the outer face": (surface.area, "m2"),
+        "velocity level": (total(found.velocity_level), "dB re 1 nm/s"),
+        "equivalent radiated power": (total(found.power_level), "dB re 1 pW"),
+        "A-weighted": (total(found.weighted), "dB(A) re 1 pW"),
+        "strongest line": (float(found.frequency[strongest]), "Hz"),
+    }

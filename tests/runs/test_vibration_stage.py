@@ -1,0 +1,117 @@
+"""output.vibration: the whole tire in frequency, from the forces of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import tireroad
+from tireroad.fem.errors import InputError
+from tireroad.runs.scene.load import load
+from tireroad.runs.stages.pipeline import run_scene
+
+TIRE = """
+[tire]
+segments = 12
+elements_arc = 4
+order = 2
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 300.0
+error_estimate = false
+[modal]
+count = 12
+[output]
+vibration = true
+fields = true
+"""
+FORCE = """
+[[force]]
+angle = 90.0
+frequency = 50.0
+amplitude = 2.0
+direction = [1.0, 0.0, 0.0]
+[time]
+duration = 0.4
+step = 1e-3
+[greens]
+residual = "none"
+band = 200.0
+"""
+ROLLING = """
+[rotation]
+speed = 20.0
+[contact]
+tread = "winkler"
+[road]
+kind = "sine"
+[time]
+duration = 0.3
+step = 2e-4
+"""
+
+
+def run(folder: Path, text: str) -> tireroad.RunResults:
+    folder.mkdir(exist_ok=True)
+    (folder / "scene.toml").write_text(TIRE + text)
+    scene = load(folder / "scene.toml")
+    run_scene(scene, folder, MPI.COMM_SELF, until="motion", fresh=False, petsc_options=[])
+    return tireroad.load(folder)
+
+
+def test_a_steady_force_moves_the_face_by_its_receptance(tmp_path: Path) -> None:
+    """At the line of the force: what the driven point does, |H| F, is what the field shows there."""
+    results = run(tmp_path, FORCE + "[output.receptance]\nto = 50.0\nstep = 25.0\n")
+    frequency = results["vibration/frequency"]
+    line = int(np.argmin(np.abs(frequency - 50.0)))
+    assert frequency[line] == pytest.approx(50.0) and frequency[-1] <= 200.0
+    H = results["response/receptance"][-1, 0, 0]
+    points, field = results["vibration/surface/points"], results["vibration/surface/displacement"]
+    driven = np.argmax(points[:, 0] - 10 * np.abs(points[:, 1]) - 10 * np.abs(points[:, 2]))
+    assert abs(field[line, driven, 0]) == pytest.approx(2.0 * abs(H), rel=0.01)
+    # All that shakes has the frequency of the force.
+    level = results["vibration/mean_square_velocity"]
+    assert level.argmax() == line and level[line + 3 :].max() < 1e-3 * level[line]
+
+
+def test_the_field_in_time_is_the_response_in_time(tmp_path: Path) -> None:
+    """By another stage of the program, from the same states."""
+    results = run(tmp_path, FORCE)
+    time, moved = results["motion/time"], results["motion/displacement"]
+    points = results["motion/surface/points"]
+    driven = np.argmax(points[:, 0] - 10 * np.abs(points[:, 1]) - 10 * np.abs(points[:, 2]))
+    rows = np.searchsorted(results["response/time"], time - 1e-6)
+    known = results["response/displacement"][rows, 0, 0]
+    np.testing.assert_allclose(moved[:, driven, 0], known, atol=0.01 * np.abs(known).max())
+    assert len(time) == 400 and time[-1] == pytest.approx(0.4)
+
+
+def test_a_rolling_tire_vibrates_as_its_road_passes(tmp_path: Path) -> None:
+    results = run(tmp_path, ROLLING)
+    frequency = results["vibration/frequency"]
+    level = results["vibration/mean_square_velocity"]
+    passing = results.attributes("static")["rolling_radius"] * 20.0 / 0.1
+    assert frequency[level.argmax()] == pytest.approx(passing, abs=2 * frequency[0])
+    power = results["vibration/third_octave/radiated_power_level"]
+    heard = results["vibration/third_octave/radiated_power_level_a_weighted"]
+    assert len(power) and (heard < power).all()  # below 1 kHz
+    # The points of contact move as the loop said, but for the residual flexibility at them.
+    time, moved = results["motion/time"], results["motion/displacement"]
+    assert len(time) > 200 and np.isfinite(moved).all() and np.abs(moved).max() > 1e-6
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "needs forces in time"),
+        (ROLLING.replace("[rotation]", '[rotation]\nmethod = "full"'), "projected"),
+    ],
+)
+def test_what_it_needs(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "scene.toml").write_text(TIRE + text)
+    with pytest.raises(InputError, match=words):
+        load(tmp_path / "scene.toml")
