@@ -1,1 +1,25 @@
 """Roads, tread laws, and the unilateral contact problem of a rolling tire."""
+
+from tireroad.fem.exports import exported
+
+_HOMES = {
+    "ContactSetup": "setup",
+    "EndlessRoad": "roads.kind",
+    "Patch": "patch",
+    "RoadKind": "roads.kind",
+    "RoadUnderTire": "roads.under_tire",
+    "Rolled": "setup",
+    "TreadLaw": "tread.law",
+    "amplitudes": "spectra",
+    "contact_setup": "setup",
+    "equal_steps": "steps",
+    "make_patch": "patch",
+    "make_road": "roads.road",
+    "road_kind": "roads.kind",
+    "roll": "rolling",
+    "step_solver": "model",
+    "third_octaves": "spectra",
+    "tread_law": "tread.law",
+}
+__all__ = sorted(_HOMES)
+__getattr__, __dir__ = exported(__name__, _HOMES)

@@ -10,8 +10,9 @@ A_static the exact static flexibility between the nodes, delta the height by whi
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy import sparse
@@ -89,7 +90,9 @@ def make_grid_patch(
     )
 
 
-def _check_count(ends, spacing: tuple[float, float], reach: float) -> None:
+def _check_count(
+    ends: Sequence[tuple[float, float]], spacing: tuple[float, float], reach: float
+) -> None:
     """InputError for a grid of more than MOST_POINTS, before it is laid out."""
     sizes = [high - low for low, high in ends]
     counts = [np.floor(size / step) for size, step in zip(sizes, spacing, strict=True)]
@@ -127,7 +130,7 @@ def settle(
     return replace(patch, force=force, gap=gap), rise
 
 
-def _bracket(excess, step: float) -> tuple[float, float]:
+def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, float]:
     """Rises (m) with too much and too little load."""
     low, high = 0.0, 0.0
     for _ in range(20):
@@ -150,7 +153,7 @@ class OnPoints:
     `components` 1: vertical only; 3: z, then x, then y of all points.
     """
 
-    def __init__(self, tire, weights: sparse.csr_matrix, components: int = 1) -> None:
+    def __init__(self, tire: Any, weights: sparse.csr_matrix, components: int = 1) -> None:
         self._tire = tire
         self._weights = sparse.block_diag([weights] * components, format="csr")
         self._transposed = self._weights.T.tocsr()

@@ -10,7 +10,7 @@ def a_weighting(frequency: np.ndarray) -> np.ndarray:
     f2 = np.asarray(frequency, float) ** 2
     f1, low, high, f4 = 20.598997, 107.65265, 737.86223, 12194.217
 
-    def response(square):
+    def response(square: np.ndarray | float) -> np.ndarray:
         return (f4**2 * square**2) / (
             (square + f1**2) * np.sqrt((square + low**2) * (square + high**2)) * (square + f4**2)
         )

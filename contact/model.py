@@ -10,6 +10,7 @@ from tireroad.contact.solver.choose import make_solver
 from tireroad.contact.solver.conditions import ContactSolver, checked_compliance
 from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance, SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.tread.creep import TreadMemory, steady
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
 from tireroad.fem.errors import InputError
@@ -46,14 +47,51 @@ def solver_name(spec: Spec, patch: Patch) -> str:
     return "projected-cg" if many and patch.places is not None else "active-set"
 
 
-def step_solver(spec: Spec, patch: Patch, tire: Array) -> ContactSolver:
-    """The solver for A = W tire W^T + C~, `tire` (p, p) m/N between the patch's nodes.
+def static_solver(spec: Spec, patch: Patch, tire: Array, speed: float) -> ContactSolver:
+    """The solver for the static state of a patch that rolls at `speed` m/s: as `step_solver`, and of a tread
+    that creeps with all of its past, C~ (1 + sum c_k F_k) (contact.tread.creep)."""
+    if spec.law.creep is None:
+        return step_solver(spec, patch, tire)
+    check_creeps(patch)
+    past = steady(spec.law.creep, patch, speed)
+    return make_solver("active-set", _spread(patch, tire) + tread_matrix(spec, patch) @ past)
+
+
+def check_creeps(patch: Patch) -> None:
+    """InputError where a tread that creeps has no grid, or one too large for its static state."""
+    if patch.places is None:
+        raise InputError(
+            "contact.tread: a tread that creeps needs a grid of points: contact.points = { dx, dy }"
+        )
+    if len(patch.points) > MOST_DENSE:
+        raise InputError(
+            f"contact.tread: a tread that creeps takes at most {MOST_DENSE} points, here are "
+            f"{len(patch.points)}: take a coarser contact.points or a smaller contact.reach"
+        )
+
+
+def tread_memory(spec: Spec, patch: Patch, speed: float, step: float) -> TreadMemory | None:
+    """The past of a tread that creeps, rolled over at `speed` m/s in steps of `step` s; else None."""
+    if spec.law.creep is None:
+        return None
+    check_creeps(patch)
+    influence = spec.law.influence(_farthest(patch))
+    return TreadMemory(spec.law.creep, influence, patch, speed, step)
+
+
+def _spread(patch: Patch, tire: Array) -> Array:
+    """W tire W^T (c, c) m/N."""
+    return tire if patch.weights is None else patch.weights @ (patch.weights @ tire.T).T
+
+
+def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> ContactSolver:
+    """The solver for A = W tire W^T + C~, `tire` (p, p) m/N between the patch's nodes; C~ times `at_once`.
 
     InputError when the matrix of that many points is not affordable, or A not positive definite.
     """
     name, count = solver_name(spec, patch), len(patch.points)
     if patch.places is not None and count > DENSE_POINTS:
-        product = _product(spec, patch, tire)
+        product = _product(spec, patch, tire, at_once)
         return ProjectedCG(product) if name == "projected-cg" else make_solver(name, product)
     if count > MOST_DENSE:
         raise InputError(
@@ -61,8 +99,7 @@ def step_solver(spec: Spec, patch: Patch, tire: Array) -> ContactSolver:
             f"{MOST_DENSE} of them, here are {count}: take fewer points, or a grid of points with "
             'solver = "auto"'
         )
-    matrix = tire if patch.weights is None else patch.weights @ (patch.weights @ tire.T).T
-    matrix = matrix + tread_matrix(spec, patch)
+    matrix = _spread(patch, tire) + at_once * tread_matrix(spec, patch)
     if name == "projected-cg":
         return ProjectedCG(MatrixCompliance(checked_compliance(matrix)))
     return make_solver(name, matrix)
@@ -104,7 +141,7 @@ def _out_of_reach(patch: Patch) -> InputError | None:
     )
 
 
-def _product(spec: Spec, patch: Patch, tire: Array) -> Compliance:
+def _product(spec: Spec, patch: Patch, tire: Array, at_once: float) -> Compliance:
     """A as a product. A grid has more points than nodes: without a tread A would be singular."""
     if not spec.law.compliant:
         raise InputError(
@@ -112,7 +149,11 @@ def _product(spec: Spec, patch: Patch, tire: Array) -> Compliance:
             'another, e.g. "half-space", or points = "nodes"'
         )
     assert patch.places is not None, "only a grid of points makes a product"
-    influence = spec.law.influence(_farthest(patch))
+    plain = spec.law.influence(_farthest(patch))
+
+    def influence(x: Array, y: Array, a: Array, b: Array) -> Array:
+        return at_once * plain(x, y, a, b)
+
     return SpreadCompliance(tire, patch.weights, KernelTread(patch.places, influence))
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.friction import Friction
+from tireroad.contact.tread.creep import TreadMemory
 from tireroad.greens.sparse_columns import LoadedColumns
 
 # Road heights that are found at once: as many steps as make this many points, so that what a call
@@ -89,11 +90,13 @@ class Loop:
     tire: Tire
     solver: ContactSolver
     friction: Friction | None = None
+    memory: TreadMemory | None = None
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Arrays by name, between two steps. Collective when the tire is."""
         friction = self.friction.state() if self.friction else {}
-        return self.tire.snapshot() | self.solver.state() | friction
+        memory = self.memory.state() if self.memory else {}
+        return self.tire.snapshot() | self.solver.state() | friction | memory
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         """Go on as if nothing had happened: the same bits on the same number of processes."""
@@ -101,6 +104,8 @@ class Loop:
         self.solver.set_state(kept)
         if self.friction:
             self.friction.set_state(kept)
+        if self.memory:
+            self.memory.set_state(kept)
 
 
 def roll(
@@ -112,6 +117,7 @@ def roll(
     steps: int,
     friction: Friction | None = None,
     done: int = 0,
+    memory: TreadMemory | None = None,
 ) -> Iterator[Instant]:
     """Yield the state after each of `steps` steps of `step` seconds. Collective when the tire is.
 
@@ -119,7 +125,8 @@ def roll(
 
     The solver was made for A + C~. Every process solves the same small contact problem on the same
     bits, so no process has to wait for another's answer. With `friction`, the tire's forces and
-    displacements are three times as many: z, then x, then y of all points.
+    displacements are three times as many: z, then x, then y of all points. `memory`: of a tread that creeps,
+    whose part within the step the solver knows.
     """
     count = len(patch.points)
     horizontal = np.zeros((count, 2))
@@ -131,9 +138,10 @@ def roll(
     settle = tire.settle if isinstance(tire, NonlinearTire) else None
     for time, road in _roads(drive, patch, step, steps, done):
         free = tire.predict()
+        past_tread = memory.predict() if memory else 0.0
         past = friction.state() if friction and settle else {}
         while True:
-            q = patch.gap + free[:count] - road
+            q = patch.gap + free[:count] + past_tread - road
             if friction is None:
                 force = solver.solve(q, touching, reference=patch.force)
                 change = force - patch.force
@@ -148,6 +156,8 @@ def roll(
             if friction:
                 friction.set_state(past)
         tire.advance(change)
+        if memory:
+            memory.advance(change[:count])
         moved = free + answer @ change
         axle = -tire.inertia_force()
         axle += [*horizontal.sum(axis=0), force.sum()]

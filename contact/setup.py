@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from tireroad.contact.grid_patch import make_grid_patch, settle
-from tireroad.contact.model import Spec, step_solver
+from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import Patch, make_patch
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
 from tireroad.contact.rolling import Drive
+from tireroad.contact.tread.pattern import Pattern
 from tireroad.greens.response import Response
 
 # What the tire may give way beyond the road's own height, m: the smallest reach of the patch.
@@ -60,11 +61,26 @@ class ContactSetup:
     reach: float
     road: PreparedRoad
     rolled: Rolled
+    pattern: Pattern | None = None
 
     @property
     def drive(self) -> Drive:
-        """The road as the time loop asks for it."""
-        return Drive(self.road.height, self.rolled.motion, self.rolled.speed)
+        """The road as the time loop asks for it; a pattern's depth is road that is missing, but for what the
+        static state knows of it."""
+        if self.pattern is None:
+            return Drive(self.road.height, self.rolled.motion, self.rolled.speed)
+        pattern, road, begun = self.pattern, self.road, self.begun
+
+        def height(along: np.ndarray, across: np.ndarray) -> np.ndarray:
+            return road.height(along, across) - (pattern.depth(along, across) - begun)
+
+        return Drive(height, self.rolled.motion, self.rolled.speed)
+
+    @property
+    def begun(self) -> np.ndarray:
+        """Depth (c,) m of the pattern under the points at t = 0."""
+        assert self.pattern is not None, "the tread is a slick"
+        return self.pattern.depth(self.patch.points[:, 0], self.patch.points[:, 1])
 
     def settled(self, response: Response, nodal_force: np.ndarray, spec: Spec) -> tuple:
         """(setup, rise in m): a grid of points takes up the static load that the finite elements gave to
@@ -72,25 +88,28 @@ class ContactSetup:
         patch = self.patch
         if patch.weights is None:
             return self, 0.0
+        if self.pattern is not None:
+            patch = replace(patch, gap=patch.gap + self.begun)
         p = len(patch.index)
         flexibility = (response.static() + response.residual)[:p, :p]
-        solver = step_solver(spec, patch, flexibility)
+        solver = static_solver(spec, patch, flexibility, self.rolled.speed)
         settled, rise = settle(patch, solver, flexibility, nodal_force[patch.index])
         return replace(self, patch=settled), rise
 
 
 def contact_setup(
     face: OuterFace,
-    lattice,
+    lattice: Any,
     road: RoadUnderTire,
     rolled: Rolled,
     *,
     spacing: tuple[float, float] | None = None,
     reach: float | None = None,
+    pattern: Pattern | None = None,
 ) -> ContactSetup:
     """Patch and road of a run: points at the nodes, or on a grid of the `spacing` (m).
 
-    `lattice` of the finite elements' nodes, for a grid only. `reach` (m) by default from the road.
+    `lattice` of the finite elements' nodes, for a grid only. `pattern` of the tread, on a grid. `reach` (m) by default from the road.
     """
     if reach is None:
         reach = _reach(face, road, rolled)
@@ -101,7 +120,10 @@ def contact_setup(
         assert face.road_height is not None, "contact needs a tire that stands on a road"
         surface = TreadSurface(lattice, face.positions)
         patch = make_grid_patch(surface, face.road_height, patch, spacing, reach)
-    return ContactSetup(patch=patch, reach=reach, road=_under(road, patch, rolled), rolled=rolled)
+    if pattern is not None:
+        pattern.land(patch.points[~patch.edge, 1])
+    under = _under(road, patch, rolled)
+    return ContactSetup(patch=patch, reach=reach, road=under, rolled=rolled, pattern=pattern)
 
 
 def _nodes(face: OuterFace, reach: float) -> Patch:

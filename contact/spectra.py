@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import signal
 
 REFERENCE = 1.0  # N, of the levels
@@ -37,7 +38,7 @@ def third_octaves(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarr
     cumulative = np.concatenate([np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)]) * spacing
     edges = np.concatenate([[0.0], frequency + spacing / 2])
 
-    def up_to(limit):
+    def up_to(limit: float) -> NDArray[np.intp]:
         return np.stack([np.interp(limit, edges, column) for column in cumulative.T], axis=-1)
 
     square = up_to(high[use]) - up_to(low[use])

@@ -1,1 +1,40 @@
 """The tire as a body: mesh, materials, equilibrium, and the matrices at a static state."""
+
+from tireroad.fem.exports import exported
+
+_HOMES = {
+    "Axle": "axle",
+    "Body": "tire.body",
+    "Column": "cavity.column",
+    "ConvergenceError": "errors",
+    "Cords": "tire.cords",
+    "Equilibrium": "static.equilibrium",
+    "FullTire": "transient.linear",
+    "InputError": "errors",
+    "Loader": "static.loading",
+    "Material": "tire.material",
+    "MaterialLaw": "tire.law",
+    "NonlinearTire": "transient.nonlinear",
+    "Operators": "matrices.operators",
+    "ParameterError": "parameters",
+    "Parameters": "parameters",
+    "Region": "tire.wall",
+    "Ring": "sections.ring",
+    "SectionMesh": "sections.mesh2d",
+    "SmallMotions": "model",
+    "StaticState": "static.state",
+    "TireModel": "model",
+    "Torus": "sections.torus",
+    "Turning": "turning",
+    "compound": "tire.material",
+    "dilatation": "tire.invariants",
+    "directed": "matrices.probe",
+    "isochoric": "tire.invariants",
+    "load_curve": "static.load_curve",
+    "material_law": "tire.law",
+    "press": "static.press",
+    "radial": "sections.radial",
+    "spot": "matrices.probe",
+}
+__all__ = sorted(_HOMES)
+__getattr__, __dir__ = exported(__name__, _HOMES)

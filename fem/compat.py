@@ -13,6 +13,7 @@ import platform
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import basix
 import dolfinx.fem.petsc  # noqa: F401  (newer releases do not import it by themselves)
@@ -41,7 +42,7 @@ def _quietly(function: Callable) -> Callable:
     """What compiles, without the compiler's command lines and FFCx's unclosed lock files."""
 
     @functools.wraps(function)
-    def quiet(*arguments):
+    def quiet(*arguments: Any) -> Any:
         before = logging.root.manager.disable
         logging.disable(logging.INFO)
         try:
@@ -71,7 +72,7 @@ _JIT_KEY = (
 )
 
 
-def _options(folder: Path, **more) -> dict:
+def _options(folder: Path, **more: Any) -> dict:
     """Keyword of what dolfinx compiles: in this folder (form_cache). On another node of a cluster
     the folder's new files may be seen some seconds later."""
     return {_JIT_KEY: {**more, "cache_dir": str(folder), "timeout": 120}}
@@ -89,13 +90,13 @@ def field_nodes(degree: int) -> np.ndarray:
     return _nodes(degree, basix.LagrangeVariant.gll_warped)
 
 
-def _nodes(degree: int, variant) -> np.ndarray:
+def _nodes(degree: int, variant: basix.LagrangeVariant) -> np.ndarray:
     family, cell = basix.ElementFamily.P, basix.CellType.hexahedron
     return basix.create_element(family, cell, degree, variant).points
 
 
 @_quietly
-def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, degree: int):
+def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, degree: int) -> dmesh.Mesh:
     """Distributed mesh of curved hexahedra from each process's share of cells and points. Collective."""
     if HAS_BASIX_UFL:
         element = basix.ufl.element("Lagrange", "hexahedron", degree, shape=(3,))
@@ -111,7 +112,7 @@ def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, degree: i
 
 
 @_quietly
-def vector_space(mesh, degree: int):
+def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
     """Continuous Lagrange space of displacement vectors."""
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
@@ -119,14 +120,14 @@ def vector_space(mesh, degree: int):
 
 
 @_quietly
-def cell_space(mesh):
+def cell_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
     """Scalars that are constant in each cell."""
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, ("DG", 0))
     return _space(mesh, ufl.FiniteElement("DG", mesh.ufl_cell(), 0))
 
 
-def _space(mesh, element):
+def _space(mesh: dmesh.Mesh, element: Any) -> fem.FunctionSpace:
     """dolfinx 0.5 compiles elements too; newer releases take theirs from Basix."""
     return form_cache.compiled(
         mesh.comm, lambda folder: fem.FunctionSpace(mesh, element, **_options(folder))
@@ -134,14 +135,16 @@ def _space(mesh, element):
 
 
 @_quietly
-def form(expression):
+def form(expression: ufl.Form) -> Any:
     """Compile a UFL form with the program's compiler flags. Collective."""
     comm = expression.ufl_domain().ufl_cargo().comm
     return form_cache.compiled(comm, lambda folder: fem.form(expression, **_options(folder, **JIT)))
 
 
 @_quietly
-def evaluate(expression, points: np.ndarray, mesh, cells: np.ndarray) -> np.ndarray:
+def evaluate(
+    expression: ufl.core.expr.Expr, points: np.ndarray, mesh: dmesh.Mesh, cells: np.ndarray
+) -> np.ndarray:
     """A scalar UFL expression (cells, points) at reference `points` (p, 3) of this process's cells. Collective."""
     made = form_cache.compiled(
         mesh.comm, lambda folder: fem.Expression(expression, points, **_options(folder, **JIT))
@@ -152,13 +155,13 @@ def evaluate(expression, points: np.ndarray, mesh, cells: np.ndarray) -> np.ndar
     return np.asarray(values).reshape(len(cells), len(points))
 
 
-def cell_facets(mesh) -> np.ndarray:
+def cell_facets(mesh: dmesh.Mesh) -> np.ndarray:
     """Facets (cells, 6) of the hexahedra of this process, ghosts included, in the reference element's order."""
     mesh.topology.create_connectivity(3, 2)
     mesh.topology.create_connectivity(2, 3)  # newer releases do not make it where dofs are located
     return mesh.topology.connectivity(3, 2).array.reshape(-1, 6)
 
 
-def meshtags(mesh, dim: int, entities: np.ndarray, values: np.ndarray):
+def meshtags(mesh: dmesh.Mesh, dim: int, entities: np.ndarray, values: np.ndarray) -> Any:
     """Integer tags of mesh entities, entities ascending."""
     return dmesh.meshtags(mesh, dim, entities.astype(np.int32), values.astype(np.int32))

@@ -5,35 +5,37 @@ Nackenhorst 2004, and thesis (2.6)-(2.8) with its errors put right). All of it i
 """
 
 import ufl
+from dolfinx.mesh import Mesh
+from ufl.core.expr import Expr
 
 
-def deformation_gradient(u):
+def deformation_gradient(u: Expr) -> Expr:
     """F = I + grad u, on the undeformed mesh."""
     return ufl.Identity(3) + ufl.grad(u)
 
 
-def pressure_virtual_work(u, v, normal):
+def pressure_virtual_work(u: Expr, v: Expr, normal: Expr) -> Expr:
     """J F^-T N . v: virtual work per undeformed area of a unit follower pressure pushing inwards."""
     F = deformation_gradient(u)
     return ufl.inner(ufl.det(F) * ufl.inv(F).T * normal, v)
 
 
-def wheel_velocity(mesh):
+def wheel_velocity(mesh: Mesh) -> Expr:
     """w = e_y x X = (z, 0, -x): velocity of the undeformed material at Omega = 1 rad/s, m/rad."""
     X = ufl.SpatialCoordinate(mesh)
     return ufl.as_vector((X[2], 0.0, -X[0]))
 
 
-def convective(u, w):
+def convective(u: Expr, w: Expr) -> Expr:
     """grad(u) w: the rate of a field seen from the inertial frame when the field stands still."""
     return ufl.dot(ufl.grad(u), w)
 
 
-def turn(u):
+def turn(u: Expr) -> Expr:
     """e_y x u."""
     return ufl.as_vector((u[2], 0.0, -u[0]))
 
 
-def body_rate(u, w):
+def body_rate(u: Expr, w: Expr) -> Expr:
     """grad(u) w - e_y x u: the rate the rotating material sees of itself."""
     return convective(u, w) - turn(u)

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 
+import numpy as np
+
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.rim_motion import RimMotion, rim_motion
@@ -80,7 +82,7 @@ class SmallMotions:
         shape = self.static.rolling
         return rim_motion(self.body, self.static.inflation, shape, shape.speed != 0)
 
-    def _touching(self):
+    def _touching(self) -> np.ndarray:
         face = self.body.surface
         return face.local[self.static.force[face.place] > 0]
 

@@ -14,7 +14,7 @@ from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite, keys
 
 
 class ParameterError(InputError):
-    """A parameter that does not fit; `parameter` is its name, `reason` what is wrong."""
+    """A parameter out of its range or type; `parameter` is its name, `reason` what is wrong."""
 
     def __init__(self, parameter: str, reason: str, owner: str = "") -> None:
         super().__init__(f"{owner}: {parameter} {reason}" if owner else f"{parameter} {reason}")
@@ -145,6 +145,21 @@ def text(default: str | None, doc: str, *, only_for: OnlyFor = None) -> Any:
     """Any text that is not empty. A default of None makes it optional."""
     optional = default is None
     key = Key(read=_read_text, doc=doc, values="text", optional=optional, only_for=only_for)
+    return parameter(key, default)
+
+
+def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] = ()) -> Any:
+    """A list of finite numbers, of any length, each within the limits."""
+
+    def read(value: Any) -> tuple[float, ...]:
+        if not isinstance(value, list | tuple):
+            raise ValueError(f"must be a list of numbers, not {described(value)}")
+        result = tuple(finite(part) for part in value)
+        for part in result:
+            limits.check(part, unit)
+        return result
+
+    key = Key(read=read, unit=unit, doc=doc, values=f"numbers, {limits}", limits=limits)
     return parameter(key, default)
 
 

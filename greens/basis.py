@@ -14,6 +14,8 @@ from tireroad.modal.corner import MOMENTS, SEEN
 from tireroad.modal.rolling import RollingModes
 from tireroad.modal.rotating import StateModes
 
+Array = np.ndarray
+Probes = sparse.csr_matrix  # (k, 3 s) over the outer face, or (k, 3 s + 6) with the rim
 Pencil = tuple[np.ndarray, np.ndarray]  # D~ and K~ of a projected problem
 
 
@@ -38,7 +40,12 @@ class Basis:
             rolling.basis.shape, rolling.basis.projection, rolling.states, rolling.turning.speed
         )
 
-    def couple(self, outputs, loads, flexibility: np.ndarray | None = None) -> Response:
+    def couple(
+        self,
+        outputs: sparse.csr_matrix,
+        loads: sparse.csr_matrix,
+        flexibility: np.ndarray | None = None,
+    ) -> Response:
         """Response (r, k) of the probes `outputs` and `loads`."""
         carried = self.projection.carried
         given = self.seen(outputs), self.seen(loads)
@@ -49,7 +56,9 @@ class Basis:
         )
         return self._reading_moments(response, wanted, loads) if wanted.nnz else response
 
-    def _reading_moments(self, response: Response, wanted, loads) -> Response:
+    def _reading_moments(
+        self, response: Response, wanted: sparse.csr_matrix, loads: sparse.csr_matrix
+    ) -> Response:
         """The response whose outputs `wanted` (r, 3) read the moments on the hub besides."""
         rows, states = self.projection.moments(self.speed), self.states
         s, block = states.eigenvalue, states.block

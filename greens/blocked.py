@@ -12,14 +12,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy import sparse
 
+from tireroad.fem.axle import Axle
 from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Basis
-from tireroad.modal.corner import BODY, SEEN
+from tireroad.modal.corner import BODY, SEEN, Corner
 from tireroad.modal.rotating import held_matrices
 
 
-def substituted(basis: Basis, turning: Turning, loads, frequency: np.ndarray) -> np.ndarray:
+def substituted(
+    basis: Basis, turning: Turning, loads: sparse.csr_matrix, frequency: np.ndarray
+) -> np.ndarray:
     """Force on the hub (f, 3, k) per unit load at the probes (k, 3 s), at `frequency` (f,) Hz above 0: of its
     springs and dampers where the wheel moves, of the held rim where it is locked.
     """
@@ -57,7 +61,7 @@ def substituted(basis: Basis, turning: Turning, loads, frequency: np.ndarray) ->
     return out
 
 
-def _of_rim(corner, air_mass: float, s: complex, speed: float) -> np.ndarray:
+def _of_rim(corner: Corner, air_mass: float, s: complex, speed: float) -> np.ndarray:
     """Dynamic stiffness (7, 7) of the tire carried along as a rigid body."""
     out = np.zeros((SEEN, SEEN), complex)
     out[:BODY, :BODY] = s**2 * corner.own_mass + 2 * s * speed * corner.own_gyroscopic
@@ -66,7 +70,7 @@ def _of_rim(corner, air_mass: float, s: complex, speed: float) -> np.ndarray:
     return out
 
 
-def _wheel(axle) -> np.ndarray:
+def _wheel(axle: Axle) -> np.ndarray:
     """Mass (7, 7) of wheel and body."""
     out = np.zeros((SEEN, SEEN))
     out[:BODY, :BODY] = axle.mass
@@ -74,7 +78,7 @@ def _wheel(axle) -> np.ndarray:
     return out
 
 
-def by_states(basis: Basis, loads, frequency: np.ndarray) -> np.ndarray:
+def by_states(basis: Basis, loads: sparse.csr_matrix, frequency: np.ndarray) -> np.ndarray:
     """The same (f, 3, k) from the coupled states: loads less the rate of the momentum that they carry."""
     response = basis.couple(loads, loads)
     count = loads.shape[0]
@@ -88,7 +92,9 @@ def by_states(basis: Basis, loads, frequency: np.ndarray) -> np.ndarray:
     return basis.projection.wheel.rigid(loads)[:, :3].T - s**2 * moving.receptance(frequency)
 
 
-def disagreement(basis: Basis, turning: Turning, loads, frequency: np.ndarray) -> float:
+def disagreement(
+    basis: Basis, turning: Turning, loads: sparse.csr_matrix, frequency: np.ndarray
+) -> float:
     """Largest relative difference of both over the frequencies, Frobenius norm."""
     one, other = substituted(basis, turning, loads, frequency), by_states(basis, loads, frequency)
     size = np.linalg.norm(one, axis=(1, 2))

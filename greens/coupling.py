@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.cavity.column import Column
@@ -26,7 +28,7 @@ from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.turning import Turning
 from tireroad.greens.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
-from tireroad.greens.basis import Basis, Pencil, regained
+from tireroad.greens.basis import Array, Basis, Pencil, Probes, regained
 from tireroad.greens.response import Response, couple
 from tireroad.greens.second_order import Moments, modal_moments, second_order
 from tireroad.modal.basis import Projection, project, with_air
@@ -55,12 +57,12 @@ class Wheel:
     corner: Callable[[Projection, Modes], Projection] | None = None
 
     @cached_property
-    def rotating_stiffness(self):
+    def rotating_stiffness(self) -> PETSc.Mat:
         """K_Omega."""
         return rotating_stiffness(*self._given)
 
     @cached_property
-    def rotating_damping(self):
+    def rotating_damping(self) -> PETSc.Mat:
         """D + 2 Omega G."""
         return rotating_damping(*self._given)
 
@@ -77,7 +79,7 @@ class Wheel:
         return self.damping
 
     @cached_property
-    def _loss(self):
+    def _loss(self) -> PETSc.Mat | None:
         """sum_r eta_r K_r, or None."""
         return self.operators.loss_stiffness()
 
@@ -87,12 +89,7 @@ class Wheel:
         return true, held_matrices(projection, self.speed, self._uniform, self.inertia)
 
     def respond(
-        self,
-        basis: Basis,
-        modes: Modes | None,
-        outputs: sparse.csr_matrix,
-        loads: sparse.csr_matrix,
-        option: str,
+        self, basis: Basis, modes: Modes | None, outputs: Probes, loads: Probes, option: str
     ) -> Response:
         """Response with the residual `option`. Collective.
 
@@ -100,7 +97,7 @@ class Wheel:
         for another one: its signs and its vectors of repeated frequencies differ.
         """
         if option in ("static", "dirac"):
-            return self._with_statics(basis, outputs, loads, pulse=option == "dirac")
+            return self._with_statics(basis, outputs, loads, option == "dirac")
         if option == "second-order" and self.corner:
             raise InputError("greens.residual: second-order knows no wheel that moves")
         r, k, same = outputs.shape[0], loads.shape[0], outputs is loads
@@ -121,7 +118,7 @@ class Wheel:
             whole = self._lacking(whole, moments.momentum - whole.static_moment())
         return whole if same else whole.between(slice(r), slice(r, r + k))
 
-    def _with_statics(self, basis: Basis, outputs, loads, *, pulse: bool) -> Response:
+    def _with_statics(self, basis: Basis, outputs: Probes, loads: Probes, pulse: bool) -> Response:
         """The states, and the exact static flexibility of what they lack. Collective."""
         given = self.operators, self.rotating_stiffness, outputs, loads
         answers = compliance(*given, self.air, moment=True)
@@ -131,7 +128,9 @@ class Wheel:
             flexibility, moment = flexibility + lacking.compliance, moment + lacking.momentum
         return replace(self._completed(basis, outputs, loads, flexibility, moment), pulse=pulse)
 
-    def _completed(self, basis: Basis, outputs, loads, flexibility, moment) -> Response:
+    def _completed(
+        self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, moment: Array
+    ) -> Response:
         """The states with what they lack, the rim held, of a static displacement and a first moment."""
         if self.corner is None:
             response = basis.couple(outputs, loads, flexibility)
@@ -148,11 +147,11 @@ class Wheel:
         """With the static first moment (3, k) kg m/N that the states lack; not with air, whose own is not known."""
         return replace(response, left_out=moment) if self.air is None else response
 
-    def _static_shapes(self, probes: sparse.csr_matrix) -> StaticShapes:
+    def _static_shapes(self, probes: Probes) -> StaticShapes:
         full = self.rotating_stiffness, self.rotating_damping
         return static_shapes(self.operators, *full, probes, self.air)
 
-    def _attached(self, basis: Basis, modes: Modes, probes: sparse.csr_matrix) -> Response:
+    def _attached(self, basis: Basis, modes: Modes, probes: Probes) -> Response:
         """Response of the modes and the attachment modes of all probes. Collective."""
         self._check_same(basis, modes)
         if not self._drifts:
@@ -160,7 +159,8 @@ class Wheel:
             full = self.operators, self.rotating_stiffness
             shapes, flexibility = loaded_shapes(*full, loads, self.air)
             flexibility = weights @ (weights @ flexibility.T).T
-            missing = self._completed(basis, probes, probes, flexibility, 0.0).residual
+            nothing = np.zeros((3, probes.shape[0]))
+            missing = self._completed(basis, probes, probes, flexibility, nothing).residual
             columns = shapes @ (weights.T @ foremost(missing, np.abs(np.diag(flexibility))))
             grown = self._grown(modes, columns, basis.projection, every=False)
             if self.beyond is not None:
@@ -188,12 +188,12 @@ class Wheel:
         """Whether the turning tire has no static answer: with a free rim K_Omega has no inverse."""
         return self.rotation is not None and self.operators.unknowns.rim is not None
 
-    def _standing_attachments(self, modes: Modes, probes: sparse.csr_matrix) -> Basis:
+    def _standing_attachments(self, modes: Modes, probes: Probes) -> Basis:
         """Modes with the static shapes, relieved where nothing holds the tire, of K. Collective."""
         loads = on_own_rows(self.operators, probes)
         return self._grown(modes, statics(self.operators, self.operators.stiffness, loads))
 
-    def axle(self, modes: Modes, loads: sparse.csr_matrix, frequency: np.ndarray) -> np.ndarray:
+    def axle(self, modes: Modes, loads: Probes, frequency: np.ndarray) -> np.ndarray:
         """Force on the held axle per unit load (f, 3, k), -, by the modes of the free rim (greens.axle).
 
         `loads` (k, 3 s); the rim's and the loads' attachment modes join the basis. Collective.
@@ -238,13 +238,11 @@ class Wheel:
         """The projection on the modes (all rows), joined by the air where there is any. Collective."""
         return with_air(projection, modes, self.air)
 
-    def decouple(self, projection: Projection, comm) -> StateModes:
+    def decouple(self, projection: Projection, comm: MPI.Comm) -> StateModes:
         """The second eigenproblem, or the closed formula of a tire that stands. Collective."""
         return decouple(projection, self.turning, comm)
 
-    def receptance(
-        self, outputs: sparse.csr_matrix, loads: sparse.csr_matrix, frequency: np.ndarray
-    ) -> np.ndarray:
+    def receptance(self, outputs: Probes, loads: Probes, frequency: np.ndarray) -> np.ndarray:
         """H (f, r, k) m/N without any modes, at the frequencies in Hz. Collective."""
         full = self.rotating_stiffness, self.rotating_damping
         return receptance(self.operators, *full, outputs, loads, frequency, air=self.air)

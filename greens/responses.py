@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import sparse
 
 from tireroad.fem.errors import InputError
 from tireroad.greens.coupling import Basis, Wheel
@@ -60,8 +61,8 @@ class Made:
 def make_response(
     wheel: Callable[[], Wheel],
     rolling: RollingModes,
-    outputs,
-    loads,
+    outputs: sparse.csr_matrix,
+    loads: sparse.csr_matrix,
     residual: str,
     fields: Callable[[], ModalBasis],
 ) -> Made:

@@ -6,14 +6,18 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
 
 from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import InputError
+from tireroad.fem.matrices.operators import Rotation
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.modal.air import Air
 from tireroad.modal.corner import Corner, meeting
-from tireroad.modal.solver.fields import CHUNK, gram, multiply
+from tireroad.modal.solver.fields import CHUNK, multiply, projected
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import Labels
 
@@ -64,7 +68,7 @@ class Projection:
             turn.T @ matrix @ turn for matrix in self.corner.joined(drag, stiffness, speed)
         )
 
-    def seen(self, shapes: np.ndarray, probes) -> np.ndarray:
+    def seen(self, shapes: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
         """All coordinates (k, m + a + c) as `probes` read them, `shapes` (k, m) being what they see of the modes:
         the air's are not seen.
         """
@@ -112,9 +116,7 @@ class Projection:
         return len(self.squares)
 
     def rotating(self, inertia: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What multiplies 2 Omega, Omega^2, and Omega times the damping rate, of the inertia "full" or
-        "doppler". InputError where the projection is of a wheel that stands.
-        """
+        """Factors (m, m) of 2 Omega, Omega^2 and Omega d_k. InputError for the modes of a wheel that stands."""
         full = inertia == "full"
         gyroscopic = self.gyroscopic if full else self.body
         convective = self.convective if full else self.body_convective
@@ -179,7 +181,12 @@ class ModalBasis:
 
 
 def project(
-    modes: Modes, rotation, carried: np.ndarray, comm, known: Projection | None = None, loss=None
+    modes: Modes,
+    rotation: Rotation | None,
+    carried: np.ndarray,
+    comm: MPI.Comm,
+    known: Projection | None = None,
+    loss: PETSc.Mat | None = None,
 ) -> Projection:
     """Project the rotation matrices (fem.operators.Rotation, or None) and the momentum: `carried` (3, n)
     kg of own rows, as in fem.operators. `known`, the projection on the first of the modes, is taken
@@ -193,7 +200,7 @@ def project(
 
     def reduced(name: str, sign: int) -> np.ndarray:
         old = None if known is None else getattr(known, name)
-        return _reduced(comm, modes.vectors, getattr(rotation, name), sign, old)
+        return projected(comm, modes.vectors, getattr(rotation, name), sign, old)
 
     return Projection(
         modes.squares,
@@ -207,7 +214,12 @@ def project(
 
 
 def with_corner(
-    projection: Projection, modes: Modes, axle: Axle | None, rim: RimMotion | None, places, comm
+    projection: Projection,
+    modes: Modes,
+    axle: Axle | None,
+    rim: RimMotion | None,
+    places: np.ndarray,
+    comm: MPI.Comm,
 ) -> Projection:
     """The projection on the modes (all rows), joined by a wheel that moves where there is one; `places` (s, 3) m
     of the outer face in the static state. Collective."""
@@ -224,7 +236,9 @@ def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projec
     return replace(projection, air=Air(air.duct, air.coupling(modes.vectors)))
 
 
-def _loss_factors(modes: Modes, loss, comm, known: Projection | None) -> np.ndarray:
+def _loss_factors(
+    modes: Modes, loss: PETSc.Mat, comm: MPI.Comm, known: Projection | None
+) -> np.ndarray:
     """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of modes of unit mass; 0 of rigid ones. Collective."""
     done = np.zeros(0) if known is None or known.loss_factor is None else known.loss_factor
     lost = np.empty(modes.vectors.shape[1] - len(done))
@@ -234,16 +248,3 @@ def _loss_factors(modes: Modes, loss, comm, known: Projection | None) -> np.ndar
     squares = modes.squares[len(done) :]
     eta = np.divide(comm.allreduce(lost), squares, out=np.zeros(len(squares)), where=squares > 0)
     return np.concatenate([done, eta])
-
-
-def _reduced(comm, vectors: np.ndarray, matrix, sign: int, known: np.ndarray | None) -> np.ndarray:
-    """V^T X V (m, m), symmetric (sign 1) or skew (-1); `known` (k, k) is its upper left part."""
-    m, k = vectors.shape[1], 0 if known is None else len(known)
-    out = np.empty((m, m))
-    out[:, k:] = gram(comm, vectors, multiply(matrix, vectors[:, k:]))
-    own = out[k:, k:]
-    out[k:, k:] = (own + sign * own.T) / 2
-    out[k:, :k] = sign * out[:k, k:].T
-    if known is not None:
-        out[:k, :k] = known
-    return out

@@ -72,7 +72,9 @@ def _lowest(modes: StateModes, count: int) -> np.ndarray:
     return waves[np.argsort(modes.eigenvalue.imag[waves], kind="stable")][:count]
 
 
-def _continued(before: StateModes, now: StateModes, held: np.ndarray, drag: np.ndarray):
+def _continued(
+    before: StateModes, now: StateModes, held: np.ndarray, drag: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Indices at the present speed of the states held before (-1: lost), and the shares."""
     alive = np.flatnonzero(held >= 0)
     share = np.abs(overlap(before, now, drag))[held[alive]]

@@ -18,7 +18,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy import linalg
+from mpi4py import MPI
+from scipy import linalg, sparse
 
 from tireroad.fem.axle import DIRECTIONS, Axle
 from tireroad.fem.errors import InputError
@@ -128,11 +129,11 @@ class Corner:
         lower = np.linalg.cholesky(self.inertia(air_mass)[np.ix_(part, part)] - p @ p.T)
         return linalg.qr(np.vstack([p.T @ drifts, lower.T @ drifts]), mode="economic")[0]
 
-    def seen(self, tire: np.ndarray, probes) -> np.ndarray:
+    def seen(self, tire: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
         """What the probes (k, 3 s) or wider see of (eta, xi): (k, n + c), `tire` (k, n) being the first."""
         return np.hstack([tire, self.rigid(probes)[:, self.taking_part]])
 
-    def rigid(self, probes) -> np.ndarray:
+    def rigid(self, probes: sparse.csr_matrix) -> np.ndarray:
         """What they see of the motions of rim and body, (k, 7): m per m and rad; transposed, the forces N and
         moments N m on the axle's centre by unit loads at the probes."""
         s = len(self.places)
@@ -178,7 +179,9 @@ _PER_MODE = ("mass", "stiffness", "gyroscopic", "convective")
 ARRAYS = tuple(item.name for item in fields(Corner) if item.name != "axle")
 
 
-def meeting(axle: Axle, rim: RimMotion, vectors: np.ndarray, places: np.ndarray, comm) -> Corner:
+def meeting(
+    axle: Axle, rim: RimMotion, vectors: np.ndarray, places: np.ndarray, comm: MPI.Comm
+) -> Corner:
     """The corner on fields `vectors` (own rows (n, m)) of unit mass. Collective."""
     nothing = np.zeros((vectors.shape[1], 6))
     per_mode = {

@@ -59,7 +59,13 @@ def full_states(
     return full, figures | _compared(found, projected.states), warnings
 
 
-def _solve(operators, pencil, projected: RollingModes, count: int, window) -> tuple:
+def _solve(
+    operators: Operators,
+    pencil: tuple[PETSc.Mat, PETSc.Mat],
+    projected: RollingModes,
+    count: int,
+    window: tuple[float, float],
+) -> tuple:
     """As many pairs as wanted, or all in the window. Collective."""
     drag, full_stiffness = pencil
     whole, s = (operators.mass, drag, full_stiffness), projected.states.eigenvalue

@@ -14,6 +14,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg
 
+Array = np.ndarray
+
 # States slower than this part of the fastest have terms of rounding alone: a faster one is their yardstick.
 AT_REST = 1e-5
 _ROUGH = 1e-11  # residual from which a state is made better
@@ -21,12 +23,11 @@ _MOST = 20  # such states, of which each costs a factorisation: more are no case
 _SAME = 1e-4  # relative change beyond which inverse iteration has left the state for a neighbour
 
 
-def residual(
-    drag: np.ndarray, stiffness: np.ndarray, values: np.ndarray, vectors: np.ndarray
-) -> np.ndarray:
+def residual(drag: Array, stiffness: Array, values: Array, vectors: Array) -> Array:
     """||(s^2 + s D + K) u|| over the sum of its terms' norms, column by column."""
 
-    def times(matrix):  # real by complex, without a complex copy of the matrix
+    # Real by complex, without a complex copy of the matrix.
+    def times(matrix: Array) -> Array:
         return matrix @ vectors.real + 1j * (matrix @ vectors.imag)
 
     terms = (vectors * values**2, times(drag) * values, times(stiffness))
@@ -36,12 +37,12 @@ def residual(
 
 
 def refined(
-    drag: np.ndarray,
-    stiffness: np.ndarray,
-    values: np.ndarray,
-    right: np.ndarray,
-    left: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    drag: Array,
+    stiffness: Array,
+    values: Array,
+    right: Array,
+    left: Array,
+) -> tuple[Array, Array, Array]:
     """Values (q,), right vectors (m, q) and left ones (q, m) with w^T (2 s + D) u = 1, the roughest of them
     made better. A state next to another one, which one step cannot tell from it, stays as it is.
     """
@@ -57,7 +58,9 @@ def refined(
     return values, right, left
 
 
-def _better(drag, stiffness, s: complex, u: np.ndarray, w: np.ndarray) -> tuple | None:
+def _better(
+    drag: Array, stiffness: Array, s: complex, u: Array, w: Array
+) -> tuple[complex, Array, Array] | None:
     """One state after a step, real if it was; None where it became another."""
     s, u, w = (np.real(x) if np.imag(s) == 0 else x for x in (s, u, w))
     unit = np.eye(len(u))
@@ -76,13 +79,13 @@ def _better(drag, stiffness, s: complex, u: np.ndarray, w: np.ndarray) -> tuple 
 
 
 def cleared(
-    matrix: np.ndarray,
-    values: np.ndarray,
-    vectors: np.ndarray,
-    block: np.ndarray,
-    span: np.ndarray,
-    inverse: np.ndarray,
-) -> np.ndarray:
+    matrix: Array,
+    values: Array,
+    vectors: Array,
+    block: Array,
+    span: Array,
+    inverse: Array,
+) -> Array:
     """Eigenvectors (n, q) of a real matrix (n, n) without what they have of an invariant subspace `span` (n, b),
     T = `block` (b, b) on it, that is none of theirs; `inverse` (b, n) its left basis.
 
@@ -97,7 +100,7 @@ def cleared(
     return vectors + span @ share.T
 
 
-def at_rest(matrix: np.ndarray, span: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
+def at_rest(matrix: Array, span: Array, shift: float) -> tuple[Array, Array]:
     """(T, V): a real matrix (n, n) on its invariant subspace next to rest, `span` (n, b) orthonormal, and that
     subspace, by inverse iteration at the `shift`, far below all other eigenvalues.
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from mpi4py import MPI
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parallel import on_root
@@ -51,7 +52,7 @@ class RollingModes:
         return 2 * np.pi * float(self.basis.frequency[-1])
 
 
-def rolling_modes(basis: ModalBasis, turning: Turning, comm) -> RollingModes:
+def rolling_modes(basis: ModalBasis, turning: Turning, comm: MPI.Comm) -> RollingModes:
     """The second eigenproblem on the modal basis; of a tire without air that stands, the closed
     formula. Collective.
     """
@@ -59,12 +60,12 @@ def rolling_modes(basis: ModalBasis, turning: Turning, comm) -> RollingModes:
     return RollingModes(basis=basis, states=states, turning=turning, figures=figures)
 
 
-def decouple(projection: Projection, turning: Turning, comm) -> StateModes:
+def decouple(projection: Projection, turning: Turning, comm: MPI.Comm) -> StateModes:
     """The states of the projected problem, on every process, their identities checked. Collective."""
     return _decoupled(projection, turning, comm)[0]
 
 
-def _decoupled(projection: Projection, turning: Turning, comm) -> tuple[StateModes, dict]:
+def _decoupled(projection: Projection, turning: Turning, comm: MPI.Comm) -> tuple[StateModes, dict]:
     """The states and the figures of modal.rotating.checks. Collective."""
     if turning.speed == 0 and projection.air is None and projection.corner is None:
         return standing(projection, turning.damping), {}

@@ -18,13 +18,14 @@ from tireroad.modal.damping import Damping, rates
 from tireroad.modal.refined import AT_REST, at_rest, cleared, refined, residual
 from tireroad.modal.states import StateModes
 
+Array = np.ndarray
 # Above this condition an eigenvector loses ten of sixteen digits; such eigenvalues go to the block.
 DEFECTIVE = 1e6
 SINGULAR = 1e13  # condition of K~ beyond which it has no inverse
 # States at rest beside the fastest drift, as rigid modes do, unless there is one and its vectors are apart.
 _SKEWED = 1e2
 
-Pencil = tuple[np.ndarray, np.ndarray]
+Pencil = tuple[Array, Array]
 
 
 def matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
@@ -86,10 +87,7 @@ LIMITS = 1e-8, 1e-6  # largest residual, and largest defect of an identity, of s
 
 
 def checks(
-    modes: StateModes,
-    drag: np.ndarray,
-    stiffness: np.ndarray,
-    limits: tuple[float, float] = LIMITS,
+    modes: StateModes, drag: Array, stiffness: Array, limits: tuple[float, float] = LIMITS
 ) -> dict[str, float]:
     """How far the decoupled equations are from the problem they came from, relative figures by name.
 
@@ -127,7 +125,7 @@ def checks(
     return figures
 
 
-def overlap(one: StateModes, other: StateModes, drag: np.ndarray) -> np.ndarray:
+def overlap(one: StateModes, other: StateModes, drag: Array) -> Array:
     """(q, q') share of the states of `other` in those of `one`: 1 on the diagonal for the same problem.
 
     w_i^T [(s_i + s'_j) + D~] u'_j / a_i: the left vectors of the companion matrix on its right ones.
@@ -138,7 +136,9 @@ def overlap(one: StateModes, other: StateModes, drag: np.ndarray) -> np.ndarray:
     return one.eigenvalue[:, None] * near + near * other.eigenvalue + one.left @ (drag @ right)
 
 
-def companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m: int):
+def companion_blocks(
+    modes: Array, squares: Array, half: Array, m: int
+) -> tuple[Array, Array, Array]:
     """(T, R_b, L_b) of single modes, critically damped or rigid, each as its own companion matrix."""
     k = 2 * len(modes)
     block, right, left = np.zeros((k, k)), np.zeros((m, k)), np.zeros((k, m))
@@ -148,7 +148,7 @@ def companion_blocks(modes: np.ndarray, squares: np.ndarray, half: np.ndarray, m
     return block, right, left
 
 
-def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
+def rotating(drag: Array, stiffness: Array) -> StateModes:
     """Decouple s^2 + s D~ + K~ through the companion matrix and the inverse of its vectors.
 
     The lower half of a row of that inverse is w^T / a: left vectors and their normalisation come
@@ -190,7 +190,7 @@ def rotating(drag: np.ndarray, stiffness: np.ndarray) -> StateModes:
     )
 
 
-def _in_order(values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _in_order(values: Array, vectors: Array) -> tuple[Array, Array]:
     """Ascending in Im s, then from fast to slow decay; vectors of length 1, whose largest component, or the
     first of those within a thousandth, is real and positive.
     """
@@ -202,7 +202,7 @@ def _in_order(values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.n
     return values, vectors * turn / np.linalg.norm(vectors, axis=0)
 
 
-def _inverse(values, vectors, block_vectors) -> tuple[np.ndarray, np.ndarray]:
+def _inverse(values: Array, vectors: Array, block_vectors: Array) -> tuple[Array, Array]:
     """Rows of the inverse of [vectors, their conjugates, block vectors] for the first and the last.
 
     Through [Re v, Im v] in real arithmetic, a quarter of the work of the complex matrix.
@@ -216,19 +216,17 @@ def _inverse(values, vectors, block_vectors) -> tuple[np.ndarray, np.ndarray]:
     return rows, inverse[count + waves :]
 
 
-def _invariant(
-    companion: np.ndarray, values: np.ndarray, good: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _invariant(companion: Array, values: Array, good: Array) -> tuple[Array, Array, Array]:
     """Schur block and orthonormal real basis of the invariant subspace of the eigenvalues that are not `good`,
     and which are good in the end: what cannot be told from the others goes with them.
 
     Another algorithm finds them again within what a defective one is uncertain by: a small part of
     itself, or, where it is zero, of the matrix.
     """
-    chosen, everything = values[~good], np.linalg.norm(companion, 2)
-    for near in (1e-6 * np.abs(chosen).max(), 1e-7 * everything, 1e-6 * everything):
+    chosen, everything = values[~good], float(np.linalg.norm(companion, 2))
+    for near in (1e-6 * float(np.abs(chosen).max()), 1e-7 * everything, 1e-6 * everything):
 
-        def taken(re: float, im: float, near=near) -> bool:
+        def taken(re: float, im: float, near: float = near) -> bool:
             both = np.abs([chosen - complex(re, im), chosen - complex(re, -im)])
             return bool(both.min() < near)
 

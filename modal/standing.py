@@ -85,8 +85,8 @@ def with_fields(
     air: Column | None = None,
     axle: Axle | None = None,
 ) -> ModalBasis:
-    """The basis with its fields on all unknowns: itself, or, of one read from a file, the modes solved
-    and projected once more, in place of all its parts. Collective.
+    """The basis with its fields on all unknowns: itself, or, of one read from a file, the `count` lowest modes
+    or those below `up_to` (Hz) solved and projected once more, in place of all its parts. Collective.
     """
     if basis.modes is not None:
         return basis

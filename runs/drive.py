@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tireroad.contact.chatter import choose, oscillation
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.model import step_solver
+from tireroad.contact.model import step_solver, tread_memory
 from tireroad.contact.patch import Patch
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.rolling import roll as instants_of
@@ -95,13 +95,19 @@ def drive(
     scheme = choose(oscillation(spec, setup.patch, kept, chosen.size)).scheme
     recursion = Recursion(kept, chosen.size, scheme, motions.body.comm)
     p = len(setup.patch.index)
-    solver = step_solver(spec, setup.patch, recursion.same_step[:p, :p])
+    memory = tread_memory(spec, setup.patch, rolled.speed, chosen.size)
+    at_once = memory.at_once if memory else 1.0
+    solver = step_solver(spec, setup.patch, recursion.same_step[:p, :p], at_once)
     seen = (
         OnPoints(recursion, setup.patch.weights, 1)
         if setup.patch.weights is not None
         else recursion
     )
-    instants = list(instants_of(seen, solver, setup.patch, setup.drive, chosen.size, chosen.count))
+    instants = list(
+        instants_of(
+            seen, solver, setup.patch, setup.drive, chosen.size, chosen.count, memory=memory
+        )
+    )
     history = History(
         time=np.array([instant.time for instant in instants]),
         force=np.stack([instant.force for instant in instants]),

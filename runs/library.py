@@ -22,7 +22,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.sections.torus import Torus
@@ -65,10 +64,6 @@ def torus(
 
     `material`, or a neo-Hookean rubber of `youngs_modulus` Pa, `poisson_ratio`, `density` kg/m3.
     """
-    if not 0 < half_angle < math.pi:
-        raise InputError(
-            f"torus: half_angle = {half_angle:g} rad must lie between 0 and pi: it is in radians"
-        )
     section = Torus(
         outer_radius,
         minor_radius,

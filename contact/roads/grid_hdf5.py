@@ -1,12 +1,18 @@
 """Road heights in HDF5 files, whose datasets stay in their file until they are driven over."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.roads.rows import Rows, check_count
 from tireroad.fem.errors import InputError
+
+if TYPE_CHECKING:  # imported where a file is read: to check a scene it is not needed
+    import h5py
 
 Array = NDArray[np.float64]
 
@@ -16,7 +22,7 @@ MAX_CHUNK = 256_000_000  # bytes: HDF5 unpacks a chunk as a whole
 class Hdf5Rows:
     """A dataset, which stays in its file."""
 
-    def __init__(self, dataset) -> None:
+    def __init__(self, dataset: h5py.Dataset) -> None:
         self._dataset, self.shape = dataset, dataset.shape
 
     def read(self, i0: int, i1: int) -> Array:
@@ -54,7 +60,7 @@ def read_hdf5(file: Path) -> tuple[Array, Array, Rows]:
     return x, y, Hdf5Rows(datasets["z"])
 
 
-def _check(file: Path, name: str, dataset) -> None:
+def _check(file: Path, name: str, dataset: h5py.Dataset) -> None:
     """Numbers, of a shape that fits, in this file, in chunks that fit into memory."""
     if dataset.external or dataset.is_virtual:
         raise InputError(

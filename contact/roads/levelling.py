@@ -1,7 +1,14 @@
 """What of a road the axle is taken to follow: its mean height, or its long waves."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from tireroad.contact.roads.under_tire import Road
 
 Array = NDArray[np.float64]
 
@@ -30,13 +37,15 @@ class Level:
         return float(values.min()), float(values.max())
 
 
-def mean_level(road, x0: float, x1: float, y0: float, y1: float) -> Level:
+def mean_level(road: Road, x0: float, x1: float, y0: float, y1: float) -> Level:
     """The mean height of a strip of road (contact.road.Road), everywhere the same."""
     _, profile = _profile(road, x0, x1, y0, y1)
     return Level(np.array([x0]), np.array([profile.mean()]))
 
 
-def wave_level(road, x0: float, x1: float, y0: float, y1: float, longest_wave: float) -> Level:
+def wave_level(
+    road: Road, x0: float, x1: float, y0: float, y1: float, longest_wave: float
+) -> Level:
     """The waves of the strip longer than `longest_wave` (m): ISO 16610-21 on its mean profile.
 
     Past its ends the profile is continued by reflection.
@@ -48,7 +57,7 @@ def wave_level(road, x0: float, x1: float, y0: float, y1: float, longest_wave: f
     return Level(x, gaussian_filter1d(profile, DEVIATION * longest_wave / step, mode="reflect"))
 
 
-def _profile(road, x0: float, x1: float, y0: float, y1: float) -> tuple[Array, Array]:
+def _profile(road: Road, x0: float, x1: float, y0: float, y1: float) -> tuple[Array, Array]:
     """x (n,) m and the mean height over the width (n,) m, at half the road's spacing if affordable."""
     step = 0.5 * road.spacing
     if not np.isfinite(step):

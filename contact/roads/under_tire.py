@@ -1,5 +1,6 @@
 """A road placed under the tire: the strip of a run, eased in and levelled."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -59,7 +60,9 @@ class Placement(Parameters):
         most=1e4,
     )
     start: float = number(0.0, "m", "x of the road under the axle at t = 0", least=-1e6, most=1e6)
-    offset: float = number(0.0, "m", "added to all heights, positive up", least=-10, most=10)
+    offset: float = number(
+        0.0, "m", "height added to the whole road, positive up", least=-10, most=10
+    )
 
 
 class RoadUnderTire:
@@ -184,7 +187,9 @@ class PreparedRoad:
         pieces = self._pieces(x0, x1, y0, y1)
         return min(0.0, *(self._road.lowest(*piece) - high for piece, _, high in pieces))
 
-    def _pieces(self, x0: float, x1: float, y0: float, y1: float):
+    def _pieces(
+        self, x0: float, x1: float, y0: float, y1: float
+    ) -> Iterator[tuple[tuple[float, float, float, float], float, float]]:
         """The strip in the road's own coordinates, piece by piece with bounds of what is taken off."""
         dx, dy = self._shift
         count = max(PIECES, int(np.ceil((x1 - x0) / LONGEST))) if self._level else 1

@@ -86,7 +86,7 @@ class Friction:
                 return force, horizontal
         raise ConvergenceError(
             f"contact: normal and horizontal forces do not settle in {TURNS} turns; the friction "
-            "is too large for this step: lower contact.friction, contact.brush_stiffness or "
+            "is too large for this step: lower contact.friction, the brush's stiffness or "
             "time.step"
         )
 
@@ -105,7 +105,8 @@ class Friction:
         index = np.flatnonzero((force > 0) & (share > 1e-9))
         if len(index) == 0:
             return out
-        stiffness = Stiffness(*self._between(index), 1.0 / (law.stiffness * share[index]))
+        springs = np.broadcast_to(law.stiffness, share.shape)[index] * share[index]
+        stiffness = Stiffness(*self._between(index), 1.0 / springs)
         constant = moved[index] + past[index] / share[index, None]
         bound = np.full(len(index), np.inf)
         if law.friction is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -44,15 +46,17 @@ class Product:
         out = self._through(self._compliance.apply, scaled) / self._unit
         y.array[:] = out if self._added is None else out + self._added * x.array_r
 
-    def diagonalScale(self, _matrix: PETSc.Mat, left: PETSc.Vec, _right) -> None:
+    def diagonalScale(self, _matrix: PETSc.Mat, left: PETSc.Vec, _right: PETSc.Vec) -> None:
         """D_b."""
         self._scale = left.array_r.copy()
 
-    def setDiagonal(self, _matrix: PETSc.Mat, diagonal: PETSc.Vec, _mode) -> None:
+    def setDiagonal(self, _matrix: PETSc.Mat, diagonal: PETSc.Vec, _mode: object) -> None:
         """D_a, added."""
         self._added = diagonal.array_r.copy()
 
-    def createSubMatrix(self, _matrix: PETSc.Mat, rows: PETSc.IS, _columns, _out=None) -> PETSc.Mat:
+    def createSubMatrix(
+        self, _matrix: PETSc.Mat, rows: PETSc.IS, _columns: PETSc.IS, _out: PETSc.Mat | None = None
+    ) -> PETSc.Mat:
         """Between some of the points; the solver asks for as many columns as rows."""
         return Product(self._compliance, self._unit, self._index[rows.indices]).matrix()
 
@@ -64,7 +68,7 @@ class Product:
         added = 0.0 if self._added is None else self._added
         return right / (self._scale * own / self._unit + added)
 
-    def _through(self, product, values: Array) -> Array:
+    def _through(self, product: Callable[[Array], Array], values: Array) -> Array:
         self._whole[:] = 0.0
         self._whole[self._index] = values
         return product(self._whole)[self._index]

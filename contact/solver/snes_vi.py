@@ -101,7 +101,9 @@ class SnesVI:
         snes.setFromOptions()
         self._snes = snes
 
-    def _fill(self, _snes: PETSc.SNES, _force: PETSc.Vec, jacobian: PETSc.Mat, _p) -> None:
+    def _fill(
+        self, _snes: PETSc.SNES, _force: PETSc.Vec, jacobian: PETSc.Mat, _p: PETSc.Mat
+    ) -> None:
         """A anew: the semismooth solver scales it in place."""
         if self._product is not None:
             self._product.reset()

@@ -27,11 +27,11 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class BrushLaw:
-    """`stiffness` N/m a point; `friction` mu, None: never slips; `slip` (s_x, s_y); `kind`:
+    """`stiffness` N/m a point, or (c,) of each; `friction` mu, None: never slips; `slip` (s_x, s_y); `kind`:
     "rolling", or "spring", the thesis's spring to the point's own displacement, e = u.
     """
 
-    stiffness: float
+    stiffness: float | Array
     friction: float | None = None
     slip: tuple[float, float] = (0.0, 0.0)
     kind: str = "rolling"
@@ -66,7 +66,7 @@ class Brush:
 
     def take(self, force: Array, moved: Array, touching: Mask) -> None:
         """The step's horizontal forces (c, 2) N, displacements (c, 2) m and touching points."""
-        self.deflection = -force / self.law.stiffness
+        self.deflection = -force / np.reshape(self.law.stiffness, (-1, 1))
         self._moved, self._touched = moved, touching
 
     def state(self) -> dict[str, np.ndarray]:

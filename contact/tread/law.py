@@ -23,6 +23,11 @@ class TreadLaw(Parameters):
     owner = "contact"
     compliant = True
 
+    @property
+    def creep(self) -> tuple[Array, Array] | None:
+        """Shares and times (k,), - and s, of its creep (contact.tread.creep); None: it answers at once."""
+        return None
+
     def influence(self, farthest: float) -> Influence:
         """Approach (m/N) at offsets x, y (m) from rectangles of half sizes a, b (m) under a unit force.
 

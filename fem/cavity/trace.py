@@ -9,6 +9,8 @@ the air, rho the distance from the axle, chi_f = 1, cos n theta, sin n theta of 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -72,7 +74,7 @@ class CavityTrace:
     def _scalars(self) -> tuple[float, float]:
         return fem.assemble_scalar(self._volume), fem.assemble_scalar(self._area)
 
-    def _each_wave(self):
+    def _each_wave(self) -> Iterator[int]:
         """Set the form's wave to 1, cos theta, sin theta, cos 2 theta, ... in turn."""
         for index in range(2 * self.count + 1):
             self._wave.value = (index + 1) // 2

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from tireroad.fem.decks.deck import Compound
+from tireroad.fem.decks.files.lines import Place
 from tireroad.fem.decks.prony import prony
 from tireroad.fem.decks.units import Units
 
@@ -95,7 +97,9 @@ def _parts(compound: Compound) -> dict:
     return {keyword: (options, rows, place) for keyword, options, rows, place in compound.parts}
 
 
-def _numbers(part, compound: Compound, notes: list[str], lines: int = 1):
+def _numbers(
+    part: Any, compound: Compound, notes: list[str], lines: int = 1
+) -> tuple[Mapping[str, str], list[float], Place]:
     """Options, the numbers of the first `lines` lines (those of the first temperature) and place."""
     options, table, place = part
     if not table and not {"MARLOW", "TEST DATA INPUT"} & set(options):
@@ -105,7 +109,9 @@ def _numbers(part, compound: Compound, notes: list[str], lines: int = 1):
     return options, [value for row in table[:lines] for value in row], place
 
 
-def _hyperelastic(options, numbers: list[float], place, name: str) -> tuple[str, dict]:
+def _hyperelastic(
+    options: Mapping[str, str], numbers: list[float], place: Place, name: str
+) -> tuple[str, dict]:
     """(law, coefficients in the deck's units) from the forms of *HYPERELASTIC."""
     order, reduced = _form(options, place, name)
     names, count = _names(order, reduced)
@@ -139,7 +145,7 @@ def _law(values: dict, bulk: float) -> tuple[str, dict]:
     return "neo-hookean", {"youngs_modulus": 2 * shear * (1 + poisson), "poisson_ratio": poisson}
 
 
-def _form(options, place, name: str) -> tuple[int, bool]:
+def _form(options: Mapping[str, str], place: Place, name: str) -> tuple[int, bool]:
     """(order N, of I1 alone) of a polynomial form. The default of Abaqus is POLYNOMIAL, N=1."""
     for fixed, form in {
         "NEO HOOKE": (1, True),
@@ -174,7 +180,9 @@ def _names(order: int, reduced: bool) -> tuple[list[str], int]:
     return names, order
 
 
-def _elastic(options, numbers: list[float], place, name: str) -> tuple[str, dict]:
+def _elastic(
+    options: Mapping[str, str], numbers: list[float], place: Place, name: str
+) -> tuple[str, dict]:
     if options.get("TYPE", "ISOTROPIC").upper() not in ("ISOTROPIC", "ISO"):
         raise place.error(
             f"material {name}: *ELASTIC with TYPE={options['TYPE']}: isotropic is read"
@@ -231,7 +239,7 @@ def _density(parts: dict, units: Units, compound: Compound) -> float | None:
     return density
 
 
-def _check_modulus(modulus: float, units: Units, place, name: str) -> None:
+def _check_modulus(modulus: float, units: Units, place: Place, name: str) -> None:
     if not _MODULUS[0] <= modulus <= _MODULUS[1]:
         raise place.error(
             f"material {name}: Young's modulus {modulus:.4g} Pa when the deck is read in {units.words}; "

@@ -7,7 +7,7 @@ from pathlib import Path
 from tireroad.fem.decks.compounds import Rubber
 from tireroad.fem.decks.shape.plies import Ply
 from tireroad.fem.errors import InputError
-from tireroad.fem.sections.construction import Construction
+from tireroad.fem.sections.construction import Construction, CordLine
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.section_file import read
 
@@ -38,6 +38,6 @@ def _rubber(construction: Construction, name: str) -> Rubber:
     )
 
 
-def _ply(line, mesh: SectionMesh) -> Ply:
+def _ply(line: CordLine, mesh: SectionMesh) -> Ply:
     given = {key: value for key, value in vars(line).items() if key not in ("under", "to")}
     return Ply(sides=mesh.plies[line.name], **given)

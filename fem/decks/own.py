@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -20,9 +21,9 @@ from tireroad.fem.decks.shape.embedding import lay_all
 from tireroad.fem.decks.shape.mirror import is_half, mirrored
 from tireroad.fem.decks.shape.plies import Laid, Ply, plies
 from tireroad.fem.decks.shape.quad_split import Quads
-from tireroad.fem.decks.shape.quads import build
+from tireroad.fem.decks.shape.quads import DeckEdges, build
 from tireroad.fem.decks.solids import revolved
-from tireroad.fem.decks.units import SYSTEMS, check_size
+from tireroad.fem.decks.units import SYSTEMS, Units, check_size
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import SectionMesh
 
@@ -84,7 +85,7 @@ def read(path: Path | str, wishes: Wishes | None = None) -> OwnSection:
         raise error if deck.file in text else InputError(f"{deck.file}: {text}") from None
 
 
-def _section(deck: Deck, ring_angles, wishes: Wishes) -> OwnSection:
+def _section(deck: Deck, ring_angles: np.ndarray | None, wishes: Wishes) -> OwnSection:
     units = SYSTEMS[wishes.length_unit]
     found = regions(deck)
     _check_radius(deck, wishes.length_unit)
@@ -132,8 +133,7 @@ def _section(deck: Deck, ring_angles, wishes: Wishes) -> OwnSection:
 
 def _check_radius(deck: Deck, unit: str) -> None:
     solids = [b for b in deck.blocks if b.kind.role == "solid"]
-    nodes = np.concatenate([deck.rows(b.nodes, b.place).ravel() for b in solids])
-    r = deck.points[nodes, 0]
+    r = deck.points[np.concatenate([deck.rows(b.nodes, b.place).ravel() for b in solids]), 0]
     if r.min() < 0:
         raise InputError(
             f"a node at r = {r.min():.5g}: the first column is the distance from the axle, r ≥ 0"
@@ -182,7 +182,7 @@ def _sides(quads: Quads, numbers: list[np.ndarray], key: str) -> np.ndarray | No
     return sides
 
 
-def _cords(deck: Deck, quads: Quads, laid: dict[str, Laid], units) -> list[Ply]:
+def _cords(deck: Deck, quads: Quads, laid: dict[str, Laid], units: Units) -> list[Ply]:
     made: list[Ply] = []
     for layer in deck.layers:
         if layer.elements not in laid:
@@ -200,7 +200,7 @@ def _cords(deck: Deck, quads: Quads, laid: dict[str, Laid], units) -> list[Ply]:
     ]
 
 
-def _lines(deck: Deck, quads: Quads, edges, origins: Origins, wishes: Wishes) -> dict:
+def _lines(deck: Deck, quads: Quads, edges: DeckEdges, origins: Origins, wishes: Wishes) -> dict:
     """Named lines of a Gmsh mesh that lie inside the body, ready for cords of the scene."""
     faces_named = {name.upper() for names in _names(deck, wishes).values() for name in names}
     found = {}
@@ -214,7 +214,7 @@ def _lines(deck: Deck, quads: Quads, edges, origins: Origins, wishes: Wishes) ->
     return found
 
 
-def _rubbers(deck: Deck, found: Regions, units, wishes: Wishes) -> list[Rubber | None]:
+def _rubbers(deck: Deck, found: Regions, units: Units, wishes: Wishes) -> list[Rubber | None]:
     given = {name.upper() for name in wishes.materials}
     compounds: list[Rubber | None] = []
     for name, material, place in zip(found.names, found.materials, found.places, strict=True):
@@ -237,7 +237,9 @@ def _centred(points: np.ndarray) -> tuple[np.ndarray, float]:
     return points - [0.0, shift], float(shift)
 
 
-def _said(deck: Deck, split: bool, shift: float, wishes: Wishes, found: Regions, units):
+def _said(
+    deck: Deck, split: bool, shift: float, wishes: Wishes, found: Regions, units: Units
+) -> Iterator[str]:
     yield f"units: the deck is read in {units.words}"
     if split:
         yield "triangles: each split into three quadrilaterals, every quadrilateral into four"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 PRONY_FREQUENCY = 100.0  # Hz at which a series is read
 
 
-def prony(parts: dict, options, notes: list[str]) -> tuple[float, float, float]:
+def prony(parts: dict, options: Mapping[str, str], notes: list[str]) -> tuple[float, float, float]:
     """(long-term share of the given moduli, dynamic over long-term modulus, loss factor)."""
     if "VISCOELASTIC" not in parts:
         return 1.0, 1.0, 0.0

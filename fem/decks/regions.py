@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.fem.decks.deck import SCOPE, Deck
+from tireroad.fem.decks.files.elements import Block
 from tireroad.fem.decks.files.lines import Place
 from tireroad.fem.errors import InputError
 
@@ -59,7 +60,7 @@ def regions(deck: Deck) -> Regions:
     return Regions(tuple(names), tuple(materials), tuple(places), of)
 
 
-def _by_set(deck: Deck, blocks, labels: np.ndarray) -> Regions:
+def _by_set(deck: Deck, blocks: list[Block], labels: np.ndarray) -> Regions:
     """One region for each element set, smallest sets first, and one of what is left."""
     sets = {
         name: np.intersect1d(deck.element_sets.labels(name), labels)

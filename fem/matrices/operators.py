@@ -16,6 +16,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from petsc4py import PETSc
+from ufl.core.expr import Expr
 
 from tireroad.fem import compat, kinematics
 from tireroad.fem.matrices.support import FIXED, Rim, Support, Unknowns
@@ -78,13 +79,13 @@ class Operators:
             self.stiffness.setValues(six, six, turning, PETSc.InsertMode.ADD)
         self.stiffness.assemble()
 
-    def _tangent(self, inflation: float):
+    def _tangent(self, inflation: float) -> ufl.Form:
         pressure = fem.Constant(self.body.mesh, inflation)
         static = tangent(self.body, static_residual(self.body, pressure, AT_REST))
         wall = self.body.wall
         return static + self._material(wall.stiffening()) if wall.stiffens else static
 
-    def _material(self, share):
+    def _material(self, share: Expr) -> ufl.Form:
         """A share (a field of the cells) of the material part of the rubber's tangent, in UFL."""
         here = fem.Function(self.body.space)
         here.x.array[:] = self.body.u.x.array
@@ -117,7 +118,7 @@ class Operators:
         body = self.body
         return self._assemble(body.inertia(ufl.inner(body.trial, body.test)))
 
-    def _assemble(self, form) -> PETSc.Mat:
+    def _assemble(self, form: ufl.Form) -> PETSc.Mat:
         matrix = fem.petsc.assemble_matrix(compat.form(form))
         matrix.assemble()
         reduced = self.unknowns.reduced(matrix)

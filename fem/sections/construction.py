@@ -7,7 +7,7 @@ length s on the outer face from the crown, the same on both sides.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,7 +147,7 @@ class Construction:
                 f"section: the tread reaches to {self.tread:g} m, the rim holds the face from {self._held:g} m on"
             )
 
-    def _surfaces(self):
+    def _surfaces(self) -> Callable[[np.ndarray], np.ndarray]:
         """Depths (k, layers + 1) m of outer face and inner sides of the layers at lengths (k,) >= 0."""
         lines = []
         for layer in self.layers:

@@ -49,7 +49,7 @@ def product(
     """
     layers, along = len(wall) - 1, len(arc) - 1
 
-    def position(cells, xi, eta):
+    def position(cells: np.ndarray, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
         k, j = np.divmod(cells, along)
         return place(_between(wall, k, xi), _between(arc, j, eta))
 
@@ -84,7 +84,11 @@ def _cells(layers: int, along: int, order: int) -> np.ndarray:
     return (order * k + step_k) * (order * along + 1) + order * j + step_j
 
 
-def _nodes(cells: np.ndarray, order: int, position) -> np.ndarray:
+def _nodes(
+    cells: np.ndarray,
+    order: int,
+    position: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
+) -> np.ndarray:
     _, first = np.unique(cells, return_index=True)
     owner, local = np.divmod(first, cells.shape[1])
     xi, eta = (part[local] for part in reference.grid_points(reference.equispaced(order)))
@@ -154,7 +158,9 @@ def corners(
 _SAMPLES = 2001
 
 
-def _cumulative(density, a: float, b: float) -> tuple[np.ndarray, np.ndarray]:
+def _cumulative(
+    density: Callable[[np.ndarray], np.ndarray], a: float, b: float
+) -> tuple[np.ndarray, np.ndarray]:
     x = np.linspace(a, b, _SAMPLES)
     middle = density((x[1:] + x[:-1]) / 2) * (b - a) / (_SAMPLES - 1)
     return x, np.concatenate([[0.0], np.cumsum(middle)])

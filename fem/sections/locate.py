@@ -13,7 +13,9 @@ _NEWTON = 12
 _OUTSIDE = 0.2  # of an element: a place off the mesh by its interpolation is not pulled in further
 
 
-def locate(nodes: np.ndarray, cells: np.ndarray, order: int, points: np.ndarray):
+def locate(
+    nodes: np.ndarray, cells: np.ndarray, order: int, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cell, xi and eta, (k,) each, of places (k, 2) m in cells (c, n) of equispaced nodes.
 
     Newton's method in the cells nearby; a place outside all goes to where it fits best.

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tireroad.fem.errors import InputError
 from tireroad.fem.sections import bead
 from tireroad.fem.sections.footprint import ARC_NEAR, near_road, ring_corners
 from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
@@ -35,6 +37,17 @@ class Torus:
     order: int
     grading: str = "bead"
     footprint_size: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.half_angle < math.pi:
+            raise InputError(
+                f"torus: half_angle = {self.half_angle:g} rad must lie between 0 and pi: it is in radians"
+            )
+        if not 0 < self.thickness < self.minor_radius < self.outer_radius < math.inf:
+            raise InputError(
+                f"torus: thickness = {self.thickness:g} m, minor_radius = {self.minor_radius:g} m and "
+                f"outer_radius = {self.outer_radius:g} m must ascend from above 0"
+            )
 
     @property
     def ring_corners(self) -> np.ndarray:
@@ -72,7 +85,9 @@ class Torus:
             order=self.order, wall=wall, arc=arc, place=self._place, patches=patches, plies=plies
         )
 
-    def lines(self, patches: Sequence[Patch], plies: Sequence[PlyLine]):
+    def lines(
+        self, patches: Sequence[Patch], plies: Sequence[PlyLine]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Corners through the wall, as shares of it, and along the arc, rad."""
         arcs = [end for patch in patches for arc in patch.arcs for end in arc]
         ends = [end for ply in plies for end in ply.arc]

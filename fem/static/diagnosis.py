@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.errors import ConvergenceError, LoadingStopped
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.loading import Loader, LoadingStopped
+from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 

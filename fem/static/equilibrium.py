@@ -7,6 +7,7 @@ z + u_z >= z_road and one of both zero.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import ufl
@@ -241,7 +242,7 @@ class Equilibrium:
         return self.body.comm.allreduce(fem.assemble_scalar(self._inverted)) > 0
 
 
-def _inverted_volume(body: Body):
+def _inverted_volume(body: Body) -> Any:
     """Volume in which det F is not positive, m3, in UFL."""
     J = ufl.det(kinematics.deformation_gradient(body.u))
     return ufl.conditional(ufl.le(J, 0.0), 1.0, 0.0) * body.dx

@@ -104,7 +104,7 @@ def _cover(level: np.ndarray, axis: int) -> np.ndarray:
     a, b = level[:-1], level[1:]
     share = (np.maximum(a, 0) + np.maximum(b, 0)) / (abs(a) + abs(b))
 
-    def half(share, inside):
+    def half(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
         return np.where(inside, np.minimum(1, 2 * share), np.maximum(0, 2 * share - 1))
 
     inner = level[1:-1] > 0

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.errors import ConvergenceError, InputError, LoadingStopped
 from tireroad.fem.parallel import on_root
 from tireroad.fem.static.equilibrium import Equilibrium, Step
 from tireroad.fem.static.round import RoundEquilibrium
@@ -42,17 +42,6 @@ class _Known:
     deflection: float
     load: float
     displacement: np.ndarray
-
-
-class LoadingStopped(ConvergenceError):
-    """Load steps that became too small; `fact` is where, without advice."""
-
-    def __init__(self, fact: str) -> None:
-        super().__init__(
-            f"{fact}. The tire may fold or buckle here: lower the load or raise the inflation, stiffen "
-            "the material or refine the mesh around the footprint."
-        )
-        self.fact = fact
 
 
 class Loader:
@@ -222,7 +211,16 @@ class Loader:
         largest = 0.25 * self.body.ring.thickness
         self._march(attempt, start, end, largest, "deflection", 1.0, "m")
 
-    def _march(self, attempt, start, end, first, what, scale, unit) -> None:
+    def _march(
+        self,
+        attempt: Callable[[float], Step],
+        start: float,
+        end: float,
+        first: float,
+        what: str,
+        scale: float,
+        unit: str,
+    ) -> None:
         """From a converged `start` to `end` in steps from `first` on: grown when easy, cut back on failure."""
         done, size = start, first
         while True:

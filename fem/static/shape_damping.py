@@ -11,6 +11,7 @@ import ufl
 import ufl.algorithms
 from dolfinx import fem
 from petsc4py import PETSc
+from ufl.core.expr import Expr
 
 from tireroad.fem import compat
 from tireroad.fem.static.virtual_work import Rolling, body_rate_form, elastic_work
@@ -23,7 +24,7 @@ class ShapeDamping:
     `update` must be called before `work` is assembled. All methods are collective.
     """
 
-    def __init__(self, body: Body, pressure, rolling: Rolling) -> None:
+    def __init__(self, body: Body, pressure: Expr, rolling: Rolling) -> None:
         self._body = body
         self._rate = fem.Function(body.space)
         self._factor = float(rolling.speed * rolling.stiffness_damping)

@@ -66,7 +66,7 @@ class TreadSurface:
             corners, found = self._closed_in(*corners)
         return float(found.min())
 
-    def _closed_in(self, ring: np.ndarray, arc: np.ndarray):
+    def _closed_in(self, ring: np.ndarray, arc: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
         """Boxes (k, 2) a third as wide around the lowest of 7 x 7 points in each, and its height (k,)."""
         t = np.linspace(0, 1, 7)
         place = [box[:, :1] + (box[:, 1:] - box[:, :1]) * t for box in (ring, arc)]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import ufl
 from dolfinx import fem
+from ufl.core.expr import Expr
 
 from tireroad.fem import kinematics
 from tireroad.fem.tire.body import Body
@@ -28,13 +29,13 @@ class Rolling:
 AT_REST = Rolling()
 
 
-def static_residual(body: Body, pressure, rolling: Rolling):
+def static_residual(body: Body, pressure: Expr, rolling: Rolling) -> ufl.Form:
     """The virtual work of everything but the road, as a UFL form in the body's displacement."""
     work = elastic_work(body, pressure)
     return work + _rolling_work(body, rolling) if rolling.speed else work
 
 
-def elastic_work(body: Body, pressure):
+def elastic_work(body: Body, pressure: Expr) -> ufl.Form:
     """The virtual work of the stresses, of the cords and of the follower pressure.
 
     The dilatation is integrated by one Gauss point a direction less than the rest. In full it locks:
@@ -53,7 +54,7 @@ def elastic_work(body: Body, pressure):
     return work + pressure * kinematics.pressure_virtual_work(u, v, normal) * body.inner_ds
 
 
-def added_stress(body: Body, share, before: fem.Function):
+def added_stress(body: Body, share: Expr, before: fem.Function) -> ufl.Form:
     """int share (S(C) - S(C_0)) : delta E: virtual work of a share of the rubber's stress since the state `before`.
 
     `share` a field of the cells. Its derivative there is that share of the material part of the tangent:
@@ -62,19 +63,19 @@ def added_stress(body: Body, share, before: fem.Function):
     u, v = body.u, body.test
     F, F0 = kinematics.deformation_gradient(u), kinematics.deformation_gradient(before)
 
-    def part(number: int):
+    def part(number: int) -> Expr:
         added = second_stress(body, number, F.T * F) - second_stress(body, number, F0.T * F0)
         return share * ufl.inner(F * added, ufl.grad(v))
 
     return part(0) * body.dx + part(1) * body.reduced_dx
 
 
-def added_energy(body: Body, share, before: fem.Function):
+def added_energy(body: Body, share: Expr, before: fem.Function) -> ufl.Form:
     """The potential of `added_stress`: int share (W(C) - W(C_0) - S(C_0) : (E - E_0)), J."""
     F, F0 = kinematics.deformation_gradient(body.u), kinematics.deformation_gradient(before)
     C, C0 = F.T * F, F0.T * F0
 
-    def part(number: int):
+    def part(number: int) -> Expr:
         stress = second_stress(body, number, C0)
         stored = body.wall.energy(C)[number] - body.wall.energy(C0)[number]
         return share * (stored - ufl.inner(stress, C - C0) / 2)
@@ -82,13 +83,13 @@ def added_energy(body: Body, share, before: fem.Function):
     return part(0) * body.dx + part(1) * body.reduced_dx
 
 
-def second_stress(body: Body, part: int, C):
+def second_stress(body: Body, part: int, C: Expr) -> Expr:
     """Second Piola-Kirchhoff stress of the rubber, Pa; part 0 of the distortion, 1 of the dilatation."""
     C = ufl.variable(C)
     return 2 * ufl.diff(body.wall.energy(C)[part], C)
 
 
-def _rolling_work(body: Body, rolling: Rolling):
+def _rolling_work(body: Body, rolling: Rolling) -> ufl.Form:
     """The virtual work of inertia and of damping by the mass."""
     u, v = body.u, body.test
     w = kinematics.wheel_velocity(body.mesh)
@@ -103,7 +104,7 @@ def _rolling_work(body: Body, rolling: Rolling):
     return work + body.inertia(drag * ufl.inner(kinematics.body_rate(u, w), v))
 
 
-def convection_form(body: Body):
+def convection_form(body: Body) -> ufl.Form:
     """G: the skew part of int rho v . (grad u w), in trial and test functions."""
     u, v = body.trial, body.test
     w = kinematics.wheel_velocity(body.mesh)
@@ -112,18 +113,18 @@ def convection_form(body: Body):
     return body.inertia(skew)
 
 
-def body_rate_form(body: Body):
+def body_rate_form(body: Body) -> ufl.Form:
     """B = G - Q, Q = int rho v . (e_y x u)."""
     u, v = body.trial, body.test
     return convection_form(body) - body.inertia(ufl.inner(v, kinematics.turn(u)))
 
 
-def tangent(body: Body, residual):
+def tangent(body: Body, residual: ufl.Form) -> ufl.Form:
     """The derivative of a residual by the body's displacement."""
     return ufl.derivative(residual, body.u, body.trial)
 
 
-def stress_prediction(body: Body, before: fem.Function):
+def stress_prediction(body: Body, before: fem.Function) -> ufl.Form:
     """What makes of the tangent the one of a Newton method in displacements and stresses.
 
     There the stresses S are unknowns of their own in each Gauss point, S = S(C(u)) is linearised
@@ -140,8 +141,8 @@ def stress_prediction(body: Body, before: fem.Function):
     bending = ufl.sym(ufl.grad(du).T * ufl.grad(v))
     reach = ufl.variable(fem.Constant(body.mesh, 0.0))
 
-    def correction(part: int):
-        def stress(C):
+    def correction(part: int) -> Expr:
+        def stress(C: Expr) -> Expr:
             return second_stress(body, part, C)
 
         slope = ufl.diff(stress(F0.T * F0 + reach * rate), reach)

@@ -9,6 +9,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
+from ufl.core.expr import Expr
 
 from tireroad.fem import compat
 from tireroad.fem.sections.ring import Ring
@@ -77,7 +78,7 @@ class Body:
         facets = self.tire.facets.indices[self.tire.facets.values == tag]
         return fem.locate_dofs_topological(self.space, 2, facets)
 
-    def clamp(self):
+    def clamp(self) -> fem.DirichletBC:
         """Boundary condition: all components zero on the rim."""
         return fem.dirichletbc(np.zeros(3), self.rim, self.space)
 
@@ -95,7 +96,7 @@ class Body:
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         return vector.array_r.copy()
 
-    def inertia(self, integrand):
+    def inertia(self, integrand: Expr) -> ufl.Form:
         """int rho0 integrand over wall and cords by full integration, a UFL form."""
         return self.wall.density * integrand * self.dx + self.plies.inertia(integrand)
 

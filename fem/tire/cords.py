@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from tireroad.fem.errors import InputError
 
@@ -84,24 +85,24 @@ class Woven:
     sine: np.ndarray
 
 
-def tension(stretch, stiffness, slack):
+def tension(stretch: Expr, stiffness: Expr, slack: Expr) -> Expr:
     """dW_c/dlambda, N/m, in UFL."""
     modulus = stiffness * ufl.conditional(ufl.lt(stretch, 1.0), slack, 1.0)
     return modulus * (stretch - 1)
 
 
-def energy(stretch, stiffness, slack):
+def energy(stretch: Expr, stiffness: Expr, slack: Expr) -> Expr:
     """W_c, J/m2, in UFL."""
     return tension(stretch, stiffness, slack) * (stretch - 1) / 2
 
 
-def tension_over_stretch(square, stiffness, slack):
+def tension_over_stretch(square: Expr, stiffness: Expr, slack: Expr) -> Expr:
     """(1/lambda) dW_c/dlambda as a function of lambda^2: the second Piola-Kirchhoff stress, N/m."""
     stretch = ufl.sqrt(square)
     return tension(stretch, stiffness, slack) / stretch
 
 
-def tension_over_stretch_rate(square, stiffness, slack):
+def tension_over_stretch_rate(square: Expr, stiffness: Expr, slack: Expr) -> Expr:
     """The derivative of `tension_over_stretch` by lambda^2, N/m."""
     stretch = ufl.sqrt(square)
     modulus = stiffness * ufl.conditional(ufl.lt(stretch, 1.0), slack, 1.0)

@@ -13,6 +13,8 @@ import itertools
 
 import numpy as np
 import ufl
+from dolfinx.mesh import Mesh
+from ufl.core.expr import Expr
 
 from tireroad.fem import compat
 
@@ -42,7 +44,7 @@ def face_points(axis: int, side: int, line: np.ndarray) -> np.ndarray:
 class Face:
     """The face of all cells of a mesh where reference coordinate `axis` is `side` (0 or 1)."""
 
-    def __init__(self, mesh, axis: int, side: int, order: int) -> None:
+    def __init__(self, mesh: Mesh, axis: int, side: int, order: int) -> None:
         self.mesh, self.axis, self.side, self._order = mesh, axis, side, order
         reference = np.zeros(AXES)
         reference[axis] = 2 * side - 1
@@ -50,7 +52,7 @@ class Face:
         self.area = ufl.sqrt(ufl.dot(scaled, scaled))
         self.normal = scaled / self.area
 
-    def integral(self, integrand, kind: str):
+    def integral(self, integrand: Expr, kind: str) -> ufl.Form:
         """The UFL form of an integral by area with the rule `kind` of `edge_rule`."""
         line, weights = edge_rule(self._order, kind)
         metadata = {
@@ -62,7 +64,7 @@ class Face:
         }
         return self.area * integrand * ufl.Measure("dx", domain=self.mesh, metadata=metadata)
 
-    def tangents(self):
+    def tangents(self) -> tuple[Expr, Expr]:
         """(e_circ, e_across) in UFL: around the axle, and e_circ x normal, both in the face's surface."""
         X = ufl.SpatialCoordinate(self.mesh)
         along = ufl.as_vector((-X[2], 0.0, X[0]))

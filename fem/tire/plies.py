@@ -7,13 +7,15 @@ where its face is on no ply: another angle, modulus or number of plies compiles 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from ufl.core.expr import Expr
 
 from tireroad.fem import compat, kinematics
 from tireroad.fem.errors import InputError
@@ -78,38 +80,40 @@ class Sheet:
 class Plies:
     """All cords of a body, `order` that of its elements; without any, every form is 0. Collective to make."""
 
-    def __init__(self, mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]) -> None:
+    def __init__(
+        self, mesh: Mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]
+    ) -> None:
         self.cords = tuple(cords)
         self.sheets = _sheets(mesh, order, self.cords, laid)
 
-    def work(self, u, v):
+    def work(self, u: Expr, v: Expr) -> ufl.Form | int:
         """Virtual work of the cords' tension in UFL."""
         return _sum(self._work(sheet, u, v) for sheet in self.sheets)
 
-    def _work(self, sheet: Sheet, u, v):
+    def _work(self, sheet: Sheet, u: Expr, v: Expr) -> ufl.Form:
         line, test_line = self._lines(sheet, u, v)
         tension = law.tension_over_stretch(ufl.dot(line, line), sheet.stiffness, sheet.slack)
         return sheet.face.integral(tension * ufl.dot(line, test_line), RULE)
 
-    def _lines(self, sheet: Sheet, u, v):
+    def _lines(self, sheet: Sheet, u: Expr, v: Expr) -> tuple[Expr, Expr]:
         """F a and grad(v) a."""
         F = kinematics.deformation_gradient(u)
         return ufl.dot(F, sheet.direction), ufl.dot(ufl.grad(v), sheet.direction)
 
-    def energy(self, u):
+    def energy(self, u: Expr) -> ufl.Form | int:
         """Strain energy of the cords, J, in UFL."""
 
-        def stored(sheet: Sheet):
+        def stored(sheet: Sheet) -> ufl.Form:
             line, _ = self._lines(sheet, u, u)
             density = law.energy(ufl.sqrt(ufl.dot(line, line)), sheet.stiffness, sheet.slack)
             return sheet.face.integral(density, RULE)
 
         return _sum(stored(sheet) for sheet in self.sheets)
 
-    def stress_prediction(self, u, before, du, v):
+    def stress_prediction(self, u: Expr, before: Expr, du: Expr, v: Expr) -> ufl.Form | int:
         """As fem.static.virtual_work.stress_prediction, of the cords."""
 
-        def correction(sheet: Sheet):
+        def correction(sheet: Sheet) -> ufl.Form:
             line, last = self._lines(sheet, u, before)[0], self._lines(sheet, before, v)[0]
             change = ufl.dot(ufl.grad(u - before), sheet.direction)
             given = sheet.stiffness, sheet.slack
@@ -124,7 +128,7 @@ class Plies:
 
         return _sum(correction(sheet) for sheet in self.sheets)
 
-    def inertia(self, integrand, kind: str = "full"):
+    def inertia(self, integrand: Expr, kind: str = "full") -> ufl.Form | int:
         """int (mass per area) integrand over all plies that have mass, in UFL."""
         if not any(one.density for one in self.cords):
             return 0
@@ -134,12 +138,12 @@ class Plies:
 RULE = "reduced"
 
 
-def _sum(forms):
+def _sum(forms: Iterable[ufl.Form]) -> ufl.Form | int:
     """The sum of UFL forms; 0 of none."""
     return sum(forms)
 
 
-def _sheets(mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]) -> list[Sheet]:
+def _sheets(mesh: Mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]) -> list[Sheet]:
     """As few sheets as hold all plies: one a face of the cells, and more where plies lie on each other."""
     cells = mesh.topology.index_map(3)
     count = cells.size_local + cells.num_ghosts

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
+from ufl.core.expr import Expr
 
 from tireroad.fem import compat
 from tireroad.fem.errors import InputError
@@ -85,7 +86,7 @@ class Wall:
         """Imaginary part of the modulus of small motions over the static modulus."""
         return self._by_cell([m.dynamic * m.loss_factor for m in self._materials])
 
-    def energy(self, C):
+    def energy(self, C: Expr) -> tuple[Expr, Expr]:
         """Strain energy density as (distortion, dilatation), J/m3, in UFL."""
         parts = [energy(C, *coefficients) for energy, coefficients in self._laws]
         return sum(part[0] for part in parts), sum(part[1] for part in parts)

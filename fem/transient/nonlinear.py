@@ -16,11 +16,13 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
+from ufl.core.expr import Expr
 
 from tireroad.fem import compat, kinematics
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.virtual_work import AT_REST, added_energy, added_stress, static_residual
+from tireroad.fem.tire.body import Body
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.modal_damping import ModalDamping
 
@@ -123,7 +125,7 @@ class NonlinearTire(FullTire):
         balanced = (1 - a) * acceleration + a * self.acceleration
         return self._mass * balanced + self._product(rate)
 
-    def _at(self, motion: np.ndarray, work):
+    def _at(self, motion: np.ndarray, work: ufl.Form) -> np.ndarray:
         """What `work()` says at the static state plus a motion; the body is put back."""
         field = self._body.u.x
         field.array[self._operators.unknowns.free] += motion
@@ -154,7 +156,7 @@ class NonlinearTire(FullTire):
         return kinetic + self._at(self.displacement, self._stored) - self._rest_potential
 
 
-def _potential(body, pressure):
+def _potential(body: Body, pressure: Expr) -> ufl.Form:
     """Strain energy of wall and cords and p V, J, in UFL; V(u) the volume behind the inner face, whose edges stand still."""
     F = kinematics.deformation_gradient(body.u)
     distortion, dilatation = body.wall.energy(F.T * F)

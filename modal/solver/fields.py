@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
-from tireroad.modal.solver.spectrum import Slice
+from tireroad.modal.solver.spectrum import Part, Slice
 
 CHUNK = 64  # columns a matrix product: no second copy of all vectors
 # Vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product.
@@ -36,7 +38,9 @@ def everywhere(matrix: PETSc.Mat) -> sparse.csr_matrix:
     return sparse.csr_matrix((values, columns, rows), (size, size))
 
 
-def collect(matrix: PETSc.Mat, parts, found: list[Slice], order: np.ndarray) -> np.ndarray:
+def collect(
+    matrix: PETSc.Mat, parts: Sequence[Part], found: list[Slice], order: np.ndarray
+) -> np.ndarray:
     """This process's rows of the vectors in the given order, each slice sent by its owner. Collective."""
     comm = matrix.comm.tompi4py()
     ranges = np.asarray(matrix.getOwnershipRanges())
@@ -53,7 +57,7 @@ def collect(matrix: PETSc.Mat, parts, found: list[Slice], order: np.ndarray) -> 
         if not width:
             continue
         sent, rows = None, np.empty((own, width))
-        if one.owner == comm.rank:
+        if one.vectors is not None:  # on the owner only
             fields = parts[one.part].fields(one.vectors)[:, wanted]
             sent = [
                 np.ascontiguousarray(fields),
@@ -104,3 +108,18 @@ def orthonormalise(comm: MPI.Comm, vectors: np.ndarray, part: np.ndarray) -> flo
             defect = gram(comm, mine, mine) - np.eye(len(columns))
         worst = max(worst, float(np.abs(defect).max()))
     return worst
+
+
+def projected(
+    comm: MPI.Comm, vectors: np.ndarray, matrix: PETSc.Mat, sign: int, known: np.ndarray | None
+) -> np.ndarray:
+    """V^T X V (m, m), symmetric (sign 1) or skew (-1); `known` (k, k) is its upper left part."""
+    m, k = vectors.shape[1], 0 if known is None else len(known)
+    out = np.empty((m, m))
+    out[:, k:] = gram(comm, vectors, multiply(matrix, vectors[:, k:]))
+    own = out[k:, k:]
+    out[k:, k:] = (own + sign * own.T) / 2
+    out[k:, :k] = sign * out[:k, k:].T
+    if known is not None:
+        out[:k, :k] = known
+    return out

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import optimize
 from slepc4py import SLEPc
@@ -19,12 +20,12 @@ from slepc4py import SLEPc
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver.fields import multiply
 
+Array = np.ndarray
 RESIDUAL_TOLERANCE = 1e-8
 _EXTRA = 10  # states beyond the wanted ones, to end in a gap and never inside a cluster
 _SAME = 1e-6  # relative distance of the right and left eigenvalue of one state
-DEFECTIVE = (
-    1e5  # two equal states come out at 7e5 to 1.3e6 by rounding, which differs with the processes
-)
+# Two equal states come out at 7e5 to 1.3e6 by rounding, which differs with the processes.
+DEFECTIVE = 1e5
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,14 @@ class FullModes:
     unit momentum.
     """
 
-    eigenvalue: np.ndarray
-    right: np.ndarray
-    left: np.ndarray
-    residual: np.ndarray
-    left_residual: np.ndarray
+    eigenvalue: Array
+    right: Array
+    left: Array
+    residual: Array
+    left_residual: Array
     condition: float
 
-    def among(self, wanted: np.ndarray) -> FullModes:
+    def among(self, wanted: Array) -> FullModes:
         """The states where `wanted` (q,) is true."""
         return FullModes(
             self.eigenvalue[wanted],
@@ -54,7 +55,7 @@ class FullModes:
 
 
 def window(
-    mass: np.ndarray,
+    mass: Array,
     drag: PETSc.Mat,
     stiffness: PETSc.Mat,
     span: tuple[float, float],
@@ -85,7 +86,7 @@ def window(
     return found.among(inside)
 
 
-def solve(mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -> FullModes:
+def solve(mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -> FullModes:
     """The `count` pairs (or about as many real states more) nearest to zero of a diagonal mass (own rows) kg,
     D (n, n) kg/s and K (n, n) N/m. Raises ConvergenceError. Collective.
     """
@@ -117,7 +118,7 @@ def solve(mass: np.ndarray, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -
     )
 
 
-def _condition(comm, mass, s, u, w, turn) -> float:
+def _condition(comm: MPI.Comm, mass: Array, s: Array, u: Array, w: Array, turn: Array) -> float:
     """Of the pairing between vectors of unit momentum: about the worst of an eigenvalue. Raises ConvergenceError
     where states are next to defective, for which no vectors of their own serve.
     """
@@ -137,14 +138,16 @@ def _condition(comm, mass, s, u, w, turn) -> float:
     return condition
 
 
-def _pairing(comm, mass, drag, s, u, w) -> np.ndarray:
+def _pairing(comm: MPI.Comm, mass: Array, drag: PETSc.Mat, s: Array, u: Array, w: Array) -> Array:
     """w_i^T [(s_i + s_j) M + D] u_j: diagonal but for clusters, where its inverse makes w biorthogonal."""
     moved = _times(drag, u)
     near = comm.allreduce(w.T @ (mass[:, None] * u))
     return s[:, None] * near + near * s + comm.allreduce(w.T @ moved)
 
 
-def _states(mass, drag, stiffness, wanted: int):
+def _states(
+    mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, wanted: int
+) -> tuple[Array, Array, Array]:
     """(s, vectors, residuals) of about `wanted` states nearest to zero, conjugates included."""
     weight = stiffness.createVecLeft()
     weight.array[:] = mass
@@ -188,7 +191,7 @@ def _states(mass, drag, stiffness, wanted: int):
     return s, vectors, residual
 
 
-def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, found: int) -> tuple[np.ndarray, np.ndarray]:
+def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, found: int) -> tuple[Array, Array]:
     real, imaginary = matrix.createVecs()
     s = np.empty(found, complex)
     vectors = np.empty((real.getLocalSize(), found), complex)
@@ -200,7 +203,7 @@ def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, found: int) -> tuple[np.ndarray, np
     return s, vectors
 
 
-def _polished(factor: PETSc.Mat, mass, drag, s, vectors) -> np.ndarray:
+def _polished(factor: PETSc.Mat, mass: Array, drag: PETSc.Mat, s: Array, vectors: Array) -> Array:
     """u = -K^-1 (s^2 M + s D) u once more, with the factorised K: it takes out what the Krylov basis
     carries in the stiffest directions, which is little in u and much in K u. Collective.
     """
@@ -219,11 +222,11 @@ def _polished(factor: PETSc.Mat, mass, drag, s, vectors) -> np.ndarray:
     return better / np.sqrt(size)
 
 
-def _times(matrix: PETSc.Mat, vectors: np.ndarray) -> np.ndarray:
+def _times(matrix: PETSc.Mat, vectors: Array) -> Array:
     return multiply(matrix, vectors.real) + 1j * multiply(matrix, vectors.imag)
 
 
-def _up_to_a_gap(s: np.ndarray, wanted: int) -> np.ndarray:
+def _up_to_a_gap(s: Array, wanted: int) -> Array:
     """Indices by |s|, ending at the widest gap after the wanted ones: conjugates stay together."""
     order = np.argsort(np.abs(s), kind="stable")
     size = np.abs(s[order])
@@ -234,12 +237,14 @@ def _up_to_a_gap(s: np.ndarray, wanted: int) -> np.ndarray:
     return order[:end]
 
 
-def _residuals(mass, drag, stiffness, s, vectors) -> np.ndarray:
+def _residuals(
+    mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, s: Array, vectors: Array
+) -> Array:
     """||(s^2 M + s D + K) u|| over the sum of its terms' norms, column by column. Collective."""
     comm = stiffness.comm.tompi4py()
     terms = [mass[:, None] * vectors * s**2, _times(drag, vectors) * s, _times(stiffness, vectors)]
 
-    def norm(field):
+    def norm(field: Array) -> Array:
         return np.sqrt(comm.allreduce((np.abs(field) ** 2).sum(axis=0)))
 
     return norm(sum(terms)) / sum(norm(term) for term in terms)

@@ -74,7 +74,9 @@ def _check_count(found: int, interval: Interval) -> None:
         )
 
 
-def _search(matrix, shifted: Shifted, interval: Interval) -> tuple[np.ndarray, np.ndarray]:
+def _search(
+    matrix: sparse.csr_matrix, shifted: Shifted, interval: Interval
+) -> tuple[np.ndarray, np.ndarray]:
     """Eigenpairs inside the interval, in no order, as many as there are or as are found."""
     operator = PETSc.Mat().createPython(matrix.shape, _Inverse(shifted), comm=PETSc.COMM_SELF)
     operator.setUp()
@@ -109,7 +111,7 @@ class _Inverse:
     def __init__(self, shifted: Shifted) -> None:
         self._shifted = shifted
 
-    def mult(self, _, right: PETSc.Vec, out: PETSc.Vec) -> None:
+    def mult(self, _: PETSc.Mat, right: PETSc.Vec, out: PETSc.Vec) -> None:
         """out = (A - sigma I)^-1 right."""
         self._shifted.apply(right, out)
 

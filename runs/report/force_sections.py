@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.files.read import Absent, Results, Section, attributes
-from tireroad.runs.report import corner, figures, surface_figures
+from tireroad.runs.report import corner, figures, pattern, surface_figures
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.report.tire_sections import pressure
 
@@ -37,6 +37,7 @@ def contact(results: Results) -> Section:
     if len(time) == 1:
         return section
     corner.wheel(results, section, time)
+    pattern.tread(results, section)
     points, normal = results.array(name, "points"), results.dataset(name, "normal_force")
     stride = max(1, -(-len(time) // SAMPLED))
     picture = surface_figures.space_time(time[::stride], points, sampled(normal, stride))

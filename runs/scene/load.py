@@ -62,10 +62,19 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     scene = with_elements(filled(scene))
     if "tire" not in source.broken():
         scene = with_own_section(scene, source)
-    scene = _with_damping(scene)
+    scene = _with_speed(_with_damping(scene))
     rules.check(scene, raw, source)
     source.refuse()
     return scene
+
+
+def _with_speed(scene: Scene) -> Scene:
+    """The wheel's speed for a speed over the road, until the static state tells its rolling radius."""
+    rotation = scene.rotation
+    if rotation is None or rotation.travel_speed is None:
+        return scene
+    speed = rotation.travel_speed / (rotation.rolling_radius or scene.tire.outer_radius)
+    return replace(scene, rotation=replace(rotation, speed=speed))
 
 
 def _with_damping(scene: Scene) -> Scene:

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from tireroad.contact.chatter import LIMIT, Chatter, Chosen, warning
 from tireroad.contact.driven import Driven
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.model import solver_name, step_solver
+from tireroad.contact.model import solver_name, step_solver, tread_memory
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.friction import Friction
@@ -24,6 +24,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
+from tireroad.runs.stages.build import pattern
 from tireroad.runs.stages.build.energy import Losses, describe_energy, works
 from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, told
@@ -62,7 +63,7 @@ class ContactStage(Stage[ContactHistory]):
         return {
             "greens": self.greens.key,
             "contact": asdict(scene.contact),
-            "road": asdict(scene.road),
+            "road": [asdict(scene.road), pattern.inputs(self.job)],
             "file": store.file_hash(scene.road.file) if scene.road.file else None,
             "speed": self.setup.product.rolled.speed,
             "axle_force": scene.output.axle_force,
@@ -88,10 +89,8 @@ class ContactStage(Stage[ContactHistory]):
             begun = begun_with(self.job, key)
             chosen = chosen_scheme(self.job, record, setup, plan, begun)
         spec, patch = self.job.scene.contact, setup.patch
-        observe.say(
-            f"  {len(patch.points)} contact points on {len(patch.index)} nodes, tread {spec.tread}, "
-            f"solver {solver_name(spec, patch)}"
-        )
+        count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
+        observe.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
         doubtful = self.job.scene.time.scheme == "auto" and chosen.scheme == "linear"
         try:
             self._attempt(key, record, setup, plan, chosen.scheme, doubtful)
@@ -135,6 +134,7 @@ class ContactStage(Stage[ContactHistory]):
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
         _describe(record, totals, loop.solver, chosen, chosen.steps - done)
+        pattern.describe(record, setup)
         if chosen.scheme != "convolution":
             work = works(chosen.scheme, totals.work, driven if self.job.scene.force else None)
             given = self.rotating.product, response, loop.tire.snapshot(), work
@@ -158,9 +158,11 @@ class ContactStage(Stage[ContactHistory]):
         """The tire as seen at the patch's points, normal solver, friction; the choice is shown."""
         spec, patch = self.job.scene.contact, setup.patch
         p = len(patch.index)
-        solver = step_solver(spec, patch, tire.same_step[:p, :p])
+        memory = tread_memory(spec, patch, setup.rolled.speed, step)
+        at_once = memory.at_once if memory else 1.0
+        solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once)
         friction = None
-        if spec.brush_stiffness is not None:
+        if spec.rubs:
             friction = _friction(spec, setup, tire, step)
             limit = friction.largest_unique(patch.force > 0, solver)
             record.indicators["friction up to which a step has one answer"] = (limit, "-")
@@ -169,13 +171,13 @@ class ContactStage(Stage[ContactHistory]):
             ]
         if patch.weights is not None:
             tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
-        return Loop(tire, solver, friction)
+        return Loop(tire, solver, friction, memory)
 
     def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, losses, chosen) -> None:
         """Take the steps that are left; stop between two of them when asked to. Collective."""
         done, steps = totals.figures.steps, chosen.steps
         given = setup.patch, setup.drive, chosen.step, steps
-        instants = roll(loop.tire, loop.solver, *given, loop.friction, done)
+        instants = roll(loop.tire, loop.solver, *given, loop.friction, done, loop.memory)
         watch = Watch(self.job.comm, self.job.scene.time.checkpoint)
         with (
             Deferred() as deferred,
@@ -217,7 +219,8 @@ def beyond_unique(friction: float | None, limit: float) -> list[str]:
 def _friction(spec, setup: ContactSetup, tire, step: float) -> Friction:
     """The brush of the scene, at rest."""
     patch = setup.patch
-    law = BrushLaw(spec.brush_stiffness, spec.friction, spec.slip, spec.brush)
+    stiffness = spec.brush_stiffness or spec.brush_stiffness_per_area * patch.area
+    law = BrushLaw(stiffness, spec.friction, spec.slip, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0)
     return Friction(brush, tire.same_step, patch.weights)

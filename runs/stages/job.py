@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from tireroad.fem.axle import Axle
 from tireroad.fem.model import TireModel
+from tireroad.fem.static.state import StaticState
 from tireroad.runs.files import store
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.resolved import dumps
@@ -30,11 +31,31 @@ class Job:
     directory: Path
     comm: MPI.Comm
     fresh: bool = False
+    found: dict[str, float] = field(default_factory=dict)
 
     @property
     def speed(self) -> float:
-        """Speed of rotation, rad/s; 0 when the wheel stands."""
+        """Speed of rotation, rad/s; 0 when the wheel stands. Of a scene with a travel speed a first guess, until
+        the static state has told its rolling radius."""
+        if "speed" in self.found:
+            return self.found["speed"]
         return self.scene.rotation.speed if self.scene.rotation else 0.0
+
+    def free_speed(self, state: StaticState) -> float:
+        """Speed (rad/s) at which a wheel with this rolling radius rolls freely at the scene's travel speed;
+        the scene's own where it has none."""
+        rotation = self.scene.rotation
+        if rotation is None or rotation.travel_speed is None:
+            return self.speed
+        return rotation.travel_speed / (rotation.rolling_radius or state.rolling_radius())
+
+    def settle(self, done: Mapping[str, Any]) -> None:
+        """At a travel speed, take the wheel's for which the static state was found, once it is `done`. Collective."""
+        rotation = self.scene.rotation
+        if rotation is None or not rotation.travel_speed or self.found or "static" not in done:
+            return
+        state = done["static"].product
+        self.found["speed"] = state.rolling.speed or self.free_speed(state)
 
     @cached_property
     def axle(self) -> Axle | None:

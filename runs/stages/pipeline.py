@@ -103,9 +103,9 @@ def run_scene(
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
     done: dict[str, Done] = {}
     for kind in PARTS:
-        found = _done(job, kind, done, reasons, summary)
-        if found is not None:
+        if (found := _done(job, kind, done, reasons, summary)) is not None:
             done[kind.name] = found
+        job.settle(done)
     _check_options(petsc_options)
     if "report" in reasons:
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -27,15 +27,18 @@ from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed
 from tireroad.runs.stages.stored import cords_file
 
+_SPEEDS, _SAME_SPEED = 6, 1e-6  # solutions at a travel speed at most, and when they agree
 COARSE = 0.02  # estimated error of the load above which the user is warned
 
 
-def steady_rolling(job: Job) -> Rolling:
-    """The steady rolling that the static state is computed for; at rest where the scene wants that."""
+def steady_rolling(job: Job, speed: float | None = None) -> Rolling:
+    """The steady rolling that the static state is computed for, at `speed` (rad/s) or the job's; at rest where
+    the scene wants that."""
     scene = job.scene
-    if not scene.static.steady_rolling or job.speed == 0:
+    speed = job.speed if speed is None else speed
+    if not scene.static.steady_rolling or speed == 0:
         return AT_REST
-    return rolling_shape(turning_of(job))
+    return rolling_shape(replace(turning_of(job), speed=speed))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,34 +54,55 @@ class StaticStage(Computed[StaticState]):
             "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
             "file": fingerprint(scene.tire),
             "static": asdict(scene.static),
-            "rolling": asdict(steady_rolling(self.job)),
+            "rolling": asdict(
+                steady_rolling(self.job, scene.rotation.speed if scene.rotation else None)
+            ),
+            "travel": [scene.rotation.travel_speed, scene.rotation.rolling_radius]
+            if scene.rotation
+            else None,
         }
 
     def compute(self, record: Record) -> StaticState:
-        """Load steps up to the scene's state, and the error of its load. Collective."""
+        """The scene's state, at a travel speed again until the wheel's speed is that of its radius. Collective."""
+        speed = self.job.speed
+        for _ in range(_SPEEDS):
+            state, loader = self._solved(record, speed)
+            before, speed = speed, self.job.free_speed(state)
+            if abs(speed - before) <= _SAME_SPEED * speed or not state.rolling.speed:
+                break
+            observe.say(
+                f"  rolling radius {state.rolling_radius():.6g} m: again at {speed:.6g} rad/s"
+            )
+        self._conclude(record, state, loader)
+        return state
+
+    def _conclude(self, record: Record, state: StaticState, loader: Loader) -> None:
+        """What is told of the state, and the error of its load. Collective."""
         wanted = self.job.scene.static
-        with record.timing("mesh and forms"):
-            equilibrium = Equilibrium(self.job.tire.body, steady_rolling(self.job))
-        loader = Loader(equilibrium, _show)
-        began = time.perf_counter()
-        try:
-            _press(loader, wanted)
-        except ConvergenceError as error:
-            self._keep_last(static_state(equilibrium, loader.lowest()))
-            rolling = steady_rolling(self.job)
-            cause = with_cause(error, loader, rolling, lambda other: _press(other, wanted))
-            last = self.job.path("static_last")
-            raise ConvergenceError(f"{cause} The last state that converged is in {last}.") from None
-        record.cost |= equilibrium.cost
-        record.cost["other"] = time.perf_counter() - began - sum(equilibrium.cost.values())
-        state = static_state(equilibrium, loader.touch)
         _describe(record, state, loader)
         self._warn_at_rest(record)
         if wanted.error_estimate and state.load:
             with record.timing("error estimate"):
                 _estimate(record, state, loader)
         observe.say(f"  {_parts(record.cost)}")
-        return state
+
+    def _solved(self, record: Record, speed: float) -> tuple[StaticState, Loader]:
+        """Load steps up to the state at `speed` rad/s. Collective."""
+        wanted, rolling = self.job.scene.static, steady_rolling(self.job, speed)
+        with record.timing("mesh and forms"):
+            equilibrium = Equilibrium(self.job.tire.body, rolling)
+        loader = Loader(equilibrium, _show)
+        began = time.perf_counter()
+        try:
+            _press(loader, wanted)
+        except ConvergenceError as error:
+            self._keep_last(static_state(equilibrium, loader.lowest()))
+            cause = with_cause(error, loader, rolling, lambda other: _press(other, wanted))
+            last = self.job.path("static_last")
+            raise ConvergenceError(f"{cause} The last state that converged is in {last}.") from None
+        record.cost |= equilibrium.cost
+        record.cost["other"] = time.perf_counter() - began - sum(equilibrium.cost.values())
+        return static_state(equilibrium, loader.touch), loader
 
     def _keep_last(self, state: StaticState) -> None:
         """Write the last state that converged. Collective."""
@@ -120,7 +144,7 @@ class StaticStage(Computed[StaticState]):
             touch_height=float(attributes["touch_height"]),
             road_height=None if road is None else float(road),
             inflation=float(attributes["inflation"]),
-            rolling=steady_rolling(self.job),
+            rolling=steady_rolling(self.job, float(attributes["rolling_speed"])),
             **cords_file.read(file),
         )
 

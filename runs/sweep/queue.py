@@ -82,7 +82,8 @@ class Queue:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"sweep: queue.template {path} cannot be read: {error}") from None
-        return cls(**{**{k: str(v) for k, v in given.items()}, "template": text})
+        words: dict[str, Any] = {key: str(value) for key, value in given.items()}
+        return cls(**words | {"template": text})
 
     def submission(self, script: Path, count: int | None, before: Sequence[str]) -> list[str]:
         """The command line that submits a script as an array of `count`, after the jobs `before`."""

@@ -82,5 +82,5 @@ def _row(tires: Tires, response: Response, exact: History, tread, residual, step
 def _off(duration: float, exact: History, found: History | None) -> float | str:
     if found is None:
         return "unbounded"
-    values = (history.values["contact force"] for history in (exact, found))
-    return digits(100 * distance(*values, duration).mean)
+    one, other = exact.values["contact force"], found.values["contact force"]
+    return digits(100 * distance(one, other, duration).mean)

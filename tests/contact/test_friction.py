@@ -211,3 +211,26 @@ def test_a_loop_goes_on_with_the_same_bits(iterative: bool, pulse: bool) -> None
         assert np.array_equal(one.force, other.force)
         assert np.array_equal(one.horizontal, other.horizontal)
         assert np.array_equal(one.axle_force, other.axle_force)
+
+
+def test_a_brush_by_area_is_the_same_on_every_grid() -> None:
+    """Sticking on a rigid tire: k_A s int (way from the entry) dA, for an ellipse k_A s 8/3 a^2 b; by points it grows."""
+    slip, per_area, forces = 2e-3, 5e7, {"area": [], "point": []}
+    for fine in (1, 4, 8):
+        patch = oval_patch((9 * fine, 7 * fine), (0.015 / fine, 0.02 / fine), 500.0)
+        touching = patch.force > 0
+        for kind, stiffness in (("area", per_area * patch.area), ("point", 1e4)):
+            law = BrushLaw(stiffness, None, (slip, 0.0))
+            brush = Brush(law, patch.points[:, 0], patch.line, 20.0, 1e-4 / fine)
+            brush.begin(touching)
+            for _ in range(200 * fine):
+                share, past = brush.offer()
+                e = np.where((touching & (share > 1e-9))[:, None], past, 0.0)
+                brush.take(-np.reshape(law.stiffness, (-1, 1)) * e, np.zeros_like(e), touching)
+            force = (np.reshape(law.stiffness, (-1, 1)) * -brush.deflection).sum(axis=0)
+            a, b = 0.6 * patch.points[:, :2].max(axis=0)
+            exact = per_area * slip * 8 / 3 * a**2 * b
+            forces[kind].append(abs(float(force[0])) / exact)
+    assert forces["area"][0] == pytest.approx(1.0, abs=0.1)
+    assert forces["area"][-1] == pytest.approx(1.0, abs=0.015)
+    assert forces["point"][-1] / forces["point"][0] > 30.0

@@ -131,3 +131,34 @@ def test_springs_are_a_diagonal_or_a_matrix(tmp_path):
     one = load(scene)
     scene.write_text(SCENE + '[axle]\nkind = "corner"\nstiffness = [0, 0, 2e4, 0, 0, 0]\n')
     assert (axle_of(one).stiffness == axle_of(load(scene)).stiffness).all()
+
+
+def test_a_travel_speed_is_the_speed_over_the_road(tmp_path, launch):
+    """The wheel's speed times the rolling radius of the state that rolls at it; written back, and told once only."""
+    scene, folder = tmp_path / "wheel.toml", tmp_path / "wheel"
+    scene.write_text('name = "wheel"\n' + SCENE.replace("speed = 50.0", "travel_speed = 20.0"))
+    done = launch("-m", "runs", "run", scene, "--out", folder, "--until", "static")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(folder / "static.h5") as file:
+        speed, radius = file.attrs["rolling_speed"], file.attrs["rolling_radius"]
+    assert speed * radius == pytest.approx(20.0, rel=2e-6)
+    assert load(folder / "scene.toml").rotation.travel_speed == 20.0
+    scene.write_text(SCENE.replace("speed = 50.0", "speed = 50.0\ntravel_speed = 20.0"))
+    with pytest.raises(InputError, match="twice"):
+        load(scene)
+
+
+@pytest.mark.parametrize(
+    ("contact", "told"),
+    [
+        ('tread = "viscoelastic"', "needs a grid"),
+        ('tread = "viscoelastic"\nrelaxation = [0.6, 0.5]', "sum below 1"),
+        ("brush_stiffness = 1e4\nbrush_stiffness_per_area = 1e7", "two brushes"),
+        ("friction = 0.5", "needs brush_stiffness_per_area"),
+    ],
+)
+def test_treads_and_brushes_that_cannot_be(tmp_path, contact, told):
+    scene = tmp_path / "bad.toml"
+    scene.write_text(SCENE.replace('points = "nodes"', f'points = "nodes"\n{contact}'))
+    with pytest.raises(InputError, match=told):
+        load(scene)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.image import imsave
 from mpi4py import MPI
 
 from tireroad.contact.roads.kind import ROADS
@@ -17,7 +18,9 @@ from tireroad.runs.scene.load import load
 from tireroad.runs.scene.reference import reference
 from tireroad.runs.scene.schema import variant_of, walk
 from tireroad.runs.scene.tables import tire as tire_tables
+from tireroad.runs.scene.tables.pattern import PatternTable
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages.build.pattern import make_pattern
 from tireroad.runs.stages.pipeline import run_scene
 
 KEYS = {f"{of.__name__}.{item.name}": key for _, of, item, key in walk(Scene)}
@@ -180,7 +183,7 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
             file = ["road.file=road.npz"] if kind == "grid" else []
             if kind != "crg":  # its keys are the grid's
                 _run(tmp_path / "rolling", ROLLING.format(kind=kind), *file)
-        for tread in ("layer", "winkler"):
+        for tread in ("layer", "winkler", "viscoelastic"):
             points = "contact.points={dx=0.02,dy=0.02}"
             _run(
                 tmp_path / "rolling", ROLLING.format(kind="flat"), f"contact.tread={tread}", points
@@ -192,6 +195,13 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
             "greens.dynamic=6",
         )
         wheel = "road.motion.kind=ramp", "axle.kind=corner", "axle.body_mass=300"
+        grooves = "pattern.pitches=50", "pattern.groove=[{width=0.004}]"
+        points = "contact.points={dx=0.01,dy=0.01}"
+        _run(tmp_path / "rolling", ROLLING.format(kind="flat"), *grooves, points)
+        imsave(tmp_path / "tread.png", np.ones((4, 9)), cmap="gray")
+        make_pattern(PatternTable(file=str(tmp_path / "tread.png")), 0.3)
+        area = "contact.brush_stiffness=", "contact.brush_stiffness_per_area=1e7"
+        wheel += (*area, "rotation.speed=", "rotation.travel_speed=10")
         _run(tmp_path / "rolling", ROLLING.format(kind="flat"), *wheel)
         _run(tmp_path / "standing", STANDING)
         stiffness = "stiffness.steps=1", "stiffness.up_to=0.001", "stiffness.which=vertical"

@@ -1,5 +1,7 @@
 """A random road of an ISO 8608 class: one profile for the whole width, generated as it rolls by."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -98,7 +100,7 @@ class Profile:
         """Lowest place of the profile from x0 to x1, m, with what may hide between two."""
         return -self._extreme(x0, x1, lambda z: np.max(-z))
 
-    def _extreme(self, x0: float, x1: float, pick) -> float:
+    def _extreme(self, x0: float, x1: float, pick: Callable[[Array], float]) -> float:
         first, last = (int(np.floor(v / self._pitch / CHUNK)) for v in (x0, x1))
         worst = -np.inf
         for index in range(first, last + 1):

@@ -1,5 +1,7 @@
 """A self-affine road texture: random tiles with a given spectrum, blended so that nothing repeats."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -148,7 +150,7 @@ class Tiles:
         """The lowest place from x0 to x1, m."""
         return min(float(z.min()) for z in self._strip(x0, x1))
 
-    def _strip(self, x0: float, x1: float):
+    def _strip(self, x0: float, x1: float) -> Iterator[Array]:
         length = self._shape[0] // 2 * self._pitch
         for index in range(int(np.floor(x0 / length)), int(np.floor(x1 / length)) + 1):
             yield self._half(index)

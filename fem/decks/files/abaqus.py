@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -208,7 +209,7 @@ class _Reader:
             block = next(b for b in reversed(self.blocks) if again[0] in b.labels)
             raise block.place.error(f"element {again[0] % SCOPE} is defined twice")
 
-    def _used(self):
+    def _used(self) -> Iterator[str]:
         """One line for each kind of thing that is read."""
         count = sum(len(part[0]) for part in self.nodes)
         yield f"{count} nodes in {len(self.nodes)} blocks"
@@ -216,7 +217,7 @@ class _Reader:
             yield f"{len(block.labels)} elements {block.type} ({block.place})"
         yield from self.sections.used()
 
-    def _not_used(self):
+    def _not_used(self) -> Iterator[str]:
         """One line for each keyword that is not used, with the first line it stands in."""
         for name, places in self.unused.items():
             keyword = name.split(",")[0]

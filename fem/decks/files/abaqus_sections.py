@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 
 from tireroad.fem.decks.deck import Compound, Embedded, Layer, Orientation, Solid
 from tireroad.fem.decks.files.abaqus_sets import data_lines
@@ -139,7 +140,7 @@ class SectionReader:
             for name, (parts, place) in self._materials.items()
         }
 
-    def used(self):
+    def used(self) -> Iterator[str]:
         """Lines for the user on what was read here."""
         counts = Counter(
             {

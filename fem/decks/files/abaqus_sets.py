@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -14,7 +15,7 @@ _FACE = re.compile(r"S([1-6])")
 _NAME = re.compile(r"[^\d\s+.-]")  # a field that is the name of a set and no number
 
 
-def data_lines(lines: list[Data]):
+def data_lines(lines: list[Data]) -> Iterator[tuple[Place, list[str]]]:
     """(place, fields) of every data line that is not blank."""
     for part in lines:
         first = part.place.line - part.text[: len(part.text) - len(part.text.lstrip())].count(b"\n")
@@ -125,7 +126,7 @@ class SetReader:
 
     def pressure(self, card: Card, lines: list[Data], _: int) -> None:
         """Surfaces with a pressure in a step: the inner face, most likely."""
-        for _, parts in data_lines(lines):
+        for _place, parts in data_lines(lines):
             if len(parts) > 1 and parts[1].upper() == "P":
                 self.pressed.append(parts[0].upper())
 

@@ -19,6 +19,7 @@ from tireroad.fem.decks.files.gmsh_types import FACES, TYPES
 from tireroad.fem.decks.files.numbers import LABEL
 from tireroad.fem.errors import InputError
 
+Numbers = TextNumbers | BinaryNumbers
 Elements = list[tuple[int, int, int, np.ndarray]]  # type, physical group, label, nodes
 
 
@@ -77,7 +78,7 @@ def _names(part: Part | None) -> dict[tuple[int, int], str]:
     return names
 
 
-def _entities(numbers) -> dict[tuple[int, int], int]:
+def _entities(numbers: Numbers) -> dict[tuple[int, int], int]:
     """(dimension, entity) -> physical group, the first where there are several."""
     groups = {}
     counts = numbers.sizes(4)
@@ -93,7 +94,7 @@ def _entities(numbers) -> dict[tuple[int, int], int]:
     return groups
 
 
-def _nodes_4(numbers):
+def _nodes_4(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
     blocks, total, *_ = numbers.sizes(4)
     numbers.fits(total, 8)
     labels, points = [np.empty(0, np.int64)], [np.empty((0, 3))]
@@ -108,7 +109,7 @@ def _nodes_4(numbers):
     return np.concatenate(labels), np.concatenate(points)
 
 
-def _elements_4(numbers, groups) -> Elements:
+def _elements_4(numbers: Numbers, groups: dict[tuple[int, int], int]) -> Elements:
     blocks, total, *_ = numbers.sizes(4)
     numbers.fits(total, 8)
     found: Elements = []
@@ -122,7 +123,7 @@ def _elements_4(numbers, groups) -> Elements:
     return found
 
 
-def _nodes_of(sort: int, numbers) -> int:
+def _nodes_of(sort: int, numbers: Numbers) -> int:
     if sort not in TYPES:
         raise numbers.error(
             f"element type {sort} of Gmsh is not read: lines, triangles, quadrilaterals, hexahedra and "
@@ -131,13 +132,13 @@ def _nodes_of(sort: int, numbers) -> int:
     return TYPES[sort][1]
 
 
-def _nodes_2(numbers):
+def _nodes_2(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
     (count,) = numbers.ints(1)
     numbers.fits(count, 4)
     return numbers.labelled_points(int(count))
 
 
-def _elements_2(numbers, binary: bool) -> Elements:
+def _elements_2(numbers: Numbers, binary: bool) -> Elements:
     (count,) = numbers.ints(1)
     numbers.fits(count, 4)
     found: Elements = []
@@ -161,7 +162,14 @@ def _elements_2(numbers, binary: bool) -> Elements:
     return found
 
 
-def _deck(path: Path, labels, points, elements: Elements, names, part: Part) -> Deck:
+def _deck(
+    path: Path,
+    labels: np.ndarray,
+    points: np.ndarray,
+    elements: Elements,
+    names: dict[tuple[int, int], str],
+    part: Part,
+) -> Deck:
     dimension = max((TYPES[sort][0] for sort, *_ in elements), default=0)
     order = np.argsort(labels, kind="stable")
     labels, points = labels[order], points[order]
@@ -187,7 +195,9 @@ def _deck(path: Path, labels, points, elements: Elements, names, part: Part) -> 
     return _counter_clockwise(deck) if dimension == 2 else deck
 
 
-def _groups(elements: Elements, dimension: int, names, part: Part):
+def _groups(
+    elements: Elements, dimension: int, names: dict[tuple[int, int], str], part: Part
+) -> tuple[list[Block], dict[str, Members], dict[str, np.ndarray]]:
     """Blocks by type, element sets and surfaces by group."""
     by_type: dict[int, list] = {}
     for element in elements:

@@ -53,7 +53,7 @@ class _Numbers:
     def error(self, message: str) -> InputError:
         return self.part.place.error(message)
 
-    def fits(self, count, size: int) -> int:
+    def fits(self, count: int, size: int) -> int:
         """A count of things of at least `size` bytes (or characters), if the part can hold as many."""
         if not count >= 0 or count * (size if self.binary else 2) > len(self.part.text) + 64:
             raise self.error(f"{count} entries are announced and not there: is the file cut short?")

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
 
 from tireroad.fem.errors import InputError
 
@@ -92,7 +93,7 @@ def _file(path: Path, asked: Place | None, reading: _Reading) -> Iterator[Card |
     reading.open.pop()
 
 
-def _stream(file, path: Path, reading: _Reading) -> Iterator[Card | Data]:
+def _stream(file: BinaryIO, path: Path, reading: _Reading) -> Iterator[Card | Data]:
     """Keywords and data of an open file."""
     for number, text in _pieces(file, path, reading):
         at, line = 0, number
@@ -105,7 +106,7 @@ def _stream(file, path: Path, reading: _Reading) -> Iterator[Card | Data]:
         yield from _data(text[at:], Place(path.name, line))
 
 
-def _pieces(file, path: Path, reading: _Reading) -> Iterator[tuple[int, bytes]]:
+def _pieces(file: BinaryIO, path: Path, reading: _Reading) -> Iterator[tuple[int, bytes]]:
     """(number of the first line, text) of whole lines, no keyword line torn."""
     left, number = b"", 1
     while True:

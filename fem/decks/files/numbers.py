@@ -79,7 +79,7 @@ def _ragged(lines: list[bytes], width: int, least: int) -> np.ndarray | None:
     return np.array(found).reshape(-1, width)
 
 
-def _slow(part: Data, width: int, least: int):
+def _slow(part: Data, width: int, least: int) -> Iterator[list[float]]:
     for offset, line in enumerate(part.text.split(b"\n")):
         if not line.strip():
             continue
@@ -133,7 +133,7 @@ def records(data: list[Data], width: int) -> np.ndarray:
     return np.concatenate([np.empty((0, width), np.int64), *_joined_records(data, width)], axis=0)
 
 
-def _joined_records(data: list[Data], width: int):
+def _joined_records(data: list[Data], width: int) -> Iterator[np.ndarray]:
     text = b"".join(part.text if part.text.endswith(b"\n") else part.text + b"\n" for part in data)
     flat = fast(text) if data else np.empty(0)
     if flat is not None and len(flat) % width == 0 and _whole(flat):

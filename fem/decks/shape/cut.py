@@ -77,7 +77,9 @@ def cut(
     )
 
 
-def _closed(quads: Quads, marks: Marks, fail) -> tuple[Marks, dict[int, int]]:
+def _closed(
+    quads: Quads, marks: Marks, fail: Callable[[str], Exception]
+) -> tuple[Marks, dict[int, int]]:
     """All sides to be cut, and for each cell the direction (0 xi, 1 eta) in which it is divided."""
     sides = quads.sides()
     cells = defaultdict(list)
@@ -116,7 +118,15 @@ def _cut_sides(quads: Quads, marks: Marks, points: list) -> dict[int, tuple]:
     return found
 
 
-def _halves(quads, cell: int, along: int, marks, side_points, points: list, middle):
+def _halves(
+    quads: Quads,
+    cell: int,
+    along: int,
+    marks: Marks,
+    side_points: dict[int, tuple],
+    points: list,
+    middle: float | None,
+) -> tuple[np.ndarray, np.ndarray]:
     """Two cells (2, 9) in place of one, and the origin of their sides (2, 4); -2 on the cut."""
     grid = quads.cells[cell].reshape(3, 3)
     origin = quads.origin[cell]

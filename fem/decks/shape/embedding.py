@@ -60,7 +60,15 @@ def _elements(deck: Deck, layer: Layer) -> tuple[np.ndarray, np.ndarray, np.ndar
     return ends, points, labels
 
 
-def _embed(deck, quads: Quads, layer: Layer, ends, points, labels, origins: Origins):
+def _embed(
+    deck: Deck,
+    quads: Quads,
+    layer: Layer,
+    ends: np.ndarray,
+    points: np.ndarray,
+    labels: np.ndarray,
+    origins: Origins,
+) -> tuple[Quads, np.ndarray]:
     """The cells cut along membranes that lie inside them, and the numbers of the sides made."""
     hosts = _hosts(deck, layer, labels)
     numbers: list[int] = []
@@ -69,7 +77,7 @@ def _embed(deck, quads: Quads, layer: Layer, ends, points, labels, origins: Orig
         three = np.where(turned[:, None, None], points[line][:, ::-1], points[line])
         first = labels[line[0]] % SCOPE
 
-        def fail(text: str, first=first):
+        def fail(text: str, first: int = first) -> Exception:
             return layer.place.error(
                 f"cords {layer.name}: the line of membranes from element {first}: {text}"
             )

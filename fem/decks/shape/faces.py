@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +76,7 @@ def on_outline(quads: Quads, sides: np.ndarray) -> np.ndarray:
     return once(quads, sides[np.isin(middle[sides[:, 0], sides[:, 1]], there)])
 
 
-def one_body(quads: Quads, name) -> None:
+def one_body(quads: Quads, name: Callable[[int], str]) -> None:
     """That all cells hang together by sides. `name` makes a text of an element label."""
     pairs = ends(quads, np.argwhere(np.ones((len(quads.cells), 4), bool)))
     group = np.arange(len(quads.points))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -124,7 +124,7 @@ def _stations(quads: Quads, line: Line, reach: tuple[float, float]) -> list[_Sta
     return sorted(found.values(), key=lambda one: one.s)
 
 
-def _candidates(sides: np.ndarray, line: Line):
+def _candidates(sides: np.ndarray, line: Line) -> Iterator[tuple[int, float]]:
     """(side, s) near which a side (n, 3, 2) and the line may meet, by straight pieces of both."""
     pieces = 4
     s = np.linspace(0, len(line.points), pieces * len(line.points) + 1)
@@ -162,7 +162,9 @@ def _meet(side: np.ndarray, line: Line, s: float) -> tuple[float, float] | None:
     return (t, s) if -SNAP <= t <= 1 + SNAP else None
 
 
-def _follow(quads: Quads, line: Line, stations: list[_Station]):
+def _follow(
+    quads: Quads, line: Line, stations: list[_Station]
+) -> tuple[dict[int, float], dict[int, float], list[int]]:
     """Sides to cut, the cells they are in (with the place half way), and whole sides on the line."""
     if len(stations) < 2:
         raise line.fail("it crosses no element")
@@ -197,7 +199,9 @@ def _slant(line: Line, a: _Station, b: _Station) -> str:
     )
 
 
-def _between(quads: Quads, cells, first: int, last: int, line, a, b) -> int:
+def _between(
+    quads: Quads, cells: set[int], first: int, last: int, line: Line, a: _Station, b: _Station
+) -> int:
     """The middle node of the side between two nodes."""
     for cell in cells:
         for side in quads.sides_of(cell):
@@ -206,7 +210,9 @@ def _between(quads: Quads, cells, first: int, last: int, line, a, b) -> int:
     raise line.fail(_slant(line, a, b))
 
 
-def _opposite(quads: Quads, cells, names: list[int], a, b, line) -> int:
+def _opposite(
+    quads: Quads, cells: set[int], names: list[int], a: _Station, b: _Station, line: Line
+) -> int:
     """The cell in which two sides are opposite each other."""
     if a.node < 0 and b.node < 0:
         for cell in cells:

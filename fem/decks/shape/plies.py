@@ -78,7 +78,9 @@ def plies(
     return made
 
 
-def _ply(quads, sides, layer: Layer, material: CordMaterial, length: float, sense: int) -> Ply:
+def _ply(
+    quads: Quads, sides: np.ndarray, layer: Layer, material: CordMaterial, length: float, sense: int
+) -> Ply:
     r = quads.points[ends(quads, sides).ravel(), 0].mean()
     angle, spacing = _geometry(layer, r)
     return Ply(

@@ -106,7 +106,9 @@ def _named(sort: int, number: np.ndarray, place_in: int = 0) -> np.ndarray:
     return np.column_stack([np.full_like(number, sort), number, np.full_like(number, place_in)])
 
 
-def _quarters(nodes, raw: Raw, edge: np.ndarray, middles: np.ndarray, first: int):
+def _quarters(
+    nodes: np.ndarray, raw: Raw, edge: np.ndarray, middles: np.ndarray, first: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """points (4 c, 9, 2), origin (4 c, 4) and names (4 c, 9, 3) of the quarters of quadrilaterals."""
     grid = np.linspace(0, 1, 5)
     xi, eta = (part.ravel() for part in np.meshgrid(grid, grid, indexing="ij"))
@@ -133,7 +135,9 @@ def _quarters(nodes, raw: Raw, edge: np.ndarray, middles: np.ndarray, first: int
     return points.reshape(-1, 9, 2), origin.reshape(-1, 4), names.reshape(-1, 9, 3)
 
 
-def _thirds(nodes, raw: Raw, edge: np.ndarray, middles: np.ndarray):
+def _thirds(
+    nodes: np.ndarray, raw: Raw, edge: np.ndarray, middles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """points (3 c, 9, 2), origin (3 c, 4) and names (3 c, 9, 3) of the thirds of triangles."""
     six = np.concatenate([nodes[raw.corners], middles[edge]], axis=1)
     forward = raw.corners < np.roll(raw.corners, -1, axis=1)
@@ -160,8 +164,12 @@ def _thirds(nodes, raw: Raw, edge: np.ndarray, middles: np.ndarray):
         sides = np.full((len(edge), 4), -1)
         sides[:, SIDE_OF_FACE[0]], sides[:, SIDE_OF_FACE[3]] = edge[:, k], edge[:, before]
         origin.append(sides)
-    stacked = (np.stack(part, axis=1) for part in (points, origin, names))
-    return tuple(part.reshape(-1, *part.shape[2:]) for part in stacked)
+
+    def flat(part: list[np.ndarray]) -> np.ndarray:
+        stacked = np.stack(part, axis=1)
+        return stacked.reshape(-1, *stacked.shape[2:])
+
+    return flat(points), flat(origin), flat(names)
 
 
 def _third_middle(a: int, b: int) -> np.ndarray:

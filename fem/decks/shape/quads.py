@@ -7,6 +7,7 @@ sets of the deck survive what is done to the cells.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +69,7 @@ def build(deck: Deck, region_of: dict[int, int]) -> tuple[Quads, DeckEdges, bool
     return split(nodes, raws, (edge3, edge4), middles), edges, True
 
 
-def _raw(deck: Deck, blocks: list[Block], corners: int, region_of) -> Raw:
+def _raw(deck: Deck, blocks: list[Block], corners: int, region_of: dict[int, int]) -> Raw:
     labels, ends, middles = [np.empty(0, np.int64)], [], []
     for block in blocks:
         rows = deck.rows(block.nodes, block.place)
@@ -111,7 +112,9 @@ def _pairs(raw: Raw) -> np.ndarray:
     ).reshape(-1, 2)
 
 
-def _middles(deck: Deck, ends: np.ndarray, parts, blocks) -> np.ndarray:
+def _middles(
+    deck: Deck, ends: np.ndarray, parts: Sequence[tuple[np.ndarray, Raw]], blocks: list[Block]
+) -> np.ndarray:
     """The middle of each edge: the deck's node where an element has one, else between its ends."""
     nodes = deck.points[:, :2]
     middles = nodes[ends].mean(axis=1)
@@ -129,7 +132,7 @@ def _middles(deck: Deck, ends: np.ndarray, parts, blocks) -> np.ndarray:
     return middles
 
 
-def _whole(nodes, raw: Raw, edge: np.ndarray, middles: np.ndarray) -> Quads:
+def _whole(nodes: np.ndarray, raw: Raw, edge: np.ndarray, middles: np.ndarray) -> Quads:
     used, corner = np.unique(raw.corners, return_inverse=True)
     corner = corner.reshape(raw.corners.shape)
     first, count = len(used), len(raw.labels)

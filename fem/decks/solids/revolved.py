@@ -6,12 +6,13 @@ other body is refused, with the reason.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tireroad.fem.decks.deck import SCOPE, Deck, Members, Sets
-from tireroad.fem.decks.files.elements import Block, used_kind
+from tireroad.fem.decks.files.elements import Block, Kind, used_kind
 from tireroad.fem.decks.solids.revolved_cords import meridian_layers
 from tireroad.fem.decks.solids.rings import Rings, find_rings
 from tireroad.fem.errors import InputError
@@ -115,7 +116,9 @@ def _cell(ring: np.ndarray, face: tuple, middle: dict, rings: Rings) -> list[int
     return ring[local].tolist()
 
 
-def _meridian_faces(rings: Rings, faces, rows: np.ndarray, block: Block) -> np.ndarray:
+def _meridian_faces(
+    rings: Rings, faces: Sequence[tuple[int, ...]], rows: np.ndarray, block: Block
+) -> np.ndarray:
     """For each solid the number of its first face whose corners have one angle and different rings."""
     found = np.full(len(rows), -1)
     for number in reversed(range(len(faces))):
@@ -133,7 +136,7 @@ def _meridian_faces(rings: Rings, faces, rows: np.ndarray, block: Block) -> np.n
     return found
 
 
-def _middles(shape) -> dict[frozenset, int]:
+def _middles(shape: Kind) -> dict[frozenset, int]:
     """Local node between two corners, of quadratic solids, in Abaqus's order."""
     if shape.nodes in (6, 8):
         return {}

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from ufl.core.expr import Expr
+
 from tireroad.fem.parameters import number
 from tireroad.fem.tire.law import MaterialLaw, material_law
 
@@ -37,7 +39,7 @@ class Linear(Elastic):
     """For small strains in large rotations."""
 
     @staticmethod
-    def energy(C, shear, bulk):
+    def energy(C: Expr, shear: Expr, bulk: Expr) -> tuple[Expr, Expr]:
         """G E_d : E_d and K/2 (tr E)^2 with E = (C - I) / 2."""
         import ufl  # slow to import, and not needed to read a scene
 
@@ -50,7 +52,7 @@ class NeoHookean(Elastic):
     """The simplest rubber."""
 
     @staticmethod
-    def energy(C, shear, bulk):
+    def energy(C: Expr, shear: Expr, bulk: Expr) -> tuple[Expr, Expr]:
         """G/2 (I1 - 3) of the isochoric part, and K/2 (J - 1)^2."""
         from tireroad.fem.tire.invariants import dilatation, isochoric
 

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from ufl.core.expr import Expr
+
 from tireroad.fem.parameters import number
 from tireroad.fem.tire.law import MaterialLaw, material_law
 
@@ -33,7 +35,7 @@ class MooneyRivlin(Polynomial):
         return 2 * (self.c10 + self.c01)
 
     @staticmethod
-    def energy(C, c10, c01, bulk):
+    def energy(C: Expr, c10: Expr, c01: Expr, bulk: Expr) -> tuple[Expr, Expr]:
         """c10 (I1 - 3) + c01 (I2 - 3) of the isochoric part, and K/2 (J - 1)^2."""
         from tireroad.fem.tire.invariants import dilatation, isochoric
 
@@ -60,7 +62,7 @@ class Yeoh(Polynomial):
         return 2 * self.c10
 
     @staticmethod
-    def energy(C, c10, c20, c30, bulk):
+    def energy(C: Expr, c10: Expr, c20: Expr, c30: Expr, bulk: Expr) -> tuple[Expr, Expr]:
         """The polynomial of the isochoric part, and K/2 (J - 1)^2."""
         from tireroad.fem.tire.invariants import dilatation, isochoric
 

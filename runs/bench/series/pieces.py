@@ -77,8 +77,8 @@ class Line:
         moved = self._direction + np.einsum("cqkd,cd->cqk", self.stretch(0), u)
         stretch = np.linalg.norm(moved, axis=-1)[..., None]
         along, cords = moved / stretch, self._cords
-        stiffness = cords.youngs_modulus * cords.area / cords.spacing
-        stiffness = stiffness * np.where(stretch < 1, cords.compression, 1.0)
+        in_tension = cords.youngs_modulus * cords.area / cords.spacing
+        stiffness = in_tension * np.where(stretch < 1, cords.compression, 1.0)
         tension = stiffness * (stretch - 1)
         geometric = (tension / stretch)[..., None]
         outer = along[..., None] * along[..., None, :]
@@ -115,10 +115,10 @@ class Face:
             around[..., k, k] = 1j * wave * self._N if wave else 0.0
         around[:, :, 1, 0] -= self._N
         around[:, :, 0, 1] += self._N
-        W, along, around = (part.reshape(q, 3 * a, 3) for part in (W, along, around))
-        change = np.cross(around, self._x_s[:, :, None])
-        change = (change + np.cross(self._x_t[:, :, None], along)) * self._sign[..., None]
-        return np.einsum("qik,cqjk,q->cij", W, change, self._w)
+        test, slope, turn = (part.reshape(q, 3 * a, 3) for part in (W, along, around))
+        change = np.cross(turn, self._x_s[:, :, None])
+        change = (change + np.cross(self._x_t[:, :, None], slope)) * self._sign[..., None]
+        return np.einsum("qik,cqjk,q->cij", test, change, self._w)
 
 
 def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -102,7 +102,7 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
 
 
 def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
-    directions = 3 if scene.contact.brush_stiffness is not None else 1
+    directions = 3 if scene.contact.rubs else 1
     loads = directions * size.nodes
     grid = scene.contact.points != "nodes" and size.points > DENSE
     parts = {
@@ -125,7 +125,7 @@ def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, floa
     if "modes" not in left_out:
         parts["modes.h5"] = 8.0 * size.modes * (face + 5 * size.modes)
     if "contact" not in left_out:
-        numbers = size.points * (3 + 2 * (scene.contact.brush_stiffness is not None)) + 10
+        numbers = size.points * (3 + 2 * (scene.contact.rubs)) + 10
         parts["contact.h5"] = 2 * PACKED * 8.0 * size.steps * numbers
         parts["greens.h5"] = 16.0 * 2 * size.nodes * (2 * size.modes + size.nodes)
     if "response" not in left_out:
@@ -146,7 +146,7 @@ def _seconds(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, f
     if "rotating" not in left_out:
         parts["rotating"] = 0.8 * count**3 * (1 + size.speeds)
     if "contact" not in left_out:
-        loads = size.nodes * (3 if scene.contact.brush_stiffness is not None else 1)
+        loads = size.nodes * (3 if scene.contact.rubs else 1)
         parts["greens"] = 3.0 * mesh**1.2 * loads / 277
         dense = size.points**2 if size.points <= DENSE else 300 * size.points
         step = 2e-4 + 1e-9 * (4 * loads * size.modes + dense)

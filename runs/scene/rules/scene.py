@@ -11,6 +11,8 @@ from tireroad.runs.scene.rules.tire import full_matrices, geometry
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.axle import check_axle
 from tireroad.runs.scene.tables.cavity import check_cavity
+from tireroad.runs.scene.tables.contact import check_tread
+from tireroad.runs.scene.tables.pattern import check_pattern
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.tables.stiffness import check_stiffness
 
@@ -71,7 +73,14 @@ def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 def _rotation(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     rotation = scene.rotation
-    if rotation is None or not any(rotation.window):
+    if rotation is None:
+        return
+    given = raw.get("rotation", {}).get("speed")
+    if rotation.travel_speed is not None and given not in (None, rotation.speed):
+        raise error(
+            ("rotation", "travel_speed"), "and speed give the wheel's speed twice: keep one of them"
+        )
+    if not any(rotation.window):
         return
     low, high = rotation.window
     if low >= high:
@@ -164,11 +173,8 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     if static.load is None and static.deflection is None and static.road_height is None:
         raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
     contact = scene.contact
-    if contact.brush_stiffness is None and contact.friction is not None:
-        raise error(("contact", "friction"), "needs brush_stiffness (N/m), which carries it")
     standing = scene.rotation is None or scene.rotation.speed == 0
-    if any(contact.slip) and (contact.brush_stiffness is None or standing):
-        raise error(("contact", "slip"), "needs brush_stiffness (N/m) and a rolling tire")
+    check_tread(contact, standing, error)
 
 
 def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
@@ -201,6 +207,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("greens", "rotation"), _greens),
     (("stiffness", "static"), check_stiffness),
     (("tire", "rotation", "modal", "greens"), check_cavity),
+    (("pattern", "contact"), check_pattern),
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
     (("output", "time", "contact", "force", "rotation"), check_vibration),
     (("time",), _time),

@@ -65,26 +65,30 @@ class AxleTable:
     kind: str = choice(
         "fixed",
         ("fixed", "corner", "free"),
-        "of the wheel: held; on springs and dampers; under the static load as a constant force alone",
+        "support of the wheel: held, on springs and dampers, or free under the constant static load",
     )
     wheel_mass: float = number(
         15.0,
         "kg",
-        "rim, brake and what moves with them, without the tire",
+        "mass of rim, brake and all that moves with them, without the tire",
         least=0.01,
         most=1e6,
         only_for=_MOVING,
     )
     wheel_inertia: tuple[float, float, float] = vector(
-        (0.4, 0.8, 0.4), "kg m²", "of it, about x, y (the axle) and z", least=0, most=1e6
+        (0.4, 0.8, 0.4),
+        "kg m²",
+        "moments of inertia of the wheel about x, y (the axle) and z",
+        least=0,
+        most=1e6,
     )
     stiffness: Springs = _springs(
         (0.0, 0.0, 25e3, 0.0, 0.0, 0.0),
-        "of the springs to the body along x, y, z (N/m) and about them (N m/rad)",
+        "stiffness of the springs to the body along x, y, z (N/m) and about them (N m/rad)",
     )
     damping: Springs = _springs(
         (0.0, 0.0, 2.4e3, 0.0, 0.0, 0.0),
-        "of the dampers beside them, N s/m and N m s/rad",
+        "damping of the dampers parallel to the springs, N s/m and N m s/rad",
     )
     body_mass: float | None = number(
         None,

@@ -17,15 +17,23 @@ Where = Callable[[tuple[str, ...], str], InputError]
 
 @dataclass(frozen=True)
 class Cavity:
-    gas: str = choice("air", ("air", "none"), "in the tire; none: it weighs and resounds nothing")
-    temperature: float = number(293.15, "K", "of the gas", least=150, most=1000)
+    gas: str = choice(
+        "air",
+        ("air", "none"),
+        "gas in the tire; none: neither its mass nor its resonances are modelled",
+    )
+    temperature: float = number(293.15, "K", "temperature of the gas", least=150, most=1000)
     loss_factor: float | None = number(
-        None, "-", "of its waves; absent: friction at the walls", least=0, most=1
+        None,
+        "-",
+        "loss factor of the acoustic waves; absent: from friction at the walls",
+        least=0,
+        most=1,
     )
     up_to: float | None = number(
         None,
         "Hz",
-        "its modes; absent: to the highest of the tire, at most 1000",
+        "highest frequency of its modes; absent: that of the tire's modes, at most 1000",
         least=1,
         most=5000,
     )

@@ -1,10 +1,14 @@
 """The tables of the contact and of the run in time, with units, ranges and defaults."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from tireroad.contact.tread.law import TREADS, TreadLaw
+from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import choice, number, vector
 from tireroad.runs.scene.schema import Pitch, Variants, points, registered, variant
+
+Where = Callable[[tuple[str, ...], str], InputError]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,9 +21,18 @@ class Contact(Variants):
     brush_stiffness: float | None = number(
         None,
         "N/m",
-        "tangential stiffness of a point's bristle; absent: no horizontal forces",
+        "tangential stiffness of a point's bristle, whatever its area: the force depends on the grid; absent, and "
+        "brush_stiffness_per_area too: no horizontal forces",
         least=1e-3,
         most=1e12,
+    )
+    brush_stiffness_per_area: float | None = number(
+        None,
+        "N/m³",
+        "tangential stiffness of the bristles, instead of brush_stiffness: the same on every grid; a tread of shear "
+        "modulus G and thickness h has about G/h",
+        least=1e-3,
+        most=1e15,
     )
     brush: str = choice(
         "rolling",
@@ -48,6 +61,30 @@ class Contact(Variants):
         least=1e-6,
         most=1,
     )
+
+    @property
+    def rubs(self) -> bool:
+        """Whether bristles carry horizontal forces."""
+        return (self.brush_stiffness, self.brush_stiffness_per_area) != (None, None)
+
+
+def check_tread(contact: Contact, standing: bool, error: Where) -> None:
+    """Raise InputError for treads and brushes that cannot be."""
+    if contact.law.creep is not None and contact.points == "nodes":
+        raise error(
+            ("contact", "tread"),
+            "= a tread that creeps needs a grid: contact.points = { dx, dy } (m)",
+        )
+    if None not in (contact.brush_stiffness, contact.brush_stiffness_per_area):
+        raise error(
+            ("contact", "brush_stiffness_per_area"), "and brush_stiffness are two brushes: keep one"
+        )
+    if not contact.rubs and contact.friction is not None:
+        raise error(
+            ("contact", "friction"), "needs brush_stiffness_per_area (N/m³), which carries it"
+        )
+    if any(contact.slip) and (not contact.rubs or standing):
+        raise error(("contact", "slip"), "needs brush_stiffness_per_area (N/m³) and a rolling tire")
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from tireroad.runs.scene.schema import (
 )
 from tireroad.runs.scene.tables.axle import AxleTable
 from tireroad.runs.scene.tables.contact import Contact, Time
+from tireroad.runs.scene.tables.pattern import PatternTable
 from tireroad.runs.scene.tables.road import Road
 from tireroad.runs.scene.tables.stiffness import Stiffness
 from tireroad.runs.scene.tables.tire import Tire
@@ -33,7 +34,8 @@ class Static:
         None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, most=-1e-3
     )
     steady_rolling: bool = flag(
-        True, "inertia and material damping of the rolling shape; false: the state at rest"
+        True,
+        "include the inertia and material damping of the rolling shape; false: the state at rest",
     )
     error_estimate: bool = flag(
         True, "estimate of the load's discretisation error, by a solution on coarser elements"
@@ -54,7 +56,7 @@ class Modal:
     road: str = choice(
         "forces",
         ("forces", "held"),
-        "road in the modes: its forces of the static state, or its nodes held in height",
+        "road in the modes: replaced by its static forces, or the touching nodes held in height",
     )
 
 
@@ -77,6 +79,13 @@ class Campbell:
 class Rotation:
     speed: float = number(
         100.0, "rad/s", "speed of rotation of the wheel; 0: standing", least=0, most=2000
+    )
+    travel_speed: float | None = number(
+        None,
+        "m/s",
+        "speed over the road, instead of speed: the wheel turns as fast as it rolls freely; 25 m/s are 90 km/h",
+        least=1e-6,
+        most=500,
     )
     inertia: str = choice(
         "full",
@@ -113,11 +122,11 @@ class Greens:
     residual: str = choice(
         "static",
         ("none", "dirac", "static", "second-order", "attachment"),
-        "residual flexibility: what stands for the modes that are left out",
+        "residual flexibility, which represents the modes that are left out",
     )
     dynamic: int | None = integer(
         None,
-        "number of states kept dynamic, the others follow statically; absent: all",
+        "number of states kept dynamic; the others respond statically; absent: all",
         least=1,
         most=200000,
     )
@@ -216,6 +225,11 @@ class Scene:
     greens: Greens = table(Greens, "Green's functions")
     force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")
     contact: Contact | None = table(Contact, "contact with the road in time", optional=True)
+    pattern: PatternTable | None = table(
+        PatternTable,
+        "grooves of the tread, which turn with the tire; absent: a slick",
+        optional=True,
+    )
     road: Road | None = table(Road, "the road driven over", optional=True)
     time: Time | None = table(Time, "the run in time", optional=True)
     output: Output = table(Output, "what is computed and kept")

@@ -41,16 +41,18 @@ def _ascending(doc: str, unit: str, limits: Limits) -> Any:
 @dataclass(frozen=True)
 class Stiffness:
     deflections: tuple[float, ...] = _ascending(
-        "at which load and footprint are found; empty: steps up to up_to",
+        "deflections at which load and footprint are computed; empty: equal steps up to up_to",
         "m",
         Limits(least=1e-6, most=10),
     )
     up_to: float | None = number(
-        None, "m", "largest deflection; absent: 1.5 times the scene's own", least=1e-6, most=10
+        None, "m", "largest deflection; absent: 1.5 times that of the scene", least=1e-6, most=10
     )
-    steps: int = integer(6, "equal ones up to up_to", least=1, most=_MOST)
+    steps: int = integer(6, "number of equal steps up to up_to", least=1, most=_MOST)
     which: str = choice(
-        "all", ("all", "vertical"), "all: longitudinal, lateral and torsional besides"
+        "all",
+        ("all", "vertical"),
+        "stiffnesses to compute: the vertical one, or also the longitudinal, lateral and torsional ones (all)",
     )
 
 

@@ -31,26 +31,34 @@ class Material(Variants):
 
 def _dynamic():
     return number(
-        1.0, "-", "modulus of the modes over that of the static state", least=0.01, most=100
+        1.0,
+        "-",
+        "dynamic modulus, used for the modes, over the static modulus",
+        least=0.01,
+        most=100,
     )
 
 
 def _loss_factor():
-    return number(0.0, "-", "tan δ of the rubber in the modes", least=0, most=2)
+    return number(0.0, "-", "loss factor tan δ of the rubber, used for the modes", least=0, most=2)
 
 
 @dataclass(frozen=True)
 class Region:
-    name: str | None = text(None, "region of a file that this is; a torus has none of its own")
+    name: str | None = text(None, "name of the region in the file; not for a torus")
     arc: tuple[float, float] = vector(
-        (0.0, 45.0), "deg", "from, to, measured from the crown", least=0, most=175
+        (0.0, 45.0), "deg", "start and end, measured from the crown", least=0, most=175
     )
-    side: str = choice("both", ("both", "left", "right"), "of the crown; left: y < 0")
+    side: str = choice("both", ("both", "left", "right"), "side of the crown; left: y < 0")
     depth: tuple[float, float] = vector(
-        (0.0, 1.0), "-", "from, to, through the wall; 0: inner face", least=0, most=1
+        (0.0, 1.0),
+        "-",
+        "start and end through the wall, from 0 at the inner face to 1 at the outer face",
+        least=0,
+        most=1,
     )
     material: Material | None = table(
-        Material, "what the region is made of; absent: as the file says", optional=True
+        Material, "material of the region; absent: that of the file", optional=True
     )
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()
@@ -58,27 +66,39 @@ class Region:
 
 @dataclass(frozen=True)
 class Cords:
-    name: str = text("ply", "of this line of cords, in results and messages")
+    name: str = text("ply", "name of this line of cords in results and messages")
     depth: float = number(
-        0.006, "m", "under the outer face of the undeformed wall", least=0, most=5
+        0.006, "m", "depth under the outer face of the undeformed wall", least=0, most=5
     )
     arc: tuple[float, float] = vector(
-        (-45.0, 45.0), "deg", "from, to, measured from the crown; y < 0 first", least=-180, most=180
+        (-45.0, 45.0),
+        "deg",
+        "start and end, measured from the crown; y < 0 first",
+        least=-180,
+        most=180,
     )
     angle: float = number(
-        20.0, "deg", "from the circumference, at the lowest point +x to +y", least=-90, most=90
+        20.0,
+        "deg",
+        "angle to the circumference; at the lowest point from +x towards +y",
+        least=-90,
+        most=90,
     )
-    youngs_modulus: float = number(172.2e9, "Pa", "of a cord in tension", least=1e3, most=1e13)
-    area: float = number(2.118e-7, "m²", "cross-section of one cord", least=1e-12, most=1e-3)
-    spacing: float = number(1.16e-3, "m", "between cords, across them", least=1e-6, most=0.1)
-    density: float = number(0.0, "kg/m³", "of the cords", least=0, most=3e4)
+    youngs_modulus: float = number(
+        172.2e9, "Pa", "Young's modulus of a cord in tension", least=1e3, most=1e13
+    )
+    area: float = number(2.118e-7, "m²", "cross-sectional area of one cord", least=1e-12, most=1e-3)
+    spacing: float = number(
+        1.16e-3, "m", "distance between cords, measured across them", least=1e-6, most=0.1
+    )
+    density: float = number(0.0, "kg/m³", "density of the cords", least=0, most=3e4)
     compression: float = number(
         1.0, "-", "modulus in compression over that in tension", least=0, most=1
     )
     drum_radius: float | None = number(
         None,
         "m",
-        "angle and spacing are those on this building drum; absent: those in the tire",
+        "radius of the building drum on which angle and spacing are given; absent: they are those in the tire",
         least=0.01,
         most=10,
     )
@@ -92,63 +112,88 @@ class Cords:
 class Tire:
     section: str = choice("torus", ("torus", "radial", "file"), "shape of the section")
     size: str = text(
-        "205/60 R15", "of the built-in passenger tire (docs/radial-tire.md)", only_for=RADIAL
+        "205/60 R15", "size of the built-in passenger tire (docs/radial-tire.md)", only_for=RADIAL
     )
-    outer_radius: float = number(0.32, "m", "axle to crown", least=0.01, most=10, only_for=TORUS)
+    outer_radius: float = number(
+        0.32, "m", "outer radius, from the axle to the crown", least=0.01, most=10, only_for=TORUS
+    )
     minor_radius: float = number(
-        0.10, "m", "of the section, to its outer face", least=1e-3, most=10, only_for=TORUS
+        0.10,
+        "m",
+        "radius of the section circle, to its outer face",
+        least=1e-3,
+        most=10,
+        only_for=TORUS,
     )
-    thickness: float = number(0.012, "m", "of the wall", least=1e-4, most=5, only_for=TORUS)
+    thickness: float = number(
+        0.012, "m", "thickness of the wall", least=1e-4, most=5, only_for=TORUS
+    )
     half_angle: float = number(
-        120.0, "deg", "arc from the crown to each bead", least=10, most=175, only_for=TORUS
+        120.0,
+        "deg",
+        "angle of the section from the crown to each bead",
+        least=10,
+        most=175,
+        only_for=TORUS,
     )
     segments: int | None = integer(
-        None, "elements around; absent: 30 of order 3, 60 of a file", least=8, most=4000
+        None,
+        "number of elements around the axle; absent: 30 of order 3, 60 for a section from a file",
+        least=8,
+        most=4000,
     )
     elements_arc: int | None = integer(
         None,
-        "elements from bead to bead; absent: 14 of order 3, 26 of a radial tire",
+        "number of elements from bead to bead; absent: 14 of order 3, 26 for a radial tire",
         least=2,
         most=1000,
         only_for=MESHED,
     )
     elements_thickness: int = integer(
-        1, "elements through the wall", least=1, most=20, only_for=TORUS
+        1, "number of elements through the wall", least=1, most=20, only_for=TORUS
     )
     order: int | None = integer(
         None,
-        "of the elements; absent: 3, or 2 where their number is given, of a radial tire and a file",
+        "polynomial order of the elements; absent: 3, or 2 where their number is given, and for a radial tire or a file",
         least=1,
         most=3,
     )
     grading: str = choice(
-        "bead", ("bead", "uniform"), "of the elements along the arc", only_for=TORUS
+        "bead", ("bead", "uniform"), "grading of the elements along the section", only_for=TORUS
     )
     footprint_size: float | None = number(
         None,
         "-",
-        "length of elements at the footprint over that elsewhere; absent: 0.2 with a road, else 1",
+        "element length at the footprint relative to that elsewhere; absent: 0.2 with a road, else 1",
         least=0.05,
         most=1,
     )
-    material: Material = table(Material, "what the wall is made of")
+    material: Material = table(Material, "material of the wall")
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()
-    region: tuple[Region, ...] = tables(Region, "a part of the section of another material")
+    region: tuple[Region, ...] = tables(
+        Region, "a part of the section that is made of another material"
+    )
     file: str | None = filename(
         "Abaqus deck (.inp), Gmsh mesh (.msh) or section file (.toml, docs/section-file.md)",
         only_for=FILE,
     )
-    inner: str | None = text(None, "surface or node set of the face under pressure", only_for=FILE)
+    inner: str | None = text(
+        None, "surface or node set that carries the inflation pressure", only_for=FILE
+    )
     tread: str | None = text(None, "surface or node set that can touch the road", only_for=FILE)
-    rim: tuple[str, ...] = texts("surfaces or node sets that the wheel holds", only_for=FILE)
+    rim: tuple[str, ...] = texts("surfaces or node sets that are fixed to the wheel", only_for=FILE)
     length_unit: str = choice(
         "m",
         ("m", "mm", "in"),
-        "of the file; mm: with N, MPa and tonnes; in: lbf, psi",
+        "length unit of the file; mm implies N, MPa and tonnes, in implies lbf and psi",
         only_for=FILE,
     )
-    mirror: bool = flag(False, "the file has half the section, which ends on z = 0", only_for=FILE)
+    mirror: bool = flag(
+        False,
+        "true: the file holds half the section, which ends on z = 0, and is mirrored",
+        only_for=FILE,
+    )
     cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")
     cavity: Cavity | None = table(
         Cavity, "the air inside; absent: none in a torus, else this table's defaults", optional=True

@@ -124,9 +124,9 @@ def describe_energy(
     if losses.found is None:
         _standing(record, rolling, total, left + elastic)
     else:
-        *known, springs_lead = losses.found
+        lost, drive, beyond, springs_lead = losses.found
         taken = springs_lead - work.lead if work.lead else 0.0
-        _rolling(record, total, left + elastic, *known, taken)
+        _rolling(record, total, left + elastic, lost, drive, beyond, taken)
 
 
 def _standing(record: Record, rolling: RollingModes, work: float, left: float) -> None:

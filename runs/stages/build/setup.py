@@ -15,6 +15,7 @@ from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.stages.build import corner
+from tireroad.runs.stages.build.pattern import make_pattern
 from tireroad.runs.stages.build.stepping import run_time
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.stage import Done, Shared
@@ -49,18 +50,24 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
         ),
         spacing=(points.dx, points.dy) if isinstance(points, Pitch) else None,
         reach=scene.contact.reach,
+        pattern=make_pattern(scene.pattern, rolling_radius(job, state)),
     )
 
 
 def rolling_speed(job: Job, state: StaticState) -> float:
     """Speed of the road under the tire, m/s: the wheel's by its effective rolling radius."""
+    return job.speed * rolling_radius(job, state)
+
+
+def rolling_radius(job: Job, state: StaticState) -> float:
+    """Effective rolling radius, m: the scene's, or that of the static state."""
     given = job.scene.rotation.rolling_radius if job.scene.rotation else None
-    return job.speed * (given or state.rolling_radius())
+    return given or state.rolling_radius()
 
 
 def components(job: Job) -> tuple[int, ...]:
     """Directions of the contact forces: z, and with a brush x and y after it."""
-    return (2,) if job.scene.contact.brush_stiffness is None else (2, 0, 1)
+    return (2, 0, 1) if job.scene.contact.rubs else (2,)
 
 
 @dataclass(frozen=True)

@@ -78,6 +78,7 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
 
 def integration(job: Job, plan: Planned, scheme: str) -> Integration:
     """The tire at t = 0, to be taken over the planned steps. Collective."""
+    tire: Recursion | Convolution
     if scheme == "convolution":
         tire = Convolution(plan.response, plan.step, plan.steps)
     else:

@@ -18,7 +18,7 @@ from tireroad.runs.files.checksum import seal
 from tireroad.runs.files.disk import part_of, replacing
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.build import corner
+from tireroad.runs.stages.build import corner, pattern
 from tireroad.runs.stages.job import Job
 
 BLOCK = 512  # steps kept in memory between two writes
@@ -94,6 +94,7 @@ class ContactFile:
 
     def __init__(self, job: Job, key: str, setup: ContactSetup, attributes: dict):
         self._job, self._key, self._patch = job, key, setup.patch
+        self._setup = setup
         self._attributes = attributes | {
             "road": job.scene.road.kind,
             "speed": job.speed,
@@ -102,7 +103,7 @@ class ContactFile:
         self._checkpoint = job.directory / CHECKPOINT
         self._stack: list = []
         self._readings: list[np.ndarray] = []
-        self._rubs = job.scene.contact.brush_stiffness is not None
+        self._rubs = job.scene.contact.rubs
         self._layout = dict(_LAYOUT)
         if not job.scene.output.axle_force:
             del self._layout["axle_force"]
@@ -141,6 +142,7 @@ class ContactFile:
         c = len(patch.points)
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
+        pattern.fill(self._file, self._setup)
         forces = len(self._job.scene.force)
         driven: dict[str, tuple[tuple, str]] = {DRIVEN: ((forces, 3), "m")} if forces else {}
         driven |= _OF_WHEEL if self._job.axle else {}

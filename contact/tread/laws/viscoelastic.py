@@ -1,0 +1,54 @@
+"""A tread that creeps: a half-space or a bonded layer of rubber with one to three relaxation times."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.tread.compliance import Influence
+from tireroad.contact.tread.law import tread_law
+from tireroad.contact.tread.laws.elastic import Elastic, HalfSpace, Layer
+from tireroad.fem.errors import InputError
+from tireroad.fem.keys import Limits
+from tireroad.fem.parameters import ParameterError, number, numbers
+
+Array = NDArray[np.float64]
+_TERMS = 3
+
+
+@tread_law(
+    "viscoelastic", "rubber that creeps, on a grid of points: past pressure travels with the tread"
+)
+class Viscoelastic(Elastic):
+    """E(t) = E [1 - sum_k g_k (1 - exp(-t/t_k))], Poisson's ratio constant; E at once (contact.tread.creep)."""
+
+    thickness: float | None = number(
+        None, "m", "thickness of a layer on a stiff base; absent: a half-space", least=1e-4, most=1
+    )
+    relaxation: tuple[float, ...] = numbers(
+        "shares of the modulus that relax, one to three, of a sum below 1", "-",
+        Limits(least=1e-6, most=0.999999), (0.3,),
+    )  # fmt: skip
+    relaxation_time: tuple[float, ...] = numbers(
+        "the time in which each does", "s", Limits(least=1e-9, most=1e6), (1e-3,)
+    )
+
+    def validate(self) -> None:
+        """As many times as shares, and something left of the modulus."""
+        if not 1 <= len(self.relaxation) <= _TERMS:
+            raise ParameterError("relaxation", f"must have one to {_TERMS} numbers")
+        try:
+            _ = self.creep
+        except InputError as problem:
+            raise ParameterError("relaxation", str(problem).removeprefix("tread: ")) from None
+
+    @property
+    def creep(self) -> tuple[Array, Array]:
+        """Shares and times (k,) s of the creep."""
+        from tireroad.contact.tread.creep import creep_of
+
+        return creep_of(np.array(self.relaxation), np.array(self.relaxation_time))
+
+    def influence(self, farthest: float) -> Influence:
+        """Of the modulus at once: the half-space's, or the layer's."""
+        rubber = {"youngs_modulus": self.youngs_modulus, "poisson_ratio": self.poisson_ratio}
+        law = Layer(thickness=self.thickness, **rubber) if self.thickness else HalfSpace(**rubber)
+        return law.influence(farthest)

@@ -1,0 +1,73 @@
+"""The table of the tread's pattern, and what it does not go with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.keys import Limits
+from tireroad.fem.parameters import filename, numbers
+from tireroad.runs.scene.schema import choice, integer, number, tables, vector
+
+if TYPE_CHECKING:
+    from tireroad.runs.scene.tables.scene import Scene
+
+Where = Callable[[tuple[str, ...], str], InputError]
+
+
+@dataclass(frozen=True)
+class Groove:
+    direction: str = choice(
+        "lateral", ("lateral", "circumferential"), "one in each pitch, or around the tire"
+    )
+    position: float = number(
+        0.0, "-", "place in its pitch, 0 to 1; of a circumferential groove y in m", least=-1, most=1
+    )
+    width: float = number(0.004, "m", "between the middles of its flanks", least=1e-6, most=1)
+    depth: float = number(0.008, "m", "under the outer face", least=1e-6, most=0.1)
+    flank: float = number(0.001, "m", "in which it comes to its depth", least=1e-5, most=0.1)
+    angle: float = number(
+        0.0, "deg", "of a lateral groove from the axle's direction", least=-80, most=80
+    )
+    span: tuple[float, float] = vector(
+        (-1.0, 1.0), "m", "from, to: y between which a lateral groove lies", least=-10, most=10
+    )
+
+
+@dataclass(frozen=True)
+class PatternTable:
+    pitches: int = integer(60, "around the tire, of the lateral grooves", least=1, most=2000)
+    pitch_lengths: tuple[float, ...] = numbers(
+        "relative lengths of the pitches, in random order; one: all alike",
+        "-",
+        Limits(least=0.2, most=5),
+        (1.0,),
+    )
+    seed: int = integer(1, "of their order", least=0, most=2**31)
+    file: str | None = filename(
+        "depths in place of grooves: .npz with depth (n, m) m around the tire and y (m) m, or an image (.png) from "
+        "white, the outer face, to black, the full depth, its width around the tire"
+    )
+    depth: float = number(0.008, "m", "of the black of an image", least=1e-6, most=0.1)
+    width: float = number(0.15, "m", "across the tire, of an image", least=1e-6, most=10)
+    groove: tuple[Groove, ...] = tables(Groove, "a groove of the tread")
+
+
+def check_pattern(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """Raise InputError for a pattern that cannot be, or without the points that see it."""
+    wanted = scene.pattern
+    if wanted is None:
+        return
+    if scene.contact is None or scene.contact.points == "nodes":
+        raise error(
+            ("pattern",), "needs [contact] on a grid that sees it: contact.points = { dx, dy } (m)"
+        )
+    if bool(wanted.groove) == (wanted.file is not None):
+        raise error(("pattern",), "needs either [[pattern.groove]] or file")
+    if not wanted.pitch_lengths:
+        raise error(("pattern", "pitch_lengths"), "must have one number at least")
+    for number_, groove in enumerate(wanted.groove):
+        if groove.span[0] >= groove.span[1]:
+            raise error(("pattern", "groove", str(number_), "span"), "must ascend")
