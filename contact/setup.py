@@ -79,6 +79,7 @@ class ContactSetup:
     @property
     def begun(self) -> np.ndarray:
         """Depth (c,) m of the pattern under the points at t = 0."""
+        assert self.pattern is not None, "the tread is a slick"
         return self.pattern.depth(self.patch.points[:, 0], self.patch.points[:, 1])
 
     def settled(self, response: Response, nodal_force: np.ndarray, spec: Spec) -> tuple:

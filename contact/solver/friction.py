@@ -105,8 +105,8 @@ class Friction:
         index = np.flatnonzero((force > 0) & (share > 1e-9))
         if len(index) == 0:
             return out
-        bristles = np.broadcast_to(law.stiffness, share.shape)[index] * share[index]
-        stiffness = Stiffness(*self._between(index), 1.0 / bristles)
+        springs = np.broadcast_to(law.stiffness, share.shape)[index] * share[index]
+        stiffness = Stiffness(*self._between(index), 1.0 / springs)
         constant = moved[index] + past[index] / share[index, None]
         bound = np.full(len(index), np.inf)
         if law.friction is not None:

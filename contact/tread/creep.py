@@ -52,9 +52,9 @@ def creep_of(share: Array, time: Array) -> tuple[Array, Array]:
 
 
 def _product(factors: list[Array]) -> Array:
-    out = np.ones(1)
+    out: Array = np.ones(1)
     for factor in factors:
-        out = np.polymul(out, factor)
+        out = np.asarray(np.polymul(out, factor), dtype=float)
     return out
 
 
@@ -72,6 +72,7 @@ def steady(creep: tuple[Array, Array], patch: Patch, speed: float) -> Array:
     size, lag = creep
     if speed == 0:
         return (1.0 + size.sum()) * np.eye(len(patch.points))
+    assert patch.places is not None, "creep is for a grid of points"
     shape, place = patch.places.shape, patch.places.place
     decay, old, new = weights(lag, patch.places.spacing[0] / speed)
     n = shape[0]
@@ -121,7 +122,7 @@ class TreadMemory:
         jump = int(offset)
         kept = self._decay[:, None, None] * self._kept + self._old[:, None, None] * self._force
         self._ahead, self._next = _shifted(kept, jump), offset - jump
-        field = np.tensordot(self._size, self._ahead, 1)
+        field = np.asarray(np.tensordot(self._size, self._ahead, 1), dtype=float)
         here = (1.0 - self._next) * field + self._next * _shifted(field, 1)
         return self._tread.apply(here.ravel())[self._place]
 

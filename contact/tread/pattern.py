@@ -26,13 +26,20 @@ _LEAST_LAND = 1e-3
 class GrooveLike(Protocol):
     """A groove (runs.scene.tables.pattern): lengths in m, `angle` in degrees from the axle."""
 
-    direction: str
-    position: float
-    width: float
-    depth: float
-    flank: float
-    angle: float
-    span: tuple[float, float]
+    @property
+    def direction(self) -> str: ...
+    @property
+    def position(self) -> float: ...
+    @property
+    def width(self) -> float: ...
+    @property
+    def depth(self) -> float: ...
+    @property
+    def flank(self) -> float: ...
+    @property
+    def angle(self) -> float: ...
+    @property
+    def span(self) -> tuple[float, float]: ...
 
 
 @dataclass(frozen=True)
@@ -88,6 +95,7 @@ class Pattern:
 
     def _read(self, s: Array, y: Array, out: Array) -> Array:
         """Bilinear between the heights, around the tire without end."""
+        assert self.heights is not None, "a pattern of grooves has no heights"
         depth, across = self.heights.depth, self.heights.y
         place = np.mod(s, self.circumference) / self.circumference * len(depth)
         i = np.floor(place).astype(int) % len(depth)

@@ -54,7 +54,9 @@ class StaticStage(Computed[StaticState]):
             "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
             "file": fingerprint(scene.tire),
             "static": asdict(scene.static),
-            "rolling": asdict(steady_rolling(self.job, scene.rotation and scene.rotation.speed)),
+            "rolling": asdict(
+                steady_rolling(self.job, scene.rotation.speed if scene.rotation else None)
+            ),
             "travel": [scene.rotation.travel_speed, scene.rotation.rolling_radius]
             if scene.rotation
             else None,
@@ -162,12 +164,11 @@ def _estimate(record: Record, state: StaticState, loader: Loader) -> None:
     if isinstance(found, str):
         observe.say(f"  error of the load not estimated: {found}")
         return
-    load = state.load
     record.indicators["estimated error of the load"] = (100 * found.relative, "%")
     observe.say(
-        f"  estimated error of the load at this deflection: {100 * found.relative:.2g} %, from "
-        f"{found.load:.6g} N on elements of twice the size ({found.unknowns} unknowns) against "
-        f"{load:.6g} N"
+        f"  estimated error of the load at this height of the road: {100 * found.relative:.2g} % (ever "
+        f"smaller elements: {found.load:.5g} N); of the footprint's elements {100 * found.footprint:.2g} %, of "
+        f"the rest {100 * found.bulk:.2g} %; {found.unknowns} unknowns with finer elements there"
     )
     if found.relative > COARSE:
         record.warnings.append(
