@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any, Protocol
 
 import numpy as np
@@ -75,7 +76,9 @@ def make_grid_patch(
     place = np.flatnonzero(taken)
     if len(place) == 0:
         raise InputError("contact.points: no grid point near the road; take a finer grid")
-    weights = surface.weights(ring[place], arc[place])
+    weights = _over_cells(
+        surface, np.stack([x, y], axis=-1)[place], spacing, ring[place], arc[place]
+    )
     used = np.union1d(weights.indices, nodes.index[nodes.force > 0])
     return Patch(
         index=used,
@@ -88,6 +91,29 @@ def make_grid_patch(
         weights=weights[:, used].tocsr(),
         places=GridPlaces(shape, spacing, place),
     )
+
+
+def _over_cells(
+    surface: Surface,
+    points: np.ndarray,
+    spacing: tuple[float, float],
+    ring: np.ndarray,
+    arc: np.ndarray,
+) -> sparse.csr_matrix:
+    """Shape functions (c, s) averaged over the cell of each of the points (c, 2) m, by 2 x 2 Gauss points.
+
+    A point's force is a pressure on its cell, as the tread takes it, and what it reads the mean there. As a force at
+    a point it would sink in by what the element happens to allow: 16.9 um/N where elements of order 3 meet, 9.3
+    to 9.7 inside, on a wall of 48 MPa, 12 mm thick; over cells of 5 mm 9.7 and 9.0 to 9.2. `ring` and `arc` (rad) of the
+    points stand in for places of a cell beyond the surface.
+    """
+    total = None
+    for signs in product((-1, 1), repeat=2):
+        x, y = (points + np.array(signs) * spacing / np.sqrt(12)).T
+        around, along, found = surface.locate(x, y)
+        part = surface.weights(np.where(found, around, ring), np.where(found, along, arc))
+        total = part if total is None else total + part
+    return total / 4
 
 
 def _check_count(

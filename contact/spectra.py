@@ -19,11 +19,13 @@ def amplitudes(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]
     return np.fft.rfftfreq(len(values), step), 2 * spectrum / window.sum()
 
 
-def third_octaves(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+def third_octaves(
+    values: np.ndarray, step: float, up_to: float = np.inf
+) -> tuple[np.ndarray, np.ndarray]:
     """Band centres (b,) Hz and levels (b, d), dB re 1 N (rms), of values (n, d) in N.
 
     Base-ten bands 1000 * 10^(k/10) (IEC 61260-1), those that lie whole between the lines of the
-    record's spectrum and half the sampling rate; mean square in a band from the power spectrum,
+    record's spectrum and half the sampling rate, and below `up_to` Hz; mean square in a band from the power spectrum,
     lines on the border shared. A record of one value has no band.
     """
     if len(values) < 2:
@@ -34,7 +36,7 @@ def third_octaves(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarr
     centre = 1000.0 * 10.0 ** (k / 10)
     low, high = centre * 10**-0.05, centre * 10**0.05
     # A band narrower than three lines has no meaningful level.
-    use = (high - low > 3 * spacing) & (high < frequency[-1])
+    use = (high - low > 3 * spacing) & (high < min(frequency[-1], up_to))
     cumulative = np.concatenate([np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)]) * spacing
     edges = np.concatenate([[0.0], frequency + spacing / 2])
 

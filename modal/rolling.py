@@ -15,20 +15,12 @@ from tireroad.modal.adrift import beside
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.campbell import Campbell
 from tireroad.modal.rotating import (
-    LIMITS,
     StateModes,
     checks,
     matrices,
     rotating,
     standing,
 )
-
-# Largest residual and defect of an identity on a basis that attachment modes joined: those reach up to a
-# hundred times the band, and the vectors of the fastest lose digits (2e-5 seen, with a free rim that turns).
-_GROWN = 1e-4
-# The same where rigid modes are among them: slow states beside a drift are close to defective (3e-3 seen with
-# the air in a free wheel, whose axle force was right to 1e-5 all the same).
-_DRIFTING = 1e-2
 
 
 def pencil(projection: Projection, turning: Turning) -> tuple[np.ndarray, np.ndarray]:
@@ -70,13 +62,10 @@ def rolling_modes(basis: ModalBasis, turning: Turning, comm: MPI.Comm) -> Rollin
 
 def decouple(projection: Projection, turning: Turning, comm: MPI.Comm) -> StateModes:
     """The states of the projected problem, on every process, their identities checked. Collective."""
-    identities = _DRIFTING if (projection.squares == 0).any() else _GROWN
-    return _decoupled(projection, turning, comm, (_GROWN, identities))[0]
+    return _decoupled(projection, turning, comm)[0]
 
 
-def _decoupled(
-    projection: Projection, turning: Turning, comm: MPI.Comm, limits: tuple[float, float] = LIMITS
-) -> tuple[StateModes, dict]:
+def _decoupled(projection: Projection, turning: Turning, comm: MPI.Comm) -> tuple[StateModes, dict]:
     """The states and the figures of modal.rotating.checks. Collective."""
     if turning.speed == 0 and projection.air is None and projection.corner is None:
         return standing(projection, turning.damping), {}
@@ -90,7 +79,7 @@ def _decoupled(
 
     def solve() -> tuple[StateModes, dict]:
         states = beside(*given, adrift) if adrift.shape[1] else rotating(*given)
-        return states, checks(states, *given, limits)
+        return states, checks(states, *given)
 
     # One process solves: LAPACK on another could order repeated eigenvalues differently.
     return on_root(comm, solve)

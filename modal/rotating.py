@@ -15,14 +15,15 @@ from scipy import linalg
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.basis import Projection
 from tireroad.modal.damping import Damping, rates
+from tireroad.modal.refined import AT_REST, at_rest, cleared, refined, residual
 from tireroad.modal.states import StateModes
 
 Array = np.ndarray
 # Above this condition an eigenvector loses ten of sixteen digits; such eigenvalues go to the block.
 DEFECTIVE = 1e6
 SINGULAR = 1e13  # condition of K~ beyond which it has no inverse
-# States slower than this part of the fastest drift, as rigid modes do, unless their vectors are apart.
-_AT_REST, _SKEWED = 1e-5, 1e2
+# States at rest beside the fastest drift, as rigid modes do, unless there is one and its vectors are apart.
+_SKEWED = 1e2
 
 Pencil = tuple[Array, Array]
 
@@ -163,14 +164,19 @@ def rotating(drag: Array, stiffness: Array) -> StateModes:
     block, block_vectors = np.zeros((0, 0)), np.zeros((2 * m, 0))
     inverse, _ = _inverse(values, vectors, block_vectors)
     condition = np.linalg.norm(inverse, axis=1)
-    drifting = (np.abs(values) <= _AT_REST * np.abs(values).max()) & (condition > _SKEWED)
-    good = (condition <= DEFECTIVE) & ~drifting
+    slow = AT_REST * np.abs(values).max()
+    rest = np.abs(values) <= slow
+    good = (condition <= DEFECTIVE) & ~(rest & ((condition > _SKEWED) | (rest.sum() > 1)))
     block_inverse = block_vectors.T
     if not good.all():
         block, block_vectors, good = _invariant(companion, values, good)
+        if rest[~good].all():
+            block, block_vectors = at_rest(companion, block_vectors, slow)
         values, vectors = values[good], vectors[:, good]
+        _, block_inverse = _inverse(values, vectors, block_vectors)
+        vectors = cleared(companion, values, vectors, block, block_vectors, block_inverse)
         inverse, block_inverse = _inverse(values, vectors, block_vectors)
-    right, left = vectors[:m], inverse[:, m:] / scale
+    values, right, left = refined(drag, stiffness, values, vectors[:m], inverse[:, m:] / scale)
     return StateModes(
         values,
         right * np.where(values.imag > 0, 2.0, 1.0),
@@ -178,8 +184,8 @@ def rotating(drag: Array, stiffness: Array) -> StateModes:
         block,
         block_vectors[:m],
         block_inverse[:, m:] / scale,
-        _quadratic_residual(drag, stiffness, values, right),
-        _quadratic_residual(drag.T, stiffness.T, values, left.T),
+        residual(drag, stiffness, values, right),
+        residual(drag.T, stiffness.T, values, left.T),
         float(condition[good].max(initial=1.0)),
     )
 
@@ -233,17 +239,3 @@ def _invariant(companion: Array, values: Array, good: Array) -> tuple[Array, Arr
         f"{np.abs(chosen).max():.4g} 1/s) cannot be told from others. Change the damping or the speed a "
         "little."
     )
-
-
-def _quadratic_residual(drag: Array, stiffness: Array, values: Array, vectors: Array) -> Array:
-    """||(s^2 + s D + K) u|| over the sum of its terms' norms, column by column."""
-
-    # Real by complex, without a complex copy of the matrix.
-    def times(matrix: Array) -> Array:
-        return matrix @ vectors.real + 1j * (matrix @ vectors.imag)
-
-    terms = (vectors * values**2, times(drag) * values, times(stiffness))
-    size = sum(np.linalg.norm(term, axis=0) for term in terms)
-    # A state at rest, of a rigid mode, has terms of rounding alone: a faster one is its yardstick.
-    least = _AT_REST * np.abs(values).max(initial=0.0) ** 2 * np.linalg.norm(vectors, axis=0)
-    return np.linalg.norm(sum(terms), axis=0) / np.maximum(size, least)

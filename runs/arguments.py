@@ -23,8 +23,8 @@ A rolling tire on a rough road: finite elements, modes, Green's functions, conta
 `mpirun -n N python3 -m runs COMMAND` is the same program in a batch script.
 """
 RUN = """\
-Runs the stages static, modes, rotating, greens, response, contact, spectra, vibration, motion, report, as far as
-the scene needs them. Stages already computed from the same inputs are reused unless --fresh.
+Runs the stages static, modes, rotating, greens, contact, accuracy, response, spectra, vibration, motion, report,
+as far as the scene needs them. Stages already computed from the same inputs are reused unless --fresh.
 """
 SET_HELP = (
     "lay a value over the scene, in TOML or as a bare word: static.load=400, road.kind=flat,"

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tireroad.contact.chatter import choose, oscillation
 from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.limits import Limit, limits, lowest, pitch
 from tireroad.contact.model import step_solver, tread_memory
 from tireroad.contact.patch import Patch
 from tireroad.contact.roads.under_tire import RoadUnderTire
@@ -30,7 +31,8 @@ _LEAST_STEPS = 200
 @dataclass(frozen=True, kw_only=True)
 class History:
     """What happened: `time` (n,) s; `force` (n, c) N of each contact point, `axle_force` (n, 3) N,
-    `displacement` (n, c) m of the tire under the points, `gap` (n, c) m; the `patch` of points."""
+    `displacement` (n, c) m of the tire under the points, `gap` (n, c) m; the `patch` of points;
+    the `limit` in frequency of what this is an answer to."""
 
     time: Array
     force: Array
@@ -38,6 +40,7 @@ class History:
     displacement: Array
     gap: Array
     patch: Patch
+    limit: Limit
 
     @property
     def total_force(self) -> Array:
@@ -45,12 +48,14 @@ class History:
         return self.force.sum(axis=1)
 
     def spectrum(self) -> tuple[Array, NDArray[np.complex128]]:
-        """Frequencies (f,) Hz and amplitudes (f, 3) N of the axle force (contact.spectra)."""
-        return amplitudes(self.axle_force, self.time[1] - self.time[0])
+        """Frequencies (f,) Hz up to the limit and amplitudes (f, 3) N of the axle force (contact.spectra)."""
+        frequency, amplitude = amplitudes(self.axle_force, self.time[1] - self.time[0])
+        below = frequency <= self.limit.frequency
+        return frequency[below], amplitude[below]
 
     def third_octaves(self) -> tuple[Array, Array]:
-        """Band centres (b,) Hz and levels (b, 3), dB re 1 N rms, of the axle force."""
-        return third_octaves(self.axle_force, self.time[1] - self.time[0])
+        """Band centres (b,) Hz below the limit and levels (b, 3), dB re 1 N rms, of the axle force."""
+        return third_octaves(self.axle_force, self.time[1] - self.time[0], self.limit.frequency)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,6 +120,14 @@ def drive(
         displacement=np.stack([instant.displacement for instant in instants]),
         gap=np.stack([instant.gap for instant in instants]),
         patch=setup.patch,
+        limit=lowest(
+            limits(
+                step=chosen.size,
+                highest=tire.states.highest / (2 * np.pi),
+                pitch=pitch(setup.patch),
+                speed=rolled.speed,
+            )
+        ),
     )
     if (history.force[:, setup.patch.edge] > 0).any():
         raise ConvergenceError(

@@ -6,21 +6,20 @@ z + u_z >= z_road and one of both zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
-import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from tireroad.fem import compat, kinematics
+from tireroad.fem import compat
+from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.shape_damping import ShapeDamping
+from tireroad.fem.static.step import Step
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,
+    inverted_volume,
     static_residual,
     stress_prediction,
     tangent,
@@ -32,16 +31,6 @@ MOST_STEPS = 25  # tangents; a load step that needs more is better halved
 TOLERANCE = 1e-12  # of the force scale
 _SERVES = 0.2  # a step with an old tangent costs a twentieth of one with a new tangent
 _DIVERGED = 1e8  # times the force scale: nothing comes back from there
-
-
-@dataclass(frozen=True)
-class Step:
-    """How one equilibrium solve ended: `iterations` tangents, `residual` relative to the force scale."""
-
-    converged: bool
-    iterations: int
-    residual: float
-    reason: str
 
 
 class Equilibrium:
@@ -65,7 +54,7 @@ class Equilibrium:
             residual += self._damping.work
         self._residual = compat.form(residual)
         self._tangent = compat.form(tangent(body, residual) + stress_prediction(body, self._before))
-        self._inverted = compat.form(_inverted_volume(body))
+        self._inverted = compat.form(inverted_volume(body))
         self._clamp = [body.clamp()]
         self._local_tangent = fem.petsc.create_matrix(self._tangent)
         self.matrix = self._local_tangent
@@ -199,6 +188,23 @@ class Equilibrium:
         _, force = self._system.solve(nothing, self._system.raising)
         return self.body.comm.allreduce(float(force.sum()))
 
+    def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
+        """Under a vertical traction in place of the road: the height (m) that the face gains by one step of
+        Newton's method from the present state, and that by a newton more. Collective.
+
+        `weights` (s,) of the outer face's nodes, of sum 1, say where the `load` (N) acts and the height is read.
+        """
+        self._before.x.array[:] = self.body.u.x.array
+        out = self._assemble_residual().copy()
+        self._assemble_tangent()
+        if not self._system.take(self.matrix, np.zeros(0, np.intp), np.zeros(0)):
+            raise ConvergenceError("static: the tangent without a road is singular")
+        face, push = self.body.surface, np.zeros(len(out))
+        push[3 * face.local + 2] = weights[face.place]
+        push[self._rim] = 0.0
+        gained = [push @ self._system.solve(right)[0] for right in (load * push - out, push)]
+        return tuple(self.body.comm.allreduce(np.array(gained)))
+
     def contact_force(self) -> np.ndarray:
         """Vertical force of the road on the owned nodes (nodes,), N; not negative. Not collective."""
         force = np.zeros(self.body.nodes)
@@ -242,9 +248,3 @@ class Equilibrium:
     def _inside_out(self) -> bool:
         """Whether the wall is turned inside out in some Gauss point; no energy tells J from -J."""
         return self.body.comm.allreduce(fem.assemble_scalar(self._inverted)) > 0
-
-
-def _inverted_volume(body: Body) -> Any:
-    """Volume in which det F is not positive, m3, in UFL."""
-    J = ufl.det(kinematics.deformation_gradient(body.u))
-    return ufl.conditional(ufl.le(J, 0.0), 1.0, 0.0) * body.dx

@@ -1,7 +1,4 @@
-"""Load steps to a wanted state: inflation, then the road by height, deflection or load.
-
-Steps are cut back when Newton fails (fem.static.stepping).
-"""
+"""Load steps to a wanted state: inflation, then the road by height, deflection or load."""
 
 from __future__ import annotations
 
@@ -72,8 +69,7 @@ class Loader:
 
         before = self.body.u.x.array.copy()
         self.body.set_displacement(on_root(self.body.comm, shape))
-        self.equilibrium.pressure.value = pressure
-        step = self.equilibrium.solve()
+        step = self._solve_at(pressure)
         self.newton_steps += step.iterations
         if step.converged:
             self._report("inflation", pressure, "Pa", step)
@@ -82,11 +78,20 @@ class Loader:
         return step.converged
 
     def _inflate_in_steps(self, pressure: float) -> None:
-        def attempt(fraction: float) -> Step:
-            self.equilibrium.pressure.value = fraction * pressure
-            return self.equilibrium.solve()
+        self._march(
+            lambda part: self._solve_at(part * pressure),
+            1.0,
+            1.0,
+            Show("inflation", pressure, "Pa"),
+        )
 
-        self._march(attempt, 1.0, 1.0, Show("inflation", pressure, "Pa"))
+    def _solve_at(self, pressure: float) -> Step:
+        before = float(self.equilibrium.pressure.value)
+        self.equilibrium.pressure.value = pressure
+        step = self.equilibrium.solve()
+        if not step.converged:
+            self.equilibrium.pressure.value = before  # as the displacement is put back
+        return step
 
     @property
     def touch(self) -> float:
@@ -230,6 +235,5 @@ class Loader:
 
     def _report(self, what: str, value: float, unit: str, step: Step) -> None:
         force = self.equilibrium.contact_force()
-        total = self.body.comm.allreduce(force.sum())
-        active = self.body.comm.allreduce(int((force > 0).sum()))
+        total, active = self.load(), self.body.comm.allreduce(int((force > 0).sum()))
         self.report(Progress(what, value, unit, total, active, step))

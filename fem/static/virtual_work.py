@@ -150,3 +150,9 @@ def stress_prediction(body: Body, before: fem.Function) -> ufl.Form:
 
     stretch = body.plies.stress_prediction(u, before, du, v)
     return correction(0) * body.dx + correction(1) * body.reduced_dx + stretch
+
+
+def inverted_volume(body: Body):
+    """Volume in which det F is not positive, m3, in UFL."""
+    J = ufl.det(kinematics.deformation_gradient(body.u))
+    return ufl.conditional(ufl.le(J, 0.0), 1.0, 0.0) * body.dx

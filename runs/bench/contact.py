@@ -21,8 +21,8 @@ from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance, half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.bench.contact_points import large, rough
-from tireroad.runs.bench.contact_steps import convolution, orders
+from tireroad.runs.bench.parts.contact_points import large, rough
+from tireroad.runs.bench.parts.contact_steps import convolution, orders
 from tireroad.runs.measure.synthetic import Strip, oval_patch
 from tireroad.runs.measure.tabulate import Table
 

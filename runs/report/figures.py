@@ -125,8 +125,8 @@ def spectrum(frequency: NDArray, axle: NDArray, of: str = "axle force") -> str:
 
 
 @styled
-def third_octaves(centre: NDArray, level: NDArray) -> str:
-    """Third-octave levels (nb, 3) dB re 1 N as bars over band centres (nb) Hz."""
+def third_octaves(centre: NDArray, level: NDArray, error: NDArray | None = None) -> str:
+    """Third-octave levels (nb, 3) dB re 1 N as bars over band centres (nb) Hz, with their errors (nb, 3) dB."""
     figure, axes = canvas(9.5, 3.2)
     here, place = axes[0, 0], np.arange(len(centre))
     finite = np.where(np.isfinite(level), level, -np.inf)
@@ -137,6 +137,10 @@ def third_octaves(centre: NDArray, level: NDArray) -> str:
         height = np.maximum(finite[:, column] - floor, 0.0)
         where = place + 0.28 * (column - 1)
         here.bar(where, height, 0.26, bottom=floor, color=COLOURS[column], label=name)
+        if error is not None:
+            known = np.isfinite(error[:, column]) & (height > 0)
+            ends = where[known], (floor + height)[known], error[known, column]
+            here.errorbar(*ends, fmt="none", ecolor="#1f2933", elinewidth=0.8, capsize=1.5)
     here.set_xticks(place, [f"{value:g}" for value in nominal(centre)], rotation=45)
     here.grid(axis="x", visible=False)
     here.set(xlabel="third-octave band in Hz", ylabel="axle force, rms, in dB re 1 N")

@@ -87,14 +87,19 @@ def spectra(results: Results) -> Section:
         return section
     spacing = quantity(float(frequency[1] - frequency[0]), "Hz")
     section.facts.append(("spacing of lines", spacing))
-    section.facts.append(("up to", quantity(float(frequency.max()), "Hz")))
+    section.facts += attributes(results, name, (("limit", "Hz"), ("limit_cause", "")))
     section.figures.append((figures.spectrum(frequency, force, of), "Amplitude spectrum."))
     centre = results.optional(name, "third_octave/centre")
     level = results.optional(name, "third_octave/level")
     if centre is None or level is None or not len(centre):
         section.notes.append("No third-octave bands in spectra.h5.")
         return section
-    section.figures.append((figures.third_octaves(centre, level), "Third-octave bands, rms."))
+    error, caption = results.optional(name, "third_octave/level_error"), "Third-octave bands, rms."
+    if error is not None and np.isfinite(error).any():
+        caption += " Lines on the bars: estimated error by mesh, modes, step and points."
+    elif error is not None:
+        caption += " The companions of this run were too short to tell the error of a band."
+    section.figures.append((figures.third_octaves(centre, level, error), caption))
     return section
 
 

@@ -9,6 +9,7 @@ STAGES = (
     "rotating",
     "greens",
     "contact",
+    "accuracy",
     "response",
     "spectra",
     "vibration",
@@ -30,11 +31,13 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
         reasons["response"] = "no [[force]]"
     if scene.contact is None:
         reasons["contact"] = "no [contact]"
-        reasons["spectra"] = "no [contact], hence no contact forces"
+        reasons["accuracy"] = reasons["spectra"] = "no [contact], hence no contact forces"
         if not scene.force:
             reasons["greens"] = "neither [[force]] nor [contact]"
     elif not scene.output.spectra:
         reasons["spectra"] = "output.spectra is false"
+    if "accuracy" not in reasons and not scene.accuracy.estimate:
+        reasons["accuracy"] = "accuracy.estimate is false"
     if not scene.output.vibration:
         reasons["vibration"] = "output.vibration is false"
     if not scene.output.fields:

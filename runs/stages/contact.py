@@ -7,18 +7,13 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from typing import ClassVar
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.chatter import LIMIT, Chatter, Chosen, warning
-from tireroad.contact.driven import Driven
-from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.model import solver_name, step_solver, tread_memory
+from tireroad.contact.model import solver_name
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.solver.friction import Friction
 from tireroad.contact.totals import Totals
-from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
@@ -26,7 +21,8 @@ from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
 from tireroad.runs.stages.build import pattern
 from tireroad.runs.stages.build.energy import Losses, describe_energy, works
-from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
+from tireroad.runs.stages.build.loop import driven_tire, make_loop
+from tireroad.runs.stages.build.point_forces import shortest_period
 from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, told
 from tireroad.runs.stages.build.stepping import (
     Integration,
@@ -113,7 +109,7 @@ class ContactStage(Stage[ContactHistory]):
         """The time loop, block by block into the file; Chatter ends it where it is `watched`. Collective."""
         response, chosen = self.greens.product.contact, integration(self.job, plan, scheme)
         with record.timing("tread and solver"):
-            driven = self._driven(chosen)
+            driven = driven_tire(self.job, chosen.tire, chosen.step, chosen.steps)
             loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
         totals = Totals(setup.patch, setup.reach, watched)
         losses = Losses(chosen.tire, response, self.rotating.product, chosen.step)
@@ -146,32 +142,17 @@ class ContactStage(Stage[ContactHistory]):
         passing = passing_period(scene.road, setup.road.spacing, setup.rolled.speed)
         return min(passing, shortest_period(scene.force))
 
-    def _driven(self, chosen: Integration) -> Driven | None:
-        """The tire under the scene's prescribed forces, and with a wheel that is read, where there is either."""
-        forces = self.job.scene.force
-        if not forces and self.job.axle is None:
-            return None
-        time = chosen.step * np.arange(chosen.steps + 1)
-        return Driven(chosen.tire, histories(forces, time), directions(forces))
-
     def _loop(self, record: Record, setup: ContactSetup, tire, step: float) -> Loop:
         """The tire as seen at the patch's points, normal solver, friction; the choice is shown."""
-        spec, patch = self.job.scene.contact, setup.patch
-        p = len(patch.index)
-        memory = tread_memory(spec, patch, setup.rolled.speed, step)
-        at_once = memory.at_once if memory else 1.0
-        solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once)
-        friction = None
-        if spec.rubs:
-            friction = _friction(spec, setup, tire, step)
-            limit = friction.largest_unique(patch.force > 0, solver)
+        spec = self.job.scene.contact
+        loop = make_loop(spec, setup, tire, step)
+        if loop.friction is not None:
+            limit = loop.friction.largest_unique(setup.patch.force > 0, loop.solver)
             record.indicators["friction up to which a step has one answer"] = (limit, "-")
             record.warnings += [
                 text for text in beyond_unique(spec.friction, limit) if text not in record.warnings
             ]
-        if patch.weights is not None:
-            tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
-        return Loop(tire, solver, friction, memory)
+        return loop
 
     def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, losses, chosen) -> None:
         """Take the steps that are left; stop between two of them when asked to. Collective."""
@@ -214,16 +195,6 @@ def beyond_unique(friction: float | None, limit: float) -> list[str]:
         f"contact.friction = {friction:g} is more than {limit:.3g}, up to which a step is sure to have "
         "one answer: where points slip there may be another; lower it, or take a softer tread"
     ]
-
-
-def _friction(spec, setup: ContactSetup, tire, step: float) -> Friction:
-    """The brush of the scene, at rest."""
-    patch = setup.patch
-    stiffness = spec.brush_stiffness or spec.brush_stiffness_per_area * patch.area
-    law = BrushLaw(stiffness, spec.friction, spec.slip, spec.brush)
-    brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
-    brush.begin(patch.force > 0)
-    return Friction(brush, tire.same_step, patch.weights)
 
 
 def _describe(record: Record, counted: Totals, solver, chosen: Integration, taken: int) -> None:

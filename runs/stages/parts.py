@@ -1,5 +1,6 @@
 """The parts of the pipeline in their order."""
 
+from tireroad.runs.stages.accuracy import AccuracyStage
 from tireroad.runs.stages.build.cavity import AirColumn
 from tireroad.runs.stages.build.setup import Setup
 from tireroad.runs.stages.contact import ContactStage
@@ -26,6 +27,7 @@ PARTS: tuple[type[Part], ...] = (
     RotatingStage,
     GreensStage,
     ContactStage,
+    AccuracyStage,
     ResponseStage,
     SpectraStage,
     VibrationStage,

@@ -7,10 +7,16 @@ from typing import ClassVar
 
 import numpy as np
 
+from tireroad.contact.limits import Limit, lowest
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.spectra import amplitudes, third_octaves
+from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
+from tireroad.runs.process import observe
+from tireroad.runs.stages.accuracy import Accuracy
 from tireroad.runs.stages.build import corner
+from tireroad.runs.stages.build.model_limit import all_limits
+from tireroad.runs.stages.build.run_in import first_step, run_in
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
 from tireroad.runs.stages.stored.contact_file import ContactHistory
@@ -21,18 +27,24 @@ _FEWEST = 32  # steps of which a spectrum says anything
 @dataclass(frozen=True, kw_only=True)
 class Spectra:
     """Complex amplitudes over `frequency` (f,) Hz of the `contact_force` and, where it is kept, of the
-    `axle_force`, (f, 3) N; its third octaves: band `centre` (b,) Hz and `level` (b, 3) dB re 1 N. The
-    first `left_out` s of the run, its run-in, are not in them. `wheel`: the motions of a wheel that moves and the
-    moments on its hub, (f, 3) or (f, 1), by the names of runs.stages.corner.
+    `axle_force`, (f, 3) N; third octaves: band `centre` (b,) Hz, `level` of the axle force and
+    `contact_level` (b, 3) dB re 1 N, with their estimated errors `level_error` and `contact_level_error` dB,
+    NaN where unknown, None where they were not wanted. The first `left_out` s of the run, its run-in, are not in them, nor
+    is anything beyond the `limit` of the model. `wheel`: the motions of a wheel that moves and the moments on its
+    hub, (f, 3) or (f, 1), by the names of runs.stages.build.corner.
     """
 
     frequency: np.ndarray
     contact_force: np.ndarray
     left_out: float
+    limit: Limit
+    centre: np.ndarray
+    contact_level: np.ndarray
     wheel: dict[str, np.ndarray] = field(default_factory=dict)
     axle_force: np.ndarray | None = None
-    centre: np.ndarray | None = None
     level: np.ndarray | None = None
+    level_error: np.ndarray | None = None
+    contact_level_error: np.ndarray | None = None
 
 
 _UNITS = {
@@ -41,6 +53,9 @@ _UNITS = {
     "axle_force": ("axle_force", "N"),
     "centre": ("third_octave/centre", "Hz"),
     "level": ("third_octave/level", "dB re 1 N"),
+    "contact_level": ("third_octave/contact_level", "dB re 1 N"),
+    "level_error": ("third_octave/level_error", "dB"),
+    "contact_level_error": ("third_octave/contact_level_error", "dB"),
 }
 
 
@@ -51,10 +66,12 @@ class SpectraStage(Computed[Spectra]):
     name: ClassVar[str] = "spectra"
     contact: Done[ContactHistory]
     setup: Done[ContactSetup]
+    rotating: Done[RollingModes]
+    accuracy: Done[Accuracy] | None = None
 
     def inputs(self) -> dict:
-        """The contact forces: the length of road that is left out as run-in is in them."""
-        return {"contact": self.contact.key}
+        """The contact forces: the length of road that is left out as run-in is in them, and the modes."""
+        return {"contact": self.contact.key, "bars": self.accuracy.key if self.accuracy else None}
 
     def compute(self, record: Record) -> Spectra:
         """Not collective."""
@@ -65,23 +82,54 @@ class SpectraStage(Computed[Spectra]):
             record.warnings.append(
                 f"the spectra are of {len(total)} steps: lengthen time.duration to have any use of them"
             )
-        frequency, contact = amplitudes(total, step)
         record.headline["resolution"] = (1 / (len(total) * step), "Hz")
-        axle = {}
-        if history.axle_force is not None:
-            _, amplitude = amplitudes(history.axle_force[start:], step)
-            centre, level = third_octaves(history.axle_force[start:], step)
-            axle = {"axle_force": amplitude, "centre": centre, "level": level}
-            _largest(record, frequency, amplitude)
-        wheel = {
-            name: amplitudes(values[start:].reshape(len(total), -1), step)[1]
-            for name, values in history.wheel.items()
-        }
         if start:
             record.headline["left out as run-in"] = (start * step, "s")
+        limit = self._limit(record, step)
+        frequency, contact = amplitudes(total, step)
+        below = frequency <= limit.frequency
+        centre, contact_level = third_octaves(total, step, limit.frequency)
+        axle = {}
+        if history.axle_force is not None:
+            force = history.axle_force[start:]
+            amplitude = amplitudes(force, step)[1][below]
+            axle = {
+                "axle_force": amplitude,
+                "level": third_octaves(force, step, limit.frequency)[1],
+            }
+            _largest(record, frequency[below], amplitude)
+        if self.accuracy is not None:
+            bars = self.accuracy.product
+            axle["level_error"] = bars.levels("axle_force", centre)
+            axle["contact_level_error"] = bars.levels("contact_force", centre)
+        wheel = {
+            name: amplitudes(values[start:].reshape(len(total), -1), step)[1][below]
+            for name, values in history.wheel.items()
+        }
         return Spectra(
-            frequency=frequency, contact_force=contact, left_out=start * step, wheel=wheel, **axle
+            frequency=frequency[below],
+            contact_force=contact[below],
+            left_out=start * step,
+            limit=limit,
+            wheel=wheel,
+            centre=centre,
+            contact_level=contact_level,
+            **axle,
         )
+
+    def _limit(self, record: Record, step: float) -> Limit:
+        """Where the model ends, told with what sets it."""
+        found = all_limits(self.setup.product, self.rotating.product, step)
+        limit = lowest(found)
+        record.headline["an answer up to"] = (limit.frequency, "Hz")
+        record.headline["which is"] = (limit.cause, "-")
+        others = ", ".join(
+            f"{other.cause} would allow {other.frequency:.4g} Hz"
+            for other in found
+            if other != limit
+        )
+        observe.say(f"  spectra end at {limit.frequency:.4g} Hz, {limit.cause}; {others}")
+        return limit
 
     def _after_run_in(self, record: Record, time: np.ndarray) -> int:
         """First step with the whole patch beyond the run-in.
@@ -89,18 +137,13 @@ class SpectraStage(Computed[Spectra]):
         0, and a warning, when that takes half the run or more: what is left would resolve too little.
         """
         setup, road = self.setup.product, self.job.scene.road
-        speed = setup.rolled.speed
-        if speed == 0 or road.kind == "flat":
-            return 0
-        x0, x1, _, _ = setup.patch.extent
-        run_in = (road.run_in + x1 - x0) / speed
-        start = int(np.searchsorted(time, run_in))
-        if start < len(time) // 2:
+        start, needed = first_step(setup, road, time), run_in(setup, road)
+        if start or not needed:
             return start
         record.warnings.append(
-            f"the spectra hold the run-in: with the patch it takes {run_in:.3g} s of the run's "
+            f"the spectra hold the run-in: with the patch it takes {needed:.3g} s of the run's "
             f"{time[-1]:.3g} s, and half or more cannot be left out; take time.duration above "
-            f"{2 * run_in:.2g} s, or a shorter road.run_in"
+            f"{2 * needed:.2g} s, or a shorter road.run_in"
         )
         return 0
 
@@ -112,17 +155,21 @@ class SpectraStage(Computed[Spectra]):
         for name, values in product.wheel.items():
             put(file, name, values, corner.UNITS[name])
         file.attrs["left_out"] = product.left_out
+        file.attrs["limit"] = product.limit.frequency
+        file.attrs["limit_cause"] = product.limit.cause
 
     def read(self, file) -> Spectra:
         """The same."""
         kept = {name: file[stored][:] for name, (stored, _) in _UNITS.items() if stored in file}
+        limit = Limit(float(file.attrs["limit"]), str(file.attrs["limit_cause"]))
         wheel = {name: file[name][:] for name in corner.UNITS if name in file}
-        return Spectra(left_out=float(file.attrs["left_out"]), wheel=wheel, **kept)
+        left_out = float(file.attrs["left_out"])
+        return Spectra(left_out=left_out, limit=limit, wheel=wheel, **kept)
 
 
 def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
-    """The largest line of the vertical axle force below 1 kHz, away from the mean."""
-    band = np.flatnonzero((np.arange(len(frequency)) > 2) & (frequency < 1000))
+    """The largest line of the vertical axle force, away from the mean."""
+    band = np.arange(min(3, len(frequency)), len(frequency))
     if len(band):
         peak = band[np.abs(axle[band, 2]).argmax()]
         record.headline["largest vertical axle force"] = (float(np.abs(axle[peak, 2])), "N")

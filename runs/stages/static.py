@@ -96,20 +96,23 @@ class StaticStage(Computed[StaticState]):
         try:
             _press(loader, wanted)
         except ConvergenceError as error:
-            self._keep_last(static_state(equilibrium, loader.lowest()))
+            kept = self._keep_last(loader)
             cause = with_cause(error, loader, rolling, lambda other: _press(other, wanted))
-            last = self.job.path("static_last")
-            raise ConvergenceError(f"{cause} The last state that converged is in {last}.") from None
+            raise ConvergenceError(f"{cause}{kept}") from None
         record.cost |= equilibrium.cost
         record.cost["other"] = time.perf_counter() - began - sum(equilibrium.cost.values())
         return static_state(equilibrium, loader.touch), loader
 
-    def _keep_last(self, state: StaticState) -> None:
-        """Write the last state that converged. Collective."""
+    def _keep_last(self, loader: Loader) -> str:
+        """Write the last state that converged, if any did; a sentence that says where. Collective."""
+        if not self.job.comm.allreduce(float(np.abs(loader.body.u.x.array).sum())):
+            return ""
         job, last = self.job, self.job.path("static_last")
+        state = static_state(loader.equilibrium, loader.lowest())
         job.write(
             last, job.provenance("static", "unfinished"), lambda file: self.write(file, state)
         )
+        return f" The last state that converged is in {last}."
 
     def _warn_at_rest(self, record: Record) -> None:
         if self.job.speed and not self.job.scene.static.steady_rolling:
@@ -161,12 +164,11 @@ def _estimate(record: Record, state: StaticState, loader: Loader) -> None:
     if isinstance(found, str):
         observe.say(f"  error of the load not estimated: {found}")
         return
-    load = state.load
     record.indicators["estimated error of the load"] = (100 * found.relative, "%")
     observe.say(
-        f"  estimated error of the load at this deflection: {100 * found.relative:.2g} %, from "
-        f"{found.load:.6g} N on elements of twice the size ({found.unknowns} unknowns) against "
-        f"{load:.6g} N"
+        f"  estimated error of the load at this height of the road: {100 * found.relative:.2g} % (ever "
+        f"smaller elements: {found.load:.5g} N); of the footprint's elements {100 * found.footprint:.2g} %, of "
+        f"the rest {100 * found.bulk:.2g} %; {found.unknowns} unknowns with finer elements there"
     )
     if found.relative > COARSE:
         record.warnings.append(

@@ -8,6 +8,7 @@ from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.thinned import thinned
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.tread_surface import TreadSurface
@@ -59,13 +60,31 @@ def test_weights_hold_the_nodes_and_low_polynomials(tread) -> None:
 def test_points_lie_where_they_were_asked(tread) -> None:
     _, surface, patch = patches(tread, 3e-3, 0.004)
     assert np.allclose(patch.points[:, :2] / 0.004, np.round(patch.points[:, :2] / 0.004))
-    assert np.allclose(patch.weights @ surface._positions[patch.index], patch.points, atol=1e-10)
+    read = patch.weights @ surface._positions[patch.index]
+    assert np.allclose(read[:, :2], patch.points[:, :2], atol=1e-10)
+    assert np.allclose(
+        read[:, 2], patch.points[:, 2], atol=0.004**2 / 12 / 0.05
+    )  # the cell is curved
     assert np.array_equal(patch.edge, patch.gap > 3e-3)
     assert 0 < np.count_nonzero(patch.edge) < len(patch.edge)
     assert not patch.edge[patch.gap < 1e-3].any()
     # Every grid point within reach is there: neighbours in x of inner points are 4 mm away.
     found, _, _ = surface.locate(np.array([0.5]), np.array([0.0]))
     assert not surface.locate(np.array([0.5]), np.array([0.0]))[2][0]
+
+
+def test_a_force_is_spread_over_the_cell_of_its_point(tread) -> None:
+    """As the mean of the shape functions at many places of the cell."""
+    _, surface, patch = patches(tread, 3e-3, 0.006)
+    t = 0.006 * ((np.arange(24) + 0.5) / 24 - 0.5)
+    for k in np.flatnonzero(patch.gap < 1e-3)[::7]:
+        x, y = (a.ravel() + b for a, b in zip(np.meshgrid(t, t), patch.points[k], strict=False))
+        ring, arc, found = surface.locate(x, y)
+        assert found.all()
+        mean = np.asarray(surface.weights(ring, arc).mean(axis=0)).ravel()
+        assert patch.weights[k].toarray().ravel() == pytest.approx(
+            mean[patch.index], abs=0.06
+        )  # where elements meet
 
 
 @pytest.mark.parametrize("pitch", [0.004, 0.002])
@@ -115,6 +134,18 @@ def test_nodes_and_points_exchange_the_same_work(tread) -> None:
     assert tire.force.sum() == pytest.approx(force.sum())
     assert tire.force @ tire.predict() == pytest.approx(force @ on.predict())
     assert np.allclose(on.same_step @ force, patch.weights @ (1e-5 * tire.force))
+
+
+def test_every_other_point_is_a_grid_of_twice_the_pitch(tread) -> None:
+    _, _, fine = patches(tread, 3e-3, 0.004)
+    coarse, (_, _, wanted) = thinned(fine), patches(tread, 3e-3, 0.008)
+    i, j = np.divmod(coarse.places.place, coarse.places.shape[1])
+    places = np.stack([i, j], axis=1) * coarse.places.spacing
+    assert np.ptp(coarse.points[:, :2] - places, axis=0) == pytest.approx(0.0, abs=1e-9)
+    assert coarse.line.tolist() == j.tolist()
+    assert coarse.area == pytest.approx(6.4e-5)
+    near, other = coarse.points[~coarse.edge], wanted.points[~wanted.edge]
+    assert near[np.lexsort(near.T)] == pytest.approx(other[np.lexsort(other.T)], abs=1e-9)
 
 
 def test_a_grid_needs_a_tread_and_a_sane_pitch(tread) -> None:

@@ -87,7 +87,7 @@ def test_corner_free_wheel_and_the_fixed_axle_as_its_limit(run):
         assert file["body/height"].attrs["unit"] == "m"
 
     short = ("--until", "contact")
-    limit = ("axle.stiffness=[0,0,1e17,0,0,0]", "axle.wheel_mass=1e5", "axle.body_mass=")
+    limit = ("axle.stiffness=[0,0,1e15,0,0,0]", "axle.body_mass=")
     stiff, again, _ = run(SCENE + CAR, *(f"--set={one}" for one in limit), *short)
     assert again["modes"]["status"] == "reused"
     fixed, _, _ = run(SCENE, *short)

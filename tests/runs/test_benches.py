@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from tireroad.runs.bench import headline, pareto, scaling, skipping
+from tireroad.runs.bench import convergence, error_bars, headline, pareto, scaling, skipping
 from tireroad.runs.bench.floors import exponent
 from tireroad.runs.bench.rough_road import Mesh
 from tireroad.runs.measure import tabulate
@@ -53,7 +53,9 @@ def check_page(tables: list[Table], images: int) -> str:
 def test_pareto_names_its_front(tmp_path, monkeypatch) -> None:
     for name, value in (("STEPS", (2e-4, 4e-4)), ("DURATION", 0.04), ("FINEST", 1e-4)):
         monkeypatch.setattr(pareto, name, value)
-    first, meshes, every = pareto.tables(tmp_path, (TINY, Mesh(12, 5, 0.5)), (8, 16), 24, (4e-4,))
+    first, meshes, every = pareto.tables(
+        tmp_path, (TINY, Mesh(12, 5, 0.5)), (8, 16), 24, (4e-4,), Mesh(12, 4, 0.5)
+    )
     names = [name for name, _ in first.columns]
     cost, error = names.index("run time per simulated second"), names.index("larger error")
     best = [row for row in first.rows if row[0]]
@@ -162,3 +164,26 @@ def test_figures_as_they_are_read(value, text) -> None:
 
 def test_a_table_without_a_picture() -> None:
     assert drawn(Table("t", [("n", "-")], [[1]])) is None
+
+
+def test_convergence_tells_what_each_change_costs(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(convergence, "DURATION", 0.03)
+    finest = {"segments": 12, "arc": 6, "order": 2, "footprint": 0.5}
+    base = {"modes": 24, "residual": "static", "pitch": 0.01, "step": 2e-4}
+    coarser = {"modes": ({"modes": 12},), "step": ({"step": 4e-4},)}
+    found = convergence.table(tmp_path, "rough", finest, base, coarser)
+    assert [row[:3] for row in found.rows[:2]] == [
+        ["modes", "modes 12", "contact"],
+        ["modes", "modes 12", "axle"],
+    ]
+    assert all(row[3] > 0 for row in found.rows)
+
+
+def test_error_bars_are_compared_with_a_finer_run(tmp_path) -> None:
+    coarse = {"segments": 16, "arc": 8, "order": 2, "modes": 16, "pitch": 0.01, "step": 4e-4}
+    fine = coarse | {"modes": 24, "step": 2e-4}
+    cases = [("soft", "texture", 40.0)]
+    shares, every = error_bars.tables(tmp_path, cases, coarse, fine, 0.05)
+    assert {row[0] for row in shares.rows} >= {"mean", "deviation", "all"}
+    assert all(row[3] >= 0 and row[4] >= 0 for row in every.rows)
+    check_page([shares, every], 0)

@@ -168,6 +168,12 @@ duration = 0.03
     assert stages["contact"]["indicators"]["worst complementarity residual"]["value"] < 1e-9
     load = dataset(folder, "contact.h5", "total_force")[:, 2]
     assert load.max() > 1.1 * 400.0
+    with h5py.File(folder / "spectra.h5") as file:
+        assert file["frequency"][:].max() <= file.attrs["limit"] < 0.5 / 1e-4
+        assert "passing frequency" in file.attrs["limit_cause"]
+    told = stages["spectra"]["headline"]
+    assert told["an answer up to"]["value"] < 0.5 * stages["modes"]["headline"]["highest"]["value"]
+    assert "spectra end at" in (folder / "log.txt").read_text()
     page = (folder / "report.html").read_text()
     assert "belgian_block.crg" in page
 

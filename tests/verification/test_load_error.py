@@ -1,9 +1,14 @@
-"""The estimated error of the load against that to a much finer mesh."""
+"""The estimated error of the load against a sequence that converges.
+
+Soft torus, 0.2 MPa, road at z = -0.3184244 m, 4 mm above first touch: 30 x 14 elements of order 3, those at the
+footprint cut in two once and twice, carry 531.50, 532.26, 532.59 N, so 532.8 N (0.1 %) in the limit.
+"""
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
+from tireroad.fem.sections.split import split_ring
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_error import load_error
 from tireroad.fem.static.loading import Loader
@@ -14,59 +19,60 @@ from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.tire.wall import Region
 
 RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
+HEIGHT, CONVERGED = -0.3184244, 532.8  # m, N
 
 
-def pressed(segments, arc, rolling=AT_REST, comm=MPI.COMM_SELF, order=2, regions=()) -> Loader:
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, 1, order, footprint_size=0.25)
+def ring(segments, arc, order=2):
+    return Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, 1, order, footprint_size=0.25)
+
+
+def pressed(section, rolling=AT_REST, comm=MPI.COMM_SELF, regions=(), height=HEIGHT) -> Loader:
     loader = Loader(Equilibrium(Body(comm, section, RUBBER, regions), rolling), lambda _: None)
     loader.inflate(2e5)
-    loader.deflect(0.004)
+    loader.deflect(height - loader.touch)
     return loader
 
 
-@pytest.fixture(scope="module")
-def exact():
-    """A loader of 32,000 unknowns."""
-    return pressed(24, 12, order=3)
-
-
-@pytest.mark.parametrize(("segments", "arc"), [(16, 8), (20, 8)])
-def test_the_estimate_is_of_the_size_of_the_error(exact, segments, arc):
-    """Not from 24 x 8 on: there the error changes its sign as nodes reach the road, -1 % at 24 x 10."""
-    loader = pressed(segments, arc)
-    true = abs(loader.load() / exact.load() - 1)
-    assert 0.7 * true < load_error(loader, AT_REST).relative < 4 * true
-
-
-def test_a_fine_mesh_has_a_small_estimate_for_little(exact):
-    found = load_error(exact, AT_REST)
-    assert found.relative < 0.005
-    assert found.unknowns < 0.27 * 3 * exact.body.lattice.size
+@pytest.mark.parametrize(("segments", "arc", "order"), [(16, 8, 2), (24, 10, 2), (16, 6, 3)])
+def test_the_estimate_lies_between_half_and_twice_the_error(segments, arc, order):
+    loader = pressed(ring(segments, arc, order))
+    true = abs(loader.load() / CONVERGED - 1)
+    assert 0.5 * true < load_error(loader, AT_REST).relative < 2 * true
 
 
 def test_the_tire_is_left_as_it_was_and_the_companion_rolls_too():
+    """A companion that takes over the state ends where one that was loaded from the beginning does."""
     rolling = Rolling(60.0, 500.0)
-    loader = pressed(20, 8, rolling)
+    soft = compound("neo-hookean", 1200.0, youngs_modulus=5e6, poisson_ratio=0.45)
+    thin = [Region(soft, tuple(np.radians([105.0, 120.0])))]
+    loader = pressed(ring(12, 6), rolling, regions=thin)
     before = loader.body.u.x.array.copy()
     found = load_error(loader, rolling)
     assert np.array_equal(loader.body.u.x.array, before)
-    assert found.load == pytest.approx(pressed(10, 4, rolling).load(), rel=1e-8)
+    finer = loader.body.ring.section
+    force = loader.body.surface(loader.equilibrium.contact_force()).reshape(24, -1)
+    around = [force[(2 * i + np.arange(-2, 5)) % 24].any() for i in range(12)]
+    wide = np.pad(force, ((0, 0), (2, 2))).any(axis=0)
+    along = [wide[2 * j : 2 * j + 7].any() for j in range(len(finer.outer))]
+    halved = split_ring(loader.body.ring, np.array(around), np.array(along))
+    other = Loader(
+        Equilibrium(Body(MPI.COMM_SELF, halved, loader.body.materials), rolling), lambda _: None
+    )
+    other.inflate(2e5)
+    other.deflect(HEIGHT - other.touch)
+    assert found.footprint == pytest.approx(1 - other.load() / loader.load(), abs=1e-8)
 
 
 def test_it_says_why_there_is_none():
-    assert "too coarse" in load_error(pressed(8, 4), AT_REST)
-
-
-def test_a_thin_region_is_in_the_companion_too():
-    soft = compound("neo-hookean", 1200.0, youngs_modulus=5e6, poisson_ratio=0.45)
-    thin = [Region(soft, tuple(np.radians([105.0, 120.0])))]
-    found = load_error(pressed(16, 8, regions=thin), AT_REST)
-    assert found.load == pytest.approx(pressed(8, 4, regions=thin).load(), rel=1e-8)
+    loader = pressed(ring(8, 4), height=-0.3)
+    loader.body.u.x.array[:] = 0.0
+    loader.equilibrium.solve()
+    assert "nothing touches" in load_error(loader, AT_REST)
 
 
 @pytest.mark.mpi
 def test_the_same_estimate_on_any_number_of_processes():
     alone, shared = (
-        load_error(pressed(16, 8, comm=c), AT_REST) for c in (MPI.COMM_SELF, MPI.COMM_WORLD)
+        load_error(pressed(ring(12, 6), comm=c), AT_REST) for c in (MPI.COMM_SELF, MPI.COMM_WORLD)
     )
     assert shared.relative == pytest.approx(alone.relative, rel=1e-6)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Where = Callable[[tuple[str, ...], str], InputError]
 Springs = tuple[float, ...] | tuple[tuple[float, ...], ...]
-_SPRINGS = Limits(least=-1e12, most=1e12)  # N/m, N m/rad and per unit of velocity
+_SPRINGS = Limits(least=-1e15, most=1e15)  # N/m, N m/rad and per unit of velocity
 _HELD = tuple(name for name in DIRECTIONS if name != "z")
 _MOVING: OnlyFor = ("kind", ("corner", "free"))
 _SPRUNG: OnlyFor = ("kind", ("corner",))
@@ -45,7 +45,7 @@ def _springs(default: Springs, doc: str) -> Any:
             raise ValueError("must be 6 numbers, or 6 rows of 6")
         return tuple(tuple(_entry(part) for part in row) for row in rows)
 
-    values = "6 numbers ≥ 0, or a symmetric matrix of 6 rows, each ≤ 1e+12"
+    values = "6 numbers ≥ 0, or a symmetric matrix of 6 rows, each ≤ 1e+15"
     key = Key(read=read, unit="N, m, s, rad", doc=doc, values=values, only_for=_SPRUNG)
     return parameter(key, default)
 

@@ -13,7 +13,7 @@ from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.convolution import Convolution
 from tireroad.greens.recursion import Recursion
-from tireroad.runs.bench.contact_points import median
+from tireroad.runs.bench.parts.contact_points import median
 from tireroad.runs.measure.synthetic import Strip, oval_patch
 from tireroad.runs.measure.tabulate import Table
 

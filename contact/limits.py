@@ -1,0 +1,54 @@
+"""Up to which frequency a run in time is an answer, and what sets that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tireroad.contact.patch import Patch
+
+# Of the highest mode: beyond it what the modes left out answer dynamically, not by their static residual alone.
+USABLE = 0.5
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A `frequency` in Hz, and what `cause`s it, in words."""
+
+    frequency: float
+    cause: str
+
+
+def limits(*, step: float, highest: float, pitch: float, speed: float) -> tuple[Limit, ...]:
+    """All there are: of the `step` (s), of the `highest` mode (Hz), of points `pitch` (m) apart at `speed` (m/s).
+
+    A road's wave is met by two points at least, so half the frequency at which points pass, speed /
+    pitch: what is shorter folds back, and at the passing frequency the force of any road has a false
+    peak, since points come into contact one by one.
+    """
+    found = [
+        Limit(0.5 / step, f"half the sampling rate of the time step of {step:.4g} s"),
+        Limit(USABLE * highest, f"half the highest mode kept, {highest:.5g} Hz"),
+    ]
+    if speed > 0 and np.isfinite(pitch):
+        passing = speed / pitch
+        found.append(
+            Limit(
+                0.5 * passing, f"half the passing frequency of the contact points, {passing:.5g} Hz"
+            )
+        )
+    return tuple(found)
+
+
+def lowest(found: Iterable[Limit]) -> Limit:
+    """The one that counts."""
+    return min(found, key=lambda limit: limit.frequency)
+
+
+def pitch(patch: Patch) -> float:
+    """Largest distance (m) along x between the neighbouring points that touch at rest; of all without any."""
+    some = patch.force > 0
+    sizes = patch.half_sizes[some if some.any() else slice(None), 0]
+    return float(2 * sizes.max())

@@ -1,0 +1,131 @@
+"""Finer where it matters: strips of a section's cells, and segments of a ring, cut in two."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from tireroad.fem.sections import reference
+from tireroad.fem.sections.mesh2d import SectionMesh
+from tireroad.fem.sections.ring import Ring
+
+_SAME = 1e-7  # of the section's size: nodes of two cells that are one
+
+
+def split_ring(ring: Ring, around: np.ndarray, along: np.ndarray) -> Ring:
+    """The ring with the segments `around` (segments,) bool cut in two, and so the strips of cells under
+    the outer edges `along` (k,) bool. All nodes of the ring stay where they are, its shape too.
+    """
+    return replace(
+        ring,
+        section=split_section(ring.section, along),
+        ring_corners=_cut(ring.ring_corners, around),
+        arc_corners=_cut(ring.arc_corners, along),
+        coarser=lambda: None,
+    )
+
+
+def _cut(corners: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Ascending corners with one more in the middle of each wanted interval."""
+    return np.sort(np.append(corners, ((corners[1:] + corners[:-1]) / 2)[wanted]))
+
+
+def split_section(section: SectionMesh, along: np.ndarray) -> SectionMesh:
+    """The section with strips of cells cut in two, from outer edges `along` (k,) bool to the other side.
+
+    A strip goes from an edge to the opposite one of the same cell, and on through the next; so cells
+    go on sharing whole edges. The shape is that of the section's own cells.
+    """
+    children = _Children(_strips(section, section.outer[along]))
+    order = section.order
+    xi, eta = reference.grid_points(reference.equispaced(order))
+
+    def position(cells: np.ndarray, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
+        return section.at(*children.in_parent(cells, xi, eta))
+
+    count = len(children.owner)
+    every = np.repeat(np.arange(count), len(xi))
+    nodes, number = _merged(position(every, np.tile(xi, count), np.tile(eta, count)))
+    return replace(
+        section,
+        nodes=nodes,
+        cells=number.reshape(count, -1),
+        region=section.region[children.owner],
+        outer=children.chain(section, section.outer),
+        tread=children.edges(section.tread),
+        inner=children.edges(section.inner),
+        rim=children.edges(section.rim),
+        plies={name: children.chain(section, edges) for name, edges in section.plies.items()},
+        position=position,
+    )
+
+
+def _strips(section: SectionMesh, starts: np.ndarray) -> np.ndarray:
+    """Along which reference coordinates each cell is cut, (cells, 2) bool."""
+    sides = section.cells[:, reference.side_nodes(section.order)][..., [0, -1]]
+    across: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for cell, side in np.ndindex(sides.shape[:2]):
+        across.setdefault(tuple(sorted(sides[cell, side])), []).append((cell, side))
+    cut = np.zeros((len(section.cells), 2), bool)
+    for cell, side in starts:
+        while not cut[cell, _along(side)]:
+            cut[cell, _along(side)] = True
+            opposite = cell, side ^ 1
+            both = across[tuple(sorted(sides[opposite]))]
+            cell, side = next((found for found in both if found != opposite), opposite)
+    return cut
+
+
+def _along(side: int) -> int:
+    """The reference coordinate that runs along a side."""
+    return 1 - side // 2
+
+
+class _Children:
+    """The cells that `cut` (cells, 2) bool makes of each cell, its own ones following each other."""
+
+    def __init__(self, cut: np.ndarray) -> None:
+        self.parts = 1 + cut
+        self.first = np.concatenate([[0], np.cumsum(self.parts.prod(axis=1))])
+        self.owner = np.repeat(np.arange(len(cut)), self.parts.prod(axis=1))
+        local = np.arange(len(self.owner)) - self.first[self.owner]
+        self.size = 1 / self.parts[self.owner]
+        self.start = np.stack(np.divmod(local, self.parts[self.owner, 1]), axis=-1) * self.size
+
+    def in_parent(self, cells: np.ndarray, xi: np.ndarray, eta: np.ndarray):
+        """Cell and reference coordinates in the parent's section."""
+        place = self.start[cells] + self.size[cells] * np.stack([xi, eta], axis=-1)
+        return self.owner[cells], place[:, 0], place[:, 1]
+
+    def edges(self, edges: np.ndarray, turned: np.ndarray | None = None) -> np.ndarray:
+        """The children's edges (k', 2) of edges (k, 2), along the side or, where `turned`, against it."""
+        found = []
+        for number, (cell, side) in enumerate(edges):
+            across, step = self.parts[cell], _along(side)
+            place = np.zeros((across[step], 2), int)
+            place[:, step] = np.arange(across[step])
+            place[:, 1 - step] = (across[1 - step] - 1) * (side % 2)
+            if turned is not None and turned[number]:
+                place = place[::-1]
+            child = self.first[cell] + place[:, 0] * across[1] + place[:, 1]
+            found.append(np.stack([child, np.full(len(child), side)], axis=1))
+        return np.concatenate(found) if found else edges
+
+    def chain(self, section: SectionMesh, edges: np.ndarray) -> np.ndarray:
+        """The same of an ordered chain of edges, in its order."""
+        start = section.chain(edges)[:: section.order][:-1]
+        return self.edges(edges, section.side(edges)[:, 0] != start)
+
+
+def _merged(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (n, 2) without repetition, and the number of each point (k,) among them."""
+    size = np.ptp(points, axis=0).max()
+    a, b = cKDTree(points).query_pairs(_SAME * size, output_type="ndarray").T
+    same = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(points),) * 2)
+    _, number = connected_components(same, directed=False)
+    _, first = np.unique(number, return_index=True)
+    return points[first], number

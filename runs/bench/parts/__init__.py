@@ -1,0 +1,1 @@
+"""What benchmarks are made of that are too long for one module."""

@@ -1,0 +1,202 @@
+"""accuracy: how far the forces of a run may be off, by cheap companions of known order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from tireroad.contact.error_bars import SHARES, Bars, bars, told, total
+from tireroad.contact.setup import ContactSetup
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.static.state import StaticState
+from tireroad.modal.rolling import RollingModes
+from tireroad.runs.files.store import put
+from tireroad.runs.process import observe
+from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.stages.build.model_limit import model_limit
+from tireroad.runs.stages.build.run_in import first_step
+from tireroad.runs.stages.companions import Given, companion
+from tireroad.runs.stages.greens import Responses
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.stored.contact_file import ContactHistory
+
+SHARE = 0.33  # of the run's own cost, that all companions together take
+_FEWEST = 64  # steps that a companion repeats at the least
+_LOOPS = 2.2  # time loops that four companions take for each step they repeat
+_COARSE = 0.15  # of the cost before the loop, on elements of twice the size
+FORCES = ("contact_force", "axle_force")
+_UNITS = {"mean": "N", "deviation": "N", "level": "dB"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Accuracy:
+    """Estimated errors of each force by cause (`by_cause[force][cause]`) at the bands `centre` (b,) Hz, found on
+    the first `window` s of the run; why a cause is `absent`."""
+
+    centre: np.ndarray
+    window: float
+    by_cause: Mapping[str, Mapping[str, Bars]]
+    absent: Mapping[str, str] = field(default_factory=dict)
+
+    def total(self, force: str) -> Bars | None:
+        """Of all causes that are known; None where none is."""
+        found = self.by_cause.get(force, {})
+        return total(found) if found else None
+
+    def levels(self, force: str, centre: np.ndarray) -> np.ndarray | None:
+        """Errors (b, 3) dB at other bands; NaN where they are unknown."""
+        found = self.total(force)
+        if found is None:
+            return None
+        level = np.full((len(centre), 3), np.nan)
+        for k, band in enumerate(centre):
+            same = np.flatnonzero(np.isclose(self.centre, band))
+            level[k] = found.level[same[0]] if len(same) else np.nan
+        return level
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccuracyStage(Computed[Accuracy]):
+    """Error bars of mean, deviation and third octaves of the contact force and the axle force."""
+
+    name: ClassVar[str] = "accuracy"
+    static: Done[StaticState]
+    rotating: Done[RollingModes]
+    greens: Done[Responses]
+    setup: Done[ContactSetup]
+    contact: Done[ContactHistory]
+
+    def inputs(self) -> dict:
+        """The contact forces, and all they came from."""
+        return {"contact": self.contact.key}
+
+    def compute(self, record: Record) -> Accuracy:
+        """Companions one by one; a cause whose companion fails is told, and the run goes on. Collective."""
+        history, setup = self.contact.product, self.setup.product
+        if self._at_rest:
+            return self._none("nothing drives the tire: what varies is rounding")
+        start = first_step(setup, self.job.scene.road, history.time)
+        steps = self._window(start, len(history.time))
+        limit = model_limit(setup, self.rotating.product, history.step)
+        given = self._given(steps)
+        runs = {"contact_force": history.total_force, "axle_force": history.axle_force}
+        runs = {name: values[start:steps] for name, values in runs.items() if values is not None}
+        exact = {name: told(values, history.step, limit.frequency) for name, values in runs.items()}
+        found: dict[str, dict[str, Bars]] = {name: {} for name in exact}
+        absent: dict[str, str] = {}
+        for cause, share in SHARES.items():
+            try:
+                with record.timing(cause):
+                    forces = companion(cause, given)
+            except (ConvergenceError, InputError) as error:
+                absent[cause] = str(error)
+                continue
+            first = round(start * history.step / forces.step)
+            for name, other in (("contact_force", forces.contact), ("axle_force", forces.axle)):
+                if name in exact:
+                    off = told(other[first:], forces.step, limit.frequency)
+                    found[name][cause] = bars(exact[name], off, share)
+        product = Accuracy(
+            centre=exact["contact_force"].centre,
+            window=steps * history.step,
+            by_cause=found,
+            absent=absent,
+        )
+        _describe(record, product, runs)
+        return product
+
+    @property
+    def _at_rest(self) -> bool:
+        scene = self.job.scene
+        still = scene.road.kind == "flat" and scene.road.motion.kind == "none"
+        return still and not scene.force
+
+    def _none(self, reason: str) -> Accuracy:
+        observe.say(f"  no error bars: {reason}")
+        absent = dict.fromkeys(SHARES, reason)
+        return Accuracy(centre=np.zeros(0), window=0.0, by_cause={}, absent=absent)
+
+    def _window(self, start: int, steps: int) -> int:
+        """Up to which step companions go on, for `SHARE` of the run's estimated cost."""
+        seconds = estimate(self.job.scene).seconds
+        loop = seconds["contact loop"]
+        before = sum(seconds.values()) - loop
+        part = (SHARE * (before + loop) - _COARSE * before) / (_LOOPS * loop)
+        return int(np.clip(round(part * steps), min(start + _FEWEST, steps), steps))
+
+    def _given(self, steps: int) -> Given:
+        return Given(
+            job=self.job,
+            nodal_force=self.static.product.force,
+            setup=self.setup.product,
+            response=self.greens.product.contact,
+            rolling=self.rotating.product,
+            step=self.contact.product.step,
+            steps=steps,
+            scheme="constant" if self.contact.product.scheme == "constant" else "linear",
+        )
+
+    def write(self, file, product: Accuracy) -> None:
+        """By force and cause, and the total."""
+        put(file, "centre", product.centre, "Hz")
+        file.attrs["window"] = product.window
+        for cause, reason in product.absent.items():
+            file.attrs[f"absent_{cause}"] = reason
+        for force, causes in product.by_cause.items():
+            for cause, bar in causes.items():
+                for name, unit in _UNITS.items():
+                    put(file, f"{force}/{cause}/{name}", getattr(bar, name), unit)
+
+    def read(self, file) -> Accuracy:
+        """The same."""
+        by_cause = {
+            force: {
+                cause: Bars(*(held[name][:] for name in _UNITS))
+                for cause, held in file[force].items()
+            }
+            for force in FORCES
+            if force in file
+        }
+        absent = {
+            key.removeprefix("absent_"): str(reason)
+            for key, reason in file.attrs.items()
+            if key.startswith("absent_")
+        }
+        return Accuracy(
+            centre=file["centre"][:],
+            window=float(file.attrs["window"]),
+            by_cause=by_cause,
+            absent=absent,
+        )
+
+
+def _describe(record: Record, product: Accuracy, runs: Mapping[str, np.ndarray]) -> None:
+    """Of the vertical force: the error of mean and deviation, the largest and the middle one of the bands."""
+    for name, values in runs.items():
+        bar, what = product.total(name), name.replace("_", " ")
+        if bar is None:
+            continue
+        record.headline |= {
+            f"error of the mean {what}": (float(bar.mean[2]), "N"),
+            f"error of the deviation of the {what}": (float(bar.deviation[2]), "N"),
+            f"deviation of the {what}": (float(values[:, 2].std()), "N"),
+        }
+        known = bar.level[np.isfinite(bar.level[:, 2]), 2]
+        if len(known):
+            record.headline[f"largest error of a third octave of the {what}"] = (
+                float(known.max()),
+                "dB",
+            )
+        for cause, part in product.by_cause[name].items():
+            record.indicators[f"error of the deviation of the {what} by the {cause}"] = (
+                float(part.deviation[2]),
+                "N",
+            )
+    for cause, reason in product.absent.items():
+        observe.say(f"  error by the {cause} not estimated: {reason}")
+        record.headline[f"error by the {cause}"] = (f"not estimated: {reason}", "-")
+    observe.say(f"  error bars from the first {product.window:.4g} s of the run")

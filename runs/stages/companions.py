@@ -1,0 +1,162 @@
+"""Cheap companions of a run: what its time step, points, modes and mesh are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from tireroad.contact.setup import ContactSetup
+from tireroad.contact.thinned import thinned
+from tireroad.fem.errors import InputError
+from tireroad.greens.response import Response
+from tireroad.modal.rolling import RollingModes
+from tireroad.runs.process import observe
+from tireroad.runs.stages.build.cavity import AirColumn
+from tireroad.runs.stages.build.loop import Forces, forces
+from tireroad.runs.stages.build.setup import Setup
+from tireroad.runs.stages.greens import GreensStage
+from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.modes import Fields, ModesStage, Motions
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
+from tireroad.runs.stages.stage import Computed, Done, Part
+from tireroad.runs.stages.static import StaticStage
+
+UP_TO_GREENS: tuple[type[Part], ...] = (
+    StaticStage,
+    Motions,
+    Setup,
+    ModesStage,
+    AirColumn,
+    Fields,
+    FullMatrices,
+    RotatingStage,
+    GreensStage,
+)
+FEWER = 1 / np.sqrt(2)  # of the highest mode: up to where the companion keeps states
+LEAST = (8, 4)  # elements around and along that a companion has
+
+
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """A run: its `job`, the static forces of the outer face (s,) N, patch and road (not settled), response
+    and rolling modes, and the first `steps` of `step` s of its loop, by a `scheme`, that companions repeat."""
+
+    job: Job
+    nodal_force: np.ndarray
+    setup: ContactSetup
+    response: Response
+    rolling: RollingModes
+    step: float
+    steps: int
+    scheme: str = "linear"
+
+    @cached_property
+    def settled(self) -> ContactSetup:
+        """The patch in its static state."""
+        return settled(self.job, self.setup, self.response, self.nodal_force)
+
+    def repeated(self, setup: ContactSetup, response: Response, coarser: int = 1) -> Forces:
+        """The loop by another setup (settled), response or a step `coarser` times as long. Collective."""
+        steps = coarser * self.step, self.steps // coarser
+        return forces(self.job, setup, response, *steps, self.scheme)
+
+
+def settled(job: Job, setup: ContactSetup, response: Response, force: np.ndarray) -> ContactSetup:
+    """The patch in its static state under the nodal forces (s,) N."""
+    return setup.settled(response, force, job.scene.contact)[0]
+
+
+def longer_step(given: Given) -> Forces:
+    """Twice the time step. Collective."""
+    return given.repeated(given.settled, given.response, coarser=2)
+
+
+def fewer_points(given: Given) -> Forces:
+    """Every other point of the grid both ways. Collective."""
+    job, patch = given.job, given.setup.patch
+    if patch.places is None:
+        raise InputError(
+            "the points are nodes of the mesh: take a grid, contact.points = { dx, dy }"
+        )
+    brush = job.scene.contact.brush_stiffness
+    if brush is not None:  # of a point that stands for four
+        contact = replace(job.scene.contact, brush_stiffness=4 * brush)
+        job = replace(job, scene=replace(job.scene, contact=contact))
+    setup = replace(given.setup, patch=thinned(patch))
+    setup = settled(job, setup, given.response, given.nodal_force)
+    return replace(given, job=job).repeated(setup, given.response)
+
+
+def fewer_modes(given: Given) -> Forces:
+    """States up to `FEWER` of the highest mode, those above following statically. Collective."""
+    limit = FEWER * given.rolling.highest
+    kept = given.response.keeping_where(lambda s: np.abs(s) <= limit)
+    if len(kept.every) == len(given.response.every):
+        raise InputError("all states are slower than the highest mode by far: none can be left out")
+    return given.repeated(given.settled, kept)
+
+
+def coarser_mesh(given: Given) -> Forces:
+    """Elements of twice the size, from the static state on. Collective."""
+    job = coarser_job(given.job)
+    done: dict[str, Done] = {}
+    for kind in UP_TO_GREENS:
+        found = _made(job, kind, done)
+        if found is not None:
+            done[kind.name] = found
+    response, state = done["greens"].product.contact, done["static"].product
+    setup = settled(job, done["setup"].product, response, state.force)
+    return forces(job, setup, response, given.step, given.steps, given.scheme)
+
+
+def coarser_job(job: Job) -> Job:
+    """The same scene on half the elements around, and bead to bead where the scene says how many.
+
+    InputError where the mesh is too coarse to be halved.
+    """
+    tire, static = job.scene.tire, job.scene.static
+    around, along = tire.segments // 2, tire.elements_arc
+    if tire.section != "file":
+        along //= 2
+        if along < LEAST[1]:
+            raise InputError("the mesh is too coarse to be halved")
+    if around < LEAST[0]:
+        raise InputError("the mesh is too coarse to be halved")
+    scene = replace(
+        job.scene,
+        tire=replace(tire, segments=around, elements_arc=along),
+        static=replace(static, error_estimate=False),
+    )
+    return Job(scene, job.directory, job.comm)
+
+
+def _made(job: Job, kind: type[Part], done: dict[str, Done]) -> Done | None:
+    """A part of the chain in memory, no file read or written; None where it adds nothing. Collective."""
+    if kind is RotatingStage and not job.speed:
+        return RotatingStage.instead(job, done)
+    part = kind.taken(job, done)
+    if part is None:
+        return None
+    if isinstance(part, Computed):
+        product = part.compute(Record())
+        return Done("", lambda: product)
+    return Done("", part.make)
+
+
+COMPANIONS: dict[str, Callable[[Given], Forces]] = {
+    "step": longer_step,
+    "points": fewer_points,
+    "modes": fewer_modes,
+    "mesh": coarser_mesh,
+}
+"""By the cause of the error that each is for (contact.error_bars.SHARES)."""
+
+
+def companion(cause: str, given: Given) -> Forces:
+    """The forces of a companion, without a word. Collective; InputError or ConvergenceError where there is none."""
+    with observe.quiet():
+        return COMPANIONS[cause](given)
