@@ -107,13 +107,12 @@ def _over_cells(
     to 9.7 inside, on a wall of 48 MPa, 12 mm thick; over cells of 5 mm 9.7 and 9.0 to 9.2. `ring` and `arc` (rad) of the
     points stand in for places of a cell beyond the surface.
     """
-    total = None
+    parts = []
     for signs in product((-1, 1), repeat=2):
         x, y = (points + np.array(signs) * spacing / np.sqrt(12)).T
         around, along, found = surface.locate(x, y)
-        part = surface.weights(np.where(found, around, ring), np.where(found, along, arc))
-        total = part if total is None else total + part
-    return total / 4
+        parts.append(surface.weights(np.where(found, around, ring), np.where(found, along, arc)))
+    return sum(parts[1:], start=parts[0]) / 4
 
 
 def _check_count(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 
 REFERENCE = 1.0  # N, of the levels
@@ -40,9 +39,9 @@ def third_octaves(
     cumulative = np.concatenate([np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)]) * spacing
     edges = np.concatenate([[0.0], frequency + spacing / 2])
 
-    def up_to(limit: float) -> NDArray[np.intp]:
+    def below(limit: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(limit, edges, column) for column in cumulative.T], axis=-1)
 
-    square = up_to(high[use]) - up_to(low[use])
+    square = below(high[use]) - below(low[use])
     floor = np.finfo(float).tiny
     return centre[use], 10 * np.log10(np.maximum(square, floor) / REFERENCE**2)

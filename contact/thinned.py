@@ -15,7 +15,8 @@ def thinned(patch: Patch) -> Patch:
 
     For a patch on a grid (`places`), not settled either: `force` is zero, `gap` the surface's height.
     """
-    places = patch.places
+    places, weights = patch.places, patch.weights
+    assert places is not None and weights is not None  # of every grid
     number = np.rint(patch.points[:, :2] / places.spacing).astype(int)
     keep = (number % 2 == 0).all(axis=1)
     first = number[keep].min(axis=0)
@@ -30,6 +31,6 @@ def thinned(patch: Patch) -> Patch:
         gap=patch.gap[keep],
         edge=patch.edge[keep],
         line=column,
-        weights=patch.weights[keep],
+        weights=weights[keep],
         places=GridPlaces(shape, spacing, row * shape[1] + column),
     )

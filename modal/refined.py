@@ -62,7 +62,8 @@ def _better(
     drag: Array, stiffness: Array, s: complex, u: Array, w: Array
 ) -> tuple[complex, Array, Array] | None:
     """One state after a step, real if it was; None where it became another."""
-    s, u, w = (np.real(x) if np.imag(s) == 0 else x for x in (s, u, w))
+    if s.imag == 0:
+        s, u, w = s.real, u.real, w.real
     unit = np.eye(len(u))
     matrix = s * (s * unit + drag) + stiffness
     try:

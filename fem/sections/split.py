@@ -96,7 +96,9 @@ class _Children:
         self.size = 1 / self.parts[self.owner]
         self.start = np.stack(np.divmod(local, self.parts[self.owner, 1]), axis=-1) * self.size
 
-    def in_parent(self, cells: np.ndarray, xi: np.ndarray, eta: np.ndarray):
+    def in_parent(
+        self, cells: np.ndarray, xi: np.ndarray, eta: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Cell and reference coordinates in the parent's section."""
         place = self.start[cells] + self.size[cells] * np.stack([xi, eta], axis=-1)
         return self.owner[cells], place[:, 0], place[:, 1]

@@ -72,8 +72,8 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
 def at_finer_footprint(loader: Loader, rolling: Rolling) -> Loader:
     """The same tire on the same road, elements at the footprint cut in two. Collective."""
     lattice, force = loader.body.lattice, _force(loader)
-    around = _touched(force.any(axis=1), lattice.ring_corners, lattice, closed=True)
-    along = _touched(force.any(axis=0), lattice.arc_corners, lattice, closed=False)
+    around = _touched(np.asarray(force.any(axis=1)), lattice.ring_corners, lattice, closed=True)
+    along = _touched(np.asarray(force.any(axis=0)), lattice.arc_corners, lattice, closed=False)
     finer = _taken_over(loader, split_ring(loader.body.ring, around, along), rolling)
     step = finer.equilibrium.solve(loader.equilibrium.road_height)
     if not step.converged:
@@ -119,7 +119,7 @@ def _spot(loader: Loader) -> tuple[tuple[float, float], tuple[float, float]]:
         least = np.diff(corners)[np.abs(corners[:-1] - middle).argmin()]
         places.append(middle)
         spreads.append(max(float(np.ptp(angle[share > 0])) / 2, float(least)))
-    return tuple(places), tuple(spreads)
+    return (places[0], places[1]), (spreads[0], spreads[1])
 
 
 def _force(loader: Loader) -> np.ndarray:

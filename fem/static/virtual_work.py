@@ -152,7 +152,7 @@ def stress_prediction(body: Body, before: fem.Function) -> ufl.Form:
     return correction(0) * body.dx + correction(1) * body.reduced_dx + stretch
 
 
-def inverted_volume(body: Body):
+def inverted_volume(body: Body) -> ufl.Form:
     """Volume in which det F is not positive, m3, in UFL."""
     J = ufl.det(kinematics.deformation_gradient(body.u))
     return ufl.conditional(ufl.le(J, 0.0), 1.0, 0.0) * body.dx

@@ -67,7 +67,7 @@ def apart(exact: Rolled, found: Rolled, force: str, duration: float) -> Apart:
     ]
     worst = int(np.argmax(off)) if off else 0
     return Apart(
-        100 * distance(*values, duration, top).mean,
+        100 * distance(values[0], values[1], duration, top).mean,
         100 * abs(float(other.mean[0] / one.mean[0]) - 1),
         100 * abs(float(other.deviation[0] / one.deviation[0]) - 1),
         float(off[worst]) if off else float("nan"),

@@ -179,7 +179,7 @@ def _compared(name: str, own, exact) -> Iterator[Effectivity]:
 
 
 def _shares(found: list[Effectivity]) -> Table:
-    kinds = {"mean": [], "deviation": [], "third octaves": []}
+    kinds: dict[str, list[Effectivity]] = {"mean": [], "deviation": [], "third octaves": []}
     for one in found:
         kinds.get(one.figure, kinds["third octaves"]).append(one)
     rows = []

@@ -22,7 +22,7 @@ from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.modes import Fields, ModesStage, Motions
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
-from tireroad.runs.stages.stage import Computed, Done, Part
+from tireroad.runs.stages.stage import Computed, Done, Part, Shared
 from tireroad.runs.stages.static import StaticStage
 
 UP_TO_GREENS: tuple[type[Part], ...] = (
@@ -139,12 +139,10 @@ def _made(job: Job, kind: type[Part], done: dict[str, Done]) -> Done | None:
     if kind is RotatingStage and not job.speed:
         return RotatingStage.instead(job, done)
     part = kind.taken(job, done)
-    if part is None:
-        return None
     if isinstance(part, Computed):
         product = part.compute(Record())
         return Done("", lambda: product)
-    return Done("", part.make)
+    return Done("", part.make) if isinstance(part, Shared) else None
 
 
 COMPANIONS: dict[str, Callable[[Given], Forces]] = {

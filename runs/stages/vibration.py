@@ -118,6 +118,8 @@ class VibrationStage(Computed[Vibration]):
 
     @property
     def _top(self) -> float:
+        if self.spectra is not None:
+            return self.spectra.product.limit.frequency
         return band(self.rotating.product, Wanted(band=self.job.scene.greens.band))
 
     def write(self, file: h5py.File, product: Vibration) -> None:

@@ -57,7 +57,8 @@ def at_heights(loader, heights, cuts: int = 0) -> list[tuple[Pressed, Converged 
     rolling = loader.equilibrium.rolling
     for _ in loader.visit([height - loader.touch for height in heights]):
         estimate = load_error(loader, rolling)
-        own = pressed(loader, 100 * estimate.relative)
+        known = None if isinstance(estimate, str) else 100 * estimate.relative
+        own = pressed(loader, known)
         sequence, finer = [own], loader
         for _ in range(cuts):
             finer = at_finer_footprint(finer, rolling)

@@ -3,10 +3,7 @@
 from dataclasses import dataclass
 
 from tireroad.fem.parameters import choice, flag, integer, number, text, vector
-from tireroad.runs.scene.schema import (
-    table,
-    tables,
-)
+from tireroad.runs.scene.schema import table, tables
 from tireroad.runs.scene.tables.axle import AxleTable
 from tireroad.runs.scene.tables.contact import Contact, Time
 from tireroad.runs.scene.tables.pattern import PatternTable
