@@ -81,7 +81,8 @@ def _with_damping(scene: Scene) -> Scene:
     """The default damping in proportion, where neither it nor the loss factor of a compound is given."""
     tire = scene.tire
     compounds = tire.loss_factor, *(part.loss_factor for part in tire.region)
-    loses = any(compounds) or file_has_losses(tire)
+    # The compounds of the built-in tire all have one.
+    loses = tire.section == "radial" or any(compounds) or file_has_losses(tire)
     return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
 
 

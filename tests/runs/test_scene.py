@@ -330,3 +330,9 @@ def test_points_say_which_pitch(scene_file) -> None:
     assert "contact.points dy must be a finite number" in message
     message = refused(scene_file(FULL), "contact.points={dx=1e-300,dy=0.001}")
     assert "dx must be ≥ 1e-05" in message
+
+
+def test_the_built_in_tire_loses_by_its_compounds(scene_file) -> None:
+    """Not by the thesis's 500 1/s: a radial tire comes with loss factors."""
+    assert load(scene_file('[tire]\nsection = "radial"\n')).damping is None
+    assert load(scene_file("")).damping is not None
