@@ -126,8 +126,12 @@ def coarser_job(job: Job) -> Job:
             raise InputError("the mesh is too coarse to be halved")
     if around < LEAST[0]:
         raise InputError("the mesh is too coarse to be halved")
+    rotation = job.scene.rotation
+    if rotation is not None:  # as fast as the run's own wheel, whatever the travel speed
+        rotation = replace(rotation, speed=job.speed, travel_speed=None)
     scene = replace(
         job.scene,
+        rotation=rotation,
         tire=replace(tire, segments=around, elements_arc=along),
         static=replace(static, error_estimate=False),
     )

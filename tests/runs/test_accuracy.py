@@ -10,7 +10,8 @@ from mpi4py import MPI
 from tireroad.contact.error_bars import SHARES
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.companions import Given, companion
+from tireroad.runs.stages.companions import Given, coarser_job, companion
+from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.pipeline import run_scene
 
 SCENE = """
@@ -117,3 +118,12 @@ def test_it_can_be_left_out(run):
     assert stages["accuracy"]["status"] == "skipped"
     with h5py.File(folder / "spectra.h5") as file:
         assert "third_octave/level_error" not in file
+
+
+def test_the_coarser_tire_turns_as_fast(tmp_path) -> None:
+    """At a travel speed, too, where its own rolling radius would give another speed."""
+    (tmp_path / "scene.toml").write_text(SCENE.replace("speed = 40.0", "travel_speed = 6.0"))
+    job = Job(load(tmp_path / "scene.toml"), tmp_path, MPI.COMM_SELF)
+    job.found["speed"] = 19.0
+    other = coarser_job(job)
+    assert other.speed == 19.0 and other.scene.rotation.travel_speed is None
