@@ -95,8 +95,13 @@ def _bulk(loader: Loader, rolling: Rolling) -> float:
     """How far the load is too large since the elements are too stiff, relative. Collective."""
     ring, load = loader.body.ring, loader.load()
     order = ring.order + 1 if ring.order < HIGHEST else ring.order - 1
-    section = ring.section.of_order(order)
-    companion = _taken_over(loader, replace(ring, section=section), rolling)
+    section, corners = ring.section.of_order(order), ring.ring_corners
+    half = ring.coarser() if order > ring.order else None
+    if half is not None:
+        # Of the higher order half as many elements around say the same (50 x 16 of order 2: 0.741 % of the load
+        # by all of them, 0.747 % by half) at half the cost.
+        corners = half.ring_corners
+    companion = _taken_over(loader, replace(ring, ring_corners=corners, section=section), rolling)
     place, spread = _spot(loader)
     (sinks, compliance), (other, _) = (
         one.equilibrium.sinking(probe.spot(one.body.lattice, *place, spread), load)
