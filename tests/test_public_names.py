@@ -72,7 +72,7 @@ MESH = {"segments": 10, "elements_arc": 6, "elements_thickness": 1, "order": 2}
         {"half_angle": 120.0},  # degrees
         {"half_angle": 0.0},
         {"thickness": 0.2},
-        {"minor_radius": 0.4},
+        {"minor_radius": 0.01},
         {"outer_radius": float("nan")},
     ],
 )

@@ -43,10 +43,14 @@ class Torus:
             raise InputError(
                 f"torus: half_angle = {self.half_angle:g} rad must lie between 0 and pi: it is in radians"
             )
-        if not 0 < self.thickness < self.minor_radius < self.outer_radius < math.inf:
+        # A minor radius beyond the outer one is a barrel, up to the cylinder of closed forms.
+        least = min(self.minor_radius, self.outer_radius)
+        if not 0 < self.thickness < least or not math.isfinite(
+            self.minor_radius + self.outer_radius
+        ):
             raise InputError(
-                f"torus: thickness = {self.thickness:g} m, minor_radius = {self.minor_radius:g} m and "
-                f"outer_radius = {self.outer_radius:g} m must ascend from above 0"
+                f"torus: thickness = {self.thickness:g} m must be above 0 and less than minor_radius = "
+                f"{self.minor_radius:g} m and outer_radius = {self.outer_radius:g} m"
             )
 
     @property

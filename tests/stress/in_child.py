@@ -3,7 +3,9 @@
 import os
 import re
 import signal
+import sys
 import time
+import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -35,11 +37,10 @@ def forked(function: Callable[[], int], output: Path, limit: float) -> tuple[int
         target = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         for descriptor in (1, 2):
             os.dup2(target, descriptor)
+        # Under pytest the streams are its own files, not the descriptors.
+        sys.stdout, sys.stderr = (os.fdopen(one, "w", closefd=False) for one in (1, 2))
         status = 1
         try:
-            import sys
-            import traceback
-
             status = function()
         except SystemExit as end:
             status = int(end.code or 0)
