@@ -148,8 +148,9 @@ def companion_blocks(
     return block, right, left
 
 
-def rotating(drag: Array, stiffness: Array) -> StateModes:
-    """Decouple s^2 + s D~ + K~ through the companion matrix and the inverse of its vectors.
+def rotating(drag: Array, stiffness: Array, defective: float = DEFECTIVE) -> StateModes:
+    """Decouple s^2 + s D~ + K~ through the companion matrix and the inverse of its vectors; eigenvalues of
+    vectors with a condition above `defective` stay together in a block.
 
     The lower half of a row of that inverse is w^T / a: left vectors and their normalisation come
     together, biorthogonal also inside clusters of repeated eigenvalues.
@@ -166,7 +167,7 @@ def rotating(drag: Array, stiffness: Array) -> StateModes:
     condition = np.linalg.norm(inverse, axis=1)
     slow = AT_REST * np.abs(values).max()
     rest = np.abs(values) <= slow
-    good = (condition <= DEFECTIVE) & ~(rest & ((condition > _SKEWED) | (rest.sum() > 1)))
+    good = (condition <= defective) & ~(rest & ((condition > _SKEWED) | (rest.sum() > 1)))
     block_inverse = block_vectors.T
     if not good.all():
         block, block_vectors, good = _invariant(companion, values, good)
