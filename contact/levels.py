@@ -19,14 +19,27 @@ def a_weighting(frequency: np.ndarray) -> np.ndarray:
         return 20 * np.log10(response(f2) / response(1000.0**2))
 
 
-def band_sums(frequency: np.ndarray, square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (b,) Hz of the bands that lie whole within the lines (f,) Hz, evenly spaced, and hold more
-    than three of them; and the sums (b,) of what the lines hold, those on a border shared."""
+def band_sums(
+    frequency: np.ndarray, square: np.ndarray, up_to: float = np.inf
+) -> tuple[np.ndarray, np.ndarray]:
+    """Centres (b,) Hz of base-ten bands, 1000 * 10^(k/10) (IEC 61260-1), and the sums (b, ...) of what the lines
+    (f,) Hz, evenly spaced, hold of `square` (f, ...), those on a border shared.
+
+    Bands that lie whole within the lines and below `up_to` Hz; a band narrower than three lines has no
+    meaningful level, and a record of one line no band.
+    """
+    if len(frequency) < 2:
+        return np.zeros(0), np.zeros((0, *square.shape[1:]))
     spacing = frequency[1] - frequency[0]
-    k = np.arange(-30, 17)
-    centre = 1000.0 * 10.0 ** (k / 10)
+    centre = 1000.0 * 10.0 ** (np.arange(-30, 17) / 10)
     low, high = centre * 10**-0.05, centre * 10**0.05
-    use = (high - low > 3 * spacing) & (high < frequency[-1]) & (low > frequency[0])
+    use = (high - low > 3 * spacing) & (high < min(frequency[-1], up_to)) & (low > frequency[0])
     edges = np.append(frequency - spacing / 2, frequency[-1] + spacing / 2)
-    held = np.concatenate([[0.0], np.cumsum(square)])
-    return centre[use], np.interp(high[use], edges, held) - np.interp(low[use], edges, held)
+    held = np.concatenate([np.zeros((1, *square.shape[1:])), np.cumsum(square, axis=0)])
+
+    def below(limit: np.ndarray) -> np.ndarray:
+        columns = held.reshape(len(edges), -1).T
+        found = np.stack([np.interp(limit, edges, column) for column in columns], axis=-1)
+        return found.reshape(-1, *square.shape[1:])
+
+    return centre[use], below(high[use]) - below(low[use])

@@ -80,3 +80,9 @@ def test_bands_hold_what_the_lines_hold():
     width = centre * (10**0.05 - 10**-0.05)
     np.testing.assert_allclose(sums, width / 0.5, rtol=1e-9)
     assert centre[-1] * 10**0.05 < frequency[-1] < centre[-1] * 10**0.15
+
+
+def test_too_few_lines_have_no_band():
+    for count in (0, 1):
+        centre, sums = band_sums(np.full(count, 50.0), np.ones(count))
+        assert centre.shape == sums.shape == (0,)
