@@ -9,19 +9,12 @@ import h5py
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.contact.setup import ContactSetup
-from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import couple
-from tireroad.greens.responses import Wanted, band
-from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.build.forces import Forces, driven_loads
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done
-from tireroad.runs.stages.stored.contact_file import ContactHistory
+from tireroad.runs.stages.build.forces import Forces
+from tireroad.runs.stages.build.whole_tire import WholeTire
 
 _INSTANTS = 400  # at most, the last of the run
 _PER_PERIOD = 8  # of the end of the band
@@ -46,47 +39,22 @@ _UNITS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class MotionStage(Computed[Motion]):
+class MotionStage(WholeTire[Motion]):
     """The states of the modes once more under the forces of the run, which are known by now."""
 
     name: ClassVar[str] = "motion"
-    static: Done[StaticState]
-    rotating: Done[RollingModes]
-    setup: Done[ContactSetup | None]
-    contact: Done[ContactHistory] | None = None
 
-    def inputs(self) -> dict:
-        """The forces in time, the states, and the band."""
-        scene = self.job.scene
-        return {
-            "modes": self.rotating.key,
-            "contact": self.contact.key if self.contact else None,
-            "forces": [vars(force) for force in scene.force],
-            "time": vars(scene.time),
-            "band": scene.greens.band,
+    def seen(self, basis: Basis, forces: Forces) -> tuple[Motion, dict[str, tuple[float, str]]]:
+        """The outer face at the instants kept. Root process only."""
+        points = self.static.product.points
+        time, q = _replayed(basis, forces, self.band)
+        shape = basis.shape[: 3 * len(points)]
+        field = (q[:, : shape.shape[1]] @ shape.T).reshape(len(time), -1, 3)
+        size = float(np.linalg.norm(field, axis=2).max(initial=0.0))
+        return Motion(time=time, displacement=field.astype("f4"), points=points), {
+            "instants": (len(time), "-"),
+            "largest displacement of the face": (size, "m"),
         }
-
-    def compute(self, record: Record) -> Motion | None:
-        """On the root process, None on the others. Collective."""
-        made: list[Motion] = []
-        rolling, state = self.rotating.product, self.static.product
-        loads = driven_loads(self.job, state, self.setup.product)
-
-        def compute() -> dict[str, tuple[float, str]]:
-            basis = Basis.of(rolling)
-            contact = self.contact.product if self.contact else None
-            forces = Forces.of(self.job, self.setup.product, contact, basis.seen(loads))
-            time, q = _replayed(
-                basis, forces, band(rolling, Wanted(band=self.job.scene.greens.band))
-            )
-            shape = basis.shape[: 3 * len(state.points)]
-            field = (q[:, : shape.shape[1]] @ shape.T).reshape(len(time), -1, 3)
-            made.append(Motion(time=time, displacement=field.astype("f4"), points=state.points))
-            size = float(np.linalg.norm(field, axis=2).max(initial=0.0))
-            return {"instants": (len(time), "-"), "largest displacement of the face": (size, "m")}
-
-        record.headline |= on_root(self.job.comm, compute)
-        return made[0] if made else None
 
     def write(self, file: h5py.File, product: Motion) -> None:
         """All there is."""

@@ -9,20 +9,15 @@ import h5py
 import numpy as np
 
 from tireroad.contact.levels import a_weighting, band_sums
-from tireroad.contact.setup import ContactSetup
 from tireroad.contact.spectra import amplitudes
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
-from tireroad.greens.responses import Wanted, band
 from tireroad.greens.vibration import Surface, coordinates, mean_square_velocity, radiated_power
-from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.build.forces import Forces, driven_loads
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.build.forces import Forces
+from tireroad.runs.stages.build.whole_tire import WholeTire
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Computed, Done
-from tireroad.runs.stages.stored.contact_file import ContactHistory
+from tireroad.runs.stages.stage import Done
 
 VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: references of the levels, ISO 1683
 _LARGEST = 2e8  # bytes of displacement fields kept
@@ -64,46 +59,24 @@ _UNITS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class VibrationStage(Computed[Vibration]):
-    """From the forces in the contact's file and the prescribed ones, by the states of the modes."""
+class VibrationStage(WholeTire[Vibration]):
+    """By the states of the modes, after the run-in."""
 
     name: ClassVar[str] = "vibration"
-    static: Done[StaticState]
-    rotating: Done[RollingModes]
-    setup: Done[ContactSetup | None]
-    contact: Done[ContactHistory] | None = None
     spectra: Done[Spectra] | None = None
 
     def inputs(self) -> dict:
-        """The forces in time, the states, and the band."""
-        scene = self.job.scene
-        return {
-            "modes": self.rotating.key,
-            "contact": self.contact.key if self.contact else None,
-            "spectra": self.spectra.key if self.spectra else None,
-            "forces": [vars(force) for force in scene.force],
-            "time": vars(scene.time),
-            "band": scene.greens.band,
-        }
+        """The spectra's too: the run-in and the end of the model are theirs."""
+        return super().inputs() | {"spectra": self.spectra.key if self.spectra else None}
 
-    def compute(self, record: Record) -> Vibration | None:
-        """On the root process, None on the others. Collective."""
-        made: list[Vibration] = []
-        rolling, state = self.rotating.product, self.static.product
-        loads = driven_loads(self.job, state, self.setup.product)
+    def seen(self, basis: Basis, forces: Forces) -> tuple[Vibration, dict[str, tuple[float, str]]]:
+        """The outer face line by line. Root process only."""
+        state = self.static.product
         left_out = self.spectra.product.left_out if self.spectra else 0.0
-
-        def compute() -> dict[str, tuple[float, str]]:
-            basis = Basis.of(rolling)
-            contact = self.contact.product if self.contact else None
-            forces = Forces.of(self.job, self.setup.product, contact, basis.seen(loads))
-            frequency, a = self._coordinates(basis, forces, left_out)
-            surface = Surface.of(state.points, self.job.tire.lattice.quads())
-            made.append(_seen(basis.shape[: 3 * len(state.points)], surface, state, frequency, a))
-            return _headline(made[0], surface)
-
-        record.headline |= on_root(self.job.comm, compute)
-        return made[0] if made else None
+        frequency, a = self._coordinates(basis, forces, left_out)
+        surface = Surface.of(state.points, self.job.tire.lattice.quads())
+        found = _seen(basis.shape[: 3 * len(state.points)], surface, state, frequency, a)
+        return found, _headline(found, surface)
 
     def _coordinates(
         self, basis: Basis, forces: Forces, left_out: float
@@ -112,15 +85,9 @@ class VibrationStage(Computed[Vibration]):
         start = round(left_out / forces.step)
         pushed = np.concatenate(list(forces.pushes(start)))
         frequency, amplitude = amplitudes(pushed, forces.step)
-        top = self._top
+        top = self.spectra.product.limit.frequency if self.spectra else self.band
         below = (frequency > 0) & (frequency <= top)
         return frequency[below], coordinates(basis.states, amplitude[below], frequency[below])
-
-    @property
-    def _top(self) -> float:
-        if self.spectra is not None:
-            return self.spectra.product.limit.frequency
-        return band(self.rotating.product, Wanted(band=self.job.scene.greens.band))
 
     def write(self, file: h5py.File, product: Vibration) -> None:
         """All there is."""

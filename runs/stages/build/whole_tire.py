@@ -1,0 +1,66 @@
+"""What the stages have in common that show the whole tire under the forces of a finished run."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from tireroad.contact.setup import ContactSetup
+from tireroad.fem.static.state import StaticState
+from tireroad.greens.basis import Basis
+from tireroad.greens.responses import Wanted, band
+from tireroad.modal.rolling import RollingModes
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.build.forces import Forces, driven_loads
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.stored.contact_file import ContactHistory
+
+P = TypeVar("P")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WholeTire(Computed[P]):
+    """Computed on the root process from the forces in the file of the contact, and the prescribed ones."""
+
+    static: Done[StaticState]
+    rotating: Done[RollingModes]
+    setup: Done[ContactSetup | None]
+    contact: Done[ContactHistory] | None = None
+
+    def inputs(self) -> dict[str, Any]:
+        """The forces in time, the states, and the band."""
+        scene = self.job.scene
+        return {
+            "modes": self.rotating.key,
+            "contact": self.contact.key if self.contact else None,
+            "forces": [vars(force) for force in scene.force],
+            "time": vars(scene.time),
+            "band": scene.greens.band,
+        }
+
+    def compute(self, record: Record) -> P | None:
+        """The product on the root process, None on the others. Collective."""
+        made: list[P] = []
+        basis, setup = Basis.of(self.rotating.product), self.setup.product
+        loads = driven_loads(self.job, self.static.product, setup)
+
+        def on_one() -> dict[str, tuple[float, str]]:
+            contact = self.contact.product if self.contact else None
+            forces = Forces.of(self.job, setup, contact, basis.seen(loads))
+            product, figures = self.seen(basis, forces)
+            made.append(product)
+            return figures
+
+        record.headline |= on_root(self.job.comm, on_one)
+        return made[0] if made else None
+
+    @abstractmethod
+    def seen(self, basis: Basis, forces: Forces) -> tuple[P, dict[str, tuple[float, str]]]:
+        """The product and its headline. Root process only."""
+
+    @property
+    def band(self) -> float:
+        """Frequencies of interest, Hz."""
+        return band(self.rotating.product, Wanted(band=self.job.scene.greens.band))
