@@ -25,7 +25,7 @@ from tireroad.runs.search.journal import Journal, Trial
 from tireroad.runs.search.planning import planned
 from tireroad.runs.search.settings import Ladders, Settings, aim, applied
 from tireroad.runs.search.shares import CAUSES, Found, shown, worst
-from tireroad.runs.stages.pipeline import run_scene
+from tireroad.runs.stages.pipeline import Finished, run_scene
 
 CHOSEN = "chosen.toml"
 FOLDER = "search"
@@ -157,7 +157,7 @@ class Search:
 
     def _final(self, scene: Scene) -> None:
         """The results of settings that were tried, in the folder. Collective."""
-        run_scene(
+        done = run_scene(
             scene,
             self.directory,
             self.comm,
@@ -166,6 +166,7 @@ class Search:
             petsc_options=self.petsc_options,
             cache=self._cache,
         )
+        _tell(scene, done)
 
     def _give_up(self, tried: list[Trial], why: str) -> None:
         """Results of the nearest trial, and ConvergenceError with what it reached. Collective."""
@@ -203,11 +204,27 @@ def run(
     nothing of earlier runs and trials is reused. Collective.
     """
     if not scene.accuracy.searches or (until and STAGES.index(until) < STAGES.index("accuracy")):
-        run_scene(scene, directory, comm, until=until, fresh=fresh, petsc_options=petsc_options)
+        given = scene, directory, comm
+        done = run_scene(*given, until=until, fresh=fresh, petsc_options=petsc_options)
+        _tell(scene, done)
         return
     if fresh:
         on_root(comm, lambda: _forget(directory))
     Search(scene, directory, comm, petsc_options).run()
+
+
+def _tell(scene: Scene, done: Finished) -> None:
+    """Whether the error that is asked for is met, where it has been estimated. Collective."""
+    if not scene.accuracy.aimed or "accuracy" not in done.done:
+        return
+    over = Found.of(done.done["accuracy"].product, scene.accuracy).over(scene.accuracy)
+    text = f"estimated error of the {scene.accuracy.of.replace('_', ' ')}: {shown(over, scene.accuracy)}"
+    if worst(over)[0] <= 1:
+        observe.say(f"{text}, within the target")
+    else:
+        observe.warn(
+            f"{text}, more than the target: accuracy.search = true looks for better settings"
+        )
 
 
 def _forget(directory: Path) -> None:

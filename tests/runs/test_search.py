@@ -215,20 +215,21 @@ def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
     monkeypatch.setattr(ladder, "ORDER", 2)
     out = file.parent / "out"
     out.mkdir()
+    smooth = ["accuracy.up_to=70", "road.wavelength=0.25"]
 
     def started(*sets: str) -> None:
-        scene = load(file, ["accuracy.up_to=45", *sets])
+        scene = load(file, [*smooth, *sets])
         with observe.quiet():
             searching.run(scene, out, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])
 
     with pytest.raises(ConvergenceError, match="accuracy.trials = 1 are done. Reached"):
         started("accuracy.target=0.001", "accuracy.trials=1")
     assert (out / "contact.h5").exists() and (out / "search" / "cache").exists()
-    started("accuracy.target=1.0")
+    started("accuracy.target=0.5")
     stages = json.loads((out / "summary.json").read_text())["stages"]
     assert {stages[name]["status"] for name in ("static", "modes", "contact", "accuracy")} == {
         "reused"
     }
     assert load(out / "scene.toml") == load(out / "chosen.toml")
     assert not (out / "search").exists()
-    assert len(Journal(out, load(file, ["accuracy.up_to=45"])).trials) == 1
+    assert len(Journal(out, load(file, smooth)).trials) == 1
