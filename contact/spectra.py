@@ -9,7 +9,11 @@ from scipy import signal
 
 from tireroad.contact.levels import a_weighting, band_sums, confidence
 
-FORCE, MOMENT, VELOCITY = 1.0, 1.0, 1e-9  # N, N m, m/s: references of the levels; ISO 1683 of velocity
+FORCE, MOMENT, VELOCITY = (
+    1.0,
+    1.0,
+    1e-9,
+)  # N, N m, m/s: references of the levels; ISO 1683 of velocity
 _SEGMENTS = 4.5  # of half overlap make eight averages
 _LONGEST = 0.5  # s of a segment: lines of 2 Hz; longer records give more averages instead
 

@@ -149,7 +149,9 @@ class SpectraStage(Computed[Spectra]):
             put(file, name, values, corner.UNITS[name])
         levels.write(file, product.levels)
         file.attrs["axle_force_is"] = (
-            "force on the hub of a wheel that moves" if self.job.axle else "blocked force, wheel held"
+            "force on the hub of a wheel that moves"
+            if self.job.axle
+            else "blocked force, wheel held"
         )
         file.attrs["left_out"] = product.left_out
         file.attrs["limit"] = product.limit.frequency
