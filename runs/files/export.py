@@ -125,7 +125,8 @@ def spectra(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     if "third_octave/centre" in file:
         files |= _table("third_octave.csv", bands(file["third_octave"]))
     if "density/frequency" in file:
-        files |= _table("density.csv", _spread(file["density"], file["density/frequency"]))
+        over, group = file["density/frequency"], file["density"]
+        files |= _table("density.csv", {"frequency [Hz]": over[()]} | _spread(group, over))
     return files
 
 
