@@ -14,12 +14,12 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.stages.accuracy import Accuracy
-from tireroad.runs.stages import levels
 from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.model_limit import all_limits
 from tireroad.runs.stages.build.run_in import first_step, run_in
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.stored import levels
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 _FEWEST = 32  # steps of which a spectrum says anything
@@ -33,7 +33,7 @@ class Spectra:
     NaN where unknown, None where they were not wanted. The first `left_out` s of the run, its run-in, are not in them, nor
     is anything beyond the `limit` of the model. `wheel`: the motions of a wheel that moves and the moments on its
     hub, (f, 3) or (f, 1), by the names of runs.stages.build.corner. `levels`: third octaves of all that the run tells, and
-    densities, by the names of runs.stages.levels.
+    densities, by the names of runs.stages.stored.levels.
     """
 
     frequency: np.ndarray
