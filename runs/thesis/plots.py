@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tireroad.runs.report.comparison_figures import CYCLE
 from tireroad.runs.report.figures import canvas, encode, envelope, styled
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True)

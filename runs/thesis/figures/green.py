@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tireroad.greens.response import Response
@@ -142,9 +144,14 @@ def admittance(scenes: Scenes) -> Reproduced:
 
 
 def _admittance_claims(doppler: float, full: float, rates: list[float]) -> tuple[Claim, ...]:
-    known = {"unit": "-", "thesis": 1.0, "source": "section 4.3, figure 4.5", "relation": "below"}
+    known: dict[str, Any] = {
+        "unit": "-",
+        "thesis": 1.0,
+        "source": "section 4.3, figure 4.5",
+        "relation": "below",
+    }
     skew = "rotation adds no damping: what it adds to the damping matrix, 2ΩP, is skew (Φᵀ G Φ)"
-    damping = {"unit": "1/s", "thesis": DAMPING / 2, "relation": "above", "tolerance": 1e-6, "because": skew,
+    damping: dict[str, Any] = {"unit": "1/s", "thesis": DAMPING / 2, "relation": "above", "tolerance": 1e-6, "because": skew,
                "source": "section 4.3: \"the increase of damping due to rotation\"", "right": DAMPING / 2,
                "by": "γ1/2, the trace of the damping matrix"}  # fmt: skip
     return (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -105,7 +107,7 @@ def _formula() -> tuple[Claim, ...]:
     because = "the third term of (5.4) has the factor (x − a), not (x + a)"
     at = np.array([-2.0, 0.0, 2.0])
     theirs, ours = printed(at, 0.0, 1.0, 1.0), rectangle_potential(at, 0.0, 1.0, 1.0)
-    given = {"source": "(5.4) evaluated", "tolerance": 1e-6, "because": because}
+    given: dict[str, Any] = {"source": "(5.4) evaluated", "tolerance": 1e-6, "because": because}
     return (
         Claim(what="πE u/((1 − ν²) p) at the centre of a square of half side 1", unit="m", thesis=float(theirs[1]),
               found=float(ours[1]), right=closed_forms.LOVE_SQUARE_CENTRE, by="8 ln(1 + √2)", **given),

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
-from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.pipeline import Finished
 from tireroad.runs.thesis.claim import Claim
 from tireroad.runs.thesis.figure import Reproduced, figure
 from tireroad.runs.thesis.runner import Scenes
 
-Read = Callable[[Scene], float]
+Read = Callable[[Any], float]  # of a scene whose tables are there
 # What stands in the tables: unit, where a scene has it, and why it may differ.
 KNOWN: dict[str, tuple[str, Read, str]] = {
     "elements": ("-", lambda scene: scene.tire.segments, ""),
