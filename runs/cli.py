@@ -40,8 +40,12 @@ def _only_warnings() -> None:
     logging.getLogger().addHandler(handler)
 
 
-def _run(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
-    """The main job. Collective."""
+def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
+    """The main job. Collective over all processes."""
+    return _together(lambda comm: _run_inside(args, petsc_options, comm))
+
+
+def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
     from tireroad.runs.files.folder import check_kept_scene, claimed
     from tireroad.runs.scene.load import load
 
@@ -207,7 +211,7 @@ def main(argv: list[str]) -> int:
     if args.command == "resume":
         args = _resumed(args)
     if args.command == "run":
-        return handed_over(_together(lambda comm: _run(args, options, comm)))
+        return handed_over(_run(args, options))
     if args.command == "reproduce":
         return handed_over(_together(lambda comm: _reproduce(args, comm)))
     return _alone(lambda: ALONE[args.command](args))
