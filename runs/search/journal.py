@@ -13,7 +13,6 @@ from typing import Any
 from tireroad.runs.files import store
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.identity import identity
-from tireroad.runs.scene.extent.own_tire import fingerprint
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.scene.tables.scene import Scene
@@ -86,7 +85,7 @@ def _origin(scene: Scene) -> str:
     parts = (
         dumps(bare),
         files,
-        fingerprint(scene.tire),
+        scene.tire.shape.fingerprint(scene.tire),
         program.code,
         sorted(program.libraries.items()),
     )

@@ -12,36 +12,8 @@ from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.scene.tables.scene import Scene
 
 CAUSES = tuple(ORDERS)
-# (elements around, from bead to bead); each some 1.2 times as fine as the one before. The coarsest can be halved.
-TORUS = (
-    (16, 8),
-    (20, 10),
-    (24, 12),
-    (28, 14),
-    (34, 16),
-    (40, 20),
-    (48, 24),
-    (58, 28),
-    (70, 34),
-    (84, 42),
-)
-RADIAL = ((16, 14), (20, 18), (24, 22), (30, 26), (36, 32), (44, 38), (52, 46), (64, 56))
-AROUND = (
-    16,
-    20,
-    24,
-    30,
-    36,
-    44,
-    52,
-    64,
-    78,
-    96,
-    120,
-)  # of a section from a file, whose own mesh stays
 FINER = 2**0.5  # of a rung of modes and points; of the step, twice that
 RUNGS = 10
-ORDER = 3  # of a torus's elements, the cheapest for their error (scene.tables.tire)
 MODES = 2.25  # highest mode over the highest frequency of interest on the lowest rung: an answer ends at half of it
 SAMPLES = 8  # steps in the period of that frequency on the lowest rung
 PASSING = 2.25  # contact points that pass in that period at least
@@ -80,7 +52,7 @@ class Ladders:
     def of(cls, scene: Scene) -> Ladders:
         """Of a resolved scene; the speed by its outer radius."""
         turning = scene.rotation.speed if scene.rotation else 0.0
-        return cls(scene, turning * scene.tire.outer_radius)
+        return cls(scene, turning * scene.tire.proportions().outer_radius)
 
     def at(self, rungs: dict[str, int]) -> Settings | None:
         """The settings on these rungs; None where a ladder has no such rung."""
@@ -90,7 +62,7 @@ class Ladders:
         step = self._step / 2 ** rungs["step"]
         return Settings(
             mesh=meshes[rungs["mesh"]],
-            order=ORDER if self.scene.tire.section == "torus" else self.scene.tire.order,
+            order=self.scene.tire.shape.search_order(self.scene.tire),
             up_to=MODES * self.scene.accuracy.up_to * FINER ** rungs["modes"],
             residual=self._residual,
             pitch=self._pitch / FINER ** rungs["points"],
@@ -120,10 +92,7 @@ class Ladders:
 
     @property
     def _meshes(self) -> tuple[tuple[int, int], ...]:
-        tire = self.scene.tire
-        if tire.section == "file":
-            return tuple((around, tire.elements_arc) for around in AROUND)
-        return RADIAL if tire.section == "radial" else TORUS
+        return self.scene.tire.shape.meshes(self.scene.tire)
 
     @property
     def _residual(self) -> str:
@@ -135,7 +104,7 @@ class Ladders:
 
     @property
     def _pitch(self) -> float:
-        largest = POINTS * self.scene.tire.outer_radius
+        largest = POINTS * self.scene.tire.proportions().outer_radius
         if self.speed:
             largest = min(largest, self.speed / (PASSING * self.scene.accuracy.up_to))
         return largest
@@ -184,7 +153,12 @@ def applied(scene: Scene, settings: Settings, *, search: bool = False) -> Scene:
     around, along = settings.mesh
     return replace(
         scene,
-        tire=replace(scene.tire, segments=around, elements_arc=along, order=settings.order),
+        tire=replace(
+            scene.tire,
+            segments=around,
+            order=settings.order,
+            shape=scene.tire.shape.elements_along(along),
+        ),
         # The companion of the mesh tells it, and for the forces that are asked for.
         static=replace(scene.static, error_estimate=False),
         modal=replace(scene.modal, up_to=settings.up_to),

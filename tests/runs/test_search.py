@@ -14,8 +14,8 @@ from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.scene.load import load
+from tireroad.runs.scene.sections.kinds import torus
 from tireroad.runs.search import search as searching
-from tireroad.runs.search import settings as ladder
 from tireroad.runs.search.journal import Journal, Trial
 from tireroad.runs.search.search import Search
 from tireroad.runs.search.settings import CAUSES, Ladders, Settings, applied, size_ratio
@@ -105,7 +105,7 @@ def test_it_ends_within_the_target_near_the_least_cost(file, search, monkeypatch
     last = modelled(scene, tried[-1])
     assert worst(last.found.over(scene.accuracy))[0] <= 1
     assert all(worst(modelled(scene, one).found.over(scene.accuracy))[0] > 1 for one in tried[:-1])
-    monkeypatch.setattr(ladder, "TORUS", ladder.TORUS[:6])
+    monkeypatch.setattr(torus, "FINER", torus.FINER[:6])
     least = cheapest(scene, 0.05)
     spent = sum(sum(modelled(scene, one).seconds.values()) for one in tried)
     assert sum(last.seconds.values()) <= 2 * least
@@ -212,7 +212,7 @@ def test_a_target_that_cannot_be_is_refused(file, sets, said) -> None:
 
 def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
     """The real thing: one trial misses a hard target, and meets a loose one without being run again."""
-    monkeypatch.setattr(ladder, "ORDER", 2)
+    monkeypatch.setattr(torus, "ORDER", 2)
     out = file.parent / "out"
     out.mkdir()
     smooth = ["accuracy.up_to=70", "road.wavelength=0.25"]
