@@ -1,13 +1,21 @@
-"""Spectra of a force that was computed in time: amplitudes, and third-octave levels."""
+"""Spectra of what was computed in time: amplitudes, power spectral densities, and third-octave levels."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import signal
 
-from tireroad.contact.levels import band_sums
+from tireroad.contact.levels import a_weighting, band_sums, confidence
 
-REFERENCE = 1.0  # N, of the levels
+FORCE, MOMENT, VELOCITY = (
+    1.0,
+    1.0,
+    1e-9,
+)  # N, N m, m/s: references of the levels; ISO 1683 of velocity
+_SEGMENTS = 4.5  # of half overlap make eight averages
+_LONGEST = 0.5  # s of a segment: lines of 2 Hz; longer records give more averages instead
 
 
 def amplitudes(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -21,13 +29,63 @@ def amplitudes(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def third_octaves(
-    values: np.ndarray, step: float, up_to: float = np.inf
+    values: np.ndarray,
+    step: float,
+    up_to: float = np.inf,
+    *,
+    reference: float = FORCE,
+    rate: bool = False,
+    weighted: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Band centres (b,) Hz and levels (b, d), dB re 1 N (rms), of values (n, d) in N; bands as of
-    `contact.levels.band_sums`, below `up_to` Hz and half the sampling rate. A record of one value has no band.
+    """Band centres (b,) Hz and levels (b, d), dB re `reference` (rms), of values (n, d), or, as `rate`, of their rate
+    of change per second; A-weighted line by line if wanted; bands as of `contact.levels.band_sums`, below `up_to` Hz and
+    half the sampling rate. Hann window over the whole record, mean removed. A record of one value has no band.
     """
     if len(values) < 2:
         return np.zeros(0), np.zeros((0, values.shape[1]))
     frequency, power = signal.periodogram(values, 1 / step, "hann", detrend="constant", axis=0)
+    if rate:
+        power = power * (2 * np.pi * frequency[:, None]) ** 2
+    if weighted:
+        power = power * 10 ** (a_weighting(frequency)[:, None] / 10)
     centre, square = band_sums(frequency, power * frequency[1], up_to)
-    return centre, 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / REFERENCE**2)
+    return centre, 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference**2)
+
+
+@dataclass(frozen=True)
+class Density:
+    """Power spectral `density` (f, d), one-sided, at `frequency` (f,) Hz, by Welch's method: Hann windows of
+    `segment` s, half overlapping, `averages` of them; `confidence` (2,) dB, 95 %, as of contact.levels."""
+
+    frequency: np.ndarray
+    density: np.ndarray
+    segment: float
+    averages: int
+    confidence: np.ndarray
+
+
+def density(values: np.ndarray, step: float, up_to: float = np.inf, rate: bool = False) -> Density:
+    """Of values (n, d) in steps of `step` s, or of their `rate`; unit of the values squared per Hz.
+
+    Segments of half the record and less: eight averages, more where segments of 0.5 s make more. Each has its mean
+    removed. The integral is the variance (Parseval). The power of segments that overlap by half under Hann's
+    window is correlated by 1/36 with the next: of k averages k / (1 + (k - 1) / 18 k) count.
+    """
+    count = len(values)
+    width = max(min(int(count / _SEGMENTS), round(_LONGEST / step)), min(count, 8))
+    shift = width - width // 2
+    averages = max(1 + (count - width) // shift, 1)
+    frequency, power = signal.welch(
+        values, 1 / step, "hann", width, width // 2, detrend="constant", axis=0
+    )
+    if rate:
+        power = power * (2 * np.pi * frequency[:, None]) ** 2
+    independent = averages / (1 + (averages - 1) / (18 * averages))
+    kept = frequency <= up_to
+    return Density(
+        frequency[kept],
+        power[kept],
+        width * step,
+        averages,
+        confidence(np.array(2 * independent)),
+    )

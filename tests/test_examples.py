@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tireroad.fem.tire.law import MATERIALS
+from tireroad.runs.scene.sections.kind import SECTIONS
+
 SCENE = """
 [tire]
 segments = 12
@@ -96,8 +99,18 @@ def test_own_material_stiffens() -> None:
     import own_material
 
     neo_hookean, gent = own_material.main()
+    MATERIALS.forget("gent")  # the key reference lists what is registered
     assert neo_hookean == pytest.approx(559.3, rel=1e-3)
     assert gent == pytest.approx(569.7, rel=1e-3) and gent > 1.001 * neo_hookean
+
+
+def test_own_section() -> None:
+    import own_section
+
+    circle, ellipse = own_section.main()
+    SECTIONS.forget("ellipse")
+    assert circle == pytest.approx(575.9, rel=1e-3)
+    assert ellipse == pytest.approx(594.6, rel=1e-3)
 
 
 def test_read_results(launch, tmp_path: Path) -> None:

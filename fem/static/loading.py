@@ -123,11 +123,23 @@ class Loader:
             yield deflection
 
     def carry(self, load: float) -> float:
-        """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket."""
+        """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket.
+
+        States on the way may be out of balance; where that fails they may not: an error leaves a good one.
+        """
         if load <= 0:
             raise InputError(f"static.load = {load:g} N: a road carries a positive load")
+        start = self.body.u.x.array.copy()
+        try:
+            return self._seek(load, _NEAR * load)
+        except ConvergenceError:
+            self.body.u.x.array[:] = start
+            return self._seek(load, 0.0)
+
+    def _seek(self, load: float, allowed: float) -> float:
+        """That deflection, with states on the way `allowed` (N) out of balance."""
         known = [_Known(0.0, 0.0, self.body.u.x.array.copy())]
-        trial, allowed = 0.1 * self.body.ring.thickness, _NEAR * load
+        trial = 0.1 * self.body.ring.thickness
         for _ in range(60):
             self._try_deflection(trial, known, allowed)
             rounding = self.equilibrium.rounding
@@ -174,14 +186,11 @@ class Loader:
             self.newton_steps += step.iterations
             if step.converged:
                 self._report("deflection", trial, "m", step)
-                known.append(self._reached(trial))
+                known.append(_Known(trial, self.load(), self.body.u.x.array.copy()))
                 return
         below = max((k for k in known if k.deflection <= trial), key=lambda k: k.deflection)
         self.body.u.x.array[:] = below.displacement
         self._raise_road(below.deflection, trial, known, allowed)
-
-    def _reached(self, deflection: float) -> _Known:
-        return _Known(deflection, self.load(), self.body.u.x.array.copy())
 
     def _next_deflection(self, known: list[_Known], load: float) -> float:
         """Secant through the two loads nearest to the wanted one, kept inside the bracket."""
@@ -215,7 +224,7 @@ class Loader:
         def attempt(deflection: float) -> Step:
             step = self.equilibrium.solve(self.touch + deflection, allowed=allowed)
             if step.converged:
-                known.append(self._reached(deflection))
+                known.append(_Known(deflection, self.load(), self.body.u.x.array.copy()))
             return step
 
         largest = 0.25 * self.body.ring.thickness

@@ -8,12 +8,21 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.levels import nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import xdmf
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.store import opened
 
 AXES = ("x", "y", "z")
+NAMES = {  # of levels in third_octave/ whose names are older than the other quantities
+    "level": "axle force level",
+    "level_a_weighted": "axle force level a weighted",
+    "level_error": "error of the axle force level",
+    "contact_level": "contact force level",
+    "contact_level_a_weighted": "contact force level a weighted",
+    "contact_level_error": "error of the contact force level",
+}
 Columns = dict[str, NDArray]  # heading with unit -> values (n)
 
 
@@ -107,17 +116,42 @@ def contact(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 
 def spectra(file: h5py.File) -> dict[str, Callable[[Path], object]]:
-    """spectra.csv: complex spectra; third_octave.csv: bands of the axle force."""
+    """spectra.csv: complex spectra; third_octave.csv: levels of all quantities, with their errors; density.csv."""
     columns = {"frequency [Hz]": file["frequency"][()]}
     for name in ("axle_force", "contact_force"):
         if name in file:
             columns |= _components(name.replace("_", " "), file[name][()], "N")
     files = _table("spectra.csv", columns)
     if "third_octave/centre" in file:
-        bands = {"band centre [Hz]": file["third_octave/centre"][()]}
-        level = file["third_octave/level"][()]
-        files |= _table("third_octave.csv", bands | _components("level", level, "dB re 1 N"))
+        files |= _table("third_octave.csv", bands(file["third_octave"]))
+    if "density/frequency" in file:
+        over, group = file["density/frequency"], file["density"]
+        files |= _table("density.csv", {"frequency [Hz]": over[()]} | _spread(group, over))
     return files
+
+
+def bands(group: h5py.Group) -> Columns:
+    """Levels by band: its name of IEC 61260, its exact centre, then column by column."""
+    centre = group["centre"][()]
+    columns = {"band [Hz]": nominal(centre), "exact centre of the band [Hz]": centre}
+    if "confidence" in group:
+        low, high = group["confidence"][()].T
+        columns["lines in the band [-]"] = group["lines"][()]
+        columns |= {"95 % of the process from [dB]": low, "95 % of the process to [dB]": high}
+    return columns | _spread(group, group["centre"])
+
+
+def _spread(group: h5py.Group, over: h5py.Dataset) -> Columns:
+    """The vectors (n, 3), or (n, k, 3) at k points, that a group holds beside what they are given over."""
+    columns: Columns = {}
+    for name, held in group.items():
+        if held.ndim < 2 or held.shape[-1] != 3 or len(held) != len(over):
+            continue
+        label, values = NAMES.get(name, name.replace("_", " ")), held[()].reshape(len(over), -1, 3)
+        for point in range(values.shape[1]):
+            place = f" {point + 1}" if held.ndim > 2 else ""
+            columns |= _components(label + place, values[:, point], held.attrs["unit"])
+    return columns
 
 
 def response(file: h5py.File) -> dict[str, Callable[[Path], object]]:
@@ -144,10 +178,12 @@ def vibration(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     """vibration.csv: third-octave levels of the outer face."""
     names = {
         "velocity level [dB re 1 nm/s]": "velocity_level",
+        "velocity level, A-weighted [dB(A) re 1 nm/s]": "velocity_level_a_weighted",
         "radiated power [dB re 1 pW]": "radiated_power_level",
         "radiated power, A-weighted [dB(A) re 1 pW]": "radiated_power_level_a_weighted",
     }
-    columns = {"band centre [Hz]": file["third_octave/centre"][()]}
+    centre = file["third_octave/centre"][()]
+    columns = {"band [Hz]": nominal(centre), "exact centre of the band [Hz]": centre}
     columns |= {label: file[f"third_octave/{name}"][()] for label, name in names.items()}
     return _table("vibration.csv", columns)
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tireroad.contact.levels import nominal
 from tireroad.runs.files.reader import RunResults
-from tireroad.runs.report.figures import nominal
 
 Array = NDArray[np.float64]
 AXES = ("x", "y", "z")

@@ -14,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from tireroad.contact.levels import nominal
 from tireroad.modal.states import growing
 
 COMPONENTS = ("x, forward", "y, along the axle", "z, up")
@@ -147,14 +148,6 @@ def third_octaves(centre: NDArray, level: NDArray, error: NDArray | None = None)
     here.margins(x=0.01)
     here.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return encode(figure)
-
-
-def nominal(centre: NDArray) -> NDArray:
-    """Preferred numbers of IEC 61260 for exact band centres 1000·10^(k/10) Hz; others unchanged."""
-    preferred = np.array((1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0))
-    band = np.rint(10.0 * np.log10(np.maximum(centre, 1e-9)))
-    name = preferred[(band % 10).astype(int)] * 10.0 ** (band // 10)
-    return np.where(np.abs(name / np.maximum(centre, 1e-9) - 1.0) < 0.03, name, centre)
 
 
 @styled

@@ -12,8 +12,8 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.read import Absent, Results, Section
-from tireroad.runs.report import force_sections, stiffness, tire_sections, vibration
 from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.sections import forces, stiffness, tire, vibration
 from tireroad.runs.report.verdicts import verdicts
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.schema import every_field, key_of, table_of
@@ -21,13 +21,13 @@ from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.version import PROGRAM
 
 SECTIONS: Mapping[str, Callable[[Results], Section]] = {
-    "static.h5": tire_sections.static,
+    "static.h5": tire.static,
     "stiffness.h5": stiffness.section,
-    "modes.h5": tire_sections.modes,
-    "rotating.h5": tire_sections.rotating,
-    "response.h5": force_sections.response,
-    "contact.h5": force_sections.contact,
-    "spectra.h5": force_sections.spectra,
+    "modes.h5": tire.modes,
+    "rotating.h5": tire.rotating,
+    "response.h5": forces.response,
+    "contact.h5": forces.contact,
+    "spectra.h5": forces.spectra,
     "vibration.h5": vibration.vibration,
 }
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tireroad.contact.limits import Limit, lowest
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.spectra import amplitudes, third_octaves
+from tireroad.contact.spectra import amplitudes
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
@@ -19,6 +19,7 @@ from tireroad.runs.stages.build.model_limit import all_limits
 from tireroad.runs.stages.build.run_in import first_step, run_in
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.stored import levels
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 _FEWEST = 32  # steps of which a spectrum says anything
@@ -31,18 +32,17 @@ class Spectra:
     `contact_level` (b, 3) dB re 1 N, with their estimated errors `level_error` and `contact_level_error` dB,
     NaN where unknown, None where they were not wanted. The first `left_out` s of the run, its run-in, are not in them, nor
     is anything beyond the `limit` of the model. `wheel`: the motions of a wheel that moves and the moments on its
-    hub, (f, 3) or (f, 1), by the names of runs.stages.build.corner.
+    hub, (f, 3) or (f, 1), by the names of runs.stages.build.corner. `levels`: third octaves of all that the run tells, and
+    densities, by the names of runs.stages.stored.levels.
     """
 
     frequency: np.ndarray
     contact_force: np.ndarray
     left_out: float
     limit: Limit
-    centre: np.ndarray
-    contact_level: np.ndarray
+    levels: dict[str, np.ndarray]
     wheel: dict[str, np.ndarray] = field(default_factory=dict)
     axle_force: np.ndarray | None = None
-    level: np.ndarray | None = None
     level_error: np.ndarray | None = None
     contact_level_error: np.ndarray | None = None
 
@@ -51,9 +51,6 @@ _UNITS = {
     "frequency": ("frequency", "Hz"),
     "contact_force": ("contact_force", "N"),
     "axle_force": ("axle_force", "N"),
-    "centre": ("third_octave/centre", "Hz"),
-    "level": ("third_octave/level", "dB re 1 N"),
-    "contact_level": ("third_octave/contact_level", "dB re 1 N"),
     "level_error": ("third_octave/level_error", "dB"),
     "contact_level_error": ("third_octave/contact_level_error", "dB"),
 }
@@ -88,18 +85,16 @@ class SpectraStage(Computed[Spectra]):
         limit = self._limit(record, step)
         frequency, contact = amplitudes(total, step)
         below = frequency <= limit.frequency
-        centre, contact_level = third_octaves(total, step, limit.frequency)
+        found = levels.told(history, start, limit.frequency)
+        levels.describe(record, found)
         axle = {}
         if history.axle_force is not None:
             force = history.axle_force[start:]
             amplitude = amplitudes(force, step)[1][below]
-            axle = {
-                "axle_force": amplitude,
-                "level": third_octaves(force, step, limit.frequency)[1],
-            }
+            axle["axle_force"] = amplitude
             _largest(record, frequency[below], amplitude)
         if self.accuracy is not None:
-            bars = self.accuracy.product
+            bars, centre = self.accuracy.product, found["third_octave/centre"]
             axle["level_error"] = bars.levels("axle_force", centre)
             axle["contact_level_error"] = bars.levels("contact_force", centre)
         wheel = {
@@ -112,8 +107,7 @@ class SpectraStage(Computed[Spectra]):
             left_out=start * step,
             limit=limit,
             wheel=wheel,
-            centre=centre,
-            contact_level=contact_level,
+            levels=found,
             **axle,
         )
 
@@ -154,6 +148,12 @@ class SpectraStage(Computed[Spectra]):
                 put(file, stored, getattr(product, name), unit)
         for name, values in product.wheel.items():
             put(file, name, values, corner.UNITS[name])
+        levels.write(file, product.levels)
+        file.attrs["axle_force_is"] = (
+            "force on the hub of a wheel that moves"
+            if self.job.axle
+            else "blocked force, wheel held"
+        )
         file.attrs["left_out"] = product.left_out
         file.attrs["limit"] = product.limit.frequency
         file.attrs["limit_cause"] = product.limit.cause
@@ -164,7 +164,9 @@ class SpectraStage(Computed[Spectra]):
         limit = Limit(float(file.attrs["limit"]), str(file.attrs["limit_cause"]))
         wheel = {name: file[name][:] for name in corner.UNITS if name in file}
         left_out = float(file.attrs["left_out"])
-        return Spectra(left_out=left_out, limit=limit, wheel=wheel, **kept)
+        return Spectra(
+            left_out=left_out, limit=limit, levels=levels.read(file), wheel=wheel, **kept
+        )
 
 
 def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:

@@ -29,7 +29,8 @@ class Vibration:
     """On the outer face, up to the band of the Green's functions.
 
     `frequency` (f,) Hz; `velocity` (f,) m2/s2, mean square normal to the surface, of each line; `centre` (b,) Hz
-    with the third-octave `velocity_level` dB re 1 nm/s, `power_level` dB re 1 pW and `weighted` dB(A) (b,).
+    with the third-octave `velocity_level` dB re 1 nm/s and `power_level` dB re 1 pW, and both A-weighted,
+    `velocity_weighted` and `weighted` (b,).
     `shapes_at` (g,) Hz: the lines whose `displacement` (g, s, 3) m, complex amplitudes at the `points` (s, 3) m,
     is kept: all, or the strongest that fit in 200 MB.
     """
@@ -40,6 +41,7 @@ class Vibration:
     velocity_level: np.ndarray
     power_level: np.ndarray
     weighted: np.ndarray
+    velocity_weighted: np.ndarray
     shapes_at: np.ndarray
     displacement: np.ndarray
     points: np.ndarray
@@ -52,6 +54,7 @@ _UNITS = {
     "velocity_level": ("third_octave/velocity_level", "dB re 1 nm/s"),
     "power_level": ("third_octave/radiated_power_level", "dB re 1 pW"),
     "weighted": ("third_octave/radiated_power_level_a_weighted", "dB(A) re 1 pW"),
+    "velocity_weighted": ("third_octave/velocity_level_a_weighted", "dB(A) re 1 nm/s"),
     "shapes_at": ("surface/frequency", "Hz"),
     "displacement": ("surface/displacement", "m"),
     "points": ("surface/points", "m"),
@@ -119,6 +122,7 @@ def _seen(
         velocity_level=_level(square, VELOCITY**2),
         power_level=_level(power, POWER),
         weighted=_level(heard, POWER),
+        velocity_weighted=_level(weighted, VELOCITY**2),
         shapes_at=frequency[kept],
         displacement=(own[kept] @ shape.T).reshape(len(kept), -1, 3),
         points=state.points,

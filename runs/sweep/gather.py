@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.levels import nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.reader import RunResults
 from tireroad.runs.files.store import sealed
-from tireroad.runs.report.figures import nominal
 from tireroad.runs.sweep.definition import Sweep
 
 Array = NDArray[np.float64]

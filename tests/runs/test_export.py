@@ -147,3 +147,11 @@ def test_nothing_to_export_is_an_input_error(tmp_path: Path) -> None:
     for directory in (tmp_path, tmp_path / "nowhere"):
         with pytest.raises(InputError, match="give the result folder of a run"):
             export(directory)
+
+
+def test_bands_have_the_names_of_the_standard(results: Path) -> None:
+    """315, where the centre is 316.2: IEC 61260-1."""
+    bands = columns(results / "export" / "third_octave.csv")
+    assert {31.5, 315.0, 1000.0} <= set(bands["band [Hz]"])
+    exact = bands["exact centre of the band [Hz]"]
+    assert exact[bands["band [Hz]"] == 315.0] == pytest.approx([316.227766])

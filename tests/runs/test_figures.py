@@ -53,13 +53,6 @@ def test_a_spectrum_keeps_its_highest_line() -> None:
     assert drawn[kept.argmax()] == pytest.approx(33_334.0, rel=0.03)
 
 
-def test_preferred_band_names() -> None:
-    exact = 1000.0 * 10.0 ** (np.arange(-15, 6) / 10.0)
-    names = figures.nominal(exact)
-    assert names[[0, 1, 4, 15, 16]] == pytest.approx([31.5, 40.0, 80.0, 1000.0, 1250.0])
-    assert figures.nominal(np.array([87.0])) == 87.0
-
-
 def test_a_cut_lies_in_its_plane_and_on_the_surface() -> None:
     points, quads = lattice(60, 21)
     ends, weight = surface_figures.cut(

@@ -1,6 +1,6 @@
 """Random scenes through `check` and `run`, random damage to road files: by hand, in minutes to an hour.
 
-    PYTHONPATH=.:tests python3 tests/stress/fuzz_scenes.py --seed 7 --checks 1000 --runs 200 --roads 400
+    PYTHONPATH=.:tests:tests/stress python3 -P tests/stress/fuzz_scenes.py --seed 7 --checks 1000 --runs 200 --roads 400
 
 Allowed ends: exit status 0 with results that are numbers, 2, 3 and 4 with a message and no traceback, for
 roads an InputError or a road; never a hang; memory within the estimate. `test_fuzz.py` runs a short
@@ -32,6 +32,7 @@ from tireroad.runs.process.mpi import judged
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
 
+FEW = 10  # runs up to which the scenes to start from are not run themselves
 RARE = 0.05  # share of runs of the radial tire, which has many unknowns
 
 
@@ -86,8 +87,8 @@ def fuzz_check(folder: Path, seed: int, number: int) -> tuple[str, str]:
     return limited(run), f"{name} {changed}"
 
 
-def fuzz_run(folder: Path, seed: int, number: int) -> tuple[str, str]:
-    """(end, what was tried) of one scene that `check` accepts, through `run` on a small mesh."""
+def fuzz_run(folder: Path, seed: int, number: int, limit: float) -> tuple[str, str]:
+    """(end, what was tried) of one scene that `check` accepts, through `run` on a small mesh, in `limit` s."""
     rng = np.random.default_rng([seed, 2, number])
     write_deck(folder)
     path = folder / "run.toml"
@@ -98,7 +99,7 @@ def fuzz_run(folder: Path, seed: int, number: int) -> tuple[str, str]:
         with suppress(InputError):
             explain(load(path, changed))
             break
-    status, said, memory = _run(folder, changed, LIMIT)
+    status, said, memory = _run(folder, changed, limit)
     tried = f"{name} {changed} {said.strip()[-300:]}"
     wrong = ended(status, said, memory, folder / "out")
     return wrong or ("stopped" if status is None else f"exit {status}"), tried
@@ -134,18 +135,19 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     for name, count in (("seed", 1), ("checks", 1000), ("runs", 200), ("roads", 400)):
         parser.add_argument(f"--{name}", type=int, default=count)
+    parser.add_argument("--limit", type=float, default=LIMIT, help="seconds a run may take")
     args = parser.parse_args()
     bad = 0
     warm()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         files = list(road_files(folder))
-        if args.runs:
+        if args.runs > FEW:
             run_bases(folder)
         for what, count, case in (
             ("check", args.checks, lambda n: fuzz_check(folder, args.seed, n)),
             ("road", args.roads, lambda n: fuzz_road(files, args.seed, n)),
-            ("run", args.runs, lambda n: fuzz_run(folder, args.seed, n)),
+            ("run", args.runs, lambda n: fuzz_run(folder, args.seed, n, args.limit)),
         ):
             began, ends = time.monotonic(), Counter()
             for number in range(count):

@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.extent.tire_section import free_unknowns
 from tireroad.runs.scene.rules.road import least_travel, made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.scene import Scene
@@ -34,7 +33,7 @@ class Sizes:
 
 def sizes(scene: Scene) -> Sizes:
     """The sizes of a scene."""
-    free = free_unknowns(scene.tire)
+    free = scene.tire.free_unknowns()
     modes = _modes(scene, free)
     nodes, points = _points(scene, free)
     receptance, rotation = scene.output.receptance, scene.rotation
@@ -53,10 +52,9 @@ def sizes(scene: Scene) -> Sizes:
 
 def _plate(scene: Scene) -> tuple[float, float]:
     """Area (m²) of the wall, and its mass per area over its bending stiffness (s²/m⁴)."""
-    tire = scene.tire
-    material = tire.material
-    middle = tire.outer_radius - 0.5 * tire.minor_radius
-    area = 2 * math.pi * middle * 2 * math.radians(tire.half_angle) * tire.minor_radius
+    tire, material = scene.tire.proportions(), scene.tire.material
+    middle = tire.outer_radius - 0.5 * tire.height
+    area = 2 * math.pi * middle * 2 * math.radians(tire.half_angle) * tire.height
     law = material.law
     bending = law.youngs * tire.thickness**3 / (12 * (1 - law.poisson**2))
     return area, material.density * tire.thickness / bending
@@ -99,18 +97,19 @@ def _points(scene: Scene, free: int) -> tuple[int, int]:
     """Nodes and points of the patch: where a torus is within reach of the road."""
     if scene.contact is None:
         return 0, 0
-    tire, static, contact = scene.tire, scene.static, scene.contact
-    round_ = math.sqrt(tire.outer_radius * tire.minor_radius)
+    static, contact, mesh = scene.static, scene.contact, scene.tire
+    tire = mesh.proportions()
+    round_ = math.sqrt(tire.outer_radius * tire.height)
     reach = contact.reach or 1.5 * road_height(scene) + MARGIN
     deflection = static.deflection or 0.01
     if static.load is not None and static.inflation > 0:
         # A membrane carries its load by the pressure on the area that is pressed flat.
-        deflection = min(static.load / (2 * math.pi * static.inflation * round_), tire.minor_radius)
+        deflection = min(static.load / (2 * math.pi * static.inflation * round_), tire.height)
     area = 2 * math.pi * (reach + deflection) * round_
-    graded = math.sqrt(tire.footprint_size)  # the patch reaches beyond the finest elements
-    around = 2 * math.pi * tire.outer_radius / (tire.segments * tire.order) * graded
-    along = 2 * math.radians(tire.half_angle) * tire.minor_radius
-    along *= graded / (tire.elements_arc * tire.order)
+    graded = math.sqrt(mesh.footprint_size)  # the patch reaches beyond the finest elements
+    around = 2 * math.pi * tire.outer_radius / (mesh.segments * mesh.order) * graded
+    along = 2 * math.radians(tire.half_angle) * tire.height
+    along *= graded / (tire.along * mesh.order)
     nodes = max(min(int(area / (around * along)), free // 6), 9)
     pitch = contact.points
     return nodes, int(area / (pitch.dx * pitch.dy)) if isinstance(pitch, Pitch) else nodes

@@ -5,8 +5,9 @@ from numpy.typing import NDArray
 
 from tireroad.modal.states import growing
 from tireroad.runs.files.read import Results, Section, Table, attributes
-from tireroad.runs.report import cavity, figures, surface_figures
+from tireroad.runs.report import figures, surface_figures
 from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.sections import cavity
 
 LISTED = 16  # rows of a table of modes; the files hold them all
 PICTURED = 6

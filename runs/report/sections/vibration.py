@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.levels import nominal
 from tireroad.runs.files.read import Results, Section
-from tireroad.runs.report.figures import COLOURS, RANGE_DB, canvas, encode, nominal, styled
+from tireroad.runs.report.figures import COLOURS, RANGE_DB, canvas, encode, styled
 
 
 def vibration(results: Results) -> Section:

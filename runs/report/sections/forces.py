@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.files.read import Absent, Results, Section, attributes
-from tireroad.runs.report import corner, figures, pattern, surface_figures
+from tireroad.runs.report import figures, surface_figures
 from tireroad.runs.report.quantities import quantity
-from tireroad.runs.report.tire_sections import pressure
+from tireroad.runs.report.sections import corner, pattern
+from tireroad.runs.report.sections.tire import pressure
 
 SAMPLED = 400  # instants read of a (time, point) dataset: the file may be larger than memory
 AT_ONCE = 2e8  # bytes

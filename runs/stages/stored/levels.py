@@ -1,0 +1,113 @@
+"""Levels and densities of all that a run in time tells: forces, moments, motion of chosen points."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+
+from tireroad.contact import levels
+from tireroad.contact.spectra import FORCE, MOMENT, VELOCITY, density, third_octaves
+from tireroad.runs.files.store import put
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stored.contact_file import ContactHistory
+
+# name in `third_octave/` -> name in `density/`, reference of the level, its unit, unit of the density, rate of what is kept
+_KINDS = {
+    "level": ("axle_force", FORCE, "1 N", "N2/Hz", False),
+    "contact_level": ("contact_force", FORCE, "1 N", "N2/Hz", False),
+    "hub_moment_level": ("hub_moment", MOMENT, "1 N m", "N2 m2/Hz", False),
+    "point_velocity_level": ("point_velocity", VELOCITY, "1 nm/s", "m2/s2/Hz", True),
+}
+WEIGHTED = "_a_weighted"
+_ONE = {  # of all
+    "third_octave/centre": "Hz",
+    "third_octave/nominal": "Hz",
+    "third_octave/lines": "-",
+    "third_octave/confidence": "dB",
+    "third_octave/too_narrow": "Hz",
+    "density/frequency": "Hz",
+    "density/confidence": "dB",
+    "density/segment": "s",
+    "density/averages": "-",
+}
+UNITS = _ONE | {
+    key: unit
+    for name, (what, _, reference, per_hertz, _) in _KINDS.items()
+    for key, unit in (
+        (f"third_octave/{name}", f"dB re {reference}"),
+        (f"third_octave/{name}{WEIGHTED}", f"dB(A) re {reference}"),
+        (f"density/{what}", per_hertz),
+    )
+}
+
+
+def series(history: ContactHistory, start: int) -> dict[str, np.ndarray]:
+    """What there is, by the names of the levels, from step `start` on: (n, d) in N, N m, and m of points."""
+    found = {"contact_level": history.total_force, "level": history.axle_force}
+    found |= {"hub_moment_level": history.wheel.get("hub_moment")}
+    found |= {"point_velocity_level": history.driven}
+    return {name: values[start:] for name, values in found.items() if values is not None}
+
+
+def told(history: ContactHistory, start: int, up_to: float) -> dict[str, np.ndarray]:
+    """All of `UNITS` that the history has, after the run-in and below `up_to` Hz, by their names in spectra.h5.
+
+    Levels (b, 3), of points (b, k, 3), dB of the root mean square; `…_a_weighted` of the same, each line weighted;
+    densities (f, 3) or (f, k, 3).
+    """
+    found: dict[str, np.ndarray] = {}
+    for name, values in series(history, start).items():
+        what, reference, _, _, rate = _KINDS[name]
+        flat, shape = values.reshape(len(values), -1), values.shape[1:]
+        for weighted, suffix in ((False, ""), (True, WEIGHTED)):
+            centre, level = third_octaves(
+                flat, history.step, up_to, reference=reference, rate=rate, weighted=weighted
+            )
+            found[f"third_octave/{name}{suffix}"] = level.reshape(-1, *shape)
+        welch = density(flat, history.step, up_to, rate)
+        found[f"density/{what}"] = welch.density.reshape(-1, *shape)
+    spacing = 1 / (len(flat) * history.step)
+    count = levels.lines(centre, spacing)
+    return found | {
+        "third_octave/centre": centre,
+        "third_octave/nominal": levels.nominal(centre),
+        "third_octave/lines": count,
+        "third_octave/confidence": levels.confidence(levels.freedom(count)),
+        "third_octave/too_narrow": levels.too_narrow(spacing, up_to),
+        "density/frequency": welch.frequency,
+        "density/confidence": welch.confidence,
+        "density/segment": np.array(welch.segment),
+        "density/averages": np.array(welch.averages),
+    }
+
+
+def describe(record: Record, found: dict[str, np.ndarray]) -> None:
+    """The sums over all bands, vertical, and what the record is too short for."""
+    names = found["third_octave/nominal"]
+    if len(names):
+        band = f"{names[0]:g} to {names[-1]:g} Hz"
+        for name, what in (("contact_level", "contact force"), ("level", "force on the axle")):
+            for suffix, letter in (("", ""), (WEIGHTED, "(A)")):
+                level = found.get(f"third_octave/{name}{suffix}")
+                if level is not None:
+                    total = 10 * np.log10((10 ** (level[:, 2] / 10)).sum())
+                    record.headline[f"vertical {what}, {band}, dB{letter}"] = (
+                        float(total),
+                        f"dB{letter} re 1 N",
+                    )
+    narrow = levels.nominal(found["third_octave/too_narrow"])
+    if len(narrow):
+        text = f"{narrow[0]:g} to {narrow[-1]:g} Hz" if len(narrow) > 1 else f"{narrow[0]:g} Hz"
+        record.headline["bands left out, narrower than three lines"] = (text, "-")
+
+
+def write(file: h5py.File, found: dict[str, np.ndarray]) -> None:
+    """All there is."""
+    for name in UNITS:
+        if name in found:
+            put(file, name, found[name], UNITS[name])
+
+
+def read(file: h5py.File) -> dict[str, np.ndarray]:
+    """The same."""
+    return {name: file[name][()] for name in UNITS if name in file}
