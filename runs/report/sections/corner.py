@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.files.read import Results, Section
-from tireroad.runs.report import figures
+from tireroad.runs.report import figures, live
 from tireroad.runs.report.quantities import quantity
 
 _AXES = "xyz"
@@ -30,7 +30,9 @@ def wheel(results: Results, section: Section, time: NDArray) -> None:
     lines = {"wheel, z": moved[:, 2], "body, z": body}
     shown = {name: 1e3 * line for name, line in lines.items() if np.abs(line).max() > 0}
     if shown:
-        section.figures.append((_drawn(time, shown), "Wheel and body over the static state."))
+        drawn = live.chart(time, shown, ("time in s", "height in mm"), figures.COLOURS)
+        caption = "Wheel and body over the static state."
+        section.show(_drawn(time, shown), caption, live.charts(drawn))
 
 
 @figures.styled
