@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Any
 
 from tireroad.fem import form_cache
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -16,8 +17,8 @@ from tireroad.runs.process.statuses import DONE, handed_over, rank_before_mpi
 from tireroad.runs.process.surroundings import check_surroundings
 
 
-def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
-    """The main job. Collective over all processes."""
+def _together(function: Callable[[Any], None]) -> int:
+    """A command of all processes, `function(comm)`: its exit status. Collective over all processes."""
     status, message = mpi.judged(check_surroundings)
     if status != DONE:
         if rank_before_mpi() == 0:
@@ -29,7 +30,7 @@ def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
     observe.set_root(comm.rank == 0)
     _only_warnings()
     signals.stop_on_signals()
-    return mpi.guarded(comm, lambda: _run_inside(args, petsc_options, comm))
+    return mpi.guarded(comm, lambda: function(comm))
 
 
 def _only_warnings() -> None:
@@ -39,16 +40,16 @@ def _only_warnings() -> None:
     logging.getLogger().addHandler(handler)
 
 
+def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
+    """The main job. Collective over all processes."""
+    return _together(lambda comm: _run_inside(args, petsc_options, comm))
+
+
 def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
     from tireroad.runs.files.folder import check_kept_scene, claimed
     from tireroad.runs.scene.load import load
 
-    if args.processes not in (None, comm.size):
-        raise InputError(
-            f"-n {args.processes} but {comm.size} processes were started:"
-            f" use ./tireroad run … -n {args.processes},"
-            f" or mpirun -n {args.processes} python3 -m runs run …"
-        )
+    _check_processes(args, comm.size)
     if getattr(args, "resumed", False):
         check_kept_scene(args.out)
     scene = load(args.scene, args.set)
@@ -76,6 +77,24 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
         except (InputError, ConvergenceError) as error:
             observe.log(f"error: {error}")
             raise
+
+
+def _check_processes(args: argparse.Namespace, size: int) -> None:
+    if args.processes not in (None, size):
+        raise InputError(
+            f"-n {args.processes} but {size} processes were started:"
+            f" use ./tireroad {args.command} … -n {args.processes},"
+            f" or mpirun -n {args.processes} python3 -m runs {args.command} …"
+        )
+
+
+def _reproduce(args: argparse.Namespace, comm) -> None:
+    """Figures of the thesis. Collective."""
+    _check_processes(args, comm.size)
+    mpi.start_petsc([])
+    from tireroad.runs.thesis.command import reproduce
+
+    reproduce(args.names, args.out, comm)
 
 
 def _resumed(args: argparse.Namespace) -> argparse.Namespace:
@@ -193,4 +212,6 @@ def main(argv: list[str]) -> int:
         args = _resumed(args)
     if args.command == "run":
         return handed_over(_run(args, options))
+    if args.command == "reproduce":
+        return handed_over(_together(lambda comm: _reproduce(args, comm)))
     return _alone(lambda: ALONE[args.command](args))

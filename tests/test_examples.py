@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tireroad.fem.tire.law import MATERIALS
+from tireroad.runs.scene.sections.kind import SECTIONS
 
 SCENE = """
 [tire]
@@ -101,6 +102,15 @@ def test_own_material_stiffens() -> None:
     MATERIALS.forget("gent")  # the key reference lists what is registered
     assert neo_hookean == pytest.approx(559.3, rel=1e-3)
     assert gent == pytest.approx(569.7, rel=1e-3) and gent > 1.001 * neo_hookean
+
+
+def test_own_section() -> None:
+    import own_section
+
+    circle, ellipse = own_section.main()
+    SECTIONS.forget("ellipse")
+    assert circle == pytest.approx(575.9, rel=1e-3)
+    assert ellipse == pytest.approx(594.6, rel=1e-3)
 
 
 def test_read_results(launch, tmp_path: Path) -> None:

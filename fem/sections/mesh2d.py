@@ -83,6 +83,12 @@ class SectionMesh:
         nodes, cells = self.on_nodes(order, reference.equispaced(order))
         return replace(self, order=order, nodes=nodes, cells=cells)
 
+    def moved(self, place: Callable[[np.ndarray], np.ndarray]) -> SectionMesh:
+        """The same elements with every point (r, y) at place((r, y)), (k, 2) to (k, 2) m."""
+        exact = self.position
+        position = None if exact is None else lambda *at: place(exact(*at))
+        return replace(self, nodes=place(self.nodes), position=position)
+
     def side(self, edges: np.ndarray) -> np.ndarray:
         """Nodes (k, order + 1) of edges (k, 2), in ascending xi or eta."""
         cell, side = edges.T

@@ -221,7 +221,7 @@ def _meshes(found, on_fine, apart, coarse: Prepared, fine: Prepared) -> Table:
     """Fronts of the two meshes, each against its own reference, and how far those are apart."""
     rows = [_row(choice) for part in (found, on_fine) for choice in front(part)]
     sizes = [
-        f"{s.run.job.scene.tire.segments} x {s.run.job.scene.tire.elements_arc}"
+        f"{s.run.job.scene.tire.segments} x {s.run.job.scene.tire.proportions().along}"
         for s in (coarse, fine)
     ]
     unknowns = [3 * s.run.motions.lattice.size for s in (coarse, fine)]

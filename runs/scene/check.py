@@ -5,7 +5,6 @@ from typing import Any
 
 from tireroad.runs.scene.extent.demand import check_demand, duration
 from tireroad.runs.scene.extent.estimate import estimate
-from tireroad.runs.scene.extent.own_tire import described
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.rules.road import check_road
@@ -62,8 +61,8 @@ def explain(scene: Scene) -> str:
         lines.append(
             f"  {stage:10}" + (f"skipped: {reasons[stage]}" if stage in reasons else "runs")
         )
-    if scene.tire.section == "file":
-        lines += ["", *described(scene.tire)]
+    described = scene.tire.shape.described(scene.tire)
+    lines += ["", *described] if described else []
     return "\n".join([*lines, *_demand(scene)])
 
 

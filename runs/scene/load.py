@@ -16,8 +16,6 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.fem.keys import Key, described
 from tireroad.fem.parameters import ParameterError
-from tireroad.runs.scene.extent.own_tire import file_has_losses, with_own_section
-from tireroad.runs.scene.extent.tire_section import with_elements
 from tireroad.runs.scene.raw import override, read_text
 from tireroad.runs.scene.rules import scene as rules
 from tireroad.runs.scene.schema import (
@@ -53,16 +51,19 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     changed = frozenset(override(raw, item) for item in overrides)
     source = Source(path, text, changed)
     raw.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "-", path.stem).lstrip(".-") or "scene")
-    rules.refuse_later(raw, source)
+    if isinstance(tire := raw.get("tire"), dict) and "mesh" in tire:
+        tire.setdefault("section", "file")
     scene = _table(Scene, raw, (), source)
     if not NAME.fullmatch(scene.name):
         source.add(
             ("name",), f"must be letters, digits, '.', '_', '-', not {described(scene.name)}"
         )
-    scene = with_elements(filled(scene))
+    scene = filled(scene)
+    scene = replace(scene, tire=scene.tire.with_elements(scene.static.on_road))
     if "tire" not in source.broken():
-        scene = with_own_section(scene, source)
-    scene = _with_speed(_with_damping(scene))
+        scene.tire.shape.check(scene.tire, source)
+    if "tire" not in source.broken():
+        scene = _with_speed(_with_damping(scene))
     rules.check(scene, raw, source)
     source.refuse()
     return scene
@@ -73,16 +74,15 @@ def _with_speed(scene: Scene) -> Scene:
     rotation = scene.rotation
     if rotation is None or rotation.travel_speed is None:
         return scene
-    speed = rotation.travel_speed / (rotation.rolling_radius or scene.tire.outer_radius)
+    speed = rotation.travel_speed / (
+        rotation.rolling_radius or scene.tire.proportions().outer_radius
+    )
     return replace(scene, rotation=replace(rotation, speed=speed))
 
 
 def _with_damping(scene: Scene) -> Scene:
     """The default damping in proportion, where neither it nor the loss factor of a compound is given."""
-    tire = scene.tire
-    compounds = tire.loss_factor, *(part.loss_factor for part in tire.region)
-    # The compounds of the built-in tire all have one.
-    loses = tire.section == "radial" or any(compounds) or file_has_losses(tire)
+    loses = scene.tire.shape.has_losses(scene.tire)
     return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
 
 

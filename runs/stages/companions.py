@@ -119,12 +119,8 @@ def coarser_job(job: Job) -> Job:
     InputError where the mesh is too coarse to be halved.
     """
     tire, static = job.scene.tire, job.scene.static
-    around, along = tire.segments // 2, tire.elements_arc
-    if tire.section != "file":
-        along //= 2
-        if along < LEAST[1]:
-            raise InputError("the mesh is too coarse to be halved")
-    if around < LEAST[0]:
+    coarse = replace(tire, segments=tire.segments // 2, shape=tire.shape.coarser(tire))
+    if coarse.segments < LEAST[0] or coarse.proportions().along < LEAST[1]:
         raise InputError("the mesh is too coarse to be halved")
     rotation = job.scene.rotation
     if rotation is not None:  # as fast as the run's own wheel, whatever the travel speed
@@ -132,7 +128,7 @@ def coarser_job(job: Job) -> Job:
     scene = replace(
         job.scene,
         rotation=rotation,
-        tire=replace(tire, segments=around, elements_arc=along),
+        tire=coarse,
         static=replace(static, error_estimate=False),
     )
     return Job(scene, job.directory, job.comm)

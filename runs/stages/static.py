@@ -20,7 +20,6 @@ from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.scene.extent.own_tire import fingerprint
 from tireroad.runs.stages.build.turning import rolling_shape, turning_of
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
@@ -52,7 +51,7 @@ class StaticStage(Computed[StaticState]):
         scene = self.job.scene
         return {
             "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
-            "file": fingerprint(scene.tire),
+            "file": scene.tire.shape.fingerprint(scene.tire),
             "static": asdict(scene.static),
             "rolling": asdict(
                 steady_rolling(self.job, scene.rotation.speed if scene.rotation else None)

@@ -13,9 +13,9 @@ from torus_decks import CORDS, HALF_ANGLE, Torus, membranes, plain
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.cli import main
-from tireroad.runs.scene.extent.own_tire import fingerprint, own_section
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.sections.own_file import fingerprint, own_section
 
 TIRE = """
 [tire]
@@ -77,8 +77,21 @@ def test_resolved_scene_reads_back(folder):
     scene = load(folder / "own.toml")
     (folder / "again.toml").write_text(dumps(scene))
     assert load(folder / "again.toml") == scene
-    assert scene.tire.outer_radius == pytest.approx(0.32)
+    assert scene.tire.proportions().outer_radius == pytest.approx(0.32)
     assert "outer_radius" not in dumps(scene)
+
+
+def test_a_mesh_is_a_file(folder):
+    """The same tire and hash with mesh = "…" and no section as with section = "file" and file = "…"."""
+    text = (folder / "own.toml").read_text()
+    (folder / "mesh.toml").write_text(
+        text.replace('section = "file"', "").replace("file =", "mesh =")
+    )
+    one, other = load(folder / "own.toml").tire, load(folder / "mesh.toml").tire
+    assert other.section == "file" and fingerprint(one) == fingerprint(other)
+    (folder / "both.toml").write_text(text.replace("file =", 'mesh = "tire.inp"\nfile ='))
+    with pytest.raises(InputError, match="needs one of file"):
+        load(folder / "both.toml")
 
 
 def test_check_tells_what_is_used(folder, capsys):
@@ -121,7 +134,7 @@ def test_messages(folder, add, message):
 
 def test_materials_of_the_scene(folder):
     """[[tire.region]] by name replaces the file's compound, [[tire.cords]] by name its cords."""
-    from tireroad.runs.stages.build.own_tire import own_cords, own_materials
+    from tireroad.runs.scene.sections.own_file import own_cords, own_materials
 
     (folder / "own.toml").write_text(
         TIRE + '[[tire.region]]\nname = "wall"\ndynamic = 1.4\nloss_factor = 0.1\n'
@@ -149,7 +162,7 @@ def test_documented_example(folder):
     deck = deck.replace("RIMNODES", "RIMNOD").replace("OUTSIDE", "STREAD")
     (folder / "AXI.inp").write_text(deck)
     tire = load(folder / "half.toml").tire
-    assert (tire.outer_radius, tire.elements_arc) == (pytest.approx(0.32), 12)
+    assert (tire.proportions().outer_radius, tire.proportions().along) == (pytest.approx(0.32), 12)
     (compound,) = own_section(tire).rubbers
     assert compound.density == pytest.approx(1200)
     assert compound.coefficients["youngs_modulus"] == pytest.approx(2e6 * 2 * 1.49)

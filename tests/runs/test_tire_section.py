@@ -3,7 +3,6 @@
 import pytest
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.extent.tire_section import free_unknowns, make_section
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
 
@@ -28,7 +27,7 @@ def scene(tmp_path, text, *overrides):
 def test_elements_where_the_scene_leaves_them_open(tmp_path, given, expected):
     found = scene(tmp_path, "", *given)
     tire = found.tire
-    assert (tire.order, tire.segments, tire.elements_arc, tire.footprint_size) == expected
+    assert (tire.order, tire.segments, tire.shape.elements_arc, tire.footprint_size) == expected
     path = tmp_path / "again.toml"
     path.write_text(dumps(found))
     assert load(path).tire == tire
@@ -39,10 +38,10 @@ def test_elements_where_the_scene_leaves_them_open(tmp_path, given, expected):
 )
 def test_unknowns_are_those_of_the_section(tmp_path, given):
     tire = scene(tmp_path, "", *given).tire
-    ring = make_section(tire)
+    ring = tire.ring()
     held = len(set(ring.section.side(ring.section.rim).ravel()))
     nodes = len(ring.section.nodes) - held
-    assert free_unknowns(tire) == 3 * ring.segments * ring.order * nodes
+    assert tire.free_unknowns() == 3 * ring.segments * ring.order * nodes
 
 
 @pytest.mark.parametrize(
@@ -63,13 +62,12 @@ def test_a_radial_tire_says_what_it_does_not_take(tmp_path, text, message):
 def test_a_section_file_is_a_tire(tmp_path):
     """Compounds and cords by name, of the order asked for; the hash changes with the drawing."""
     from tireroad.fem.sections.ring import wall_thickness
-    from tireroad.runs.scene.extent.own_tire import fingerprint
-    from tireroad.runs.stages.build.own_tire import own_cords, own_materials
+    from tireroad.runs.scene.sections.own_file import fingerprint, own_cords, own_materials
 
     drawing = tmp_path / "section.toml"
     drawing.write_text(DRAWING)
     tire = scene(tmp_path, '[tire]\nsection = "file"\nfile = "section.toml"\norder = 3\n').tire
-    ring = make_section(tire)
+    ring = tire.ring()
     assert ring.order == 3
     assert wall_thickness(ring.section) == pytest.approx(0.009, rel=0.02)
     assert own_materials(tire)["rubber"].law.youngs_modulus == 5e6

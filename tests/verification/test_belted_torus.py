@@ -7,7 +7,6 @@ from mpi4py import MPI
 from tireroad.fem.matrices.operators import Operators
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.symmetry import Sites
-from tireroad.runs.scene.extent.tire_section import make_section
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.build.tire import make_body
 
@@ -42,7 +41,7 @@ def test_frequencies_of_the_belted_torus(tmp_path):
     path = tmp_path / "belted.toml"
     path.write_text(SCENE)
     tire = load(path, ["tire.segments=8", "tire.order=3"]).tire
-    body = make_body(MPI.COMM_WORLD, tire, make_section(tire))
+    body = make_body(MPI.COMM_WORLD, tire, tire.ring())
     operators = Operators(body, 0.0)
     sites = Sites(operators.unknowns.place, operators.unknowns.component)
     modes = undamped.solve(operators.stiffness, operators.mass, len(REFERENCE), sites=sites)

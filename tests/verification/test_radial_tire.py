@@ -11,7 +11,6 @@ from tireroad.fem.static.loading import Loader
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.symmetry import Sites
 from tireroad.runs.bench.series.inflated import InflatedRing, lowest
-from tireroad.runs.scene.extent.tire_section import make_section
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.build.tire import make_body
 
@@ -30,7 +29,7 @@ def test_three_dimensional_elements_against_fourier_series(tmp_path):
     path = tmp_path / "radial.toml"
     path.write_text('[tire]\nsection = "radial"\n')
     tire = load(path, ["tire.segments=8", "tire.elements_arc=14", "tire.order=2"]).tire
-    body = make_body(MPI.COMM_SELF, tire, make_section(tire))
+    body = make_body(MPI.COMM_SELF, tire, tire.ring())
     Loader(Equilibrium(body), lambda progress: None).inflate(PRESSURE)
     operators = Operators(body, PRESSURE)
     sites = Sites(operators.unknowns.place, operators.unknowns.component)

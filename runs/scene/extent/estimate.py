@@ -77,7 +77,7 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
     unknowns of second order, this gives 88 MB and 211 MB. A turning tire's has both triangles.
     """
     tire, free, count = scene.tire, size.free, size.modes
-    block = 3 * (tire.elements_thickness * tire.order + 1)
+    block = 3 * (tire.proportions().through * tire.order + 1)
     columns = max(free / block, 2.0)
     parts = {
         "program": PROGRAM,
@@ -120,7 +120,8 @@ def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
 
 def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
     """Bytes of files; a checkpoint is a copy of contact.h5 so far."""
-    face = size.free / (3 * (scene.tire.elements_thickness * scene.tire.order + 1)) * 3
+    through = scene.tire.proportions().through
+    face = size.free / (3 * (through * scene.tire.order + 1)) * 3
     parts = {"static.h5": 40.0 * size.free}
     if "modes" not in left_out:
         parts["modes.h5"] = 8.0 * size.modes * (face + 5 * size.modes)

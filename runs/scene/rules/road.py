@@ -55,6 +55,6 @@ def least_travel(scene: Scene) -> float:
     rotation, time = scene.rotation, scene.time
     if rotation is None or time is None:
         return 0.0
-    radius = rotation.rolling_radius or LEAST_RADIUS * scene.tire.outer_radius
+    radius = rotation.rolling_radius or LEAST_RADIUS * scene.tire.proportions().outer_radius
     travel = rotation.speed * radius * time.duration
     return travel if math.isfinite(travel) else 0.0

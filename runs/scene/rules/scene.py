@@ -4,10 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import described
-from tireroad.runs.scene.extent.tire_section import free_unknowns
+from tireroad.runs.scene.rules.full import full_matrices
 from tireroad.runs.scene.rules.output import check_campbell, check_receptance, check_vibration
-from tireroad.runs.scene.rules.tire import full_matrices, geometry
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.axle import check_axle
 from tireroad.runs.scene.tables.cavity import check_cavity
@@ -17,27 +15,6 @@ from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.tables.stiffness import check_stiffness
 
 Where = Callable[[tuple[str, ...], str], InputError]
-
-# Keys of the public interface that this version does not compute, with the values it does take and
-# what to write instead. A later version takes its lines out.
-LATER: dict[str, tuple[tuple[Any, ...], str]] = {
-    "tire.mesh": ((), 'is not supported: write section = "file" and file = "…"'),
-    "tire.section": (
-        ("torus", "radial", "file"),
-        'is not supported: "torus", "radial" and "file" are',
-    ),
-}
-
-
-def refuse_later(raw: dict[str, Any], source: Source) -> None:
-    """Note the values in `raw` that are of the interface but not of this version, and take them out."""
-    for dotted, (supported, message) in LATER.items():
-        table, key = dotted.split(".")
-        here = raw.get(table)
-        value = here.get(key) if isinstance(here, dict) else None
-        if value is not None and value not in supported:
-            source.add((table, key), f"= {described(value)}: {message}")
-            del here[key]
 
 
 def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
@@ -57,7 +34,7 @@ def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
 
 
 def _modes(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    free = free_unknowns(scene.tire)
+    free = scene.tire.free_unknowns()
     if scene.modal.up_to is None and scene.modal.count >= free:
         raise error(
             ("modal", "count"),
@@ -93,8 +70,7 @@ def _rotation(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     modal, static, rotation = scene.modal, scene.static, scene.rotation
-    road = (static.load, static.deflection, static.road_height) != (None, None, None)
-    if modal.road == "held" and not road:
+    if modal.road == "held" and not static.on_road:
         raise error(("modal", "road"), '= "held" needs a road: add load (N) to [static]')
     if scene.contact is not None and modal.road == "held":
         raise error(
@@ -145,10 +121,10 @@ def _force(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     for number, force in enumerate(scene.force):
         if not any(force.direction):
             raise error(("force", str(number), "direction"), "must not be all zeros")
-        if abs(force.arc) >= scene.tire.half_angle:
+        if abs(force.arc) >= scene.tire.proportions().half_angle:
             raise error(
                 ("force", str(number), "arc"),
-                f"= {force.arc:g} deg lies beyond the bead at {scene.tire.half_angle:g} deg",
+                f"= {force.arc:g} deg lies beyond the bead at {scene.tire.proportions().half_angle:g} deg",
             )
 
 
@@ -170,7 +146,7 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         raise error(("contact",), 'needs a road: add [road], e.g. kind = "flat"')
     if scene.time is None:
         raise error(("contact",), "needs a time to run: add [time] with duration")
-    if static.load is None and static.deflection is None and static.road_height is None:
+    if not static.on_road:
         raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
     contact = scene.contact
     standing = scene.rotation is None or scene.rotation.speed == 0
@@ -194,7 +170,6 @@ def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 
 RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
-    (("tire",), geometry),
     (("static",), _static),
     (("tire", "modal"), _modes),
     (("rotation",), _rotation),

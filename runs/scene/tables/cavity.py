@@ -42,7 +42,7 @@ class Cavity:
 def filled(scene: Scene) -> Scene:
     """The scene with the air that every tire has but the thesis's torus, unless its table says so."""
     tire = scene.tire
-    if tire.section == "torus" or tire.cavity is not None:
+    if not tire.shape.air or tire.cavity is not None:
         return scene
     return replace(scene, tire=replace(tire, cavity=Cavity()))
 

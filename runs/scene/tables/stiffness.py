@@ -69,7 +69,7 @@ def check_stiffness(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     wanted, static = scene.stiffness, scene.static
     if wanted is None or wanted.deflections or wanted.up_to:
         return
-    if (static.load, static.deflection, static.road_height) == (None, None, None):
+    if not static.on_road:
         raise error(
             ("stiffness", "up_to"),
             "is needed where the scene has no road: give it (m), or load (N) in [static]",

@@ -1,8 +1,10 @@
 """The table of the tire, key by key, with units, ranges and defaults (contract: Scene)."""
 
-from dataclasses import dataclass
+from __future__ import annotations
 
-from tireroad.fem.parameters import filename, flag, texts
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
 from tireroad.fem.tire.law import MATERIALS, MaterialLaw
 from tireroad.runs.scene.schema import (
     Variants,
@@ -16,10 +18,14 @@ from tireroad.runs.scene.schema import (
     variant,
     vector,
 )
+from tireroad.runs.scene.sections.kind import SECTIONS, Proportions, SectionKind
 from tireroad.runs.scene.tables.cavity import Cavity
 
-TORUS, FILE = ("section", ("torus",)), ("section", ("file",))
-RADIAL, MESHED = ("section", ("radial",)), ("section", ("torus", "radial"))
+if TYPE_CHECKING:
+    from tireroad.fem.sections.ring import Ring
+
+
+NEAR_ROAD = 0.2  # footprint_size with a road
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,62 +110,21 @@ class Cords:
     )
 
 
-# The mesh's defaults: largest error of the 28 lowest frequencies of the torus without loads, E = 480 MPa, against
-# Fourier series around (bench.series.harmonics): 30 x 14 of order 3, 44,280 unknowns, 0.16 %; 24 x 12, 30,240: 0.22 %;
-# 100 x 16 of order 2, 55,800: 1.4 to 1.75 %, as much processor time as 24 x 14 of order 3. Load at z = -0.31 m, soft
-# torus, footprint_size 0.2 on 30 x 14: 2001.6 N, where 2000 N is known to 0.15 %.
-@dataclass(frozen=True)
-class Tire:
-    section: str = choice("torus", ("torus", "radial", "file"), "shape of the section")
-    size: str = text(
-        "205/60 R15", "size of the built-in passenger tire (docs/radial-tire.md)", only_for=RADIAL
-    )
-    outer_radius: float = number(
-        0.32, "m", "outer radius, from the axle to the crown", least=0.01, most=10, only_for=TORUS
-    )
-    minor_radius: float = number(
-        0.10,
-        "m",
-        "radius of the section circle, to its outer face",
-        least=1e-3,
-        most=10,
-        only_for=TORUS,
-    )
-    thickness: float = number(
-        0.012, "m", "thickness of the wall", least=1e-4, most=5, only_for=TORUS
-    )
-    half_angle: float = number(
-        120.0,
-        "deg",
-        "angle of the section from the crown to each bead",
-        least=10,
-        most=175,
-        only_for=TORUS,
-    )
+@dataclass(frozen=True, kw_only=True)
+class Tire(Variants):
+    section: str = registered(SECTIONS, "torus", "shape of the section")
+    shape: SectionKind = variant("section", SECTIONS)
     segments: int | None = integer(
         None,
-        "number of elements around the axle; absent: 30 of order 3, 60 for a section from a file",
+        "number of elements around the axle; absent: 30, of order 2 in a torus 100, for a section from a file 60",
         least=8,
         most=4000,
-    )
-    elements_arc: int | None = integer(
-        None,
-        "number of elements from bead to bead; absent: 14 of order 3, 26 for a radial tire",
-        least=2,
-        most=1000,
-        only_for=MESHED,
-    )
-    elements_thickness: int = integer(
-        1, "number of elements through the wall", least=1, most=20, only_for=TORUS
     )
     order: int | None = integer(
         None,
         "polynomial order of the elements; absent: 3, or 2 where their number is given, and for a radial tire or a file",
         least=1,
         most=3,
-    )
-    grading: str = choice(
-        "bead", ("bead", "uniform"), "grading of the elements along the section", only_for=TORUS
     )
     footprint_size: float | None = number(
         None,
@@ -174,27 +139,25 @@ class Tire:
     region: tuple[Region, ...] = tables(
         Region, "a part of the section that is made of another material"
     )
-    file: str | None = filename(
-        "Abaqus deck (.inp), Gmsh mesh (.msh) or section file (.toml, docs/section-file.md)",
-        only_for=FILE,
-    )
-    inner: str | None = text(
-        None, "surface or node set that carries the inflation pressure", only_for=FILE
-    )
-    tread: str | None = text(None, "surface or node set that can touch the road", only_for=FILE)
-    rim: tuple[str, ...] = texts("surfaces or node sets that are fixed to the wheel", only_for=FILE)
-    length_unit: str = choice(
-        "m",
-        ("m", "mm", "in"),
-        "length unit of the file; mm implies N, MPa and tonnes, in implies lbf and psi",
-        only_for=FILE,
-    )
-    mirror: bool = flag(
-        False,
-        "true: the file holds half the section, which ends on z = 0, and is mirrored",
-        only_for=FILE,
-    )
     cords: tuple[Cords, ...] = tables(Cords, "a line of cords in the wall: a ply or a belt")
     cavity: Cavity | None = table(
         Cavity, "the air inside; absent: none in a torus, else this table's defaults", optional=True
     )
+
+    def with_elements(self, on_road: bool) -> Tire:
+        """With its elements chosen where the scene leaves them open; smaller at the footprint on a road."""
+        shape, order, segments = self.shape.elements(self)
+        near = self.footprint_size or (NEAR_ROAD if on_road else 1.0)
+        return replace(self, shape=shape, order=order, segments=segments, footprint_size=near)
+
+    def proportions(self) -> Proportions:
+        """Sizes of the section."""
+        return self.shape.proportions(self)
+
+    def ring(self) -> Ring:
+        """The section's elements, revolved."""
+        return self.shape.ring(self)
+
+    def free_unknowns(self) -> int:
+        """Displacement unknowns of the mesh without those held by the rim."""
+        return self.shape.free_unknowns(self)

@@ -1,0 +1,21 @@
+"""What is solved on the full matrices needs a damping that they have."""
+
+from collections.abc import Callable
+from typing import Any
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.scene.tables.scene import Scene
+
+Where = Callable[[tuple[str, ...], str], InputError]
+
+
+def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """What is solved on the full matrices needs a damping that they have."""
+    if scene.damping is not None:
+        return
+    advice = "needs full matrices of damping, and loss factors make none: add [damping]"
+    if scene.rotation is not None and scene.rotation.method == "full":
+        raise error(("rotation", "method"), f'= "full" {advice}')
+    receptance = scene.output.receptance
+    if receptance is not None and receptance.direct:
+        raise error(("output", "receptance", "direct"), f"= {receptance.direct} {advice}")

@@ -1,0 +1,112 @@
+"""What a kind of section is: its own keys, and the ring of elements, compounds and cords that follow.
+
+A new kind is one file in runs.scene.sections.kinds, or a class in a user's own script. The scene's keys,
+`check`, the key reference and the range tests follow from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Self
+
+from tireroad.fem.parameters import Parameters
+from tireroad.fem.registry import Registry
+from tireroad.runs.scene.source import Source
+
+if TYPE_CHECKING:
+    from tireroad.fem.sections.ring import Ring
+    from tireroad.fem.tire.cords import Cords
+    from tireroad.fem.tire.material import Material
+    from tireroad.runs.scene.tables.tire import Tire
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proportions:
+    """Sizes of a section, for estimates and for checks against other keys.
+
+    `outer_radius` m at the crown, `height` m from the crown to the beads' side of the section (of a torus
+    the radius of its section), `thickness` m of the wall at the crown, `half_angle` deg from the crown to
+    a bead; elements `along` the section from bead to bead and `through` the wall.
+    """
+
+    outer_radius: float
+    height: float
+    thickness: float
+    half_angle: float
+    along: int
+    through: int
+
+
+class SectionKind(Parameters):
+    """Base of the kinds of section. Methods take the scene's [tire], of which the kind is a part.
+
+    `order` and `segments`: polynomial order and elements around where the scene leaves them open. `air`:
+    whether the tire holds air that takes part, unless [tire.cavity] says otherwise.
+    """
+
+    owner = "section"
+    order: ClassVar[int] = 2
+    segments: ClassVar[int] = 60
+    air: ClassVar[bool] = True
+
+    def elements(self, tire: Tire) -> tuple[Self, int, int]:
+        """The kind with its number of elements chosen, and order and segments of the scene or by default."""
+        return self, tire.order or self.order, tire.segments or self.segments
+
+    def check(self, tire: Tire, source: Source) -> None:
+        """Note in `source` what in [tire] cannot be."""
+
+    def proportions(self, tire: Tire) -> Proportions:
+        """Sizes of the section."""
+        raise NotImplementedError
+
+    def ring(self, tire: Tire) -> Ring:
+        """The section's elements, revolved."""
+        raise NotImplementedError
+
+    def rubbers(self, tire: Tire) -> dict[str, Material]:
+        """The compound of each region of the ring's section, by name."""
+        raise NotImplementedError
+
+    def cords(self, tire: Tire) -> list[Cords]:
+        """The cords on the plies of the ring's section."""
+        raise NotImplementedError
+
+    def angles(self, tire: Tire) -> dict[str, float]:
+        """Angle to the circumference (deg) of each line of cords, for drawings."""
+        return {line.name: line.angle for line in tire.cords}
+
+    def rubber(self, tire: Tire) -> tuple[float, float, float]:
+        """Dynamic Young's modulus (Pa), Poisson's ratio and density (kg/m³) of the wall, for estimates."""
+        law = tire.material.law
+        return tire.dynamic * law.youngs, law.poisson, tire.material.density
+
+    def free_unknowns(self, tire: Tire) -> int:
+        """Displacement unknowns of the mesh without those held by the rim."""
+        import numpy as np
+
+        section = self.ring(tire).section
+        held = len(np.unique(section.side(section.rim)))
+        return 3 * tire.segments * tire.order * (len(section.nodes) - held)
+
+    def coarser(self, tire: Tire) -> Self:
+        """The kind with half the elements along the section, however few."""
+        raise NotImplementedError
+
+    def has_losses(self, tire: Tire) -> bool:
+        """Whether a compound has a loss factor."""
+        return any((tire.loss_factor, *(part.loss_factor for part in tire.region)))
+
+    def fingerprint(self, tire: Tire) -> str | None:
+        """A hash of what a run takes from files that the section is read from; None without one."""
+        return None
+
+    def described(self, tire: Tire) -> list[str]:
+        """Lines for `check`: what of a file is used and what is not."""
+        return []
+
+
+SECTIONS: Registry[SectionKind] = Registry(
+    "section", "tireroad.runs.scene.sections.kinds", SectionKind
+)
+section_kind = SECTIONS.register

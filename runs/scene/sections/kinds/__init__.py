@@ -1,0 +1,1 @@
+"""One file for each kind of section: its keys, its elements, its compounds and cords."""

@@ -1,0 +1,120 @@
+"""`section = "file"`: a tire from an Abaqus deck, a Gmsh mesh or a section file (docs/how-to/own-tire.md)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import choice, filename, flag, text, texts
+from tireroad.fem.sections.ring import Ring, section_angles, wall_thickness
+from tireroad.fem.sections.torus import LEAST, ring_corners
+from tireroad.runs.scene.sections import own_file
+from tireroad.runs.scene.sections.kind import Proportions, SectionKind, section_kind
+from tireroad.runs.scene.source import Source
+
+if TYPE_CHECKING:
+    from tireroad.fem.sections.mesh2d import SectionMesh
+    from tireroad.fem.tire.cords import Cords
+    from tireroad.fem.tire.material import Material
+    from tireroad.runs.scene.tables.tire import Tire
+
+
+@section_kind("file", "a section read from a file")
+class FileSection(SectionKind):
+    """Elements along and through the section are the file's."""
+
+    file: str | None = filename(
+        "Abaqus deck (.inp), Gmsh mesh (.msh) or section file (.toml, docs/section-file.md)"
+    )
+    mesh: str | None = filename('the same as file; section = "file" need not be said then')
+    inner: str | None = text(None, "surface or node set that carries the inflation pressure")
+    tread: str | None = text(None, "surface or node set that can touch the road")
+    rim: tuple[str, ...] = texts("surfaces or node sets that are fixed to the wheel")
+    length_unit: str = choice(
+        "m",
+        ("m", "mm", "in"),
+        "length unit of the file; mm implies N, MPa and tonnes, in implies lbf and psi",
+    )
+    mirror: bool = flag(
+        False, "true: the file holds half the section, which ends on z = 0, and is mirrored"
+    )
+
+    @property
+    def name(self) -> Path:
+        """The file."""
+        return Path(self.file or self.mesh or "")
+
+    def check(self, tire: Tire, source: Source) -> None:
+        if (self.file is None) == (self.mesh is None):
+            source.add(("tire",), 'with section = "file" needs one of file = "…" and mesh = "…"')
+            return
+        try:
+            own = own_file.own_section(tire)
+            own_file.check_regions(tire, own)
+            own_file.check_cords(tire, own)
+        except InputError as error:
+            source.add_as_is(("tire", "file"), str(error))
+
+    def proportions(self, tire: Tire) -> Proportions:
+        ring, mesh = self.ring(tire), own_file.own_section(tire).mesh
+        return Proportions(
+            outer_radius=float(mesh.nodes[:, 0].max()),
+            height=ring.height / 2,
+            thickness=ring.thickness,
+            half_angle=float(np.degrees(np.abs(ring.arc_corners).max())),
+            along=len(mesh.outer),
+            through=max(1, round(len(mesh.cells) / len(mesh.outer))),
+        )
+
+    def ring(self, tire: Tire) -> Ring:
+        mesh = own_file.own_section(tire).mesh.of_order(tire.order)
+        return _revolved(mesh, tire.segments, tire.footprint_size)
+
+    def rubbers(self, tire: Tire) -> dict[str, Material]:
+        return own_file.own_materials(tire)
+
+    def rubber(self, tire: Tire) -> tuple[float, float, float]:
+        """Of the softest compound, in which the wall bends most."""
+        soft = min(self.rubbers(tire).values(), key=lambda one: one.dynamic * one.law.youngs)
+        return soft.dynamic * soft.law.youngs, soft.law.poisson, soft.density
+
+    def cords(self, tire: Tire) -> list[Cords]:
+        return own_file.own_cords(tire)
+
+    def angles(self, tire: Tire) -> dict[str, float]:
+        own = own_file.own_section(tire).plies
+        return {ply.name: float(np.degrees(ply.angle)) for ply in own} | super().angles(tire)
+
+    def coarser(self, tire: Tire) -> FileSection:
+        """The file's elements: there are no others."""
+        return self
+
+    def has_losses(self, tire: Tire) -> bool:
+        rubbers = own_file.own_section(tire).rubbers
+        return super().has_losses(tire) or any(one and one.loss_factor for one in rubbers)
+
+    def fingerprint(self, tire: Tire) -> str:
+        return own_file.fingerprint(tire)
+
+    def described(self, tire: Tire) -> list[str]:
+        return own_file.described(tire)
+
+
+def _revolved(mesh: SectionMesh, segments: int, footprint_size: float) -> Ring:
+    """The section as a ring; half as many elements around make its coarser companion."""
+
+    def coarser() -> Ring | None:
+        half = segments // 2
+        return _revolved(mesh, half, footprint_size) if half >= LEAST[0] else None
+
+    return Ring(
+        section=mesh,
+        ring_corners=ring_corners(segments, footprint_size),
+        arc_corners=section_angles(mesh),
+        thickness=wall_thickness(mesh),
+        height=float(np.ptp(mesh.nodes[:, 0])),
+        coarser=coarser,
+    )

@@ -1,0 +1,175 @@
+"""A tire's section from a file: read once, its regions and cords matched with the scene's."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from tireroad.fem.errors import InputError
+
+if TYPE_CHECKING:
+    from tireroad.fem.decks.compounds import Rubber
+    from tireroad.fem.decks.own import OwnSection, Wishes
+    from tireroad.fem.tire.cords import Cords
+    from tireroad.fem.tire.material import Material
+    from tireroad.runs.scene.sections.kinds.file import FileSection
+    from tireroad.runs.scene.tables.tire import Region, Tire
+
+
+def _keys(tire: Tire) -> FileSection:
+    return cast("FileSection", tire.shape)
+
+
+def own_section(tire: Tire) -> OwnSection:
+    """The section of the tire's file. InputError, with file and line, for what is wrong in it."""
+    from tireroad.fem.decks.own import Wishes
+
+    keys = _keys(tire)
+    path = keys.name
+    wishes = Wishes(
+        inner=keys.inner,
+        tread=keys.tread,
+        rim=keys.rim,
+        length_unit=keys.length_unit,
+        mirror=keys.mirror,
+        materials=frozenset(r.name for r in tire.region if r.name and r.material is not None),
+    )
+    try:
+        stamp = path.stat().st_mtime_ns
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from None
+    return _read(path, stamp, wishes)
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, _: int, wishes: Wishes) -> OwnSection:
+    from tireroad.fem.decks.own import read
+
+    return read(path, wishes)
+
+
+def fingerprint(tire: Tire) -> str:
+    """A hash of all that the run takes from the tire's file."""
+    own = own_section(tire)
+    mesh = own.mesh
+    faces = (mesh.outer, mesh.tread, mesh.inner, mesh.rim, *mesh.plies.values())
+    found = hashlib.sha256()
+    for array in (mesh.nodes, mesh.cells, mesh.region, *faces):
+        found.update(np.ascontiguousarray(array).tobytes())
+    plies = [{k: v for k, v in vars(ply).items() if k != "sides"} for ply in own.plies]
+    found.update(repr((mesh.regions, own.rubbers, plies)).encode())
+    return found.hexdigest()
+
+
+def region_of(tire: Tire, name: str) -> Region | None:
+    """The scene's [[tire.region]] of a region of the file."""
+    return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)
+
+
+def check_regions(tire: Tire, own: OwnSection) -> None:
+    """That every [[tire.region]] names one of the file."""
+    known = {name.upper() for name in own.mesh.regions}
+    for number, region in enumerate(tire.region):
+        if region.name is None or region.name.upper() not in known:
+            shown = "has no name" if region.name is None else f'name = "{region.name}" is none'
+            raise InputError(
+                f"tire.region.{number} {shown} of the file's regions: {', '.join(own.mesh.regions)}"
+            )
+
+
+def check_cords(tire: Tire, own: OwnSection) -> None:
+    """That every [[tire.cords]] names a line of the file, and every line without data has cords."""
+    for number, cords in enumerate(tire.cords):
+        if cords.name not in own.mesh.plies:
+            known = ", ".join(own.mesh.plies) or "none"
+            raise InputError(
+                f'tire.cords.{number} name = "{cords.name}" is no line of the file: {known}'
+            )
+
+
+def own_materials(tire: Tire) -> dict[str, Material]:
+    """The compound of each region by name: of [[tire.region]], else of the file, else [tire.material]."""
+    own = own_section(tire)
+    return {
+        name: _material(tire, name, rubber)
+        for name, rubber in zip(own.mesh.regions, own.rubbers, strict=True)
+    }
+
+
+def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
+    """The material of one region.
+
+    A [[tire.region]] of it gives its dynamic modulus and loss factor where they are not 1 and 0.
+    """
+    from tireroad.fem.tire.material import Material, compound
+
+    region = region_of(tire, name)
+    change = {"dynamic": tire.dynamic, "loss_factor": tire.loss_factor}
+    if rubber is not None:
+        change = {"dynamic": rubber.dynamic, "loss_factor": rubber.loss_factor}
+    if region is not None:
+        change |= {"dynamic": region.dynamic} if region.dynamic != 1 else {}
+        change |= {"loss_factor": region.loss_factor} if region.loss_factor else {}
+    if region is not None and region.material is not None:
+        return Material(region.material.law, region.material.density, **change)
+    if rubber is None:
+        return Material(tire.material.law, tire.material.density, **change)
+    density = tire.material.density if rubber.density is None else rubber.density
+    return compound(rubber.model, density, **rubber.coefficients, **change)
+
+
+def own_cords(tire: Tire) -> list[Cords]:
+    """The cords on the lines of the file: of [[tire.cords]] by name, else of the file."""
+    from tireroad.fem.tire.cords import Cords
+
+    given = {cords.name: cords for cords in tire.cords}
+    found = [
+        Cords(**{key: value for key, value in vars(ply).items() if key != "sides"})
+        for ply in own_section(tire).plies
+        if ply.name not in given
+    ]
+    for cords in given.values():
+        values = {k: v for k, v in vars(cords).items() if k not in ("depth", "arc", "angle")}
+        found.append(Cords(angle=float(np.radians(cords.angle)), **values))
+    return found
+
+
+def described(tire: Tire) -> list[str]:
+    """What of the tire's file is used and what is not, for `check`."""
+    own = own_section(tire)
+    mesh = own.mesh
+    lines = [f"tire from {_keys(tire).name.name}", *(f"  {line}" for line in own.used)]
+    for name, rubber in zip(mesh.regions, own.rubbers, strict=True):
+        lines.append(f"  region {name}: {_in_words(tire, name, rubber)}")
+    lines += [
+        f"  cords {ply.name}: {np.degrees(ply.angle):+.4g} deg, E {ply.youngs_modulus:.4g} Pa, area "
+        f"{ply.area:.4g} m², spacing {ply.spacing:.4g} m, {len(ply.sides)} sides"
+        for ply in own.plies
+    ]
+    lines += [f"  {note}" for note in own.notes]
+    with_data = {ply.name for ply in own.plies} | {cords.name for cords in tire.cords}
+    lines += [
+        f'  line {name}: no cords on it ([[tire.cords]] name = "{name}" lays some)'
+        for name in mesh.plies
+        if name not in with_data
+    ]
+    return lines + ["not used of the file", *(f"  {line}" for line in own.unused or ("nothing",))]
+
+
+def _in_words(tire: Tire, name: str, rubber: Rubber | None) -> str:
+    region = region_of(tire, name)
+    if region is not None and region.material is not None:
+        return "material of the scene's [[tire.region]]"
+    if rubber is None:
+        return "no material in the file: that of [tire.material]"
+    values = ", ".join(f"{key} {value:.4g}" for key, value in rubber.coefficients.items())
+    density = (
+        f"density {rubber.density:.4g} kg/m³"
+        if rubber.density is not None
+        else "no density in the file: that of [tire.material]"
+    )
+    return f"{rubber.name}, {rubber.model}, {values}; {density}"

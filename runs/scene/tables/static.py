@@ -1,0 +1,38 @@
+"""The table of the static state: inflation, and the road by load, deflection or height."""
+
+from dataclasses import dataclass
+
+from tireroad.runs.scene.schema import flag, number
+
+
+@dataclass(frozen=True)
+class Static:
+    inflation: float = number(
+        2.0e5, "Pa", "inflation pressure on the inner face", least=0, most=1e8
+    )
+    load: float | None = number(
+        None, "N", "vertical load of the tire on the road", least=1e-3, most=1e8
+    )
+    deflection: float | None = number(
+        None,
+        "m",
+        "deflection from the first touch of the inflated tire, instead of load",
+        least=1e-6,
+        most=10,
+    )
+    road_height: float | None = number(
+        None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, most=-1e-3
+    )
+    steady_rolling: bool = flag(
+        True,
+        "include the inertia and material damping of the rolling shape; false: the state at rest",
+    )
+    error_estimate: bool = flag(
+        True,
+        "estimate of the load's discretisation error, by finer elements at the footprint and another order of all",
+    )
+
+    @property
+    def on_road(self) -> bool:
+        """Whether there is a road."""
+        return (self.load, self.deflection, self.road_height) != (None, None, None)

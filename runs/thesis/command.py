@@ -1,0 +1,78 @@
+"""The command `reproduce`: the thesis's figures and tables, with what agrees and what does not."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from mpi4py import MPI
+
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.thesis import figures, output
+from tireroad.runs.thesis.figure import FIGURES, Figure, chosen
+from tireroad.runs.thesis.runner import Scenes, sharing
+
+
+def known() -> dict[str, Figure]:
+    """All figures by name, figures before tables, in the thesis's order."""
+    for found in pkgutil.iter_modules(figures.__path__):
+        importlib.import_module(f"{figures.__name__}.{found.name}")
+    return {name: FIGURES[name] for name in sorted(FIGURES, key=_place)}
+
+
+def _place(name: str) -> tuple[str, str, int]:
+    kind, _, number = name.partition("-")
+    chapter, _, place = number.partition(".")
+    return kind, chapter, int(place)
+
+
+def reproduce(names: Sequence[str], directory: Path, comm: MPI.Comm) -> None:
+    """Compute the named figures (all by default) into the directory. Collective.
+
+    InputError for an unknown name or a folder that cannot be made; ConvergenceError, after all the others, when
+    a figure could not be computed.
+    """
+    wanted = chosen(names, known())
+    on_root(comm, lambda: _made(directory))
+    scenes, entries, began = Scenes(directory, comm), [], time.perf_counter()
+    with sharing(directory / "cache"):
+        for one in wanted:
+            entries.append(_entry(one, scenes))
+            page = on_root(
+                comm,
+                lambda: output.write(entries, directory, time.perf_counter() - began, comm.size),
+            )
+            observe.say(f"{one.name:12s} {entries[-1].verdict:20s} {entries[-1].seconds:7.1f} s")
+    observe.say(
+        f"{page} and reproduce.json, reproduce.csv beside it: {time.perf_counter() - began:.1f} s"
+    )
+    failed = [f"{entry.figure.name}: {entry.failed}" for entry in entries if entry.failed]
+    if failed:
+        raise ConvergenceError(
+            f"reproduce: {len(failed)} of {len(entries)} gave up: {'; '.join(failed)}"
+        )
+
+
+def _made(directory: Path) -> None:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{directory}: cannot be made ({error.strerror}): choose another --out"
+        ) from None
+
+
+def _entry(one: Figure, scenes: Scenes) -> output.Entry:
+    """A figure computed and drawn, or how it failed. Collective."""
+    began = time.perf_counter()
+    try:
+        found = one.compute(scenes)
+    except ConvergenceError as error:
+        return output.Entry(one, time.perf_counter() - began, failed=str(error))
+    picture = on_root(scenes.comm, found.picture) if found.picture else ""
+    return output.Entry(one, time.perf_counter() - began, found, picture)

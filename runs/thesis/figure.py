@@ -1,0 +1,64 @@
+"""A figure or table of the thesis: its name, what it shows, and the function that computes it anew."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.thesis.claim import Claim, verdict
+from tireroad.runs.thesis.runner import Scenes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduced:
+    """What this program shows: a line, the `claims`, a `picture` (draws a data URI; root process) and its
+    caption."""
+
+    shows: str
+    claims: tuple[Claim, ...]
+    picture: Callable[[], str] | None = None
+    caption: str = ""
+
+    @property
+    def verdict(self) -> str:
+        """Of all claims together."""
+        return verdict(self.claims)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure:
+    """`name` on the command line, `title`, what the `thesis` shows in a line, and `compute` (collective)."""
+
+    name: str
+    title: str
+    thesis: str
+    compute: Callable[[Scenes], Reproduced]
+
+
+FIGURES: dict[str, Figure] = {}
+
+
+def figure(name: str, title: str, thesis: str) -> Callable:
+    """Decorator: a function of the scenes that computes the named figure; collective."""
+
+    def add(compute: Callable[[Scenes], Reproduced]) -> Callable[[Scenes], Reproduced]:
+        FIGURES[name] = Figure(name=name, title=title, thesis=thesis, compute=compute)
+        return compute
+
+    return add
+
+
+def chosen(names: Sequence[str], known: dict[str, Figure]) -> list[Figure]:
+    """The figures of these names, each once, in the thesis's order; all of them without names.
+
+    InputError for a name that is not known, with the nearest one.
+    """
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1, 0.0)
+            raise InputError(
+                f"reproduce: there is no {name!r}: did you mean {near[0]}? There are {', '.join(known)}"
+            )
+    return [one for name, one in known.items() if name in names or not names]

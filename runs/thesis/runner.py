@@ -1,0 +1,65 @@
+"""The scenes of the thesis, run into one folder: stages of the same inputs are computed once."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from mpi4py import MPI
+
+from tireroad.runs.files.cache import VARIABLE
+from tireroad.runs.files.folder import claimed
+from tireroad.runs.process import mpi, observe
+from tireroad.runs.scene.load import load
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages.pipeline import Finished, run_scene
+
+FOLDER = Path(__file__).parent / "scenes"
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """Runs scenes of `runs/thesis/scenes` into `directory`/runs on the processes of `comm`."""
+
+    directory: Path
+    comm: MPI.Comm
+
+    def load(self, name: str, *settings: str) -> Scene:
+        """The scene of a name with settings ("a.b=value") laid over it. Not collective."""
+        return load(FOLDER / f"{name}.toml", settings)
+
+    def run(self, name: str, *settings: str, until: str) -> Finished:
+        """Its stages up to `until`; what they left in memory. Collective."""
+        scene = self.load(name, *settings)
+        folder = (
+            self.directory / "runs" / re.sub(r"[^A-Za-z0-9._-]+", "-", "_".join([name, *settings]))
+        )
+        with ExitStack() as stack:
+            mpi.on_root(
+                self.comm, lambda: stack.enter_context(claimed(folder, scene.name)) and None
+            )
+            stack.enter_context(observe.quiet())
+            return run_scene(scene, folder, self.comm, until=until, fresh=False, petsc_options=[])
+
+
+def kept(run: Finished, stage: str, pick: Callable[[Any], T]) -> T:
+    """What `pick(file)` returns of a stage's file, on every process. Collective."""
+    return run.job.read(run.job.path(stage), pick)
+
+
+@contextmanager
+def sharing(folder: Path) -> Iterator[None]:
+    """While inside, runs share their stages through `folder`, or through the user's own cache."""
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = before or str(folder)
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[VARIABLE]
