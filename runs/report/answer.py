@@ -45,7 +45,7 @@ Given = Callable[[str, str], float | None]
 def _standing(results: Results, given: Given) -> list[Fact]:
     """Load, deflection, footprint."""
     load, sunk, length, width = (
-        results.attribute("static.h5", name)
+        float(results.attribute("static.h5", name) or 0.0)
         for name in ("load", "deflection", "footprint_length", "footprint_width")
     )
     found: list[Fact] = []

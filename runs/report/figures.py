@@ -53,7 +53,9 @@ def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more:
     return figure, figure.subplots(rows, columns, squeeze=False, **more)
 
 
-def plain(width: float, height: float, rows: int = 1, below: float = 0.42, **more: object) -> tuple:
+def line_canvas(
+    width: float, height: float, rows: int = 1, below: float = 0.42, **more: object
+) -> tuple:
     """The same for one column of line charts, with margins known beforehand: in half the time. `below` inches for
     the labels of the lowest axis."""
     figure = Figure(figsize=(width, height))
@@ -113,7 +115,7 @@ def peak_hold(frequency: NDArray, level: NDArray, bins: int = DRAWN) -> tuple[ND
 def forces(time: NDArray, contact: NDArray, axle: NDArray | None, active: NDArray | None) -> str:
     """Contact and axle force (nt, 3) N over time (nt) s, and the number of points in contact."""
     rows = 3 + (active is not None)
-    figure, axes = plain(9.5, 1.45 * rows + 0.4, rows, sharex=True)
+    figure, axes = line_canvas(9.5, 1.45 * rows + 0.4, rows, sharex=True)
     for row, name in enumerate(COMPONENTS):
         here: Axes = axes[row, 0]
         here.plot(*envelope(time, contact[:, row]), color=COLOURS[0], label="contact", lw=0.8)
@@ -133,7 +135,7 @@ def forces(time: NDArray, contact: NDArray, axle: NDArray | None, active: NDArra
 @styled
 def spectrum(frequency: NDArray, axle: NDArray, of: str = "axle force") -> str:
     """Amplitude spectrum (nf, 3) N of a force, named `of`, over frequency (nf) Hz."""
-    figure, axes = plain(9.5, 3.4)
+    figure, axes = line_canvas(9.5, 3.4)
     here, kept = axes[0, 0], frequency > 0
     levels = decibels(axle[kept])
     for column, name in enumerate(COMPONENTS):
@@ -151,7 +153,7 @@ def third_octaves(
 ) -> str:
     """Third-octave levels (nb, 3) dB as bars over band centres (nb) Hz, with their errors (nb, 3) dB; pale where
     a band holds `few` (nb) lines."""
-    figure, axes = plain(9.5, 3.2, below=0.62)
+    figure, axes = line_canvas(9.5, 3.2, below=0.62)
     here, place = axes[0, 0], np.arange(len(centre))
     finite = np.where(level > SILENT, level, -np.inf)
     top = finite.max(initial=0.0)
@@ -180,7 +182,7 @@ def lines(
     x: NDArray, curves: Mapping[str, NDArray], labels: tuple[str, str], colours: Sequence[str]
 ) -> str:
     """Named curves (n,) dB over frequency x (n,) Hz > 0, on a logarithmic axis."""
-    figure, ((here,),) = plain(9.5, 3.0)
+    figure, ((here,),) = line_canvas(9.5, 3.0)
     for (name, values), colour in zip(curves.items(), colours, strict=False):
         here.plot(*peak_hold(x, values), color=colour, label=name)
     here.set(xscale="log", xlabel=labels[0], ylabel=labels[1])

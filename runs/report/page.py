@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
@@ -96,9 +95,9 @@ def render(directory: Path) -> str:
     )
 
 
-def in_script(given: Mapping) -> Markup:
+def in_script(given: Mapping) -> str:
     """JSON that cannot end the <script> it stands in."""
-    return Markup(json.dumps(given, separators=(",", ":")).replace("<", "\\u003c"))
+    return json.dumps(given, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def read_summary(path: Path, problems: list[str]) -> dict:

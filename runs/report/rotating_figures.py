@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tireroad.modal.states import growing
 from tireroad.runs.report import live
-from tireroad.runs.report.figures import COLOURS, MUTED, canvas, encode, plain, styled
+from tireroad.runs.report.figures import COLOURS, MUTED, canvas, encode, line_canvas, styled
 
 _ORDERS = range(1, 9)
 
@@ -15,7 +15,7 @@ _ORDERS = range(1, 9)
 @styled
 def eigenvalues(eigenvalue: NDArray) -> str:
     """Growth rate Re s over frequency Im s / 2π of eigenvalues (n) 1/s, from 0 Hz up."""
-    figure, axes = plain(9.5, 3.0)
+    figure, axes = line_canvas(9.5, 3.0)
     here = axes[0, 0]
     shown = eigenvalue[eigenvalue.imag >= 0.0]
     unstable = growing(eigenvalue)[eigenvalue.imag >= 0.0]

@@ -60,9 +60,9 @@ def campbell(results: Results, section: Section) -> None:
     speed = results.optional("rotating.h5", "campbell/speed")
     if speed is None:
         return
-    radius = None
+    radius: float | None = None
     with suppress(Absent, InputError):  # that file's own section tells
-        radius = results.attribute("static.h5", "rolling_radius")
+        radius = float(results.attribute("static.h5", "rolling_radius") or 0.0)
     damped = results.array("rotating.h5", "campbell/frequency")
     undamped = results.optional("rotating.h5", "campbell/undamped")
     given = speed, damped, undamped, radius
