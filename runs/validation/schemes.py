@@ -7,12 +7,13 @@ import tempfile
 from pathlib import Path
 
 from tireroad.contact.chatter import choose, oscillation
+from tireroad.contact.spectra import BAND, distance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import digits
-from tireroad.runs.validation.histories import BAND, History, distance, follow
+from tireroad.runs.validation.histories import History, follow
 from tireroad.runs.validation.rolling import ROADS, SCENE
 from tireroad.runs.validation.tires import Tires
 

@@ -134,6 +134,10 @@ to = 20.0
 step = 10.0
 """
 )
+# What a search reads, before and between runs (tests/runs/test_search.py).
+UNREAD = {
+    f"Accuracy.{name}" for name in ("target", "target_db", "of", "search", "trials", "budget")
+}
 DRAWING = """
 tread = 0.05
 outline.arcs = [[0.32, 0], [0.28, 0.08], [0.2, 0.1]]

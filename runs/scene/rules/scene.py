@@ -7,6 +7,7 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.scene.rules.full import full_matrices
 from tireroad.runs.scene.rules.output import check_campbell, check_receptance, check_vibration
 from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.tables.accuracy import check_accuracy
 from tireroad.runs.scene.tables.axle import check_axle
 from tireroad.runs.scene.tables.cavity import check_cavity
 from tireroad.runs.scene.tables.contact import check_tread
@@ -186,4 +187,5 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
     (("output", "time", "contact", "force", "rotation"), check_vibration),
     (("time",), _time),
+    (("accuracy", "contact", "road", "time", "output", "force"), check_accuracy),
 )

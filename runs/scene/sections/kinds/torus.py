@@ -28,6 +28,21 @@ if TYPE_CHECKING:
 # 30 x 14: 2001.6 N, where 2000 N is known to 0.15 %.
 MESHES = {1: (160, 32), 2: (100, 16), 3: (30, 14)}
 
+# (elements around, along) that a search may take, of the order that is the cheapest for its error.
+FINER = (
+    (16, 8),
+    (20, 10),
+    (24, 12),
+    (28, 14),
+    (34, 16),
+    (40, 20),
+    (48, 24),
+    (58, 28),
+    (70, 34),
+    (84, 42),
+)
+ORDER = 3
+
 
 @section_kind("torus", "a wall between two circles about the section's centre: the thesis's tire")
 class TorusSection(SectionKind):
@@ -149,6 +164,15 @@ class TorusSection(SectionKind):
         lines = self._torus(tire).lines(self._patches(tire), self._plies(tire))
         wall, arc = (len(line) - 1 for line in lines)
         return 3 * tire.segments * tire.order * (tire.order * wall + 1) * (tire.order * arc - 1)
+
+    def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
+        return FINER
+
+    def search_order(self, tire: Tire) -> int:
+        return ORDER
+
+    def elements_along(self, along: int) -> TorusSection:
+        return replace(self, elements_arc=along)
 
     def coarser(self, tire: Tire) -> TorusSection:
         return replace(self, elements_arc=self.elements_arc // 2)
