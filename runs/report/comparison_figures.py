@@ -10,8 +10,9 @@ from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
 from tireroad.runs.report.differences import Row
-from tireroad.runs.report.figures import CYCLE, canvas, encode, envelope, styled
+from tireroad.runs.report.figures import CYCLE, canvas, encode, styled
 from tireroad.runs.report.surface_figures import PRESSURE, frame
+from tireroad.runs.report.thinned import envelope
 
 Array = NDArray[np.float64]
 DASHES = ("-", "--")

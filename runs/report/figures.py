@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tireroad.contact.levels import nominal
+from tireroad.runs.report.thinned import envelope, peak_hold
 
 COMPONENTS = ("x, forward", "y, along the axle", "z, up")
 # Okabe and Ito's colours, which colour-blind readers tell apart.
@@ -38,7 +39,6 @@ STYLE = {
     "path.simplify_threshold": 0.5,
 }
 styled = matplotlib.rc_context(STYLE)  # decorates every picture
-DRAWN = 600  # bins of a long series: each keeps its least and its greatest value
 RANGE_DB = 100.0  # what lies further below the highest line of a spectrum is not drawn
 
 
@@ -79,36 +79,9 @@ def encode(figure: Figure, kind: str = "svg", dpi: int = 130) -> str:
     return f"data:{mime};base64,{b64encode(stream.getvalue()).decode()}"
 
 
-def envelope(x: NDArray, y: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArray]:
-    """Least and greatest y (n) of each of `bins` runs of samples, in the order they come; x alike.
-
-    A peak of one sample stays visible, which skipping samples would not grant. Short series are
-    returned as they are.
-    """
-    width = len(y) // bins
-    if width <= 2:
-        return x, y
-    whole = width * bins
-    blocks = np.nan_to_num(y[:whole]).reshape(bins, width)
-    ends = np.sort(np.stack((blocks.argmin(axis=1), blocks.argmax(axis=1)), -1), axis=1)
-    kept = np.append((ends + width * np.arange(bins)[:, None]).ravel(), np.arange(whole, len(y)))
-    return x[kept], y[kept]
-
-
 def decibels(amplitude: NDArray) -> NDArray:
     """20 lg |a|, re 1 of its unit; nothing and not-a-number lie at −6000 dB, out of sight."""
     return 20.0 * np.log10(np.maximum(np.nan_to_num(np.abs(amplitude)), 1e-300))
-
-
-def peak_hold(frequency: NDArray, level: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArray]:
-    """The highest line of each of `bins` bands equal on a logarithmic axis; frequency (n) > 0."""
-    if len(frequency) <= bins:
-        return frequency, level
-    low, high = np.log(frequency[[0, -1]])
-    edges = np.linspace(low, high, bins)
-    first = np.unique(np.searchsorted(np.log(frequency), edges[:-1]))
-    highest = np.maximum.reduceat(level, first)
-    return frequency[first], highest
 
 
 @styled

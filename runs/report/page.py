@@ -15,6 +15,7 @@ from tireroad.runs.files.read import Absent, Results, Section
 from tireroad.runs.report import live
 from tireroad.runs.report.answer import answer
 from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.realism import unusual
 from tireroad.runs.report.sections import (
     forces,
     rotating,
@@ -69,8 +70,9 @@ def render(directory: Path) -> str:
     judged = verdicts(summary.get("told", {}))
     sections, left_out, provenance = build_sections(directory, scene, stages, problems)
     with Results(directory, scene) as results:
-        facts = answer(results, summary.get("told", {}))
-    told = [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
+        facts, strange = answer(results, summary.get("told", {})), unusual(results)
+    told = [("realism", strange)] if strange else []
+    told += [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
     told += [(section.title, warning) for section in sections for warning in section.warnings]
     loader = FileSystemLoader(Path(__file__).parent)
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
@@ -93,6 +95,12 @@ def render(directory: Path) -> str:
         left_out=left_out,
         scene_text=text,
     )
+
+
+def remarks(directory: Path) -> str | None:
+    """What of a finished run no tire has (runs.report.realism); None where all is usual."""
+    with Results(directory, read_scene(directory / "scene.toml", [])[1]) as results:
+        return unusual(results)
 
 
 def in_script(given: Mapping) -> str:

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from tireroad.runs.files.read import Results, Section
 from tireroad.runs.report import figures, live
 from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.thinned import envelope
 
 _AXES = "xyz"
 
@@ -39,7 +40,7 @@ def wheel(results: Results, section: Section, time: NDArray) -> None:
 def _drawn(time: NDArray, lines: dict[str, NDArray]) -> str:
     figure, axes = figures.canvas(9.5, 2.6)
     for colour, (name, line) in zip(figures.COLOURS, lines.items(), strict=False):
-        axes[0, 0].plot(*figures.envelope(time, line), color=colour, label=name)
+        axes[0, 0].plot(*envelope(time, line), color=colour, label=name)
     axes[0, 0].set(xlabel="time in s", ylabel="height in mm", xlim=(time[0], time[-1]))
     axes[0, 0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return figures.encode(figure)

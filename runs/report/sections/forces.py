@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.files.read import Absent, Results, Section, attributes
-from tireroad.runs.report import figures, live, surface_figures
+from tireroad.runs.report import figures, live, realism, surface_figures
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.report.sections import corner, pattern
 from tireroad.runs.report.sections.tire import pressure
@@ -39,6 +39,7 @@ def contact(results: Results) -> Section:
     pressure_maps(results, section, time, vertical)
     if len(time) == 1:
         return section
+    section.notes += [note] if (note := realism.mean_load(results)) else []
     corner.wheel(results, section, time)
     pattern.tread(results, section)
     points, normal = results.array(name, "points"), results.dataset(name, "normal_force")
