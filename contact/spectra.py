@@ -73,7 +73,7 @@ def density(values: np.ndarray, step: float, up_to: float = np.inf, rate: bool =
     window is correlated by 1/36 with the next: of k averages k / (1 + (k - 1) / 18 k) count.
     """
     count = len(values)
-    width = max(min(int(count / _SEGMENTS), round(_LONGEST / step)), min(count, 8))
+    width = max(min(2 * int(count / _SEGMENTS / 2), round(_LONGEST / step)), min(count, 8))
     shift = width - width // 2
     averages = max(1 + (count - width) // shift, 1)
     frequency, power = signal.welch(

@@ -133,7 +133,7 @@ def _export(args: argparse.Namespace) -> None:
 def _info(args: argparse.Namespace) -> None:
     from tireroad.runs.files.info import describe
 
-    print(describe(args.file))
+    print(describe(args.file, args.json))
 
 
 def _bench(args: argparse.Namespace) -> None:

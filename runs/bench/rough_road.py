@@ -141,7 +141,9 @@ def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
 
 def modal(given: Prepared, response: Response, step: float) -> History:
     """The loop on the states that the step resolves."""
-    tire = Recursion(response.resolved(step), step, "linear", MPI.COMM_SELF)
+    tire = Recursion(
+        response=response.resolved(step), step=step, scheme="linear", comm=MPI.COMM_SELF
+    )
     with threadpool_limits(1, "blas"):
         return follow(given.trial, tire, step, 0.0)
 

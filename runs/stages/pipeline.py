@@ -196,7 +196,7 @@ def _peak(comm: MPI.Comm) -> float:
 
 def _report(directory: Path, summary: Summary) -> None:
     """Root process only. The entry comes first: the page shows itself too."""
-    from tireroad.runs.report.page import write_report
+    from tireroad.runs.report.page import remarks, write_report
 
     began = time.perf_counter()
     summary.record("report", "computed")
@@ -204,6 +204,8 @@ def _report(directory: Path, summary: Summary) -> None:
     seconds = time.perf_counter() - began
     summary.record("report", "computed", seconds=seconds)
     observe.say(f"{'report':9s} done in {seconds:.1f} s: {path}")
+    if strange := remarks(directory):
+        observe.warn(strange)
 
 
 def _check_options(petsc_options: list[str]) -> None:

@@ -61,7 +61,9 @@ def tables(mesh: dict[str, int], residuals, steps, finest: float) -> list[Table]
 
 def _follow(tires: Tires, response: Response, step: float, scheme: str) -> History | None:
     """None where the motion grew without bound."""
-    tire = Recursion(response.resolved(step), step, scheme, tires.job.comm)
+    tire = Recursion(
+        response=response.resolved(step), step=step, scheme=scheme, comm=tires.job.comm
+    )
     try:
         return follow(tires.trial, tire, step, 0.0)
     except ConvergenceError:

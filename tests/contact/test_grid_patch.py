@@ -18,7 +18,18 @@ from tireroad.fem.tire.mesh import Torus, field_lattice
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import Contact
 
-SECTION = Torus(0.32, 0.10, 0.012, np.radians(120), 60, 16, 1, 2, "bead", 0.3)
+SECTION = Torus(
+    outer_radius=0.32,
+    minor_radius=0.10,
+    thickness=0.012,
+    half_angle=np.radians(120),
+    segments=60,
+    elements_arc=16,
+    elements_thickness=1,
+    order=2,
+    grading="bead",
+    footprint_size=0.3,
+)
 
 
 @pytest.fixture(scope="module")

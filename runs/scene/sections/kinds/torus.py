@@ -242,4 +242,6 @@ def rubber(part: Tire | Region) -> Material:
     from tireroad.runs.scene.tables.tire import Material as Table
 
     table = part.material or Table()
-    return Material(table.law, table.density, part.dynamic, part.loss_factor)
+    return Material(
+        law=table.law, density=table.density, dynamic=part.dynamic, loss_factor=part.loss_factor
+    )
