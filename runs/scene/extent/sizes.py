@@ -1,6 +1,6 @@
 """How large the parts of a scene will become, reckoned before anything is computed.
 
-Modes by the density of a thin shell in bending, contact points by the footprint, steps by what the
+Modes by their density in a plate under tension, contact points by the footprint, steps by what the
 automatic step resolves. Each is an estimate within a factor of two or so of what a run finds.
 """
 
@@ -50,31 +50,63 @@ def sizes(scene: Scene) -> Sizes:
     )
 
 
-def _plate(scene: Scene) -> tuple[float, float]:
-    """Area (m²) of the wall, and its mass per area over its bending stiffness (s²/m⁴)."""
-    tire, material = scene.tire.proportions(), scene.tire.material
+@dataclass(frozen=True)
+class _Wall:
+    """The wall as a flat plate under tension: N = A/4π (k² + s² ω²) modes up to ω.
+
+    k is that of bending waves, ρh ω² = B k⁴ + T k², and s² the sum of the squared slownesses of the two
+    waves in the plane, which cords make too fast to count. `area` A m², `mass` ρh kg/m², `bending` B N m,
+    `tension` T N/m, `slowness2` s² (s/m)².
+    """
+
+    area: float
+    mass: float
+    bending: float
+    tension: float
+    slowness2: float
+
+    def modes_below(self, frequency: float) -> float:
+        """Number of modes below a frequency (Hz)."""
+        omega2 = (2 * math.pi * frequency) ** 2
+        driving = self.mass * omega2
+        root = math.sqrt(self.tension**2 + 4 * self.bending * driving)
+        k2 = 2 * driving / (self.tension + root)
+        return self.area * (k2 + self.slowness2 * omega2) / (4 * math.pi)
+
+    def frequency_of(self, modes: float) -> float:
+        """Frequency (Hz) below which there are so many modes, by bisection in its logarithm."""
+        low, high = 1e-3, 1e9
+        while high > 1.001 * low:
+            middle = math.sqrt(low * high)
+            low, high = (middle, high) if self.modes_below(middle) < modes else (low, middle)
+        return low
+
+
+def _wall(scene: Scene) -> _Wall:
+    """Of the section's height and thickness; the pressure's tension is that across a circle so high."""
+    tire, shape = scene.tire.proportions(), scene.tire.shape
+    youngs, poisson, density = shape.rubber(scene.tire)
+    plane = density * (1 - poisson**2 + 2 * (1 + poisson)) / youngs
     middle = tire.outer_radius - 0.5 * tire.height
-    area = 2 * math.pi * middle * 2 * math.radians(tire.half_angle) * tire.height
-    law = material.law
-    bending = law.youngs * tire.thickness**3 / (12 * (1 - law.poisson**2))
-    return area, material.density * tire.thickness / bending
+    return _Wall(
+        area=2 * math.pi * middle * 2 * math.radians(tire.half_angle) * tire.height,
+        mass=density * tire.thickness,
+        bending=youngs * tire.thickness**3 / (12 * (1 - poisson**2)),
+        tension=scene.static.inflation * tire.height,
+        slowness2=0.0 if shape.angles(scene.tire) else plane,
+    )
 
 
 def _modes(scene: Scene, free: int) -> int:
-    """Number of modes; below a frequency as of a flat plate: N = A k²/4π, k⁴ = ω² ρh/D."""
+    """Number of modes."""
     if scene.modal.up_to is None:
         return scene.modal.count
-    area, softness = _plate(scene)
-    omega = 2 * math.pi * scene.modal.up_to
-    return max(min(int(area * omega * math.sqrt(softness) / (4 * math.pi)), free // 3), 1)
+    return max(min(int(_wall(scene).modes_below(scene.modal.up_to)), free // 3), 1)
 
 
 def highest_frequency(scene: Scene, modes: int) -> float:
     """Frequency (Hz) of the highest mode, by the same density."""
-    if scene.modal.up_to is not None:
-        return scene.modal.up_to
-    area, softness = _plate(scene)
-    return 4 * math.pi * modes / (area * math.sqrt(softness)) / (2 * math.pi)
+    return scene.modal.up_to or _wall(scene).frequency_of(modes)
 
 
 def road_height(scene: Scene) -> float:

@@ -76,6 +76,11 @@ class SectionKind(Parameters):
         """Angle to the circumference (deg) of each line of cords, for drawings."""
         return {line.name: line.angle for line in tire.cords}
 
+    def rubber(self, tire: Tire) -> tuple[float, float, float]:
+        """Dynamic Young's modulus (Pa), Poisson's ratio and density (kg/m³) of the wall, for estimates."""
+        law = tire.material.law
+        return tire.dynamic * law.youngs, law.poisson, tire.material.density
+
     def free_unknowns(self, tire: Tire) -> int:
         """Displacement unknowns of the mesh without those held by the rim."""
         import numpy as np

@@ -76,6 +76,11 @@ class FileSection(SectionKind):
     def rubbers(self, tire: Tire) -> dict[str, Material]:
         return own_file.own_materials(tire)
 
+    def rubber(self, tire: Tire) -> tuple[float, float, float]:
+        """Of the softest compound, in which the wall bends most."""
+        soft = min(self.rubbers(tire).values(), key=lambda one: one.dynamic * one.law.youngs)
+        return soft.dynamic * soft.law.youngs, soft.law.poisson, soft.density
+
     def cords(self, tire: Tire) -> list[Cords]:
         return own_file.own_cords(tire)
 

@@ -67,6 +67,12 @@ class RadialSection(SectionKind):
         compounds = built(self.size).compounds
         return {name: compound("neo-hookean", **values) for name, values in compounds.items()}
 
+    def rubber(self, tire: Tire) -> tuple[float, float, float]:
+        """Of the softest compound, in which the wall bends most."""
+        compounds = built(self.size).compounds.values()
+        soft = min(compounds, key=lambda one: one["youngs_modulus"])
+        return soft["dynamic"] * soft["youngs_modulus"], soft["poisson_ratio"], soft["density"]
+
     def cords(self, tire: Tire) -> list[Cords]:
         from tireroad.fem.tire.cords import Cords
 
