@@ -4,7 +4,8 @@ For a quantity Q with an error that goes as h^r, of a run at h and a companion a
 
     Q_h - Q_0 = (Q_qh - Q_h) / (q^r - 1),
 
-the share 1 / (q^r - 1) of the difference of both. Errors of several causes add up as squares.
+the share 1 / (q^r - 1) of the difference of both; of a history the difference is taken line by line of its
+spectrum, with phase. Errors of several causes add up as squares.
 """
 
 from __future__ import annotations
@@ -14,44 +15,51 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.contact.spectra import third_octaves
+from tireroad.contact.spectra import low_part, third_octaves
 
-_NAMES = ("mean", "deviation", "level")
-# Shares of the difference to a companion; each from the known order of what it changes.
-SHARES = {
-    "step": 1 / 3,  # twice the step: second order
-    "points": 1
-    / (2**1.5 - 1),  # twice the spacing: a footprint's pressure ends as the root of the distance
-    # Modes up to 1/sqrt(2) of the highest: what static answers leave out falls as its cube.
-    "modes": 1 / (2**1.5 - 1),
-    "mesh": 1
-    / (2**2 - 1),  # elements of twice the size: the edge of the footprint leads, second order
+_NAMES = ("mean", "deviation", "level", "history")
+# How many times larger a companion's size is, and the order in that size of what it changes.
+SIZES = {"step": 2.0, "points": 2.0, "modes": 2**0.5, "mesh": 2.0}
+ORDERS = {
+    "step": 2.0,
+    "points": 1.5,  # a footprint's pressure ends as the root of the distance to its edge
+    "modes": 3.0,  # in the highest frequency: what static answers leave out falls as its cube
+    "mesh": 2.0,  # the edge of the footprint leads
 }
+SHARES = {cause: 1 / (SIZES[cause] ** order - 1) for cause, order in ORDERS.items()}
+"""Share of the difference to a companion that is the error of the run."""
 
 
 @dataclass(frozen=True)
 class Told:
-    """What is told of a force: `mean`, `deviation` (3,) N, `level` (b, 3) dB of the bands at `centre` (b,) Hz."""
+    """What is told of a force: `mean`, `deviation` (3,) N, `level` (b, 3) dB of the bands at `centre` (b,) Hz,
+    and `low` (f, 3) N, the Fourier coefficients of what varies up to a frequency (contact.spectra.low_part)."""
 
     mean: np.ndarray
     deviation: np.ndarray
     centre: np.ndarray
     level: np.ndarray
+    low: np.ndarray
 
 
 @dataclass(frozen=True)
 class Bars:
-    """Estimated errors: of the `mean` and `deviation` (3,) N and of each `level` (b, 3) dB; NaN where unknown."""
+    """Estimated errors: of the `mean` and `deviation` (3,) N and of each `level` (b, 3) dB, NaN where unknown;
+    of the `history` (3,), relative L2 norm of what varies up to a frequency, NaN where nothing does."""
 
     mean: np.ndarray
     deviation: np.ndarray
     level: np.ndarray
+    history: np.ndarray
 
 
-def told(force: np.ndarray, step: float, up_to: float) -> Told:
-    """Of a force (n, 3) N in steps of `step` s, with the bands below `up_to` Hz."""
-    centre, level = third_octaves(force, step, up_to)
-    return Told(force.mean(axis=0), force.std(axis=0), centre, level)
+def told(force: np.ndarray, step: float, limit: float, up_to: float = np.inf) -> Told:
+    """Of a force (n, 3) N in steps of `step` s, with the bands below `limit` Hz; its history up to `up_to` Hz,
+    if that is lower."""
+    centre, level = third_octaves(force, step, limit)
+    mean = force.mean(axis=0)
+    low = low_part(force - mean, len(force) * step, min(limit, up_to))
+    return Told(mean, force.std(axis=0), centre, level, low)
 
 
 def bars(run: Told, companion: Told, share: float) -> Bars:
@@ -65,7 +73,16 @@ def bars(run: Told, companion: Told, share: float) -> Bars:
         share * np.abs(companion.mean - run.mean),
         share * np.abs(companion.deviation - run.deviation),
         level,
+        share * _apart(run.low, companion.low),
     )
+
+
+def _apart(run: np.ndarray, companion: np.ndarray) -> np.ndarray:
+    """Relative L2 distance (3,) of two spectra (f, 3) on the same lines."""
+    count = min(len(run), len(companion))
+    size = np.linalg.norm(run, axis=0)
+    off = np.linalg.norm(companion[:count] - run[:count], axis=0)
+    return np.divide(off, size, out=np.full(size.shape, np.nan), where=size > 0)
 
 
 def total(causes: Mapping[str, Bars]) -> Bars:

@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.choose import make_solver
-from tireroad.contact.solver.conditions import ContactSolver, checked_compliance
-from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance, SpreadCompliance
-from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.conditions import ContactSolver
+from tireroad.contact.solver.grid_compliance import Compliance, SpreadCompliance
 from tireroad.contact.tread.creep import TreadMemory, steady
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
@@ -19,9 +18,8 @@ Array = NDArray[np.float64]
 
 # Up to here the matrix is kept (8 MB); beyond, the tread is a convolution.
 DENSE_POINTS = 1000
-# As many touching points are factorised in the time of a step of projected conjugate gradients
-# (15 to 30 ms on a soft tread, more on a stiff one); 160 of them in a tenth of that.
-MOST_TOUCHING = 500
+# Touching points from which conjugate gradients cost less than a pivot's memory traffic and its making.
+MOST_TOUCHING = 1500
 MOST_DENSE = 6000  # 0.3 GB a matrix
 # Height over half the width of a patch on a torus that has gone up its flanks.
 STEEPEST = 0.25
@@ -92,7 +90,7 @@ def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> 
     name, count = solver_name(spec, patch), len(patch.points)
     if patch.places is not None and count > DENSE_POINTS:
         product = _product(spec, patch, tire, at_once)
-        return ProjectedCG(product) if name == "projected-cg" else make_solver(name, product)
+        return make_solver(name, product)
     if count > MOST_DENSE:
         raise InputError(
             f'contact: solver "{name}" on these points keeps a matrix, which is for at most '
@@ -100,8 +98,6 @@ def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> 
             'solver = "auto"'
         )
     matrix = _spread(patch, tire) + at_once * tread_matrix(spec, patch)
-    if name == "projected-cg":
-        return ProjectedCG(MatrixCompliance(checked_compliance(matrix)))
     return make_solver(name, matrix)
 
 

@@ -11,7 +11,7 @@ from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Patch:
     """c points on p nodes of the outer face.
 

@@ -82,6 +82,13 @@ class ContactSetup:
         assert self.pattern is not None, "the tread is a slick"
         return self.pattern.depth(self.patch.points[:, 0], self.patch.points[:, 1])
 
+    @property
+    def relief(self) -> float:
+        """From the lowest to the highest spot of the road that the patch drives over, m; bounds."""
+        x0, x1, y0, y1 = self.patch.extent
+        strip = x0, x1 + self.rolled.travel, y0, y1
+        return self.road.highest(*strip) - self.road.lowest(*strip)
+
     def settled(self, response: Response, nodal_force: np.ndarray, spec: Spec) -> tuple:
         """(setup, rise in m): a grid of points takes up the static load that the finite elements gave to
         nodes, `nodal_force` (s,) N of the outer face; points at the nodes have it already."""

@@ -19,7 +19,7 @@ Probes = sparse.csr_matrix  # (k, 3 s) over the outer face, or (k, 3 s + 6) with
 Pencil = tuple[np.ndarray, np.ndarray]  # D~ and K~ of a projected problem
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Basis:
     """`shape` kg^-1/2 of the outer face (3 s, m), of a free rim after it (+ 6); the projected matrices;
     the decoupled states at `speed` rad/s.
@@ -37,7 +37,10 @@ class Basis:
     def of(rolling: RollingModes) -> Basis:
         """The states of a rolling tire, as probes see them."""
         return Basis(
-            rolling.basis.shape, rolling.basis.projection, rolling.states, rolling.turning.speed
+            shape=rolling.basis.shape,
+            projection=rolling.basis.projection,
+            states=rolling.states,
+            speed=rolling.turning.speed,
         )
 
     def couple(

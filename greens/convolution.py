@@ -19,7 +19,7 @@ LARGEST = 4e9  # bytes of sampled Green's functions
 class Convolution:
     """The interface of `Recursion` by direct sums over the whole history, in steps of `step` s. Not collective."""
 
-    def __init__(self, response: Response, step: float, steps: int) -> None:
+    def __init__(self, *, response: Response, step: float, steps: int) -> None:
         outputs, forces = response.residual.shape
         needed = 8.0 * steps * outputs * forces
         if needed > LARGEST:

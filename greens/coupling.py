@@ -40,7 +40,7 @@ from tireroad.modal.solver.modes import Modes
 _SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by their sign at least
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Wheel:
     """The full matrices of a tire that turns: `damping` as in modal.damping, `rotation` None when it
     stands. `beyond` (gamma1 1/s, gamma2 s) damps what no mode has, and the full matrices: given where
@@ -227,7 +227,8 @@ class Wheel:
         projection = self.with_air(projection, grown)
         projection = self.corner(projection, grown) if self.corner else projection
         states = self.decouple(projection, comm)
-        return Basis(operators.trace(grown.vectors), projection, states, self.speed)
+        shape, speed = operators.trace(grown.vectors), self.speed
+        return Basis(shape=shape, projection=projection, states=states, speed=speed)
 
     @property
     def turning(self) -> Turning:

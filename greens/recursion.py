@@ -30,7 +30,7 @@ class Recursion:
     so that processes meet once a step.
     """
 
-    def __init__(self, response: Response, step: float, scheme: str, comm: MPI.Comm) -> None:
+    def __init__(self, *, response: Response, step: float, scheme: str, comm: MPI.Comm) -> None:
         self.comm = comm
         self.step = step
         mine = np.arange(comm.rank, len(response.eigenvalue), comm.size)

@@ -23,7 +23,7 @@ from tireroad.modal.states import StateModes, growing
 RESOLVED = 2.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Response:
     """Poles with their input and output, for k forces and r displacements.
 
@@ -204,17 +204,17 @@ class Response:
     def joined(self, other: Response) -> Response:
         """Both sets of states between the same outputs and forces, the residuals added; no rigid `other`."""
         return Response(
-            np.concatenate([self.eigenvalue, other.eigenvalue]),
-            np.hstack([self.output, other.output]),
-            np.vstack([self.input, other.input]),
-            linalg.block_diag(other.block, self.block),
-            np.hstack([other.block_output, self.block_output]),
-            np.vstack([other.block_input, self.block_input]),
-            self.residual + other.residual,
-            np.hstack([self.momentum, other.momentum]),
-            np.hstack([other.block_momentum, self.block_momentum]),
-            self.pulse,
-            self.rigid,
+            eigenvalue=np.concatenate([self.eigenvalue, other.eigenvalue]),
+            output=np.hstack([self.output, other.output]),
+            input=np.vstack([self.input, other.input]),
+            block=linalg.block_diag(other.block, self.block),
+            block_output=np.hstack([other.block_output, self.block_output]),
+            block_input=np.vstack([other.block_input, self.block_input]),
+            residual=self.residual + other.residual,
+            momentum=np.hstack([self.momentum, other.momentum]),
+            block_momentum=np.hstack([other.block_momentum, self.block_momentum]),
+            pulse=self.pulse,
+            rigid=self.rigid,
         )
 
 
@@ -232,15 +232,15 @@ def couple(
     out (static, exact at 0 Hz); without it they are simply missing.
     """
     response = Response(
-        modes.eigenvalue,
-        output @ modes.right,
-        modes.left @ forces.T,
-        modes.block,
-        output @ modes.block_right,
-        modes.block_left @ forces.T,
-        np.zeros((len(output), len(forces))),
-        momentum @ modes.right,
-        momentum @ modes.block_right,
+        eigenvalue=modes.eigenvalue,
+        output=output @ modes.right,
+        input=modes.left @ forces.T,
+        block=modes.block,
+        block_output=output @ modes.block_right,
+        block_input=modes.block_left @ forces.T,
+        residual=np.zeros((len(output), len(forces))),
+        momentum=momentum @ modes.right,
+        block_momentum=momentum @ modes.block_right,
         rigid=modes.rigid,
     )
     if compliance is None:

@@ -38,10 +38,18 @@ def wheel_of(
             )
         tail = beyond(turning.damping, projection)
     rotation = motions.rotation if turning.speed else None
-    given = turning.speed, turning.damping, turning.inertia
 
     def corner(projection: Projection, modes: Modes) -> Projection:
         comm, places = motions.body.comm, motions.static.positions
         return with_corner(projection, modes, axle, motions.rim_motion, places, comm)
 
-    return Wheel(motions.operators, rotation, *given, air, tail, corner if axle else None)
+    return Wheel(
+        operators=motions.operators,
+        rotation=rotation,
+        speed=turning.speed,
+        damping=turning.damping,
+        inertia=turning.inertia,
+        air=air,
+        beyond=tail,
+        corner=corner if axle else None,
+    )

@@ -22,7 +22,7 @@ from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import Labels
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Projection:
     """Phi^T X Phi of the matrices with Omega taken out (physics of the rotating frame).
 
@@ -196,20 +196,20 @@ def project(
     moved = comm.allreduce(carried @ modes.vectors)
     losing = None if loss is None else _loss_factors(modes, loss, comm, known)
     if rotation is None:
-        return Projection(modes.squares, moved, loss_factor=losing)
+        return Projection(squares=modes.squares, momentum=moved, loss_factor=losing)
 
     def reduced(name: str, sign: int) -> np.ndarray:
         old = None if known is None else getattr(known, name)
         return projected(comm, modes.vectors, getattr(rotation, name), sign, old)
 
     return Projection(
-        modes.squares,
-        moved,
-        reduced("gyroscopic", -1),
-        reduced("convective", 1),
-        reduced("body", -1),
-        reduced("body_convective", 1),
-        losing,
+        squares=modes.squares,
+        momentum=moved,
+        gyroscopic=reduced("gyroscopic", -1),
+        convective=reduced("convective", 1),
+        body=reduced("body", -1),
+        body_convective=reduced("body_convective", 1),
+        loss_factor=losing,
     )
 
 

@@ -23,12 +23,14 @@ RIGID = 1e-3
 class Campbell:
     """`speed` (v,) rad/s; `eigenvalue` (v, b) complex 1/s, one column a branch, NaN where a branch is in
     a near-defective block or has left the oscillating states; `similarity` (v, b): the share of the
-    branch's state one speed before, 1 when nothing changes, low where branches veer.
+    branch's state one speed before, 1 when nothing changes, low where branches veer; `undamped` (v, b) Hz:
+    the branches of the same tire without damping, where they were followed.
     """
 
     speed: np.ndarray
     eigenvalue: np.ndarray
     similarity: np.ndarray
+    undamped: np.ndarray | None = None
 
     @property
     def frequency(self) -> np.ndarray:

@@ -105,15 +105,15 @@ def _states(found: FullModes, coordinates: np.ndarray) -> StateModes:
     real, imaginary, left_real, left_imaginary = np.split(coordinates, 4, axis=1)
     weight = np.where(s.imag > 0, 2.0, 1.0)
     return StateModes(
-        s,
-        (real + 1j * imaginary) * weight,
-        (left_real + 1j * left_imaginary).T,
-        np.zeros((0, 0)),
-        np.zeros((size, 0)),
-        np.zeros((0, size)),
-        found.residual,
-        found.left_residual,
-        found.condition,
+        eigenvalue=s,
+        right=(real + 1j * imaginary) * weight,
+        left=(left_real + 1j * left_imaginary).T,
+        block=np.zeros((0, 0)),
+        block_right=np.zeros((size, 0)),
+        block_left=np.zeros((0, size)),
+        residual=found.residual,
+        left_residual=found.left_residual,
+        condition=found.condition,
     )
 
 

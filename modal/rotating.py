@@ -76,10 +76,17 @@ def standing(projection: Projection, damping: Damping) -> StateModes:
     left[k, mode] = 1 / (2 * eigenvalue + 2 * half[mode])
     block, block_right, block_left = companion_blocks(defective, squares, half, m)
     none = np.zeros(len(mode))
-    worst = float(condition[np.r_[paired, real]].max(initial=1.0))
-    drifting = 2 * int(rigid.sum())
     return StateModes(
-        eigenvalue, right, left, block, block_right, block_left, none, none, worst, drifting
+        eigenvalue=eigenvalue,
+        right=right,
+        left=left,
+        block=block,
+        block_right=block_right,
+        block_left=block_left,
+        residual=none,
+        left_residual=none,
+        condition=float(condition[np.r_[paired, real]].max(initial=1.0)),
+        rigid=2 * int(rigid.sum()),
     )
 
 
@@ -179,15 +186,15 @@ def rotating(drag: Array, stiffness: Array, defective: float = DEFECTIVE) -> Sta
         inverse, block_inverse = _inverse(values, vectors, block_vectors)
     values, right, left = refined(drag, stiffness, values, vectors[:m], inverse[:, m:] / scale)
     return StateModes(
-        values,
-        right * np.where(values.imag > 0, 2.0, 1.0),
-        left,
-        block,
-        block_vectors[:m],
-        block_inverse[:, m:] / scale,
-        residual(drag, stiffness, values, right),
-        residual(drag.T, stiffness.T, values, left.T),
-        float(condition[good].max(initial=1.0)),
+        eigenvalue=values,
+        right=right * np.where(values.imag > 0, 2.0, 1.0),
+        left=left,
+        block=block,
+        block_right=block_vectors[:m],
+        block_left=block_inverse[:, m:] / scale,
+        residual=residual(drag, stiffness, values, right),
+        left_residual=residual(drag.T, stiffness.T, values, left.T),
+        condition=float(condition[good].max(initial=1.0)),
     )
 
 

@@ -24,7 +24,7 @@ def growing(eigenvalue: np.ndarray) -> np.ndarray:
     return (rate > GROWS * largest) & (rate * size > ROUNDING * largest**2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StateModes:
     """The decoupled equations of motion for m modal coordinates.
 

@@ -87,6 +87,7 @@ def _processes(command: argparse.ArgumentParser) -> None:
 
 def _file(info: argparse.ArgumentParser) -> None:
     info.add_argument("file", type=Path, metavar="FILE")
+    info.add_argument("--json", action="store_true", help="for programs")
 
 
 def _sweep(sweep: argparse.ArgumentParser) -> None:

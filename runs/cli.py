@@ -63,10 +63,10 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
 
         mpi.on_root(comm, claim)
         stack.enter_context(observe.log_to(directory / "log.txt"))
-        from tireroad.runs.stages.pipeline import run_scene
+        from tireroad.runs.search.search import run
 
         try:
-            run_scene(
+            run(
                 scene,
                 directory,
                 comm,
@@ -133,7 +133,7 @@ def _export(args: argparse.Namespace) -> None:
 def _info(args: argparse.Namespace) -> None:
     from tireroad.runs.files.info import describe
 
-    print(describe(args.file))
+    print(describe(args.file, args.json))
 
 
 def _bench(args: argparse.Namespace) -> None:

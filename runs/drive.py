@@ -98,7 +98,7 @@ def drive(
     chosen = equal_steps(duration, step or min(duration / _LEAST_STEPS, _TURN / fastest))
     kept = response.resolved(chosen.size)
     scheme = choose(oscillation(spec, setup.patch, kept, chosen.size)).scheme
-    recursion = Recursion(kept, chosen.size, scheme, motions.body.comm)
+    recursion = Recursion(response=kept, step=chosen.size, scheme=scheme, comm=motions.body.comm)
     p = len(setup.patch.index)
     memory = tread_memory(spec, setup.patch, rolled.speed, chosen.size)
     at_once = memory.at_once if memory else 1.0

@@ -65,14 +65,14 @@ def torus(
     `material`, or a neo-Hookean rubber of `youngs_modulus` Pa, `poisson_ratio`, `density` kg/m3.
     """
     section = Torus(
-        outer_radius,
-        minor_radius,
-        thickness,
-        half_angle,
-        segments,
-        elements_arc,
-        elements_thickness,
-        order,
+        outer_radius=outer_radius,
+        minor_radius=minor_radius,
+        thickness=thickness,
+        half_angle=half_angle,
+        segments=segments,
+        elements_arc=elements_arc,
+        elements_thickness=elements_thickness,
+        order=order,
         footprint_size=footprint_size,
     ).ring()
     rubber = material or compound(

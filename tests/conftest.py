@@ -1,13 +1,24 @@
 """What several tests need: the repository, the measured roads, the program started as users do."""
 
+import gc
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from started import ROOT, environment
+
+
+@pytest.fixture(scope="module", autouse=True)
+def released(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Matrices and factors that a module keeps for its tests end with it: workers grew to 5 GB."""
+    yield
+    for kept in vars(request.module).values():
+        if hasattr(kept, "cache_clear") and kept.__module__ == request.module.__name__:
+            kept.cache_clear()
+    gc.collect()
 
 
 @pytest.fixture(scope="session")

@@ -1,17 +1,30 @@
 """The contact solver that a scene names."""
 
+import numpy as np
+
 from tireroad.contact.solver.complementarity import ActiveSet
-from tireroad.contact.solver.conditions import Array, ContactSolver
-from tireroad.contact.solver.grid_compliance import Compliance
+from tireroad.contact.solver.conditions import Array, ContactSolver, checked_compliance
+from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
+from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.usual_set import UsualSet
 from tireroad.fem.errors import InputError
 
 
 def make_solver(name: str, matrix: Array | Compliance) -> ContactSolver:
-    """The solver named "active-set" or "snes-vi" (`contact.solver`). InputError for another."""
+    """The solver named "active-set", "projected-cg" or "snes-vi" (`contact.solver`). InputError for another.
+
+    The active set of a product is found from the set that usually touches: a matrix is kept of points that do.
+    """
     if name == "active-set":
-        return ActiveSet(matrix)
+        return ActiveSet(matrix) if isinstance(matrix, np.ndarray) else UsualSet(matrix)
+    if name == "projected-cg":
+        if isinstance(matrix, np.ndarray):
+            matrix = MatrixCompliance(checked_compliance(matrix))
+        return ProjectedCG(matrix)
     if name == "snes-vi":
         from tireroad.contact.solver.snes_vi import SnesVI  # PETSc only where it is asked for
 
         return SnesVI(matrix)
-    raise InputError(f'contact.solver = "{name}" is unknown: take "active-set" or "snes-vi"')
+    raise InputError(
+        f'contact.solver = "{name}" is unknown: take "active-set", "projected-cg" or "snes-vi"'
+    )

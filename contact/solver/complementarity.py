@@ -100,14 +100,23 @@ class ActiveSet:
     def state(self) -> dict[str, Array | Mask]:
         """What the next solve starts from."""
         signs = {"signs": self._signs, "signs_before": self._before}
-        return {"active": self.active, "factorised": self._factor.base} | signs
+        return {"active": self.active, "factorised": self.factorised} | signs
 
     def set_state(self, kept: dict[str, Array | Mask]) -> None:
         """Go on from `state`."""
         self.active = np.asarray(kept["active"], dtype=bool)
         self._signs = np.asarray(kept["signs"], dtype=float)
         self._before = np.asarray(kept["signs_before"], dtype=float)
-        self._factor.rebase(np.asarray(kept["factorised"], dtype=bool))
+        self.refactor(np.asarray(kept["factorised"], dtype=bool))
+
+    @property
+    def factorised(self) -> Mask:
+        """The set (n,) whose factor is kept."""
+        return self._factor.base
+
+    def refactor(self, touching: Mask) -> None:
+        """Factorise this set (n,): what is solved next starts from its factor."""
+        self._factor.rebase(touching)
 
     @property
     def factorisations(self) -> int:

@@ -22,7 +22,7 @@ from tireroad.fem.matrices.support import Unknowns
 from tireroad.fem.tire.body import Body
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Column:
     """`duct` on every process, `pushed` this one's rows (n, 1 + a) of e^T; the wheel's `speed`, rad/s."""
 
@@ -82,4 +82,4 @@ def make_column(
     duct = modes(profile, gas, up_to, loss_factor) if body.comm.rank == 0 else None
     duct = body.comm.bcast(duct)
     pushed = trace.columns(unknowns) @ (duct.density * duct.pressure.T)
-    return Column(body.comm, duct, sparse.csr_matrix(pushed), speed)
+    return Column(comm=body.comm, duct=duct, pushed=sparse.csr_matrix(pushed), speed=speed)

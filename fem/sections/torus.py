@@ -18,7 +18,7 @@ from tireroad.fem.sections.ring import Ring
 LEAST = (6, 2)  # elements around and along: below, a tire is none
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Torus:
     """A toroidal tire: section circle of `minor_radius` (to its outer face) about the axle (y).
 

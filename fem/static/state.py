@@ -14,7 +14,7 @@ from tireroad.fem.tire.cord_forces import CordForce, cord_forces
 from tireroad.fem.tire.mesh import Lattice
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StaticState:
     """The tire at rest on the road.
 
@@ -102,14 +102,14 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
     )
     half_sizes, ring_rate, shape = _surface_metric(body.lattice, points + moved)
     return StaticState(
-        displacement,
-        points,
-        moved,
-        force,
-        nodal_area(body.lattice, points + moved),
-        half_sizes,
-        ring_rate,
-        shape,
+        displacement=displacement,
+        points=points,
+        moved=moved,
+        force=force,
+        area=nodal_area(body.lattice, points + moved),
+        half_sizes=half_sizes,
+        ring_rate=ring_rate,
+        shape=shape,
         touch_height=touch_height,
         road_height=road_height,
         inflation=float(equilibrium.pressure.value),

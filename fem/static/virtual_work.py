@@ -12,7 +12,7 @@ from tireroad.fem import kinematics
 from tireroad.fem.tire.body import Body
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Rolling:
     """Steady rolling: speed Omega in rad/s, damping gamma1 in 1/s, stiffness_damping gamma2 in s.
 

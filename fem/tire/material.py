@@ -9,7 +9,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.tire.law import MATERIALS, MaterialLaw
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Material:
     """A rubber of strain energy `law` and `density` (kg/m3).
 
@@ -42,4 +42,6 @@ def compound(
     if wrong:
         known = ", ".join(law.__dataclass_fields__)
         raise InputError(f"material {model}: {wrong[0]} is none of its parameters: {known}")
-    return Material(law(**parameters), density, dynamic, loss_factor)
+    return Material(
+        law=law(**parameters), density=density, dynamic=dynamic, loss_factor=loss_factor
+    )

@@ -17,7 +17,7 @@ from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import TireMesh
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Region:
     """A part of a torus's section with a material of its own; the mesh has element edges on its edges.
 

@@ -38,6 +38,7 @@ class FullTire:
 
     def __init__(
         self,
+        *,
         operators: Operators,
         rotation: Rotation | None,
         speed: float,

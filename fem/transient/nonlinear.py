@@ -41,6 +41,7 @@ class NonlinearTire(FullTire):
 
     def __init__(
         self,
+        *,
         operators: Operators,
         inflation: float,
         damping: tuple[float, float],
@@ -53,13 +54,13 @@ class NonlinearTire(FullTire):
         if operators.unknowns.rim:
             raise InputError('nonlinear tire in time: modal.rim = "free" is linear; take "fixed"')
         super().__init__(
-            operators,
-            None,
-            0.0,
-            damping,
-            step,
-            outputs,
-            loads,
+            operators=operators,
+            rotation=None,
+            speed=0.0,
+            damping=damping,
+            step=step,
+            outputs=outputs,
+            loads=loads,
             spectral_radius=spectral_radius,
             modal=modal,
         )

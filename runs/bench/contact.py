@@ -74,7 +74,7 @@ def _parts(shape: tuple[int, int], modes: int, horizontal: bool = False):
         response = replace(response, residual=_local(patch.points))
     else:
         response = strip.response(patch.points, around, 10)
-    tire = Recursion(response, STEP, "linear", MPI.COMM_SELF)
+    tire = Recursion(response=response, step=STEP, scheme="linear", comm=MPI.COMM_SELF)
     tread = half_space_compliance(patch.points[:, :2], patch.half_sizes, *ELASTIC)
     return patch, tire, tread, response
 
@@ -197,7 +197,10 @@ def _on_a_grid(shape: tuple[int, int], modes: int, finer: int, brush: float | No
     drive = Drive(_wavy, lambda t: 0.0, 20.0)
     if brush is None:
         tire = Recursion(
-            Strip(speed=20.0).response(patch.points, modes // 20, 10), STEP, "linear", MPI.COMM_SELF
+            response=Strip(speed=20.0).response(patch.points, modes // 20, 10),
+            step=STEP,
+            scheme="linear",
+            comm=MPI.COMM_SELF,
         )
         return roll(OnPoints(tire, weights), solver, points, drive, STEP, 10**6)
     bristles = Brush(

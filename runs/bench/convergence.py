@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.contact.error_bars import told
+from tireroad.contact.spectra import distance
 from tireroad.runs.bench.rough_road import Mesh, Rolled, rolled
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
-from tireroad.runs.validation.histories import distance
 
 ABOUT = "contact and axle force over mesh, points, modes, step and residual, on three roads"
 ROADS = {

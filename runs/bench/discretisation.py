@@ -18,7 +18,7 @@ ABOUT = "element order, mesh, grading, near-incompressibility and mass on the cl
 YOUNGS_MODULUS, INFLATION = 48e6, 2e5  # Pa
 COUNT = 28  # modes
 RATIOS = (0.45, 0.49, 0.499, 0.4995)
-# order, segments, elements_arc, elements_thickness, grading, footprint_size
+NAMES = "order", "segments", "elements_arc", "elements_thickness", "grading", "footprint_size"
 DEFAULT = (3, 30, 14, 1, "bead", 0.2)
 MESHES = (
     (2, 20, 8, 1, "bead", 0.25),
@@ -76,7 +76,7 @@ def run() -> list[Table]:
 
 def _fourier() -> np.ndarray:
     """The lowest frequencies (Hz) without loads by Fourier series around the axle, a fine section."""
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), 8, 28, 2, 3).section()
+    section = _section(3, 8, 28, 2, "bead", 1.0).section()
     return lowest(section, {"wall": Rubber(YOUNGS_MODULUS, 0.45, 1200.0)}, COUNT)
 
 
@@ -94,8 +94,9 @@ def _named(mesh) -> str:
     return f"order {mesh[0]}, {mesh[1]} x {mesh[2]}, {mesh[5]:g}"
 
 
-def _section(order, segments, arc, thickness, grading, size):
-    return Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, thickness, order, grading, size)
+def _section(*mesh):
+    sizes = {"outer_radius": 0.32, "minor_radius": 0.1, "thickness": 0.012}
+    return Torus(half_angle=np.radians(120), **sizes, **dict(zip(NAMES, mesh, strict=True)))
 
 
 def _body(section, ratio: float = 0.45):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+from tireroad.contact.spectra import distance
 from tireroad.runs.bench.rough_road import BAND, SPEED, Mesh, Rolled, rolled
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
-from tireroad.runs.validation.histories import distance
 
 ABOUT = "one simulated second of rolling on a rough road: wall time at 1 % error"
 

@@ -29,7 +29,16 @@ def _operators(around: int, along: int, order: int):
     from tireroad.fem.tire.material import compound
     from tireroad.fem.tire.mesh import Torus
 
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), around, along, 1, order)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=around,
+        elements_arc=along,
+        elements_thickness=1,
+        order=order,
+    )
     rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     return Operators(Body(MPI.COMM_WORLD, section, rubber), 0.0)
 

@@ -69,7 +69,17 @@ def _tire(comm: MPI.Comm):
     from tireroad.fem.tire.material import compound
     from tireroad.fem.tire.mesh import Torus
 
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), 80, 16, 1, 2, footprint_size=0.25)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=80,
+        elements_arc=16,
+        elements_thickness=1,
+        order=2,
+        footprint_size=0.25,
+    )
     material = compound(
         model="neo-hookean", youngs_modulus=48e6, poisson_ratio=0.45, density=1200.0
     )

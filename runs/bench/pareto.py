@@ -122,11 +122,15 @@ def _full(given: Prepared, exact: History, mesh: str, step: float) -> Choice:
     from tireroad.modal.damping import StrainEnergy
 
     observe.say(f"  full finite elements, {step:g} s ...")
-    wheel = given.run.wheel
+    wheel, turning = given.run.wheel, ("operators", "rotation", "speed", "damping")
     points = nodes(given.trial.setup.patch.index, len(given.run.static.points))
     assert not isinstance(wheel.damping, StrainEnergy), "the scene gives [damping]"
-    turning = wheel.rotation, wheel.speed, wheel.damping
-    tire = FullTire(wheel.operators, *turning, step, points, points)
+    tire = FullTire(
+        **{name: getattr(wheel, name) for name in turning},
+        step=step,
+        outputs=points,
+        loads=points,
+    )
     with threadpool_limits(1, "blas"):
         found = follow(given.trial, tire, step, 0.0)
     size = given.run.motions.unknowns

@@ -64,7 +64,16 @@ def run() -> list[Table]:
 
 def _tire(comm: MPI.Comm, segments: int, elements_arc: int) -> SmallMotions:
     """An inflated torus of 48 MPa. Collective."""
-    section = Torus(0.32, 0.10, 0.012, np.radians(120), segments, elements_arc, 1, 2).ring()
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.10,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=segments,
+        elements_arc=elements_arc,
+        elements_thickness=1,
+        order=2,
+    ).ring()
     rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     tire = TireModel(section, lambda: Body(comm, section, rubber))
     loader = Loader(Equilibrium(tire.body), lambda progress: None)
@@ -194,7 +203,7 @@ def _times(comm: MPI.Comm) -> Table:
     clock(
         f"recursion, {states} states, {FORCES} forces",
         5.0,
-        lambda: Recursion(response, 1e-4, "linear", comm),
+        lambda: Recursion(response=response, step=1e-4, scheme="linear", comm=comm),
     )
     return Table(
         f"Set-up with {MODES} modes at {operators.stiffness.getSize()[0]} unknowns and {FORCES} contact "

@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
+from tireroad.contact.spectra import distance
 from tireroad.fem.matrices.probe import nodes
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
@@ -18,7 +19,7 @@ from tireroad.modal.rolling import rolling_modes
 from tireroad.runs.files.store import opened
 from tireroad.runs.process import observe
 from tireroad.runs.stages.pipeline import Finished, run_scene
-from tireroad.runs.validation.histories import History, Trial, distance, follow
+from tireroad.runs.validation.histories import History, Trial, follow
 
 BAND = 500.0  # Hz, up to which errors are told
 SPEED = 100.0  # rad/s
@@ -140,7 +141,9 @@ def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
 
 def modal(given: Prepared, response: Response, step: float) -> History:
     """The loop on the states that the step resolves."""
-    tire = Recursion(response.resolved(step), step, "linear", MPI.COMM_SELF)
+    tire = Recursion(
+        response=response.resolved(step), step=step, scheme="linear", comm=MPI.COMM_SELF
+    )
     with threadpool_limits(1, "blas"):
         return follow(given.trial, tire, step, 0.0)
 

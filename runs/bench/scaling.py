@@ -161,7 +161,7 @@ def _steps(size: int, states: int, steps: int) -> list:
     step, speed = 1e-4, 20.0
     patch = oval_patch((size, size), (0.16 / size, 0.12 / size), 500.0)
     response = Strip(speed=speed).response(patch.points, max(states // 20, 1), 10)
-    tire = Recursion(response, step, "linear", MPI.COMM_SELF)
+    tire = Recursion(response=response, step=step, scheme="linear", comm=MPI.COMM_SELF)
     tread = half_space_compliance(patch.points[:, :2], patch.half_sizes, 5e6, 0.45)
     solver = ActiveSet(tire.same_step + tread)
     drive = Drive(_wavy, lambda t: 0.0, speed)

@@ -91,13 +91,13 @@ def modes(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     frequency = file["frequency"][()]
     columns = {"mode": np.arange(1, len(frequency) + 1), "frequency [Hz]": frequency}
     columns["residual [-]"] = file["residual"][()]
-    return _table("modes.csv", columns) | _page("modes.xdmf", xdmf.modes(file))
+    return _table("modes.csv", columns) | _page(xdmf.modes(file))
 
 
 def static(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     """footprint.csv: deformed contact points and their forces; static.xdmf: the loaded surface."""
     points, force = file["contact/points"][()], file["contact/force"][()]
-    files = _page("static.xdmf", xdmf.static(file))
+    files = _page(xdmf.static(file))
     if not len(points):
         return files
     columns = _components("position", points, "m") | _components("force", force, "N")
@@ -112,7 +112,7 @@ def contact(file: h5py.File) -> dict[str, Callable[[Path], object]]:
         columns |= _components("axle force", file["axle_force"][()], "N")
     if "active" in file:
         columns["points in contact [-]"] = file["active"][()]
-    return _table("contact_force.csv", columns) | _page("contact.xdmf", xdmf.contact(file))
+    return _table("contact_force.csv", columns) | _page(xdmf.contact(file))
 
 
 def spectra(file: h5py.File) -> dict[str, Callable[[Path], object]]:
@@ -190,11 +190,17 @@ def vibration(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 def motion(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     """motion.xdmf: the outer face in time, for ParaView."""
-    return _page("motion.xdmf", xdmf.motion(file))
+    return _page(xdmf.motion(file))
 
 
-def _page(name: str, text: str | None) -> dict[str, Callable[[Path], object]]:
-    return {} if text is None else {name: partial(Path.write_text, data=text, encoding="utf-8")}
+def _page(page: xdmf.Page | None) -> dict[str, Callable[[Path], object]]:
+    """A page and, where it wants one, the file of its fields."""
+    if page is None:
+        return {}
+    files: dict[str, Callable[[Path], object]] = {
+        f"{page.name}.xdmf": partial(Path.write_text, data=page.text, encoding="utf-8")
+    }
+    return files | ({page.beside: page.write_fields} if page.rows or page.arrays else {})
 
 
 READERS: dict[str, Callable[[h5py.File], dict[str, Callable[[Path], object]]]] = {

@@ -15,8 +15,8 @@ from tireroad.runs.files.store import verify
 LONG = 96  # characters of an attribute printed on one line
 
 
-def describe(file: Path) -> str:
-    """Provenance, attributes, datasets (shape, type, unit, size in the file) of an HDF5 result.
+def describe(file: Path, as_json: bool = False) -> str:
+    """Provenance, attributes, datasets (shape, type, unit, size in the file) of an HDF5 result, as text or JSON.
 
     A result file's checksum is verified first, which reads all of it: about a second per GB. Other
     HDF5 files are described too. Control characters are shown as escapes. Not collective. Raises
@@ -38,10 +38,49 @@ def describe(file: Path) -> str:
         verify(file)
     try:
         with h5py.File(file, "r") as opened:
+            if as_json:
+                return json.dumps(_held(file, opened, whole), indent=1)
             lines = (*_head(file, opened, whole), *_attributes(opened), *_datasets(opened))
             return "\n".join(_printable(line) for line in lines)
     except Exception as error:  # HDF5 and h5py raise whatever comes of a damaged foreign file
         raise InputError(f"{file} is damaged: {type(error).__name__}: {error}") from error
+
+
+def _held(path: Path, file: h5py.File, checksum_is: str) -> dict:
+    """All that the text tells, texts of many lines in full, sizes in bytes; not a number is null."""
+    datasets: dict[str, dict] = {}
+
+    def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
+        if isinstance(item, h5py.Dataset):
+            datasets[name] = {
+                "shape": None if item.shape is None else list(item.shape),
+                "type": _kind(item),
+                "unit": _unit(item),
+                "stored": item.id.get_storage_size(),
+                "compression": item.compression,
+            }
+
+    file.visititems(visit)
+    return {
+        "file": str(path),
+        "size": path.stat().st_size,
+        "checksum": checksum_is,
+        "attributes": {name: _plain(value) for name, value in file.attrs.items()},
+        "datasets": datasets,
+    }
+
+
+def _plain(value: object) -> object:
+    """An attribute as JSON has it; what JSON has not, as text."""
+    if isinstance(value, bytes):
+        return value.decode(errors="replace")
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, list):
+        return [_plain(part) for part in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value if isinstance(value, (str, int, float, bool)) else str(value)
 
 
 def _printable(line: str) -> str:

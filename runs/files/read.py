@@ -20,14 +20,27 @@ class Table:
 
 
 @dataclass
+class Picture:
+    """A still picture as a data URI, what it shows, and what a page with script draws in its place (runs.report.live)."""
+
+    image: str
+    caption: str
+    live: dict | None = None
+
+
+@dataclass
 class Section:
     title: str
     lead: str = ""
     facts: list[tuple[str, str]] = field(default_factory=list)
-    figures: list[tuple[str, str]] = field(default_factory=list)  # data URI, caption
+    figures: list[Picture] = field(default_factory=list)
     table: Table | None = None
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+
+    def show(self, image: str, caption: str, live: dict | None = None) -> None:
+        """One more picture."""
+        self.figures.append(Picture(image, caption, live))
 
 
 class Absent(LookupError):

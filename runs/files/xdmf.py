@@ -1,90 +1,154 @@
-"""XDMF pages for ParaView that point into the HDF5 results, one folder up, and copy no data."""
+"""XDMF pages for ParaView, pyvista and meshio, that point into the HDF5 results, one folder up, and copy no data.
 
+A page is a series of states with a time each, the first of which holds geometry and topology for all (XInclude, as
+DOLFINx writes it). Readers want every field to be a dataset of its own: one row of a larger dataset is made one by a
+virtual dataset (HDF5), in a small file beside the page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from tireroad.runs.files.store import opened
 
-SHAPES = 20  # modes offered: ParaView lists every one in its menus
+SHAPES = 20  # modes offered
 INSTANTS = 400  # contact states offered: every one costs 1 kB of page and a line in the time slider
+_BORROWED = 'xpointer(//Grid[@Name="states"]/Grid[1]/*[self::Topology or self::Geometry])'
 
 
-def static(file: h5py.File) -> str:
+@dataclass
+class Page:
+    """A page `name`.xdmf as `text`, and the datasets of its `name`_fields.h5."""
+
+    name: str
+    text: str = ""
+    rows: dict[str, h5py.VirtualLayout] = field(default_factory=dict)
+    arrays: dict[str, NDArray] = field(default_factory=dict)
+
+    @property
+    def beside(self) -> str:
+        """The name of the small file; it is wanted where there are `rows` or `arrays`."""
+        return f"{self.name}_fields.h5"
+
+    def write_fields(self, path: Path) -> None:
+        """The small file: virtual datasets find their results by the place of the file itself."""
+        with h5py.File(path, "w", libver="latest") as file:
+            for name, layout in self.rows.items():
+                file.create_virtual_dataset(name, layout)
+            for name, values in self.arrays.items():
+                file[name] = values
+
+    def row(self, dataset: h5py.Dataset, row: int) -> str:
+        """Row `row` of a dataset (n, …), as a dataset of its own."""
+        name = f"{dataset.name.strip('/').replace('/', '_')}_{row}"
+        above = f"../{Path(dataset.file.filename).name}"
+        source = h5py.VirtualSource(above, dataset.name, dataset.shape, dataset.dtype)
+        layout = h5py.VirtualLayout(dataset.shape[1:], dataset.dtype)
+        layout[...] = source[row]
+        self.rows[name] = layout
+        return _item(dataset.shape[1:], dataset.dtype, f"{self.beside}:/{name}")
+
+    def vertices(self, count: int) -> str:
+        """Topology of so many single points."""
+        self.arrays["vertices"] = np.arange(count)[:, None]
+        places = _item((count, 1), np.dtype(np.int64), f"{self.beside}:/vertices")
+        return (
+            f'<Topology TopologyType="Polyvertex" NumberOfElements="{count}" NodesPerElement="1">'
+            f"{places}</Topology>"
+        )
+
+    def states(self, body: str, states: Iterable[tuple[float, str]]) -> Page:
+        """The text, of geometry and topology `body` and fields at each time."""
+        grids = []
+        for number, (time, fields) in enumerate(states):
+            mesh = f"<xi:include xpointer={quoteattr(_BORROWED)}/>" if number else body
+            grids.append(
+                f'<Grid Name="state {number}" GridType="Uniform">{mesh}\n'
+                f'<Time Value="{time:.10g}"/>{fields}</Grid>'
+            )
+        self.text = (
+            '<?xml version="1.0"?>\n<Xdmf Version="3.0" xmlns:xi="http://www.w3.org/2001/XInclude">'
+            '<Domain>\n<Grid Name="states" GridType="Collection" CollectionType="Temporal">'
+            + "\n".join(grids)
+            + "</Grid>\n</Domain></Xdmf>\n"
+        )
+        return self
+
+
+def static(file: h5py.File) -> Page:
     """The outer face as made, quads, with its displacement (warp by it to see the loaded tire)."""
-    moved = _attribute("displacement", "Vector", _reference(file["surface/displacement"]))
-    return _document(_grid("loaded tire", *_surface(file), moved))
+    page = Page("static")
+    moved = _attribute("displacement", "Vector", _whole(file["surface/displacement"]))
+    return page.states(_surface(file, page), [(0.0, moved)])
 
 
-def modes(file: h5py.File) -> str:
-    """The first mode shapes as vectors on the outer face."""
-    frequency, shape = file["frequency"][()], file["surface/shape"]
+def modes(file: h5py.File) -> Page:
+    """The first mode shapes as vectors on the outer face; their frequencies in Hz stand for the time."""
+    page, shape = Page("modes"), file["surface/shape"]
     fields = [
-        _attribute(f"mode {number + 1:03d} {value:.2f} Hz", "Vector", _row(shape, number))
-        for number, value in enumerate(frequency[:SHAPES])
+        (float(value), _attribute("shape", "Vector", page.row(shape, number)))
+        for number, value in enumerate(file["frequency"][:SHAPES])
     ]
-    return _document(_grid("modes", *_surface(file), "".join(fields)))
+    return page.states(_surface(file, page), fields)
 
 
-def contact(file: h5py.File) -> str | None:
+def contact(file: h5py.File) -> Page | None:
     """Normal force and gap of the contact points over time; None before the first step."""
     time, points = file["time"][()], file["points"]
     if not len(time):
         return None
-    geometry, topology = _reference(points), _vertices(points.shape[0])
-    grids = []
-    for row in np.unique(np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).astype(int)):
-        fields = [
-            _attribute(name, "Scalar", _row(file[name], int(row)))
-            for name in ("normal_force", "gap")
-            if name in file
-        ]
-        instant = f'<Time Value="{time[row]:.10g}"/>'
-        grids.append(_grid(f"step {row}", geometry, topology, instant + "".join(fields)))
-    series = '<Grid Name="contact" GridType="Collection" CollectionType="Temporal">'
-    return _document(series + "\n".join(grids) + "</Grid>")
+    page = Page("contact")
+    rows = np.unique(np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).astype(int))
+    scalars = {name: file[name] for name in ("normal_force", "gap") if name in file}
+    body = page.vertices(points.shape[0]) + _geometry(points)
+    return page.states(body, _over_time(page, time, rows.tolist(), scalars, "Scalar"))
 
 
-def motion(file: h5py.File) -> str | None:
+def motion(file: h5py.File) -> Page | None:
     """The outer face over time: warp it by its displacement beyond the static state."""
-    time, moved = file["time"][()], file["displacement"]
+    time, moved = file["time"][()], {"displacement": file["displacement"]}
     if not len(time):
         return None
-    geometry, topology = _surface(file)
-    grids = []
-    for row, value in enumerate(time):
-        field = _attribute("displacement", "Vector", _row(moved, row))
-        instant = f'<Time Value="{value:.10g}"/>'
-        grids.append(_grid(f"instant {row}", geometry, topology, instant + field))
-    series = '<Grid Name="motion" GridType="Collection" CollectionType="Temporal">'
-    return _document(series + "\n".join(grids) + "</Grid>")
+    page = Page("motion")
+    states = _over_time(page, time, range(len(time)), moved, "Vector")
+    return page.states(_surface(file, page), states)
 
 
-def _surface(file: h5py.File) -> tuple[str, str]:
-    """Geometry and topology of the outer face; its quads are kept in static.h5 alone."""
+def _over_time(
+    page: Page, time: NDArray, rows: Sequence[int], fields: Mapping[str, h5py.Dataset], kind: str
+) -> list[tuple[float, str]]:
+    """A state for each of the rows of datasets (n, …)."""
+    return [
+        (
+            float(time[row]),
+            "".join(_attribute(name, kind, page.row(held, row)) for name, held in fields.items()),
+        )
+        for row in rows
+    ]
+
+
+def _surface(file: h5py.File, page: Page) -> str:
+    """Topology and geometry of the outer face; its quads are kept in static.h5 alone."""
     points = file["surface/points"]
     beside = Path(file.filename).with_name("static.h5")
-    quads = None
     if beside.is_file():
         with opened(beside) as other:
             if "surface/quads" in other and other["surface/points"].shape == points.shape:
                 found = other["surface/quads"]
                 quads = f'<Topology TopologyType="Quadrilateral" NumberOfElements="{len(found)}">'
-                quads += _reference(found) + "</Topology>"
-    return _reference(points), quads or _vertices(points.shape[0])
+                return quads + _whole(found) + "</Topology>\n" + _geometry(points)
+    return page.vertices(points.shape[0]) + _geometry(points)
 
 
-def _vertices(count: int) -> str:
-    return f'<Topology TopologyType="Polyvertex" NumberOfElements="{count}" NodesPerElement="1"/>'
-
-
-def _grid(name: str, points: str, topology: str, content: str) -> str:
-    return (
-        f'<Grid Name={quoteattr(name)} GridType="Uniform">{topology}\n'
-        f'<Geometry GeometryType="XYZ">{points}</Geometry>\n{content}</Grid>'
-    )
+def _geometry(points: h5py.Dataset) -> str:
+    return f'<Geometry GeometryType="XYZ">{_whole(points)}</Geometry>'
 
 
 def _attribute(name: str, kind: str, data: str) -> str:
@@ -92,29 +156,16 @@ def _attribute(name: str, kind: str, data: str) -> str:
     return f"{head}{data}</Attribute>\n"
 
 
-def _reference(dataset: h5py.Dataset) -> str:
+def _whole(dataset: h5py.Dataset) -> str:
     """A whole dataset, by its place in the result file."""
-    kind = "Float" if dataset.dtype.kind == "f" else "Int"
-    shape = " ".join(str(size) for size in dataset.shape)
     place = f"../{Path(dataset.file.filename).name}:{dataset.name}"
+    return _item(dataset.shape, dataset.dtype, place)
+
+
+def _item(shape: tuple[int, ...], dtype: np.dtype, place: str) -> str:
+    kind = "Float" if dtype.kind == "f" else "Int"
+    sizes = " ".join(str(size) for size in shape)
     return (
-        f'<DataItem Dimensions="{shape}" NumberType="{kind}" '
-        f'Precision="{dataset.dtype.itemsize}" Format="HDF">{place}</DataItem>'
+        f'<DataItem Dimensions="{sizes}" NumberType="{kind}" '
+        f'Precision="{dtype.itemsize}" Format="HDF">{place}</DataItem>'
     )
-
-
-def _row(dataset: h5py.Dataset, row: int) -> str:
-    """Row `row` of a dataset (n, …) as a hyperslab."""
-    rest = dataset.shape[1:]
-    start, stride, count = ([row, *(0 for _ in rest)], [1] * dataset.ndim, [1, *rest])
-    numbers = " ".join(str(number) for number in (*start, *stride, *count))
-    shape = " ".join(str(size) for size in rest)
-    return (
-        f'<DataItem ItemType="HyperSlab" Dimensions="{shape}" Type="HyperSlab">'
-        f'<DataItem Dimensions="3 {dataset.ndim}" Format="XML">{numbers}</DataItem>'
-        f"{_reference(dataset)}</DataItem>"
-    )
-
-
-def _document(content: str) -> str:
-    return f'<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n{content}\n</Domain></Xdmf>\n'

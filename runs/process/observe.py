@@ -23,6 +23,7 @@ class _State:
 
     root: bool = True
     log: TextIO | None = None
+    only_log: bool = False
     bar: "Progress | None" = None
 
 
@@ -63,6 +64,16 @@ def quiet() -> Iterator[None]:
         _State.root = root
 
 
+@contextmanager
+def only_log() -> Iterator[None]:
+    """While inside, lines and warnings go to the log alone; progress is shown."""
+    before, _State.only_log = _State.only_log, True
+    try:
+        yield
+    finally:
+        _State.only_log = before
+
+
 def log(text: str) -> None:
     """A line for the log only, e.g. the settings of a solver."""
     if _State.root and _State.log is not None:
@@ -71,6 +82,8 @@ def log(text: str) -> None:
 
 def _show(text: str, stream: TextIO) -> None:
     log(text)
+    if _State.only_log:
+        return
     if _State.bar is not None:
         _State.bar.hide()
     print(text, file=stream, flush=True)

@@ -10,12 +10,11 @@ from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
 from tireroad.runs.report.differences import Row
-from tireroad.runs.report.figures import canvas, encode, envelope, styled
+from tireroad.runs.report.figures import CYCLE, canvas, encode, styled
 from tireroad.runs.report.surface_figures import PRESSURE, frame
+from tireroad.runs.report.thinned import envelope
 
 Array = NDArray[np.float64]
-# Okabe and Ito's colours, which colour-blind readers tell apart; then the same with dashes.
-CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 DASHES = ("-", "--")
 
 

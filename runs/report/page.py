@@ -12,8 +12,18 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.read import Absent, Results, Section
+from tireroad.runs.report import live
+from tireroad.runs.report.answer import answer
 from tireroad.runs.report.quantities import quantity
-from tireroad.runs.report.sections import forces, stiffness, tire, vibration
+from tireroad.runs.report.realism import unusual
+from tireroad.runs.report.sections import (
+    forces,
+    rotating,
+    spectra,
+    stiffness,
+    tire,
+    vibration,
+)
 from tireroad.runs.report.verdicts import verdicts
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.schema import every_field, key_of, table_of
@@ -22,13 +32,13 @@ from tireroad.runs.version import PROGRAM
 
 SECTIONS: Mapping[str, Callable[[Results], Section]] = {
     "static.h5": tire.static,
+    "contact.h5": forces.contact,
+    "spectra.h5": spectra.spectra,
+    "vibration.h5": vibration.vibration,
+    "response.h5": forces.response,
     "stiffness.h5": stiffness.section,
     "modes.h5": tire.modes,
-    "rotating.h5": tire.rotating,
-    "response.h5": forces.response,
-    "contact.h5": forces.contact,
-    "spectra.h5": forces.spectra,
-    "vibration.h5": vibration.vibration,
+    "rotating.h5": rotating.rotating,
 }
 
 
@@ -59,16 +69,22 @@ def render(directory: Path) -> str:
     stages = summary.get("stages", {})
     judged = verdicts(summary.get("told", {}))
     sections, left_out, provenance = build_sections(directory, scene, stages, problems)
-    told = [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
+    with Results(directory, scene) as results:
+        facts, strange = answer(results, summary.get("told", {})), unusual(results)
+    told = [("realism", strange)] if strange else []
+    told += [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
     told += [(section.title, warning) for section in sections for warning in section.warnings]
     loader = FileSystemLoader(Path(__file__).parent)
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    pages.filters["quantity"] = quantity
+    pages.filters |= {"quantity": quantity, "in_script": in_script}
     return pages.get_template("report.html.j2").render(
         name=summary.get("scene") or scene.get("name") or directory.resolve().name,
         program={"name": PROGRAM, "version": ""} | summary.get("program", {}),
         processes=summary.get("processes"),
         computed=computed(directory),
+        answer=facts,
+        script=live.script(),
+        style=live.style(),
         warnings=[("report", problem) for problem in problems] + told,
         stages=stages,
         judged=judged,
@@ -79,6 +95,17 @@ def render(directory: Path) -> str:
         left_out=left_out,
         scene_text=text,
     )
+
+
+def remarks(directory: Path) -> str | None:
+    """What of a finished run no tire has (runs.report.realism); None where all is usual."""
+    with Results(directory, read_scene(directory / "scene.toml", [])[1]) as results:
+        return unusual(results)
+
+
+def in_script(given: Mapping) -> str:
+    """JSON that cannot end the <script> it stands in."""
+    return json.dumps(given, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def read_summary(path: Path, problems: list[str]) -> dict:

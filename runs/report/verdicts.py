@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Any
 
 # (part of the indicator's name, largest good value, largest usable value), the first that fits.
@@ -14,6 +15,7 @@ LIMITS: tuple[tuple[str, float, float], ...] = (
     ("estimated error of the load", 1.0, 3.0),
     ("residual in the static flexibility", 0.5, 1.0),
     ("worst complementarity residual", 1e-9, 1e-6),
+    ("energy", inf, inf),  # in joules: whether it is much, the others say
     ("residual", 1e-8, 1e-5),
     ("orthonormality", 1e-9, 1e-6),
     ("identity", 1e-9, 1e-6),
@@ -33,6 +35,8 @@ def verdict(name: str, value: Any) -> str:
         return GOOD if value >= 0 else POOR
     for part, good, fair in LIMITS:
         if part in name:
+            if good == inf:
+                return ""
             return GOOD if value <= good else FAIR if value <= fair else POOR
     return ""
 

@@ -10,6 +10,7 @@ from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.rules.road import check_road
 from tireroad.runs.scene.schema import applies, entries, key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.search.settings import Ladders, applied, bounds
 
 Row = tuple[str, str, str, str, str]
 HEAD: Row = ("key", "value", "unit", "range", "meaning")
@@ -63,6 +64,9 @@ def explain(scene: Scene) -> str:
         )
     described = scene.tire.shape.described(scene.tire)
     lines += ["", *described] if described else []
+    if scene.accuracy.searches:
+        lines += ["", *bounds(scene)]
+        scene = applied(scene, Ladders.of(scene).first())
     return "\n".join([*lines, *_demand(scene)])
 
 

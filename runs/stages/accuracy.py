@@ -29,16 +29,19 @@ _FEWEST = 64  # steps that a companion repeats at the least
 _LOOPS = 2.2  # time loops that four companions take for each step they repeat
 _COARSE = 0.15  # of the cost before the loop, on elements of twice the size
 FORCES = ("contact_force", "axle_force")
-_UNITS = {"mean": "N", "deviation": "N", "level": "dB"}
+_UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Accuracy:
     """Estimated errors of each force by cause (`by_cause[force][cause]`) at the bands `centre` (b,) Hz, found on
-    the first `window` s of the run; why a cause is `absent`."""
+    the first `window` s of the run, those of a history up to `up_to` Hz; the `mean` (3,) N of each force there; why
+    a cause is `absent`."""
 
     centre: np.ndarray
     window: float
+    up_to: float
+    mean: Mapping[str, np.ndarray]
     by_cause: Mapping[str, Mapping[str, Bars]]
     absent: Mapping[str, str] = field(default_factory=dict)
 
@@ -72,7 +75,7 @@ class AccuracyStage(Computed[Accuracy]):
 
     def inputs(self) -> dict:
         """The contact forces, and all they came from."""
-        return {"contact": self.contact.key}
+        return {"contact": self.contact.key, "up_to": self.job.scene.accuracy.up_to}
 
     def compute(self, record: Record) -> Accuracy:
         """Companions one by one; a cause whose companion fails is told, and the run goes on. Collective."""
@@ -80,12 +83,14 @@ class AccuracyStage(Computed[Accuracy]):
         if self._at_rest:
             return self._none("nothing drives the tire: what varies is rounding")
         start = first_step(setup, self.job.scene.road, history.time)
+        start += start % 2  # where a step of the companion of twice the step begins
         steps = self._window(start, len(history.time))
-        limit = model_limit(setup, self.rotating.product, history.step)
+        limit = model_limit(setup, self.rotating.product, history.step).frequency
+        up_to = min(limit, self.job.scene.accuracy.up_to)
         given = self._given(steps)
         runs = {"contact_force": history.total_force, "axle_force": history.axle_force}
         runs = {name: values[start:steps] for name, values in runs.items() if values is not None}
-        exact = {name: told(values, history.step, limit.frequency) for name, values in runs.items()}
+        exact = {name: told(values, history.step, limit, up_to) for name, values in runs.items()}
         found: dict[str, dict[str, Bars]] = {name: {} for name in exact}
         absent: dict[str, str] = {}
         for cause, share in SHARES.items():
@@ -98,11 +103,13 @@ class AccuracyStage(Computed[Accuracy]):
             first = round(start * history.step / forces.step)
             for name, other in (("contact_force", forces.contact), ("axle_force", forces.axle)):
                 if name in exact:
-                    off = told(other[first:], forces.step, limit.frequency)
+                    off = told(other[first:], forces.step, limit, up_to)
                     found[name][cause] = bars(exact[name], off, share)
         product = Accuracy(
             centre=exact["contact_force"].centre,
             window=steps * history.step,
+            up_to=up_to,
+            mean={name: one.mean for name, one in exact.items()},
             by_cause=found,
             absent=absent,
         )
@@ -118,7 +125,9 @@ class AccuracyStage(Computed[Accuracy]):
     def _none(self, reason: str) -> Accuracy:
         observe.say(f"  no error bars: {reason}")
         absent = dict.fromkeys(SHARES, reason)
-        return Accuracy(centre=np.zeros(0), window=0.0, by_cause={}, absent=absent)
+        return Accuracy(
+            centre=np.zeros(0), window=0.0, up_to=0.0, mean={}, by_cause={}, absent=absent
+        )
 
     def _window(self, start: int, steps: int) -> int:
         """Up to which step companions go on, for `SHARE` of the run's estimated cost."""
@@ -126,7 +135,8 @@ class AccuracyStage(Computed[Accuracy]):
         loop = seconds["contact loop"]
         before = sum(seconds.values()) - loop
         part = (SHARE * (before + loop) - _COARSE * before) / (_LOOPS * loop)
-        return int(np.clip(round(part * steps), min(start + _FEWEST, steps), steps))
+        count = int(np.clip(round(part * steps), min(start + _FEWEST, steps), steps))
+        return count - count % 2
 
     def _given(self, steps: int) -> Given:
         return Given(
@@ -143,7 +153,9 @@ class AccuracyStage(Computed[Accuracy]):
     def write(self, file, product: Accuracy) -> None:
         """By force and cause, and the total."""
         put(file, "centre", product.centre, "Hz")
-        file.attrs["window"] = product.window
+        file.attrs["window"], file.attrs["up_to"] = product.window, product.up_to
+        for force, mean in product.mean.items():
+            put(file, f"{force}_mean", mean, "N")
         for cause, reason in product.absent.items():
             file.attrs[f"absent_{cause}"] = reason
         for force, causes in product.by_cause.items():
@@ -169,6 +181,8 @@ class AccuracyStage(Computed[Accuracy]):
         return Accuracy(
             centre=file["centre"][:],
             window=float(file.attrs["window"]),
+            up_to=float(file.attrs["up_to"]),
+            mean={force: file[f"{force}_mean"][:] for force in FORCES if force in file},
             by_cause=by_cause,
             absent=absent,
         )
@@ -184,6 +198,10 @@ def _describe(record: Record, product: Accuracy, runs: Mapping[str, np.ndarray])
             f"error of the mean {what}": (float(bar.mean[2]), "N"),
             f"error of the deviation of the {what}": (float(bar.deviation[2]), "N"),
             f"deviation of the {what}": (float(values[:, 2].std()), "N"),
+            f"error of the {what}'s history up to {product.up_to:.4g} Hz": (
+                100 * float(bar.history[2]),
+                "%",
+            ),
         }
         known = bar.level[np.isfinite(bar.level[:, 2]), 2]
         if len(known):

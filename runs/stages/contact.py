@@ -114,7 +114,7 @@ class ContactStage(Stage[ContactHistory]):
         totals = Totals(setup.patch, setup.reach, watched)
         losses = Losses(chosen.tire, response, self.rotating.product, chosen.step)
         with ExitStack() as stack, record.timing("time loop"):
-            attributes = {"step": chosen.step, "scheme": chosen.scheme}
+            attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
             file = ContactFile(self.job, key, setup, attributes)
             kept = file.open(stack, self.job.path(self.name))
             if kept is not None:

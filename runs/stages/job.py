@@ -25,12 +25,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Job:
-    """The scene, where its results go, and the processes that compute them; `fresh`: reuse nothing."""
+    """The scene, where its results go, and the processes that compute them; `fresh`: reuse nothing; `cache`: a
+    folder of finished stages shared with other runs (runs.files.cache), the user's own where it is None."""
 
     scene: Scene
     directory: Path
     comm: MPI.Comm
     fresh: bool = False
+    cache: Path | None = None
     found: dict[str, float] = field(default_factory=dict)
 
     @property

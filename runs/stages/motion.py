@@ -70,7 +70,7 @@ def _replayed(basis: Basis, forces: Forces, top: float) -> tuple[np.ndarray, np.
     """Instants (g,) s, and the coordinates (g, m) at them."""
     unit = np.eye(basis.coordinates)
     response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
-    tire = Recursion(response, forces.step, "linear", MPI.COMM_SELF)
+    tire = Recursion(response=response, step=forces.step, scheme="linear", comm=MPI.COMM_SELF)
     stride = max(int(1 / (_PER_PERIOD * top * forces.step)), 1)
     kept = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS]
     wanted, found, number = set(kept), [], 0

@@ -89,9 +89,13 @@ def run_scene(
     until: str | None,
     fresh: bool,
     petsc_options: list[str],
+    cache: Path | None = None,
 ) -> Finished:
-    """Run the stages a scene needs into the directory; what they left in memory. Collective."""
-    job = Job(scene, directory, comm, fresh)
+    """Run the stages a scene needs into the directory; what they left in memory. Collective.
+
+    `cache`: a folder of stages shared with other runs, instead of the user's (runs.files.cache).
+    """
+    job = Job(scene, directory, comm, fresh, cache)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
     if scene.road is not None:
@@ -155,7 +159,7 @@ def _run(stage: Stage, summary: Summary) -> Done:
         record = Record()
         product = stage.produce(key, record)
         figures = vars(record)
-        on_root(job.comm, lambda: Cache().keep(name, key, path, figures))
+        on_root(job.comm, lambda: Cache(job.cache).keep(name, key, path, figures))
     record.indicators["largest memory of a process so far"] = (_peak(job.comm), "GB")
     seconds = time.perf_counter() - began
     for text in record.warnings:
@@ -177,7 +181,7 @@ def _looked_up(job: Job, name: str, key: str, claim: ExitStack) -> tuple[str, st
     reason = store.why_not(path, key, name)
     if not reason:
         return "", "before", {}
-    cache = Cache()
+    cache = Cache(job.cache)
     claim.enter_context(cache.claimed(name, key))
     figures = cache.fetch(name, key, path)
     if figures is None:
@@ -192,7 +196,7 @@ def _peak(comm: MPI.Comm) -> float:
 
 def _report(directory: Path, summary: Summary) -> None:
     """Root process only. The entry comes first: the page shows itself too."""
-    from tireroad.runs.report.page import write_report
+    from tireroad.runs.report.page import remarks, write_report
 
     began = time.perf_counter()
     summary.record("report", "computed")
@@ -200,6 +204,8 @@ def _report(directory: Path, summary: Summary) -> None:
     seconds = time.perf_counter() - began
     summary.record("report", "computed", seconds=seconds)
     observe.say(f"{'report':9s} done in {seconds:.1f} s: {path}")
+    if strange := remarks(directory):
+        observe.warn(strange)
 
 
 def _check_options(petsc_options: list[str]) -> None:

@@ -168,7 +168,7 @@ class ResponseStage(Computed[PointResponse]):
 
     def _march(self, response: Response, step: float, scheme: str, force) -> np.ndarray:
         """Readings (nt, r) under forces (nt, k) from rest. Collective."""
-        tire = Recursion(response, step, scheme, self.job.comm)
+        tire = Recursion(response=response, step=step, scheme=scheme, comm=self.job.comm)
         tire.start(force[0])
         out = [response.residual @ force[0]]
         for new in force[1:]:

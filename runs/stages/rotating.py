@@ -15,7 +15,7 @@ from tireroad.greens.coupling import Wheel
 from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.campbell import Campbell, critical_speed, growth, onset, sweep
-from tireroad.modal.damping import StrainEnergy
+from tireroad.modal.damping import Proportional, StrainEnergy
 from tireroad.modal.full_states import full_states
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.rotating import StateModes
@@ -125,9 +125,14 @@ class RotatingStage(Computed[RollingModes]):
             return None
         speeds = np.arange(0.0, wanted.to + wanted.step / 2, wanted.step)
         held = replace(self.modes.product.projection, corner=None)
-        given = held, turning.damping, turning.inertia
+
+        def both() -> Campbell:
+            free = sweep(held, Proportional(), turning.inertia, speeds, wanted.branches)
+            lines = sweep(held, turning.damping, turning.inertia, speeds, wanted.branches)
+            return replace(lines, undamped=free.frequency)
+
         with record.timing("campbell"):
-            lines = on_root(self.job.comm, lambda: sweep(*given, speeds, wanted.branches))
+            lines = on_root(self.job.comm, both)
         least = float(np.nanmin(lines.similarity))
         record.indicators["least similarity along a branch"] = (least, "-")
         return lines
@@ -217,6 +222,7 @@ def _fill(file, rolling: RollingModes) -> None:
         put(file, "campbell/eigenvalue", lines.eigenvalue, "1/s")
         put(file, "campbell/frequency", lines.frequency, "Hz")
         put(file, "campbell/similarity", lines.similarity, "-")
+        put(file, "campbell/undamped", lines.undamped, "Hz")
     file.attrs["speed"] = rolling.turning.speed
     file.attrs["basis_condition"] = states.condition
     file.attrs["first_unstable"] = states.unstable

@@ -135,13 +135,13 @@ class StaticStage(Computed[StaticState]):
         surface, attributes = file["surface"], file.attrs
         road = attributes.get("road_height")
         return StaticState(
-            file["displacement"][:],
-            surface["points"][:],
-            surface["displacement"][:],
-            surface["force"][:],
-            surface["area"][:],
-            surface["half_sizes"][:],
-            surface["ring_rate"][:],
+            displacement=file["displacement"][:],
+            points=surface["points"][:],
+            moved=surface["displacement"][:],
+            force=surface["force"][:],
+            area=surface["area"][:],
+            half_sizes=surface["half_sizes"][:],
+            ring_rate=surface["ring_rate"][:],
             shape=self.job.tire.lattice.face_shape,
             touch_height=float(attributes["touch_height"]),
             road_height=None if road is None else float(road),

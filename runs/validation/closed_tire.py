@@ -36,7 +36,15 @@ def rows() -> Iterator[tuple]:
 def _cylinder(outer: float, thickness: float, width: float, mesh: tuple, rubber: Material) -> Body:
     segments, across, layers = mesh
     section = Torus(
-        outer, FLAT, thickness, width / 2 / FLAT, segments, across, layers, 2, "uniform"
+        outer_radius=outer,
+        minor_radius=FLAT,
+        thickness=thickness,
+        half_angle=width / 2 / FLAT,
+        segments=segments,
+        elements_arc=across,
+        elements_thickness=layers,
+        order=2,
+        grading="uniform",
     )
     return Body(COMM, section, rubber)
 
@@ -120,8 +128,10 @@ def _soft_modes(operators: Operators) -> Modes:
 def _oscillator() -> Iterator[tuple]:
     """u'' + u' + u = 1 (thesis, appendix D): 1 - e^{-t/2} (cos w t + sin w t/sqrt 3), w = sqrt 3/2."""
     one = np.ones((1, 1))
-    states = standing(Projection(np.ones(1), np.ones((3, 1))), (1.0, 0.0))
-    tire = Recursion(couple(states, one, one, np.ones((3, 1))), 0.7, "linear", COMM)
+    states = standing(Projection(squares=np.ones(1), momentum=np.ones((3, 1))), (1.0, 0.0))
+    tire = Recursion(
+        response=couple(states, one, one, np.ones((3, 1))), step=0.7, scheme="linear", comm=COMM
+    )
     tire.start(np.ones(1))
     for k in range(1, 6):
         found = float((tire.predict() + tire.same_step @ np.ones(1))[0])

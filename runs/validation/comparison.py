@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tireroad.contact.spectra import BAND, Distance, distance
 from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.validation.histories import BAND, Distance, History, distance, follow
+from tireroad.runs.validation.histories import History, follow
 from tireroad.runs.validation.tires import Choice, Tires
 
 TIMES = 3  # a modal loop lasts a tenth of a second: its processor time scatters threefold

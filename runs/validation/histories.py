@@ -1,4 +1,4 @@
-"""What a tire does over time, and how far two histories are apart in a band of frequencies."""
+"""What a tire does over time, whatever it is made of: the same road, points, tread and solver."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ from tireroad.contact.grid_patch import OnPoints
 from tireroad.contact.model import Spec, step_solver
 from tireroad.contact.rolling import roll
 from tireroad.contact.setup import ContactSetup
-
-BAND = 300.0  # Hz, up to which errors are measured
 
 
 @dataclass(frozen=True)
@@ -57,37 +55,3 @@ def follow(trial: Trial, tire, step: float, setup: float) -> History:
         seconds = time.process_time() - began
     values = {"contact force": contact, "axle force": axle, "displacement": moved}
     return History(step, values, seconds, setup)
-
-
-@dataclass(frozen=True)
-class Distance:
-    """Relative L2 distance in the band, and the largest difference there over the largest variation."""
-
-    mean: float
-    worst: float
-
-
-def distance(reference: np.ndarray, found: np.ndarray, duration: float, band=BAND) -> Distance:
-    """How far `found` (n', k) is from what varies of `reference` (n, k), both over `duration` s, from
-    0 to `band` Hz.
-
-    Each is looked at with its own step: thinned out to a common one, force above half its sampling
-    frequency would fold down into the band (seen: 0.6 % where there was 0.03 %). Hann window.
-    """
-    rest = reference.mean(axis=0)
-    exact = _low(reference - rest, duration, band)
-    off = _low(found - rest, duration, band) - exact
-    # Seen in time again, the same number of instants for both.
-    seen = [np.fft.irfft(part, 8 * len(exact), axis=0) for part in (off, exact)]
-    worst, most = (np.abs(part).max() for part in seen)
-    return Distance(float(np.linalg.norm(off) / np.linalg.norm(exact)), float(worst / most))
-
-
-def _low(values: np.ndarray, duration: float, band: float) -> np.ndarray:
-    """Fourier coefficients of windowed values (n, k) at t = h, 2h, ... = duration, up to `band` Hz."""
-    n = len(values)
-    # The window vanishes at both ends, so the value at t = 0 may be any.
-    window = np.sin(np.pi * np.arange(n) / n)[:, None] ** 2
-    shifted = np.concatenate([values[:1], values[:-1]])
-    keep = np.arange(n // 2 + 1) <= band * duration * (1 + 1e-9)
-    return np.fft.rfft(window * shifted, axis=0)[keep] / n

@@ -6,9 +6,10 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from tireroad.contact.spectra import distance
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import compare, digits, percent, verdicts
-from tireroad.runs.validation.histories import distance, follow
+from tireroad.runs.validation.histories import follow
 from tireroad.runs.validation.tires import Choice, Tires
 
 ABOUT = "a standing tire on a flat road that moves: modes against full finite elements"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from tireroad.contact.spectra import BAND
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import Comparison, compare, verdicts
-from tireroad.runs.validation.histories import BAND
 from tireroad.runs.validation.tires import Choice, Tires
 
 ABOUT = "contact and axle force while rolling, modes against full finite elements of the same mesh"

@@ -7,12 +7,13 @@ import tempfile
 from pathlib import Path
 
 from tireroad.contact.chatter import choose, oscillation
+from tireroad.contact.spectra import BAND, distance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import digits
-from tireroad.runs.validation.histories import BAND, History, distance, follow
+from tireroad.runs.validation.histories import History, follow
 from tireroad.runs.validation.rolling import ROADS, SCENE
 from tireroad.runs.validation.tires import Tires
 
@@ -60,7 +61,9 @@ def tables(mesh: dict[str, int], residuals, steps, finest: float) -> list[Table]
 
 def _follow(tires: Tires, response: Response, step: float, scheme: str) -> History | None:
     """None where the motion grew without bound."""
-    tire = Recursion(response.resolved(step), step, scheme, tires.job.comm)
+    tire = Recursion(
+        response=response.resolved(step), step=step, scheme=scheme, comm=tires.job.comm
+    )
     try:
         return follow(tires.trial, tire, step, 0.0)
     except ConvergenceError:

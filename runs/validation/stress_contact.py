@@ -111,7 +111,7 @@ def thrown_up(steps: int = 1_000_000) -> Ended:
     """
     strip, step = Strip(damping=0.0), 3e-4
     response = strip.response(PATCH.points, 6, 3, residual=5).resolved(step)
-    tire = Recursion(response, step, "constant", MPI.COMM_SELF)
+    tire = Recursion(response=response, step=step, scheme="constant", comm=MPI.COMM_SELF)
     drive = Drive(Flat().height, lambda t: 5e-3 if t < 1e-3 else 0.0, 0.0)
     instants = roll(tire, ActiveSet(tire.same_step + HALF_SPACE), PATCH, drive, step, steps)
     springs, energy = response.residual + HALF_SPACE, np.empty(steps)
@@ -171,7 +171,12 @@ def _loop(case: Case, count: int):
         response = strip.response(PATCH.points, 6, 3, residual=5)
     else:
         response = strip.horizontal_response(PATCH.points, 6, 3, 1e2)
-    tire = Recursion(response.resolved(case.step), case.step, case.scheme, MPI.COMM_SELF)
+    tire = Recursion(
+        response=response.resolved(case.step),
+        step=case.step,
+        scheme=case.scheme,
+        comm=MPI.COMM_SELF,
+    )
     solver = ActiveSet(tire.same_step[:count, :count] + case.tread)
     if case.friction is not None:
         law = BrushLaw(1e5, case.friction, (0.05, 0.02))
@@ -201,7 +206,12 @@ def one_mode() -> Ended:
         name: getattr(patch, name)[middle]
         for name in ("index", "points", "half_sizes", "force", "gap", "edge", "line")
     })  # fmt: skip
-    tire = Recursion(Strip().response(small.points, 0, 1), 1e-4, "linear", MPI.COMM_SELF)
+    tire = Recursion(
+        response=Strip().response(small.points, 0, 1),
+        step=1e-4,
+        scheme="linear",
+        comm=MPI.COMM_SELF,
+    )
     solver = ActiveSet(tire.same_step + winkler_compliance(small.area, 1e8))
     drive = Drive(Flat().height, lambda t: 5e-3 * np.sin(300 * t), 0.0)
     return _followed("one mode, one point", roll(tire, solver, small, drive, 1e-4, 2000), 2000)
@@ -218,7 +228,9 @@ def many_points(steps: int = 150) -> Ended:
     kernel = KernelTread(places, lambda x, y, a, b: half_space_influence(x, y, a, b, 5e6, 0.45))
     response = Strip(speed=20.0).response(PATCH.points, 6, 3, residual=5)
     step = 2e-4
-    tire = Recursion(response.resolved(step), step, "linear", MPI.COMM_SELF)
+    tire = Recursion(
+        response=response.resolved(step), step=step, scheme="linear", comm=MPI.COMM_SELF
+    )
     solver = ProjectedCG(SpreadCompliance(tire.same_step, weights.tocsr(), kernel))
     drive = Drive(lambda x, y: 0.1 * wavy(x, y), lambda t: 0.0, 20.0)
     instants = roll(OnPoints(tire, weights.tocsr()), solver, fine, drive, step, steps)

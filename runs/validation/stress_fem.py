@@ -75,14 +75,26 @@ def result(asked: Attempt) -> Ended:
     """Load, and look at what is left."""
     segments, arc, order = asked.mesh
     half = np.radians(120)
-    section = Torus(0.32, 0.1, 0.012, half, segments, arc, 1, order, footprint_size=asked.size)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=half,
+        segments=segments,
+        elements_arc=arc,
+        elements_thickness=1,
+        order=order,
+        footprint_size=asked.size,
+    )
     rubber = compound(
         "neo-hookean",
         1200.0,
         youngs_modulus=asked.youngs_modulus,
         poisson_ratio=asked.poisson_ratio,
     )
-    equilibrium = Equilibrium(Body(MPI.COMM_SELF, section, rubber), Rolling(asked.speed, 500.0))
+    equilibrium = Equilibrium(
+        Body(MPI.COMM_SELF, section, rubber), Rolling(speed=asked.speed, damping=500.0)
+    )
     loader = Loader(equilibrium, lambda progress: None)
     message = ""
     try:

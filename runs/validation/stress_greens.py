@@ -34,7 +34,7 @@ def rows() -> list[list]:
 
 def _responses(damping: float) -> list[Response]:
     """By the closed formula and by the second eigenproblem."""
-    projection = Projection(SQUARES, np.ones((3, 3)))
+    projection = Projection(squares=SQUARES, momentum=np.ones((3, 3)))
     both = standing(projection, (damping, 0.0)), rotating(damping * np.eye(3), np.diag(SQUARES))
     return [couple(modes, SHAPE, SHAPE, np.ones((3, 3))) for modes in both]
 
@@ -56,7 +56,7 @@ def _damped(name: str, damping: float) -> list:
 
 
 def _followed(response: Response, force: np.ndarray, step: float, scheme: str) -> np.ndarray:
-    tire = Recursion(response, step, scheme, MPI.COMM_SELF)
+    tire = Recursion(response=response, step=step, scheme=scheme, comm=MPI.COMM_SELF)
     tire.start(0 * force[0])
     out = np.zeros_like(force)
     for k, new in enumerate(force):
@@ -103,7 +103,7 @@ def _defective(split: float) -> list:
 
 def _long() -> list:
     """Many steps undamped: each mode keeps its amplitude."""
-    tire = Recursion(_responses(0.0)[0], 3e-4, "linear", MPI.COMM_SELF)
+    tire = Recursion(response=_responses(0.0)[0], step=3e-4, scheme="linear", comm=MPI.COMM_SELF)
     tire.start(np.zeros(3))
     tire.predict()
     tire.advance(np.ones(3))
@@ -127,8 +127,13 @@ def _limits() -> list:
     worst = 0.0
     for turn in (1e-12, 1e-8, 1e-4, 1e4):
         one = np.ones((1, 1))
-        modes = standing(Projection(np.ones(1), np.ones((3, 1))), (0.0, 0.0))
-        tire = Recursion(couple(modes, one, one, np.ones((3, 1))), turn, "linear", MPI.COMM_SELF)
+        modes = standing(Projection(squares=np.ones(1), momentum=np.ones((3, 1))), (0.0, 0.0))
+        tire = Recursion(
+            response=couple(modes, one, one, np.ones((3, 1))),
+            step=turn,
+            scheme="linear",
+            comm=MPI.COMM_SELF,
+        )
         # (x - sin x)/x for a force that grows linearly over the step; x^2/6 for small x.
         exact = turn**2 / 6 * (1 - turn**2 / 20) if turn < 1 else 1 - np.sin(turn) / turn
         worst = max(worst, abs(tire.same_step[0, 0] / exact - 1))

@@ -26,7 +26,16 @@ SPEEDS = (0.0, 0.3, 0.999, 1.3)  # of the critical one
 
 def rows() -> list[list]:
     """(package, case, what happened, how it was caught)."""
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), 8, 4, 1, 2)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=8,
+        elements_arc=4,
+        elements_thickness=1,
+        order=2,
+    )
     body = Body(
         MPI.COMM_SELF,
         section,

@@ -104,7 +104,7 @@ class Tires:
         response, seconds = self._responses[key]
         began = time.perf_counter()
         kept = response.resolved(choice.step)
-        tire = Recursion(kept, choice.step, "linear", self.job.comm)
+        tire = Recursion(response=kept, step=choice.step, scheme="linear", comm=self.job.comm)
         return tire, choice.step, seconds + time.perf_counter() - began
 
     def response(self, count: int, residual: str) -> Response:
@@ -122,14 +122,14 @@ class Tires:
         began = time.perf_counter()
         damping, modal = self._damping()
         tire = FullTire(
-            wheel.operators,
-            wheel.rotation,
-            wheel.speed,
-            damping,
-            step,
-            points.outputs,
-            points.loads,
-            wheel.inertia,
+            operators=wheel.operators,
+            rotation=wheel.rotation,
+            speed=wheel.speed,
+            damping=damping,
+            step=step,
+            outputs=points.outputs,
+            loads=points.loads,
+            inertia=wheel.inertia,
             spectral_radius=radius,
             modal=modal,
         )
@@ -151,12 +151,12 @@ class Tires:
         began = time.perf_counter()
         damping, modal = self._damping()
         tire = NonlinearTire(
-            self.motions.operators,
-            static.inflation,
-            damping,
-            step,
-            points.outputs,
-            points.loads,
+            operators=self.motions.operators,
+            inflation=static.inflation,
+            damping=damping,
+            step=step,
+            outputs=points.outputs,
+            loads=points.loads,
             spectral_radius=RADIUS,
             modal=modal,
         )

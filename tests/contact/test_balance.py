@@ -23,12 +23,12 @@ def rolling(speed: float = 40.0, damping=(60.0, 1e-5)) -> RollingModes:
     skew = [a - a.T for a in rng.normal(size=(2, M, M)) / M]
     root = rng.normal(size=(M, M)) / M
     projection = Projection(
-        np.linspace(80.0, 600.0, M) ** 2,
-        rng.normal(size=(3, M)),
-        skew[0],
-        -root @ root.T,
-        4 * skew[1],
-        -root @ root.T,
+        squares=np.linspace(80.0, 600.0, M) ** 2,
+        momentum=rng.normal(size=(3, M)),
+        gyroscopic=skew[0],
+        convective=-root @ root.T,
+        body=4 * skew[1],
+        body_convective=-root @ root.T,
     )
     basis = ModalBasis(
         frequency=np.sqrt(projection.squares) / (2 * np.pi),
@@ -45,7 +45,7 @@ def terms(tire: RollingModes, steps: int, comm=MPI.COMM_SELF, counted: RollingMo
     response = couple(tire.states, shape, shape, tire.basis.projection.momentum)
     response = replace(response, residual=springs_of)
     step = DURATION / steps
-    march, work = Recursion(response, step, "linear", comm), Work()
+    march, work = Recursion(response=response, step=step, scheme="linear", comm=comm), Work()
     motion = Motion(counted or tire, response.slow(step), step)
     time = step * np.arange(1, steps + 1)[:, None]
     force = (

@@ -37,7 +37,10 @@ DURATION = 0.024
 
 def test_alternating_forces_settle_at_what_is_said() -> None:
     response, step = Strip(damping=3e3).response(PATCH.points, 4, 2), 1e-4
-    tire, force = Recursion(response, step, "linear", MPI.COMM_SELF), np.linspace(-1.0, 2.0, 63)
+    tire, force = (
+        Recursion(response=response, step=step, scheme="linear", comm=MPI.COMM_SELF),
+        np.linspace(-1.0, 2.0, 63),
+    )
     for n in range(600):
         free, sign = tire.predict(), (-1.0) ** n
         tire.advance(sign * force)
@@ -67,7 +70,7 @@ def test_two_steps_an_oscillation_blow_up_where_forces_are_linear(scheme: str, g
     """The same points held against a shaken road, a little beyond mu = 1 and well within it."""
 
     def largest(step: float, scheme: str) -> float:
-        tire = Recursion(response, step, scheme, MPI.COMM_SELF)
+        tire = Recursion(response=response, step=step, scheme=scheme, comm=MPI.COMM_SELF)
         solver = ActiveSet(tire.same_step + TREAD.law.matrix(*_places()))
         drive = Drive(Flat().height, lambda t: 1e-7 * np.sin(900.0 * t), 0.0)
         return max(
@@ -91,7 +94,7 @@ def _ridges(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def _low(response, step: float, scheme: str) -> np.ndarray:
     """The load's coefficients up to 300 Hz."""
-    tire = Recursion(response.resolved(step), step, scheme, MPI.COMM_SELF)
+    tire = Recursion(response=response.resolved(step), step=step, scheme=scheme, comm=MPI.COMM_SELF)
     steps, drive = round(DURATION / step), Drive(_ridges, lambda t: 0.0, 20.0)
     instants = roll(tire, step_solver(TREAD, PATCH, tire.same_step), PATCH, drive, step, steps)
     load = np.array([0.0, *(i.force.sum() - 500.0 for i in instants)])[:-1]

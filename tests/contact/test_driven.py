@@ -33,20 +33,20 @@ def oscillator() -> Response:
     push = -1j / own * shape[:2].T
     carried = np.sqrt(MASS) * np.array([[0.0], [0.0], [1.0]])
     return Response(
-        np.array([1j * own]),
-        shape,
-        push,
-        none,
-        np.zeros((3, 0)),
-        np.zeros((0, 2)),
-        np.zeros((3, 2)),
-        carried.astype(complex),
-        np.zeros((3, 0)),
+        eigenvalue=np.array([1j * own]),
+        output=shape,
+        input=push,
+        block=none,
+        block_output=np.zeros((3, 0)),
+        block_input=np.zeros((0, 2)),
+        residual=np.zeros((3, 2)),
+        momentum=carried.astype(complex),
+        block_momentum=np.zeros((3, 0)),
     )
 
 
 def driven(steps: int = STEPS) -> Driven:
-    tire = Recursion(oscillator(), STEP, "linear", MPI.COMM_SELF)
+    tire = Recursion(response=oscillator(), step=STEP, scheme="linear", comm=MPI.COMM_SELF)
     return Driven(tire, np.full((steps + 1, 1), FORCE), np.array([[0.0, 0.0, 1.0]]))
 
 

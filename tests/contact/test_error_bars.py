@@ -14,6 +14,7 @@ def at(size: float, rate: float) -> Told:
         np.full(3, 2.0 - 0.2 * off),
         np.array([100.0, 200.0]),
         np.full((2, 3), 20.0 + 0.1 * off),
+        np.full((5, 3), 1.0 + 0.04j * off),
     )
 
 
@@ -23,18 +24,27 @@ def test_the_error_of_a_known_order_is_told_exactly(rate):
     assert found.mean == pytest.approx(0.3)
     assert found.deviation == pytest.approx(0.2)
     assert found.level == pytest.approx(0.1)
+    assert found.history == pytest.approx(0.04 / abs(1 + 0.04j))
 
 
 def test_a_band_that_the_companion_lacks_is_unknown():
     companion = at(2.0, 2.0)
-    companion = Told(companion.mean, companion.deviation, companion.centre[1:], companion.level[1:])
+    companion = Told(
+        companion.mean,
+        companion.deviation,
+        companion.centre[1:],
+        companion.level[1:],
+        companion.low,
+    )
     found = bars(at(1.0, 2.0), companion, 1 / 3)
     assert np.isnan(found.level[0]).all()
     assert found.level[1] == pytest.approx(0.1)
 
 
 def test_causes_add_up_as_squares():
-    one, other = (Bars(np.full(3, a), np.full(3, a), np.full((1, 3), a)) for a in (3.0, 4.0))
+    one, other = (
+        Bars(np.full(3, a), np.full(3, a), np.full((1, 3), a), np.full(3, a)) for a in (3.0, 4.0)
+    )
     found = total({"step": one, "mesh": other})
     assert found.mean == pytest.approx(5.0)
     assert found.level == pytest.approx(5.0)

@@ -29,10 +29,10 @@ def run(law, steps, speed=20.0, motion=lambda t: 0.0, tire=None, height=None):
     count = len(PATCH.points)
     if tire is None:
         tire = Recursion(
-            Strip(speed=speed).horizontal_response(PATCH.points, 3, 2, 1e3),
-            STEP,
-            "linear",
-            MPI.COMM_SELF,
+            response=Strip(speed=speed).horizontal_response(PATCH.points, 3, 2, 1e3),
+            step=STEP,
+            scheme="linear",
+            comm=MPI.COMM_SELF,
         )
     solver = ActiveSet(tire.same_step[:count, :count] + TREAD)
     brush = Brush(law, PATCH.points[:, 0], PATCH.line, speed, STEP)
@@ -191,7 +191,7 @@ def test_a_loop_goes_on_with_the_same_bits(iterative: bool, pulse: bool) -> None
     response = replace(response, residual=1e-8 * np.eye(3 * count), pulse=pulse)
 
     def loop() -> Loop:
-        tire = Recursion(response, STEP, "linear", MPI.COMM_WORLD)
+        tire = Recursion(response=response, step=STEP, scheme="linear", comm=MPI.COMM_WORLD)
         matrix = tire.same_step[:count, :count] + TREAD
         solver = ProjectedCG(MatrixCompliance(matrix)) if iterative else ActiveSet(matrix)
         brush = Brush(BrushLaw(1e5, 0.5, (0.02, 0.0)), PATCH.points[:, 0], PATCH.line, 20.0, STEP)

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from tireroad.contact import model
 from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle
 from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG
+from tireroad.contact.solver.usual_set import UsualSet
 from tireroad.contact.thinned import thinned
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
@@ -16,7 +18,18 @@ from tireroad.fem.tire.mesh import Torus, field_lattice
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import Contact
 
-SECTION = Torus(0.32, 0.10, 0.012, np.radians(120), 60, 16, 1, 2, "bead", 0.3)
+SECTION = Torus(
+    outer_radius=0.32,
+    minor_radius=0.10,
+    thickness=0.012,
+    half_angle=np.radians(120),
+    segments=60,
+    elements_arc=16,
+    elements_thickness=1,
+    order=2,
+    grading="bead",
+    footprint_size=0.3,
+)
 
 
 @pytest.fixture(scope="module")
@@ -157,8 +170,10 @@ def test_a_grid_needs_a_tread_and_a_sane_pitch(tread) -> None:
         patches(tread, 3e-3, 1e-6)
 
 
-def test_solver_by_the_number_of_touching_points(tread) -> None:
-    for pitch, solver in ((0.004, ActiveSet), (0.001, ProjectedCG)):
+def test_solver_by_the_number_of_touching_points(tread, monkeypatch) -> None:
+    cases = (0.004, 1500, ActiveSet), (0.002, 1500, UsualSet), (0.002, 50, ProjectedCG)
+    for pitch, most, solver in cases:
+        monkeypatch.setattr(model, "MOST_TOUCHING", most)
         _, _, patch = patches(tread, 3e-3, pitch)
         flexibility = 1e-5 * np.eye(len(patch.index))
         assert isinstance(step_solver(Contact(), patch, flexibility), solver)

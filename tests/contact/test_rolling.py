@@ -29,9 +29,9 @@ def wavy(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def run(response, step, steps, scheme, height=None, motion=shaken, speed=20.0, comm=MPI.COMM_SELF):
     tire = (
-        Convolution(response, step, steps)
+        Convolution(response=response, step=step, steps=steps)
         if scheme == "convolution"
-        else Recursion(response, step, scheme, comm)
+        else Recursion(response=response, step=step, scheme=scheme, comm=comm)
     )
     solver = ActiveSet(tire.same_step + TREAD)
     drive = Drive(height or Flat().height, motion, speed)
@@ -93,7 +93,7 @@ def test_constant_scheme_never_gains_energy_undamped() -> None:
     strip = Strip(damping=0.0)
     response = strip.response(PATCH.points, 4, 2, residual=6)
     step = 2e-4
-    tire = Recursion(response, step, "constant", MPI.COMM_SELF)
+    tire = Recursion(response=response, step=step, scheme="constant", comm=MPI.COMM_SELF)
     solver = ActiveSet(tire.same_step + TREAD)
 
     def blow(t: float) -> float:

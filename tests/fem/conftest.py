@@ -22,7 +22,17 @@ def make_body() -> Callable[..., Body]:
     def make(order=2, segments=12, arc=6, layers=1, comm=MPI.COMM_SELF, free=False, **more):
         material, regions = more.pop("material", RUBBER), more.pop("regions", ())
         cords, plies = more.pop("cords", ()), more.pop("plies", ())
-        section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, layers, order, **more)
+        section = Torus(
+            outer_radius=0.32,
+            minor_radius=0.1,
+            thickness=0.012,
+            half_angle=np.radians(120),
+            segments=segments,
+            elements_arc=arc,
+            elements_thickness=layers,
+            order=order,
+            **more,
+        )
         ring = section.ring([region.patch(i) for i, region in enumerate(regions)], plies)
         body = Body(comm, ring, compounds(material, tuple(regions)), cords=cords)
         if free:

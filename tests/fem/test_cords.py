@@ -293,7 +293,7 @@ def test_any_number_of_processes_has_the_same_cords(belted):
         body.u.interpolate(wave)
         body.u.x.scatter_forward()
         pressure = fem.Constant(body.mesh, 2e5)
-        form = compat.form(static_residual(body, pressure, Rolling(80.0, 50.0)))
+        form = compat.form(static_residual(body, pressure, Rolling(speed=80.0, damping=50.0)))
         out = fem.petsc.assemble_vector(form)
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         total = body.comm.allreduce(stored(body))
@@ -310,7 +310,17 @@ def test_forces_of_cords_in_a_wavy_ring():
     """E A (lambda - 1) of hoop cords in a ring whose radius waves around it, on the grid in its order; and the same
     on any number of processes."""
     half = np.radians(30)
-    section = Torus(5.1, 5.0, 0.002, half, 16, 8, 1, 2, "uniform")
+    section = Torus(
+        outer_radius=5.1,
+        minor_radius=5.0,
+        thickness=0.002,
+        half_angle=half,
+        segments=16,
+        elements_arc=8,
+        elements_thickness=1,
+        order=2,
+        grading="uniform",
+    )
     ring = section.ring((), [PlyLine("hoop", (-half, half), 1.0)])
     soft = compound("neo-hookean", 1000.0, youngs_modulus=1e3, poisson_ratio=0.45)
     found = []

@@ -17,9 +17,9 @@ from tireroad.fem.tire.material import compound
 TERMS = {
     "stress": (0.0, Rolling()),
     "pressure": (2e6, Rolling()),
-    "inertia": (0.0, Rolling(150.0)),
-    "damping": (0.0, Rolling(150.0, 500.0)),
-    "doppler": (0.0, Rolling(150.0, 0.0, 0.0, "doppler")),
+    "inertia": (0.0, Rolling(speed=150.0)),
+    "damping": (0.0, Rolling(speed=150.0, damping=500.0)),
+    "doppler": (0.0, Rolling(speed=150.0, damping=0.0, stiffness_damping=0.0, inertia="doppler")),
 }
 MODELS = {
     "linear": {"youngs_modulus": 5e6, "poisson_ratio": 0.49},
@@ -131,7 +131,7 @@ def test_damping_of_the_rolling_shape_tilts_the_footprint_forward(make_body):
     arms = []
     for speed in (60.0, -60.0):
         state, *_ = loaded(
-            make_body, segments=16, footprint_size=0.3, rolling=Rolling(speed, 500.0)
+            make_body, segments=16, footprint_size=0.3, rolling=Rolling(speed=speed, damping=500.0)
         )
         arms.append(state.force @ state.positions[:, 0] / state.load)
     assert arms[0] > 1e-4
@@ -210,7 +210,9 @@ def test_damping_by_the_stiffness_has_a_full_tangent(make_body, csr):
     body.u.x.array[rim] = direction[rim] = 0.0
     found = {}
     for damping in (1e-4, 0.0):
-        equilibrium = Equilibrium(body, Rolling(100.0, 0.0, damping))
+        equilibrium = Equilibrium(
+            body, Rolling(speed=100.0, damping=0.0, stiffness_damping=damping)
+        )
         equilibrium._assemble_residual()
         exact = csr(fresh(equilibrium)) @ direction
         numeric = central(
@@ -237,7 +239,14 @@ def test_newton_steps_do_not_grow_towards_incompressibility(make_body, ratio):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("rolling", [Rolling(), Rolling(60.0, 500.0), Rolling(60.0, 0.0, 1e-4)])
+@pytest.mark.parametrize(
+    "rolling",
+    [
+        Rolling(),
+        Rolling(speed=60.0, damping=500.0),
+        Rolling(speed=60.0, damping=0.0, stiffness_damping=1e-4),
+    ],
+)
 def test_the_same_state_on_any_number_of_processes(make_body, rolling):
     alone, *_ = loaded(make_body, rolling=rolling)
     shared, *_ = loaded(make_body, comm=MPI.COMM_WORLD, rolling=rolling)

@@ -15,7 +15,17 @@ def plane():
     """A lattice whose outer face is laid out flat: x around, y along."""
 
     def make(order, segments, arc):
-        section = Torus(0.32, 0.1, 0.01, 1.0, segments, arc, 1, order, "uniform")
+        section = Torus(
+            outer_radius=0.32,
+            minor_radius=0.1,
+            thickness=0.01,
+            half_angle=1.0,
+            segments=segments,
+            elements_arc=arc,
+            elements_thickness=1,
+            order=order,
+            grading="uniform",
+        )
         lattice = Lattice(section, _edge(field_nodes(order)))
         x = 0.05 * (np.where(lattice.ring > np.pi, lattice.ring - 2 * np.pi, lattice.ring))
         grid = np.stack(np.meshgrid(x, 0.05 * lattice.arc, [0.0], indexing="ij"), axis=-1)

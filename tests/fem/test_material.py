@@ -99,8 +99,8 @@ def test_regions_have_their_volume_on_every_mesh(make_body, mesh):
     """Pappus: an annular sector turned about the axle, to what elements of order 3 make of circles."""
     tread, soft = (compound("yeoh", rho, c10=1e6, bulk_modulus=1e8) for rho in (900.0, 800.0))
     regions = [
-        Region(tread, (0, np.radians(40)), depth=(0.5, 1.0)),
-        Region(soft, (0, np.radians(30)), depth=(0.5, 1.0), side="left"),
+        Region(material=tread, arc=(0, np.radians(40)), depth=(0.5, 1.0)),
+        Region(material=soft, arc=(0, np.radians(30)), depth=(0.5, 1.0), side="left"),
     ]
     segments, arc, layers = mesh
     body = make_body(3, segments, arc, layers, regions=regions, comm=MPI.COMM_WORLD)
@@ -122,7 +122,7 @@ def test_regions_have_their_volume_on_every_mesh(make_body, mesh):
 def test_a_region_that_holds_no_element_is_refused(make_body):
     rubber = compound("yeoh", 1.0, c10=1e6, bulk_modulus=1e8)
     with pytest.raises(InputError, match="region 0.* no part of the wall"):
-        make_body(regions=[Region(rubber, np.radians([121.0, 130.0]))])
+        make_body(regions=[Region(material=rubber, arc=np.radians([121.0, 130.0]))])
 
 
 def test_nodes_of_an_edge_are_lobatto_points():

@@ -24,7 +24,16 @@ PUSH = 300.0  # N: some millimetres
 
 def inflated(comm):
     """A soft inflated torus of few elements, and a push at its lowest point."""
-    section = Torus(0.32, 0.10, 0.012, np.radians(120), 10, 4, 1, 2)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.10,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=10,
+        elements_arc=4,
+        elements_thickness=1,
+        order=2,
+    )
     body = Body(
         comm, section, compound("neo-hookean", 1200.0, youngs_modulus=4.8e6, poisson_ratio=0.45)
     )
@@ -40,12 +49,28 @@ def tire():
 
 def nonlinear(tire, step, radius=0.0, damping=DAMPING):
     operators, load = tire
-    return NonlinearTire(operators, INFLATION, damping, step, load, load, radius)
+    return NonlinearTire(
+        operators=operators,
+        inflation=INFLATION,
+        damping=damping,
+        step=step,
+        outputs=load,
+        loads=load,
+        spectral_radius=radius,
+    )
 
 
 def linear(tire, step):
     operators, load = tire
-    return FullTire(operators, None, 0.0, DAMPING, step, load, load)
+    return FullTire(
+        operators=operators,
+        rotation=None,
+        speed=0.0,
+        damping=DAMPING,
+        step=step,
+        outputs=load,
+        loads=load,
+    )
 
 
 def pulse(time):

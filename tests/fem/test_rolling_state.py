@@ -20,7 +20,9 @@ def test_a_little_more_load_moves_it_as_the_rotating_stiffness_says(make_body, i
     """du = K_Omega^-1 df between two states a thousandth of the deflection apart; with the other
     inertia's K_Omega it is off twenty times as far: the state and its small motions are of one model."""
     body = make_body(segments=16)
-    equilibrium = Equilibrium(body, Rolling(SPEED, DAMPING, 0.0, inertia))
+    equilibrium = Equilibrium(
+        body, Rolling(speed=SPEED, damping=DAMPING, stiffness_damping=0.0, inertia=inertia)
+    )
     loader = Loader(equilibrium, lambda progress: None)
     loader.inflate(INFLATION)
     loader.deflect(0.006)
@@ -49,8 +51,8 @@ def test_without_centrifugal_forces_a_round_tire_does_not_grow(make_body) -> Non
     crown = {}
     for name, rolling in {
         "rest": Rolling(),
-        "doppler": Rolling(150.0, 500.0, 0.0, "doppler"),
-        "full": Rolling(150.0, 500.0),
+        "doppler": Rolling(speed=150.0, damping=500.0, stiffness_damping=0.0, inertia="doppler"),
+        "full": Rolling(speed=150.0, damping=500.0),
     }.items():
         equilibrium = Equilibrium(make_body(segments=24), rolling)
         loader = Loader(equilibrium, lambda progress: None)

@@ -12,7 +12,7 @@ from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import compound
 
 PRESSURE = 1.5e5
-ROLLING = Rolling(60.0)
+ROLLING = Rolling(speed=60.0)
 
 
 @pytest.fixture

@@ -15,7 +15,16 @@ BELT = PlyLine("belt", (-0.8, 0.8), 0.75)
 
 
 def torus(order=2, arc=12, layers=1) -> Torus:
-    return Torus(0.32, 0.1, 0.012, HALF, 20, arc, layers, order)
+    return Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=HALF,
+        segments=20,
+        elements_arc=arc,
+        elements_thickness=layers,
+        order=order,
+    )
 
 
 def area(mesh, region=None) -> float:

@@ -20,7 +20,16 @@ def test_the_lowest_point_of_a_turned_wheel(order, turn):
     """A circle about the axle, turned by a part of an element: the face between nodes closes in on it."""
     errors = []
     for segments in (16, 32):
-        section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, segments // 2, 1, order)
+        section = Torus(
+            outer_radius=0.32,
+            minor_radius=0.1,
+            thickness=0.012,
+            half_angle=np.radians(120),
+            segments=segments,
+            elements_arc=segments // 2,
+            elements_thickness=1,
+            order=order,
+        )
         edge = {1: [0, 1], 2: [0, 0.5, 1], 3: [0, 0.27639320225, 0.72360679775, 1]}[order]
         lattice = Lattice(section, np.array(edge))
         ring, arc = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
@@ -32,7 +41,16 @@ def test_the_lowest_point_of_a_turned_wheel(order, turn):
 
 def test_no_place_on_the_face_is_lower():
     rng = np.random.default_rng(3)
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), 12, 6, 1, 3)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=12,
+        elements_arc=6,
+        elements_thickness=1,
+        order=3,
+    )
     lattice = Lattice(section, np.array([0, 0.27639320225, 0.72360679775, 1]))
     ring, arc = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
     face = torus(ring.ravel(), arc.ravel())

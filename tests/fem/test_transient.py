@@ -20,7 +20,16 @@ DAMPING = (400.0, 0.0)
 
 def inflated(comm):
     """An inflated torus of few elements, its operators, rotation matrices, a load and its reading."""
-    section = Torus(0.32, 0.10, 0.012, np.radians(120), 12, 4, 1, 2)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.10,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=12,
+        elements_arc=4,
+        elements_thickness=1,
+        order=2,
+    )
     material = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
     body = Body(comm, section, material)
     Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
@@ -43,7 +52,16 @@ def pulse(time):
 def history(tire, step, radius, speed=60.0, force=pulse, duration=0.02, damping=DAMPING):
     operators, rotation, load = tire
     turning = rotation if speed else None
-    full = FullTire(operators, turning, speed, damping, step, load, load, spectral_radius=radius)
+    full = FullTire(
+        operators=operators,
+        rotation=turning,
+        speed=speed,
+        damping=damping,
+        step=step,
+        outputs=load,
+        loads=load,
+        spectral_radius=radius,
+    )
     steps = round(duration / step)
     out = np.zeros(steps + 1)
     full.start(np.array([force(0.0)]))
@@ -102,7 +120,16 @@ def test_rate_of_momentum_belongs_to_the_end_of_the_step(tire):
     """Its integral is the momentum; the scheme's own acceleration would lag by a step."""
     step, steps = 1e-4, 120
     operators, _, load = tire
-    full = FullTire(operators, None, 0.0, DAMPING, step, load, load, spectral_radius=0.0)
+    full = FullTire(
+        operators=operators,
+        rotation=None,
+        speed=0.0,
+        damping=DAMPING,
+        step=step,
+        outputs=load,
+        loads=load,
+        spectral_radius=0.0,
+    )
     full.start(np.zeros(1))
     rates, momenta = np.zeros(steps + 1), np.zeros(steps + 1)
     for k in range(1, steps + 1):
@@ -126,7 +153,15 @@ def march(full, steps, first=1, step=2e-4):
 
 def rolling_tire(tire, step=2e-4):
     operators, rotation, load = tire
-    return FullTire(operators, rotation, 60.0, DAMPING, step, load, load)
+    return FullTire(
+        operators=operators,
+        rotation=rotation,
+        speed=60.0,
+        damping=DAMPING,
+        step=step,
+        outputs=load,
+        loads=load,
+    )
 
 
 def test_goes_on_from_a_snapshot_with_the_same_bits(tire):
@@ -154,7 +189,15 @@ def test_contact_with_a_floor_at_rest_never_adds_energy(tire):
     """A floor lifts the tire by 1 mm, goes back to 0 and stays: bounces on it only lose."""
     operators, _, load = tire
     step = 1e-4
-    full = FullTire(operators, None, 0.0, (0.0, 0.0), step, load, load)
+    full = FullTire(
+        operators=operators,
+        rotation=None,
+        speed=0.0,
+        damping=(0.0, 0.0),
+        step=step,
+        outputs=load,
+        loads=load,
+    )
     full.start(np.zeros(1))
     energies, touched = [], 0
     for k in range(1, 500):

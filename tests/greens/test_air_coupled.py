@@ -35,9 +35,18 @@ EVERY = 10**6
 @lru_cache(maxsize=3)
 def body(speed: float, deflection: float = 0.01) -> Body:
     """An inflated soft torus on the road, turning or not."""
-    section = Torus(0.32, 0.10, 0.012, np.radians(120), 8, 2, 1, 2)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.10,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=8,
+        elements_arc=2,
+        elements_thickness=1,
+        order=2,
+    )
     made = Body(COMM, section, RUBBER)
-    loader = Loader(Equilibrium(made, Rolling(speed)), lambda progress: None)
+    loader = Loader(Equilibrium(made, Rolling(speed=speed)), lambda progress: None)
     loader.inflate(2e5)
     if deflection:
         loader.deflect(deflection)
@@ -48,16 +57,27 @@ def body(speed: float, deflection: float = 0.01) -> Body:
 def wheel(speed: float, rim: str, count: int, loss=0.01, air=True, alone=False):
     """The full matrices, the modes, and what they make with the air; without a road if `alone`."""
     tire = body(speed, 0.0 if alone else 0.01)
-    operators = Operators(tire, 2e5, Support(rim), Rolling(speed))
+    operators = Operators(tire, 2e5, Support(rim), Rolling(speed=speed))
     rotation = operators.rotation() if speed else None
     modes = undamped.solve(operators.stiffness, operators.mass, count, sites=sites(operators))
     column = None
     if air:
         column = make_column(tire, operators.unknowns, 2e5, 293.15, speed, 500.0, loss)
-    made = Wheel(operators, rotation, speed, DAMPING, "full", column)
+    made = Wheel(
+        operators=operators,
+        rotation=rotation,
+        speed=speed,
+        damping=DAMPING,
+        inertia="full",
+        air=column,
+    )
     projection = made.with_air(project(modes, rotation, operators.carried, COMM), modes)
     states = made.decouple(projection, COMM)
-    return made, modes, Basis(operators.trace(modes.vectors), projection, states)
+    return (
+        made,
+        modes,
+        Basis(shape=operators.trace(modes.vectors), projection=projection, states=states),
+    )
 
 
 def loads() -> sparse.csr_matrix:
@@ -129,12 +149,16 @@ def test_full_finite_elements_in_time_agree_with_all_modes(speed) -> None:
     parts, size = (slice(1), slice(1, 4)), np.linalg.norm
     for step in (1e-4, 5e-5):
         full = FullTire(
-            made.operators, made.rotation, speed, DAMPING, step, load, load,
+            operators=made.operators, rotation=made.rotation, speed=speed, damping=DAMPING, step=step, outputs=load, loads=load,
             spectral_radius=1.0, air=made.air,
         )  # fmt: skip
         steps = round(0.02 / step)
         found = march(full, step, steps)
-        exact = march(Recursion(basis.couple(load, load), step, "linear", COMM), step, steps)
+        exact = march(
+            Recursion(response=basis.couple(load, load), step=step, scheme="linear", comm=COMM),
+            step,
+            steps,
+        )
         errors.append([size((found - exact)[:, k]) / size(exact[:, k]) for k in parts])
     errors = np.array(errors)
     assert errors[1, 0] < 0.01
@@ -146,8 +170,9 @@ def test_full_finite_elements_in_time_agree_with_all_modes(speed) -> None:
 def test_full_tire_with_air_goes_on_from_a_snapshot() -> None:
     made, _, _ = wheel(60.0, "fixed", 60)
     load = loads()[:1]
-    args = made.operators, made.rotation, 60.0, DAMPING, 1e-4, load, load
-    whole, again = (FullTire(*args, air=made.air) for _ in range(2))
+    names = "operators", "rotation", "speed", "damping", "step", "outputs", "loads", "air"
+    values = made.operators, made.rotation, 60.0, DAMPING, 1e-4, load, load, made.air
+    whole, again = (FullTire(**dict(zip(names, values, strict=True))) for _ in range(2))
     march(whole, 1e-4, 30)
     again.restore(whole.snapshot())
     one, other = whole.predict(), again.predict()

@@ -24,7 +24,17 @@ SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "
 @pytest.fixture(scope="module")
 def tire():
     """7,200 unknowns, 40 modes, vertical probes at 15 x 9 points 8 mm apart (closer than the nodes)."""
-    section = Torus(0.32, 0.10, 0.012, np.radians(120), 24, 9, 1, 2, footprint_size=0.4)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.10,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=24,
+        elements_arc=9,
+        elements_thickness=1,
+        order=2,
+        footprint_size=0.4,
+    )
     body = Body(COMM, section, compound(**SOFT))
     Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)
@@ -44,10 +54,16 @@ def test_what_is_left_out_is_within_the_tolerance(tire, speed, monkeypatch):
     and pseudo-modes), none at 0 Hz; and fewer states.
     """
     operators, modes, probes = tire
-    wheel = Wheel(operators, operators.rotation() if speed else None, speed, (100.0, 0.0), "full")
+    wheel = Wheel(
+        operators=operators,
+        rotation=operators.rotation() if speed else None,
+        speed=speed,
+        damping=(100.0, 0.0),
+        inertia="full",
+    )
     projection = project(modes, wheel.rotation, operators.carried, COMM)
     shape = operators.trace(modes.vectors)
-    basis = Basis(shape, projection, wheel.decouple(projection, COMM))
+    basis = Basis(shape=shape, projection=projection, states=wheel.decouple(projection, COMM))
     monkeypatch.setattr(attachment, "FEW", 0)
     reduced = wheel.respond(basis, modes, probes, probes, "attachment")
     monkeypatch.setattr(attachment, "TOLERANCE", 0.0)

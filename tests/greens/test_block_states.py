@@ -16,15 +16,15 @@ def response(rigid: bool = False) -> Response:
     block = linalg.block_diag(*parts)
     size = len(block)
     return Response(
-        np.array([-3.0 + 60.0j]),
-        random.standard_normal((2, 1)) + 1j * random.standard_normal((2, 1)),
-        random.standard_normal((1, 2)) + 1j * random.standard_normal((1, 2)),
-        block,
-        random.standard_normal((2, size)),
-        random.standard_normal((size, 2)),
-        np.zeros((2, 2)),
-        np.zeros((3, 1)),
-        random.standard_normal((3, size)),
+        eigenvalue=np.array([-3.0 + 60.0j]),
+        output=random.standard_normal((2, 1)) + 1j * random.standard_normal((2, 1)),
+        input=random.standard_normal((1, 2)) + 1j * random.standard_normal((1, 2)),
+        block=block,
+        block_output=random.standard_normal((2, size)),
+        block_input=random.standard_normal((size, 2)),
+        residual=np.zeros((2, 2)),
+        momentum=np.zeros((3, 1)),
+        block_momentum=random.standard_normal((3, size)),
         rigid=2 if rigid else 0,
     )
 

@@ -58,9 +58,9 @@ def golden_car() -> tuple[Axle, Basis]:
         mass=nothing, stiffness=nothing, gyroscopic=nothing, convective=nothing,
         own_mass=own, own_stiffness=own, own_gyroscopic=own, own_convective=own,
     )  # fmt: skip
-    projection = Projection(np.zeros(0), np.zeros((3, 0)), corner=corner)
+    projection = Projection(squares=np.zeros(0), momentum=np.zeros((3, 0)), corner=corner)
     states = decouple(projection, Turning(damping=(0.0, 0.0)), COMM)
-    return axle, Basis(np.zeros((3, 0)), projection, states)
+    return axle, Basis(shape=np.zeros((3, 0)), projection=projection, states=states)
 
 
 def test_the_golden_car_on_its_tire() -> None:
@@ -92,7 +92,7 @@ def test_the_golden_car_in_time() -> None:
     reading = sparse.hstack([sparse.csr_matrix((2, 3)), sparse.csr_matrix(np.eye(7)[[2, 6]])])
     response = basis.couple(reading.tocsr(), point)
     step, m_u, body = 1e-3, GOLDEN[3], 1.0
-    tire = Recursion(response, step, "linear", COMM)
+    tire = Recursion(response=response, step=step, scheme="linear", comm=COMM)
     tire.start(np.ones(1))
     places = []
     for _ in range(3000):
@@ -109,8 +109,21 @@ def test_the_golden_car_in_time() -> None:
 @lru_cache(maxsize=2)
 def body(speed: float) -> Body:
     """An inflated soft torus on the road, turning or not."""
-    made = Body(COMM, Torus(0.32, 0.10, 0.012, np.radians(120), 8, 2, 1, 2), RUBBER)
-    loader = Loader(Equilibrium(made, Rolling(speed)), lambda progress: None)
+    made = Body(
+        COMM,
+        Torus(
+            outer_radius=0.32,
+            minor_radius=0.10,
+            thickness=0.012,
+            half_angle=np.radians(120),
+            segments=8,
+            elements_arc=2,
+            elements_thickness=1,
+            order=2,
+        ),
+        RUBBER,
+    )
+    loader = Loader(Equilibrium(made, Rolling(speed=speed)), lambda progress: None)
     loader.inflate(2e5)
     loader.deflect(0.01)
     return made
@@ -139,7 +152,7 @@ def six_ways(body_mass: float | None = 300.0) -> Axle:
 def wheel(speed: float, count: int, axle_at: int = 0):
     """The full matrices of a held rim, the modes, and the basis that a corner has joined."""
     axle = (six_ways(), replace(six_ways(None), locked=("rx", "ry", "rz")), None)[axle_at]
-    made, rolling = body(speed), Rolling(speed)
+    made, rolling = body(speed), Rolling(speed=speed)
     operators = Operators(made, 2e5, Support("fixed"), rolling)
     rotation = operators.rotation() if speed else None
     modes = undamped.solve(operators.stiffness, operators.mass, count, sites=sites(operators))
@@ -149,10 +162,23 @@ def wheel(speed: float, count: int, axle_at: int = 0):
     def corner(projection, modes):
         return with_corner(projection, modes, axle, motion, places(speed), COMM)
 
-    full = Wheel(operators, rotation, speed, DAMPING, "full", corner=corner if axle else None)
+    full = Wheel(
+        operators=operators,
+        rotation=rotation,
+        speed=speed,
+        damping=DAMPING,
+        inertia="full",
+        corner=corner if axle else None,
+    )
     projection = corner(projection, modes)
     states = full.decouple(projection, COMM)
-    return full, modes, Basis(operators.trace(modes.vectors), projection, states, speed)
+    return (
+        full,
+        modes,
+        Basis(
+            shape=operators.trace(modes.vectors), projection=projection, states=states, speed=speed
+        ),
+    )
 
 
 def loads(speed: float, extra: int) -> sparse.csr_matrix:
@@ -169,8 +195,8 @@ def dense_receptance(speed: float, axle: Axle) -> np.ndarray:
 
     The material's damping acts on the motion against the rim.
     """
-    held = Operators(body(speed), 2e5, Support("fixed"), Rolling(speed))
-    free = Operators(body(speed), 2e5, Support("free"), Rolling(speed))
+    held = Operators(body(speed), 2e5, Support("fixed"), Rolling(speed=speed))
+    free = Operators(body(speed), 2e5, Support("free"), Rolling(speed=speed))
     n, rim = len(held.mass), free.unknowns.rim.coordinates
     points = body(speed).lattice.points(body(speed).ids) + body(speed).owned(body(speed).u.x.array)
     rigid = rigid_motions(points)[free.unknowns.free]

@@ -32,22 +32,37 @@ DAMPING = (60.0, 1e-6)
 @lru_cache(maxsize=2)
 def body(speed: float) -> Body:
     """An inflated soft torus, turning or not."""
-    section = Torus(0.32, 0.10, 0.012, np.radians(120), 8, 2, 1, 2)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.10,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=8,
+        elements_arc=2,
+        elements_thickness=1,
+        order=2,
+    )
     made = Body(COMM, section, RUBBER)
-    Loader(Equilibrium(made, Rolling(speed)), lambda progress: None).inflate(2e5)
+    Loader(Equilibrium(made, Rolling(speed=speed)), lambda progress: None).inflate(2e5)
     return made
 
 
 @lru_cache(maxsize=4)
 def wheel(speed: float, rim: str, count: int):
     """The full matrices, the modes, and what they make."""
-    operators = Operators(body(speed), 2e5, Support(rim), Rolling(speed))
+    operators = Operators(body(speed), 2e5, Support(rim), Rolling(speed=speed))
     rotation = operators.rotation() if speed else None
     modes = undamped.solve(operators.stiffness, operators.mass, count, sites=sites(operators))
-    made = Wheel(operators, rotation, speed, DAMPING, "full")
+    made = Wheel(
+        operators=operators, rotation=rotation, speed=speed, damping=DAMPING, inertia="full"
+    )
     projection = project(modes, rotation, operators.carried, COMM)
     states = made.decouple(projection, COMM)
-    return made, modes, Basis(operators.trace(modes.vectors), projection, states)
+    return (
+        made,
+        modes,
+        Basis(shape=operators.trace(modes.vectors), projection=projection, states=states),
+    )
 
 
 def loads() -> sparse.csr_matrix:

@@ -39,7 +39,16 @@ SPOTS = [(0.0, 0.0), (0.15, 0.1), (-0.2, -0.3), (1.0, 0.5)]
 def tire():
     """An inflated soft torus of 2,112 free unknowns, its lowest modes, loads and readings."""
     comm = MPI.COMM_WORLD
-    section = Torus(0.32, 0.10, 0.012, np.radians(120), 16, 6, 1, 2)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.10,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=16,
+        elements_arc=6,
+        elements_thickness=1,
+        order=2,
+    )
     body = Body(comm, section, compound(**MATERIAL))
     Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)
@@ -52,11 +61,17 @@ def tire():
 
 def wheel(speed: float, damping=DAMPING, inertia: str = "full") -> tuple[Wheel, Basis]:
     operators, rotation, modes, _, _ = tire()
-    made = Wheel(operators, rotation if speed else None, speed, damping, inertia)
+    made = Wheel(
+        operators=operators,
+        rotation=rotation if speed else None,
+        speed=speed,
+        damping=damping,
+        inertia=inertia,
+    )
     comm = operators.body.comm
     projection = project(modes, made.rotation, operators.carried, comm)
     shape = operators.trace(modes.vectors)
-    return made, Basis(shape, projection, made.decouple(projection, comm))
+    return made, Basis(shape=shape, projection=projection, states=made.decouple(projection, comm))
 
 
 def response(made: Wheel, basis: Basis, option: str):

@@ -30,8 +30,19 @@ INFLATION, KEPT = 1e5, 30
 def tire() -> SimpleNamespace:
     """A torus of two compounds with 30 modes, and its matrices in full."""
     rubber = {"density": 1200.0, "youngs_modulus": 48e6, "poisson_ratio": 0.45}
-    tread = Region(compound("neo-hookean", **rubber, loss_factor=0.3), (0.0, np.radians(60)))
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), 8, 4, 1, 2)
+    tread = Region(
+        material=compound("neo-hookean", **rubber, loss_factor=0.3), arc=(0.0, np.radians(60))
+    )
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=8,
+        elements_arc=4,
+        elements_thickness=1,
+        order=2,
+    )
     wall = compound("neo-hookean", **rubber, loss_factor=0.1)
     body = Body(MPI.COMM_SELF, section, wall, (tread,))
     equilibrium = Equilibrium(body)
@@ -79,9 +90,18 @@ def pencil(t, speed):
 def made(t, speed) -> tuple[Wheel, Basis]:
     tail = beyond(StrainEnergy(), t.projection)
     rotation = t.rotation if speed else None
-    wheel = Wheel(t.operators, rotation, speed, StrainEnergy(), "full", beyond=tail)
+    wheel = Wheel(
+        operators=t.operators,
+        rotation=rotation,
+        speed=speed,
+        damping=StrainEnergy(),
+        inertia="full",
+        beyond=tail,
+    )
     states = wheel.decouple(t.projection, MPI.COMM_SELF)
-    return wheel, Basis(t.operators.trace(t.modes.vectors), t.projection, states)
+    return wheel, Basis(
+        shape=t.operators.trace(t.modes.vectors), projection=t.projection, states=states
+    )
 
 
 @pytest.mark.parametrize("speed", [0.0, 60.0])
@@ -134,7 +154,15 @@ def test_the_reference_in_time_has_the_same_losses(speed):
     h, steps = 1e-4, 100
     rotation = t.rotation if speed else None
     full = FullTire(
-        operators, rotation, speed, tail, h, t.probes, t.probes, spectral_radius=1.0, modal=modal
+        operators=operators,
+        rotation=rotation,
+        speed=speed,
+        damping=tail,
+        step=h,
+        outputs=t.probes,
+        loads=t.probes,
+        spectral_radius=1.0,
+        modal=modal,
     )
     full.velocity = start.copy()
     none = np.zeros(t.probes.shape[0])

@@ -54,7 +54,9 @@ def test_recursion_is_exact_for_its_kind_of_force(scheme, step) -> None:
     if scheme == "constant":
         force[0] = 0
     exact = exact_march(system, force, step, scheme)
-    found = march(Recursion(system.response(), step, scheme, MPI.COMM_SELF), force)
+    found = march(
+        Recursion(response=system.response(), step=step, scheme=scheme, comm=MPI.COMM_SELF), force
+    )
     assert np.abs(found - exact).max() < 1e-9 * np.abs(exact).max()
 
 
@@ -62,9 +64,13 @@ def test_residual_acts_at_once() -> None:
     system = make()
     whole = system.shape @ np.linalg.solve(system.stiffness, system.shape.T) + np.eye(4) * 1e-4
     force = some_force(4)
-    plain = march(Recursion(system.response(), 1e-3, "linear", MPI.COMM_SELF), force)
+    plain = march(
+        Recursion(response=system.response(), step=1e-3, scheme="linear", comm=MPI.COMM_SELF), force
+    )
     with_residual = system.response(compliance=whole)
-    found = march(Recursion(with_residual, 1e-3, "linear", MPI.COMM_SELF), force)
+    found = march(
+        Recursion(response=with_residual, step=1e-3, scheme="linear", comm=MPI.COMM_SELF), force
+    )
     extra = force[1:] @ with_residual.residual.T
     assert np.abs(found - plain - extra).max() < 1e-13
     assert np.abs(extra).max() > 1e-5
@@ -74,7 +80,9 @@ def test_steady_force_ends_at_the_static_answer() -> None:
     system = make(damping=80.0)
     static = system.shape @ np.linalg.solve(system.stiffness, system.shape.T)
     force = np.tile([1.0, -2.0, 0.5, 3.0], (STEPS + 1, 1))
-    found = march(Recursion(system.response(), 0.02, "linear", MPI.COMM_SELF), force)[-1]
+    found = march(
+        Recursion(response=system.response(), step=0.02, scheme="linear", comm=MPI.COMM_SELF), force
+    )[-1]
     assert np.abs(found - static @ force[0]).max() < 1e-9 * np.abs(found).max()
 
 
@@ -85,7 +93,9 @@ def test_linear_scheme_is_of_second_order_and_constant_of_first() -> None:
     def end(step, scheme):
         times = step * np.arange(round(0.05 / step) + 1)
         force = np.sin(2 * np.pi * 42 * times)[:, None] * np.ones(4)
-        return march(Recursion(response, step, scheme, MPI.COMM_SELF), force)[-1]
+        return march(
+            Recursion(response=response, step=step, scheme=scheme, comm=MPI.COMM_SELF), force
+        )[-1]
 
     exact = end(0.05 / 6400, "linear")
     for scheme, order, cap in (("linear", 2, 2e-3), ("constant", 1, 0.1)):
@@ -105,8 +115,10 @@ def test_convolution_comes_to_the_recursion_at_first_order() -> None:
         step = 0.05 / n
         times = step * np.arange(n + 1)
         force = (1 + np.sin(2 * np.pi * 40 * times))[:, None] * np.ones(4)
-        direct = march(Convolution(response, step, n), force)
-        found = march(Recursion(response, step, "linear", MPI.COMM_SELF), force)
+        direct = march(Convolution(response=response, step=step, steps=n), force)
+        found = march(
+            Recursion(response=response, step=step, scheme="linear", comm=MPI.COMM_SELF), force
+        )
         errors.append(np.abs(direct - found).max() / np.abs(found).max())
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(1, abs=0.15)
     assert errors[-1] < 2e-2
@@ -120,7 +132,7 @@ def test_inertia_force_is_the_rate_of_momentum() -> None:
     step = 1e-5
     force = np.zeros((STEPS + 1, 5))
     force[:, :4] = np.linspace(0, 1, STEPS + 1)[:, None] ** 2
-    tire = Recursion(momentum.response(), step, "linear", MPI.COMM_SELF)
+    tire = Recursion(response=momentum.response(), step=step, scheme="linear", comm=MPI.COMM_SELF)
     tire.start(force[0])
     carried, rates = [], []
     for new in force[1:]:
@@ -134,7 +146,7 @@ def test_inertia_force_is_the_rate_of_momentum() -> None:
 
 def test_too_long_a_convolution_is_refused() -> None:
     with pytest.raises(InputError, match="needs no history"):
-        Convolution(make().response(), 1e-6, 10**8)
+        Convolution(response=make().response(), step=1e-6, steps=10**8)
 
 
 @pytest.mark.mpi
@@ -143,7 +155,10 @@ def test_the_same_on_any_number_of_processes(scheme) -> None:
     system = make(m=11)
     force = some_force(4)
     response = system.response()
-    alone, spread = (Recursion(response, 1e-3, scheme, c) for c in (MPI.COMM_SELF, MPI.COMM_WORLD))
+    alone, spread = (
+        Recursion(response=response, step=1e-3, scheme=scheme, comm=c)
+        for c in (MPI.COMM_SELF, MPI.COMM_WORLD)
+    )
     one, all_of_them = march(alone, force), march(spread, force)
     assert np.abs(one - all_of_them).max() < 1e-12 * np.abs(one).max()
     assert np.abs(alone.inertia_force() - spread.inertia_force()).max() < 1e-10
@@ -157,9 +172,13 @@ def test_dirac_residual_answers_with_a_pulse_of_one_step() -> None:
     pulse = replace(at_once, pulse=True)
     force = some_force(4)
     first, second = (
-        march(Recursion(r, 1e-3, "linear", MPI.COMM_SELF), force) for r in (at_once, pulse)
+        march(Recursion(response=r, step=1e-3, scheme="linear", comm=MPI.COMM_SELF), force)
+        for r in (at_once, pulse)
     )
     late = (force[:-1] - force[1:]) @ at_once.residual.T / 2
     assert np.abs(second - first - late).max() < 1e-13
-    held = [march(Recursion(r, 1e-3, "constant", MPI.COMM_SELF), force) for r in (at_once, pulse)]
+    held = [
+        march(Recursion(response=r, step=1e-3, scheme="constant", comm=MPI.COMM_SELF), force)
+        for r in (at_once, pulse)
+    ]
     assert np.array_equal(*held)

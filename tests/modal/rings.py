@@ -21,7 +21,14 @@ def wave_ring(frequencies: dict[int, float], repeats: int = 1) -> Projection:
     gyroscopic, squares = gyroscopic[np.ix_(order, order)], squares[order]
     convective = gyroscopic @ gyroscopic
     momentum = np.zeros((3, len(squares)))
-    return Projection(squares, momentum, gyroscopic, convective, gyroscopic, convective)
+    return Projection(
+        squares=squares,
+        momentum=momentum,
+        gyroscopic=gyroscopic,
+        convective=convective,
+        body=gyroscopic,
+        body_convective=convective,
+    )
 
 
 def inextensional_ring(waves: list[int], bending: float, speed: float) -> Projection:
@@ -50,7 +57,12 @@ def inextensional_ring(waves: list[int], bending: float, speed: float) -> Projec
     turned = np.stack([field[::-1] * [[1], [-1]] for field in fields]).reshape(len(fields), -1)
     body = gyroscopic - weight * shapes @ turned.T
     return Projection(
-        squares, np.zeros((3, len(n))), gyroscopic, -stretch, (body - body.T) / 2, body @ body
+        squares=squares,
+        momentum=np.zeros((3, len(n))),
+        gyroscopic=gyroscopic,
+        convective=-stretch,
+        body=(body - body.T) / 2,
+        body_convective=body @ body,
     )
 
 
@@ -65,4 +77,11 @@ def random_tire(size: int, seed: int = 1) -> Projection:
 
     gyroscopic, body = skew(), skew()
     momentum = np.zeros((3, size))
-    return Projection(squares, momentum, gyroscopic, gyroscopic @ gyroscopic, body, body @ body)
+    return Projection(
+        squares=squares,
+        momentum=momentum,
+        gyroscopic=gyroscopic,
+        convective=gyroscopic @ gyroscopic,
+        body=body,
+        body_convective=body @ body,
+    )

@@ -148,7 +148,7 @@ def test_onset_of_instability():
         name: turn.T @ getattr(projection, name) @ turn
         for name in ("gyroscopic", "convective", "body", "body_convective")
     }
-    tire = type(projection)(squares, projection.momentum, **rotated)
+    tire = type(projection)(squares=squares, momentum=projection.momentum, **rotated)
     speeds = np.linspace(0.0, 600.0, 61)
     rates = np.array([growth(tire, speed, (1.0, 0.0), "doppler") for speed in speeds])
     assert rates[0] == 0.0
@@ -195,7 +195,14 @@ def test_critical_speed_of_a_free_ring() -> None:
         squares = np.array([frequency[n] ** 2 if n > 1 else speed**2 for n in waves])
         zero = np.zeros((len(waves), len(waves)))
         convective = -np.diag(waves.astype(float) ** 2)
-        free = Projection(squares, zero[:3], zero, convective, zero, convective)
+        free = Projection(
+            squares=squares,
+            momentum=zero[:3],
+            gyroscopic=zero,
+            convective=convective,
+            body=zero,
+            body_convective=convective,
+        )
         assert critical_speed(free, "full") == pytest.approx(speed)
         assert critical_speed(free, "full", speed) == pytest.approx(45.0)
 

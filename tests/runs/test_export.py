@@ -23,7 +23,13 @@ CSV = {
     "response.csv",
     "receptance.csv",
 }
-XDMF = {"static.xdmf", "modes.xdmf", "contact.xdmf"}
+XDMF = {
+    "static.xdmf",
+    "modes.xdmf",
+    "modes_fields.h5",
+    "contact.xdmf",
+    "contact_fields.h5",
+}
 
 
 @pytest.fixture(scope="module")
@@ -41,20 +47,23 @@ def columns(path: Path) -> dict[str, NDArray]:
 
 def follow(item: ElementTree.Element, page: Path) -> NDArray:
     """The numbers of a DataItem, as a reader of XDMF finds them."""
-    if item.get("ItemType") == "HyperSlab":
-        slab, source = item
-        start, stride, count = np.array(slab.text.split(), dtype=int).reshape(3, -1)
-        picked = tuple(
-            slice(s, s + n * step, step) for s, step, n in zip(start, stride, count, strict=True)
-        )
-        values = follow(source, page)[picked]
-    else:
-        name, place = item.text.split(":")
-        with h5py.File(page.parent / name, "r") as file:
-            values = file[place][()]
-            assert values.dtype.itemsize == int(item.get("Precision"))
-            assert {"f": "Float", "i": "Int"}[values.dtype.kind] == item.get("NumberType")
-    return values.reshape([int(size) for size in item.get("Dimensions").split()])
+    name, place = item.text.split(":")
+    with h5py.File(page.parent / name, "r") as file:
+        values = file[place][()]
+    assert values.dtype.itemsize == int(item.get("Precision"))
+    assert {"f": "Float", "i": "Int"}[values.dtype.kind] == item.get("NumberType")
+    assert values.shape == tuple(int(size) for size in item.get("Dimensions").split())
+    return values
+
+
+def states(page: Path) -> list[ElementTree.Element]:
+    """The states of a series: the first holds the mesh, the others take it from there; each has a time."""
+    (series,) = ElementTree.parse(page).findall(".//Grid[@CollectionType='Temporal']")
+    assert series.find("Grid/Topology") is not None
+    include = "{http://www.w3.org/2001/XInclude}include"
+    assert all(grid.find(include) is not None for grid in list(series)[1:])
+    assert all(grid.find("Time") is not None for grid in series)
+    return list(series)
 
 
 def test_all_files_are_written_and_nothing_else(results: Path) -> None:
@@ -88,7 +97,7 @@ def test_forces_and_spectra_are_those_of_the_results(results: Path) -> None:
 
 def test_surface_and_displacement(results: Path) -> None:
     page = results / "export" / "static.xdmf"
-    grid = ElementTree.parse(page).find(".//Grid")
+    (grid,) = states(page)
     points = follow(grid.find("Geometry/DataItem"), page)
     quads = follow(grid.find("Topology/DataItem"), page)
     assert int(grid.find("Topology").get("NumberOfElements")) == len(quads)
@@ -99,25 +108,44 @@ def test_surface_and_displacement(results: Path) -> None:
         assert (moved == file["surface/displacement"][()]).all()
 
 
-def test_first_modes_are_vector_fields(results: Path) -> None:
+def test_first_modes_are_vector_fields_over_frequency(results: Path) -> None:
     page = results / "export" / "modes.xdmf"
-    fields = ElementTree.parse(page).findall(".//Attribute")
+    fields = states(page)
     assert len(fields) == SHAPES
     with h5py.File(results / "modes.h5") as file:
-        for number, field in enumerate(fields):
-            assert f"{file['frequency'][number]:.2f} Hz" in field.get("Name")
-            assert (follow(field[0], page) == file["surface/shape"][number]).all()
+        for number, grid in enumerate(fields):
+            frequency = float(grid.find("Time").get("Value"))
+            assert frequency == pytest.approx(file["frequency"][number])
+            shape = follow(grid.find("Attribute/DataItem"), page)
+            assert (shape == file["surface/shape"][number]).all()
 
 
-def test_contact_over_time_is_thinned_and_ends_at_the_end(results: Path) -> None:
+def test_contact_over_time_is_thinned_and_ends_at_the_end(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From any folder: a field is found by the place of the page."""
+    monkeypatch.chdir(tmp_path)
     page = results / "export" / "contact.xdmf"
-    grids = ElementTree.parse(page).findall(".//Grid[@GridType='Uniform']")
+    grids = states(page)
     assert len(grids) == INSTANTS
     with h5py.File(results / "contact.h5") as file:
+        points = follow(grids[0].find("Topology/DataItem"), page)
+        assert (points[:, 0] == np.arange(len(file["points"]))).all()
         for grid, row in ((grids[0], 0), (grids[-1], 899)):
             assert float(grid.find("Time").get("Value")) == pytest.approx(file["time"][row])
             force = grid.find("Attribute[@Name='normal_force']")[0]
             assert (follow(force, page) == file["normal_force"][row]).all()
+
+
+@pytest.mark.parametrize("name", ["static", "modes", "contact"])
+def test_meshio_reads_the_series(results: Path, name: str) -> None:
+    meshio = pytest.importorskip("meshio", reason="meshio is not installed")
+    with meshio.xdmf.TimeSeriesReader(results / "export" / f"{name}.xdmf") as reader:
+        points, cells = reader.read_points_cells()
+        for state in range(reader.num_steps):
+            _, fields, _ = reader.read_data(state)
+            assert all(len(values) == len(points) for values in fields.values())
+        assert cells[0].type == ("vertex" if name == "contact" else "quad")
 
 
 def test_only_what_is_there_is_exported(tmp_path: Path) -> None:
@@ -127,6 +155,7 @@ def test_only_what_is_there_is_exported(tmp_path: Path) -> None:
     assert {path.name for path in export(directory)} == {
         "modes.csv",
         "modes.xdmf",
+        "modes_fields.h5",
         "spectra.csv",
         "third_octave.csv",
     }

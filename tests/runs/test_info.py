@@ -1,5 +1,6 @@
 """`tireroad info`: what a result file holds."""
 
+import json
 from pathlib import Path
 
 import h5py
@@ -79,3 +80,22 @@ def test_what_is_no_result_is_an_input_error(results: Path) -> None:
         describe(results / "absent.h5")
     with pytest.raises(InputError, match="no such file"):
         describe(results)
+
+
+def test_the_same_for_programs(results: Path) -> None:
+    found = json.loads(describe(results / "contact.h5", as_json=True))
+    with h5py.File(results / "contact.h5") as file:
+        assert found["datasets"]["normal_force"]["shape"] == list(file["normal_force"].shape)
+        assert found["attributes"]["step"] == file.attrs["step"]
+    assert found["datasets"]["normal_force"]["unit"] == "N"
+    assert found["checksum"] == "right"
+    assert "[tire.material]" in found["attributes"]["scene"], "in full"
+
+
+def test_what_json_has_not_is_text_or_null(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file.attrs["unknown"], file.attrs["several"] = float("nan"), [1.0, float("inf")]
+        file["group/empty"] = h5py.Empty("f8")
+    found = json.loads(describe(tmp_path / "other.h5", as_json=True))
+    assert found["attributes"] == {"unknown": None, "several": [1.0, None]}
+    assert found["datasets"]["group/empty"]["shape"] is None

@@ -20,11 +20,11 @@ from tireroad.runs.report.page import write_report
 
 TITLES = {
     "static.h5": "Loaded tire and footprint",
-    "modes.h5": "Modes of the loaded tire",
-    "rotating.h5": "Modes of the rolling tire",
-    "response.h5": "Point forces",
     "contact.h5": "Rolling contact",
     "spectra.h5": "Spectra of the axle force",
+    "response.h5": "Point forces",
+    "modes.h5": "Modes of the loaded tire",
+    "rotating.h5": "Modes of the rolling tire",
 }
 PICTURES = 11  # of a folder with every file
 
@@ -83,11 +83,11 @@ def test_every_section_is_there_and_the_page_loads_nothing(results: Path) -> Non
 
 
 @pytest.mark.usefixtures("blank")
-def test_warnings_come_first_and_are_escaped(results: Path) -> None:
+def test_the_answer_comes_first_then_warnings_and_they_are_escaped(results: Path) -> None:
     text = page(results)
     warning = "in 12 steps the tire left the road &amp; the load was &lt;zero&gt;"
     assert text.count(warning) == 1
-    assert text.index(warning) < text.index("500 N") < text.index("<h2>")
+    assert text.index("500 N") < text.index(warning) < text.index("<h2>")
 
 
 @pytest.mark.usefixtures("blank")

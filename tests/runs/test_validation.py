@@ -5,10 +5,11 @@ import pytest
 
 from tireroad.contact.model import step_solver
 from tireroad.contact.rolling import Loop, roll
+from tireroad.contact.spectra import distance
 from tireroad.runs.measure.tabulate import modules
 from tireroad.runs.validation import rolling
 from tireroad.runs.validation.comparison import Comparison
-from tireroad.runs.validation.histories import History, distance, follow
+from tireroad.runs.validation.histories import History, follow
 from tireroad.runs.validation.moved_road import SCENE
 from tireroad.runs.validation.tires import Choice, Tires
 

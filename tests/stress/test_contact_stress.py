@@ -61,7 +61,7 @@ def test_states_that_turn_far_in_a_step_are_static_or_blow_up() -> None:
 
     growth = []
     for response in (whole.resolved(step), whole):
-        tire = Recursion(response, step, "linear", MPI.COMM_SELF)
+        tire = Recursion(response=response, step=step, scheme="linear", comm=MPI.COMM_SELF)
         solver = ActiveSet(tire.same_step + tread)
         energy = []
         for instant in roll(tire, solver, patch, Drive(Flat().height, bump, 0.0), step, 3000):

@@ -42,7 +42,7 @@ def responses(squares: np.ndarray, damping: float, points: int = 3):
     rng = np.random.default_rng(3)
     m = len(squares)
     shape = rng.normal(size=(points, m))
-    projection = Projection(squares, np.ones((3, m)))
+    projection = Projection(squares=squares, momentum=np.ones((3, m)))
     modes = standing(projection, (damping, 0.0)), rotating(damping * np.eye(m), np.diag(squares))
     return shape, [couple(found, shape, shape, np.ones((3, m))) for found in modes]
 
@@ -68,7 +68,7 @@ def test_any_step_and_any_damping(step, damping, scheme) -> None:
     moved = moved @ np.linalg.inv(scale)
     force = np.random.default_rng(5).normal(size=(8, k))
     for response in both:
-        tire = Recursion(response, step, scheme, MPI.COMM_SELF)
+        tire = Recursion(response=response, step=step, scheme=scheme, comm=MPI.COMM_SELF)
         tire.start(0 * force[0])
         state, old, size = np.zeros(2 * m), 0 * force[0], 0.0
         for new in force:
@@ -122,5 +122,5 @@ def test_the_block_takes_what_has_no_vectors() -> None:
     """The limit of the test above goes through the block form, not by luck through vectors."""
     modes = rotating(4.0 * np.eye(2), np.array([[1e4, 50.0], [0.0, 1e4]]))
     assert len(modes.block) == 4
-    projection = Projection(np.array([100.0**2]), np.ones((3, 1)))
+    projection = Projection(squares=np.array([100.0**2]), momentum=np.ones((3, 1)))
     assert len(standing(projection, (200.0, 0.0)).block) == 2

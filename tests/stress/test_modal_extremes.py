@@ -25,7 +25,16 @@ SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "
 
 @pytest.fixture(scope="module")
 def operators() -> Operators:
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), 8, 2, 1, 2)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=8,
+        elements_arc=2,
+        elements_thickness=1,
+        order=2,
+    )
     body = Body(COMM, section, compound(**SOFT))
     loader = Loader(Equilibrium(body), lambda progress: None)
     loader.inflate(2e5)
@@ -73,7 +82,16 @@ def test_growth_begins_where_onset_says(operators, modes):
 
 def test_bulk_a_thousand_times_the_shear_modulus():
     """Rounding leaves more than 1e-8 of the lowest eigenvalue: as good as LAPACK's, and not refused."""
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), 12, 4, 1, 3)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=12,
+        elements_arc=4,
+        elements_thickness=1,
+        order=3,
+    )
     rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.4995)
     operators = Operators(Body(MPI.COMM_SELF, section, rubber), 0.0)
     modes = undamped.solve(operators.stiffness, operators.mass, 10)

@@ -36,7 +36,17 @@ def csr(matrix) -> sparse.csr_matrix:
 @pytest.fixture(scope="module")
 def ring() -> Body:
     """A square cross section, nothing held."""
-    section = Torus(R + H / 2, FLAT, H, H / 2 / FLAT, 200, 1, 1, 2, "uniform")
+    section = Torus(
+        outer_radius=R + H / 2,
+        minor_radius=FLAT,
+        thickness=H,
+        half_angle=H / 2 / FLAT,
+        segments=200,
+        elements_arc=1,
+        elements_thickness=1,
+        order=2,
+        grading="uniform",
+    )
     body = Body(
         MPI.COMM_SELF, section, compound("linear", RHO, youngs_modulus=E, poisson_ratio=0.3)
     )
@@ -47,7 +57,7 @@ def ring() -> Body:
 def spin_up(body: Body, speed: float) -> None:
     """Newton's method for the hoop tension; a little mass in the matrix keeps rigid motions out."""
     body.u.x.array[:] = 0.0
-    residual = static_residual(body, fem.Constant(body.mesh, 0.0), Rolling(speed))
+    residual = static_residual(body, fem.Constant(body.mesh, 0.0), Rolling(speed=speed))
     forces, stiffness = compat.form(residual), compat.form(tangent(body, residual))
     little = sparse.diags(body.nodal_mass())
     for _ in range(4):

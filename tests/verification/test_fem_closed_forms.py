@@ -23,7 +23,17 @@ FLAT = 1e3  # m, radius of the section circle
 
 def cylinder(outer, thickness, width, segments, layers, material, order=2) -> Body:
     half = width / 2 / FLAT
-    section = Torus(outer, FLAT, thickness, half, segments, 1, layers, order, "uniform")
+    section = Torus(
+        outer_radius=outer,
+        minor_radius=FLAT,
+        thickness=thickness,
+        half_angle=half,
+        segments=segments,
+        elements_arc=1,
+        elements_thickness=layers,
+        order=order,
+        grading="uniform",
+    )
     return Body(MPI.COMM_SELF, section, material)
 
 

@@ -14,7 +14,7 @@ ONE = np.ones((1, 1))
 
 def oscillators() -> list[Response]:
     """By the uncoupled formula and by the second eigenproblem."""
-    projection = Projection(np.ones(1), np.ones((3, 1)))
+    projection = Projection(squares=np.ones(1), momentum=np.ones((3, 1)))
     both = standing(projection, (1.0, 0.0)), rotating(ONE, ONE)
     return [couple(modes, ONE, ONE, np.ones((3, 1))) for modes in both]
 
@@ -32,7 +32,7 @@ def test_greens_function_of_appendix_d(response) -> None:
 def test_step_response(response) -> None:
     """1 - e^{-t/2} (cos + sin / sqrt 3) under a constant force: exact for any step."""
     for step in (0.01, 0.7, 11.0):
-        tire = Recursion(response, step, "linear", MPI.COMM_SELF)
+        tire = Recursion(response=response, step=step, scheme="linear", comm=MPI.COMM_SELF)
         tire.start(np.ones(1))
         half = np.sqrt(3) / 2
         for k in range(1, 6):

@@ -11,7 +11,16 @@ HALF = np.radians(120)
 
 
 def section(arc=24, layers=2, plies=()):
-    torus = Torus(0.32, 0.1, 0.012, HALF, 8, arc, layers, 3)
+    torus = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=HALF,
+        segments=8,
+        elements_arc=arc,
+        elements_thickness=layers,
+        order=3,
+    )
     return torus.section([], plies)
 
 

@@ -69,13 +69,23 @@ COMM, SPEED, STEP = MPI.COMM_SELF, 40.0, 5e-5
 
 @pytest.fixture(scope="module")
 def tire() -> TireModel:
-    section = Torus(0.32, 0.10, 0.012, np.radians(120), 16, 6, 1, 2, grading="uniform")
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.10,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=16,
+        elements_arc=6,
+        elements_thickness=1,
+        order=2,
+        grading="uniform",
+    )
     rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     return TireModel(section, lambda: Body(COMM, section, rubber))
 
 
 def test_the_chain_gives_what_the_program_gives(tire, tmp_path, launch) -> None:
-    static = press(tire, inflation=2e5, load=300.0, rolling=Rolling(SPEED, 500.0))
+    static = press(tire, inflation=2e5, load=300.0, rolling=Rolling(speed=SPEED, damping=500.0))
     motions = SmallMotions(tire, static)
     modes = standing_modes(motions, count=20)
     rolling = rolling_modes(modes, Turning(speed=SPEED, damping=(500.0, 0.0)), COMM)
@@ -88,7 +98,7 @@ def test_the_chain_gives_what_the_program_gives(tire, tmp_path, launch) -> None:
     greens = make_response(
         lambda: wheel_of(motions, rolling.turning), rolling, probes, probes, "static", lambda: modes
     ).response
-    march = Recursion(greens.resolved(STEP), STEP, "linear", COMM)
+    march = Recursion(response=greens.resolved(STEP), step=STEP, scheme="linear", comm=COMM)
     tread = SimpleNamespace(law=HalfSpace(youngs_modulus=2e7), solver="active-set")
     solver = step_solver(tread, setup.patch, march.same_step)
     steps = list(roll(march, solver, setup.patch, setup.drive, STEP, 200))
@@ -107,7 +117,7 @@ def test_the_chain_gives_what_the_program_gives(tire, tmp_path, launch) -> None:
 
 
 def test_what_does_not_fit_together_is_refused(tire) -> None:
-    static = press(tire, inflation=2e5, rolling=Rolling(SPEED))
+    static = press(tire, inflation=2e5, rolling=Rolling(speed=SPEED))
     motions = SmallMotions(tire, static)
     with pytest.raises(InputError, match="rolls at 40 rad/s"):
         wheel_of(motions, Turning(speed=50.0))
@@ -125,6 +135,10 @@ def test_what_does_not_fit_together_is_refused(tire) -> None:
 
 def test_by_strain_energy_the_rolling_shape_has_inertia_alone() -> None:
     turning = Turning(speed=SPEED, damping=StrainEnergy())
-    assert rolling_shape(turning) == Rolling(SPEED, 0.0, 0.0, "full")
+    assert rolling_shape(turning) == Rolling(
+        speed=SPEED, damping=0.0, stiffness_damping=0.0, inertia="full"
+    )
     turning = Turning(speed=SPEED, damping=(500.0, 1e-6), inertia="doppler")
-    assert rolling_shape(turning) == Rolling(SPEED, 500.0, 1e-6, "doppler")
+    assert rolling_shape(turning) == Rolling(
+        speed=SPEED, damping=500.0, stiffness_damping=1e-6, inertia="doppler"
+    )

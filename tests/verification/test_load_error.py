@@ -23,7 +23,17 @@ HEIGHT, CONVERGED = -0.3184244, 532.8  # m, N
 
 
 def ring(segments, arc, order=2):
-    return Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, 1, order, footprint_size=0.25)
+    return Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=segments,
+        elements_arc=arc,
+        elements_thickness=1,
+        order=order,
+        footprint_size=0.25,
+    )
 
 
 def pressed(section, rolling=AT_REST, comm=MPI.COMM_SELF, regions=(), height=HEIGHT) -> Loader:
@@ -42,9 +52,9 @@ def test_the_estimate_lies_between_half_and_twice_the_error(segments, arc, order
 
 def test_the_tire_is_left_as_it_was_and_the_companion_rolls_too():
     """A companion that takes over the state ends where one that was loaded from the beginning does."""
-    rolling = Rolling(60.0, 500.0)
+    rolling = Rolling(speed=60.0, damping=500.0)
     soft = compound("neo-hookean", 1200.0, youngs_modulus=5e6, poisson_ratio=0.45)
-    thin = [Region(soft, tuple(np.radians([105.0, 120.0])))]
+    thin = [Region(material=soft, arc=tuple(np.radians([105.0, 120.0])))]
     loader = pressed(ring(12, 6), rolling, regions=thin)
     before = loader.body.u.x.array.copy()
     found = load_error(loader, rolling)

@@ -27,8 +27,19 @@ INFLATION = 1.0e5
 def tire(crown: dict, side: dict, segments=8, arc=6, plies=True, comm=MPI.COMM_SELF) -> Body:
     """A small inflated torus of two compounds with a radial ply."""
     rubber = {"density": 1200.0, "youngs_modulus": 48e6, "poisson_ratio": 0.45}
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), segments, arc, 1, 2)
-    regions = (Region(compound("neo-hookean", **rubber, **crown), (0.0, np.radians(50))),)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=segments,
+        elements_arc=arc,
+        elements_thickness=1,
+        order=2,
+    )
+    regions = (
+        Region(material=compound("neo-hookean", **rubber, **crown), arc=(0.0, np.radians(50))),
+    )
     lines = [PlyLine("ply", (-np.radians(120), np.radians(120)), 0.0)] if plies else []
     cords = [Cords(name="ply", angle=np.pi / 2, youngs_modulus=2e9, area=4.21e-7, spacing=1e-3)][
         : len(lines)

@@ -23,7 +23,16 @@ INFLATION = 2e5
 SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
 
 
-SMALL = Torus(0.32, 0.1, 0.012, np.radians(120), 16, 4, 1, 2)
+SMALL = Torus(
+    outer_radius=0.32,
+    minor_radius=0.1,
+    thickness=0.012,
+    half_angle=np.radians(120),
+    segments=16,
+    elements_arc=4,
+    elements_thickness=1,
+    order=2,
+)
 
 
 def tire(deflection: float) -> Operators:
@@ -113,7 +122,16 @@ def test_a_light_load_keeps_both_mirror_planes():
     """Stiff rubber, order 3: entries of the matrix are symmetric to 1e-13 of the largest, which is 1e-8 of the
     lowest eigenvalue. That is rounding, no asymmetry, and shifts no frequency by as much.
     """
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), 24, 6, 1, 3)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=24,
+        elements_arc=6,
+        elements_thickness=1,
+        order=3,
+    )
     body = Body(COMM, section, compound(**SOFT | {"youngs_modulus": 4.8e8}))
     loader = Loader(Equilibrium(body), lambda progress: None)
     loader.inflate(0.0)

@@ -28,7 +28,17 @@ RISE = 4e-3  # m
 
 def pressed(deflection: float):
     """A loader at a deflection of a standing tire of few elements."""
-    section = Torus(0.32, 0.10, 0.012, np.radians(120), 16, 6, 1, 2, footprint_size=0.3)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.10,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=16,
+        elements_arc=6,
+        elements_thickness=1,
+        order=2,
+        footprint_size=0.3,
+    )
     body = Body(
         MPI.COMM_SELF,
         section,
@@ -44,8 +54,15 @@ def patch_of(state) -> Patch:
     """Every node of the outer face within 12 mm of the road."""
     near = np.flatnonzero(state.gap < 0.012)
     none = np.zeros(len(near), dtype=int)
-    places = state.positions[near], state.half_sizes[near]
-    return Patch(near, *places, state.force[near], state.gap[near], none.astype(bool), none)
+    return Patch(
+        index=near,
+        points=state.positions[near],
+        half_sizes=state.half_sizes[near],
+        force=state.force[near],
+        gap=state.gap[near],
+        edge=none.astype(bool),
+        line=none,
+    )
 
 
 def risen(full, patch) -> float:
@@ -73,8 +90,26 @@ def test_small_shakes_with_friction_are_those_of_the_linear_tire():
     patch = patch_of(state)
     operators = Operators(loader.body, INFLATION)
     points = sparse.vstack([nodes(patch.index, len(state.points), k) for k in (2, 0, 1)]).tocsr()
-    full = NonlinearTire(operators, INFLATION, DAMPING, STEP, points, points)
-    straight = shaken(FullTire(operators, None, 0.0, DAMPING, STEP, points, points), patch)
+    full = NonlinearTire(
+        operators=operators,
+        inflation=INFLATION,
+        damping=DAMPING,
+        step=STEP,
+        outputs=points,
+        loads=points,
+    )
+    straight = shaken(
+        FullTire(
+            operators=operators,
+            rotation=None,
+            speed=0.0,
+            damping=DAMPING,
+            step=STEP,
+            outputs=points,
+            loads=points,
+        ),
+        patch,
+    )
     bent = shaken(full, patch)
     count = len(patch.points)
     assert abs(straight[:, count:]).max() > 1e-3 * abs(straight).max()
@@ -89,8 +124,23 @@ def test_a_road_that_has_risen_carries_the_static_load():
     patch = patch_of(state)
     operators = Operators(loader.body, INFLATION)
     points = nodes(patch.index, len(state.points))
-    full = NonlinearTire(operators, INFLATION, DAMPING, STEP, points, points)
-    straight = FullTire(operators, None, 0.0, DAMPING, STEP, points, points)
+    full = NonlinearTire(
+        operators=operators,
+        inflation=INFLATION,
+        damping=DAMPING,
+        step=STEP,
+        outputs=points,
+        loads=points,
+    )
+    straight = FullTire(
+        operators=operators,
+        rotation=None,
+        speed=0.0,
+        damping=DAMPING,
+        step=STEP,
+        outputs=points,
+        loads=points,
+    )
     further = pressed(0.002 + RISE)
     assert risen(full, patch) == pytest.approx(further.load(), rel=1e-4)
     assert abs(risen(straight, patch) / further.load() - 1) > 0.01

@@ -25,9 +25,18 @@ RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45
 
 def tire(inflation: float, deflection: float = 0.0, speed: float = 0.0) -> tuple[Body, np.ndarray]:
     """The body at its static state and its own nodes that touch."""
-    section = Torus(0.32, 0.1, 0.012, np.radians(120), 16, 4, 1, 2)
+    section = Torus(
+        outer_radius=0.32,
+        minor_radius=0.1,
+        thickness=0.012,
+        half_angle=np.radians(120),
+        segments=16,
+        elements_arc=4,
+        elements_thickness=1,
+        order=2,
+    )
     body = Body(COMM, section, RUBBER)
-    equilibrium = Equilibrium(body, Rolling(speed))
+    equilibrium = Equilibrium(body, Rolling(speed=speed))
     loader = Loader(equilibrium, lambda progress: None)
     loader.inflate(inflation)
     if deflection:
@@ -46,7 +55,7 @@ def solve(operators: Operators, count: int) -> Modes:
 def test_rigid_modes_of_a_free_rim(inflation, speed, rigid):
     """Six at any inflation; while it turns, the tension alone rights what rotates: three translations."""
     body, _ = tire(inflation, speed=speed)
-    operators = Operators(body, inflation, Support("free"), Rolling(speed))
+    operators = Operators(body, inflation, Support("free"), Rolling(speed=speed))
     modes = solve(operators, 12)
     assert modes.rigid == rigid
     assert (modes.squares[:rigid] == 0).all()

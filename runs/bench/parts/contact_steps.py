@@ -46,7 +46,7 @@ def orders() -> Table:
 def _forces(response, scheme: str, steps: int) -> np.ndarray:
     """Changes of the forces (25, c) N at common instants; the road shakes by 0.8 mm at 60 Hz."""
     step = DURATION / steps
-    tire = Recursion(response, step, scheme, MPI.COMM_SELF)
+    tire = Recursion(response=response, step=step, scheme=scheme, comm=MPI.COMM_SELF)
     tread = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
     drive = Drive(Flat().height, lambda t: 4e-4 * (1 - np.cos(2 * np.pi * 60.0 * t)), 20.0)
     instants = roll(tire, ActiveSet(tire.same_step + tread), PATCH, drive, step, steps)
@@ -93,8 +93,8 @@ def _both(response, shape: np.ndarray, duration: float, steps: int, shown: int):
     times (shown, r) m, and the largest displacement, m."""
     h = duration / steps
     tires: tuple[Tire, ...] = (
-        Recursion(response, h, "linear", MPI.COMM_SELF),
-        Convolution(response, h, steps),
+        Recursion(response=response, step=h, scheme="linear", comm=MPI.COMM_SELF),
+        Convolution(response=response, step=h, steps=steps),
     )
     times, off, size = [0.0, 0.0], [], 0.0
     for k in range(1, steps + 1):
@@ -116,7 +116,10 @@ def _many_steps(steps: int) -> list:
     points, lags = 500, 20
     patch = oval_patch((25, 20), (0.006, 0.006), 500.0)
     tire = Recursion(
-        Strip(speed=20.0).response(patch.points, 24, 10), 1e-4, "linear", MPI.COMM_SELF
+        response=Strip(speed=20.0).response(patch.points, 24, 10),
+        step=1e-4,
+        scheme="linear",
+        comm=MPI.COMM_SELF,
     )
     force = np.ones(points)
 

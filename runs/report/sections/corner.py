@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.files.read import Results, Section
-from tireroad.runs.report import figures
+from tireroad.runs.report import figures, live
 from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.thinned import envelope
 
 _AXES = "xyz"
 
@@ -30,14 +31,16 @@ def wheel(results: Results, section: Section, time: NDArray) -> None:
     lines = {"wheel, z": moved[:, 2], "body, z": body}
     shown = {name: 1e3 * line for name, line in lines.items() if np.abs(line).max() > 0}
     if shown:
-        section.figures.append((_drawn(time, shown), "Wheel and body over the static state."))
+        drawn = live.chart(time, shown, ("time in s", "height in mm"), figures.COLOURS)
+        caption = "Wheel and body over the static state."
+        section.show(_drawn(time, shown), caption, live.charts(drawn))
 
 
 @figures.styled
 def _drawn(time: NDArray, lines: dict[str, NDArray]) -> str:
     figure, axes = figures.canvas(9.5, 2.6)
     for colour, (name, line) in zip(figures.COLOURS, lines.items(), strict=False):
-        axes[0, 0].plot(*figures.envelope(time, line), color=colour, label=name)
+        axes[0, 0].plot(*envelope(time, line), color=colour, label=name)
     axes[0, 0].set(xlabel="time in s", ylabel="height in mm", xlim=(time[0], time[-1]))
     axes[0, 0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return figures.encode(figure)

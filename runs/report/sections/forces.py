@@ -1,4 +1,4 @@
-"""What the report says of forces: rolling contact, spectra and point forces."""
+"""What the report says of forces: rolling contact and point forces."""
 
 from collections.abc import Mapping
 
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.files.read import Absent, Results, Section, attributes
-from tireroad.runs.report import figures, surface_figures
+from tireroad.runs.report import figures, live, realism, surface_figures
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.report.sections import corner, pattern, transmissibility
 from tireroad.runs.report.sections.tire import pressure
@@ -15,6 +15,7 @@ from tireroad.runs.report.sections.tire import pressure
 SAMPLED = 400  # instants read of a (time, point) dataset: the file may be larger than memory
 AT_ONCE = 2e8  # bytes
 PAIRED = 6  # receptances drawn
+PLAYED = 240  # instants of the footprint in motion
 
 
 def contact(results: Results) -> Section:
@@ -33,17 +34,19 @@ def contact(results: Results) -> Section:
     section.facts.append(("its standard deviation", quantity(float(vertical.std()), "N")))
     axle, active = results.optional(name, "axle_force"), results.optional(name, "active")
     picture = figures.forces(time, total, axle, active)
-    section.figures.append((picture, "Forces over time; peaks are kept in the drawing."))
+    drawn = histories(time, {"contact": total, "axle": axle}, active)
+    section.show(picture, "Forces over time; peaks are kept in the drawing.", drawn)
     pressure_maps(results, section, time, vertical)
     if len(time) == 1:
         return section
+    section.notes += [note] if (note := realism.mean_load(results)) else []
     corner.wheel(results, section, time)
     pattern.tread(results, section)
     points, normal = results.array(name, "points"), results.dataset(name, "normal_force")
     stride = max(1, -(-len(time) // SAMPLED))
     picture = surface_figures.space_time(time[::stride], points, sampled(normal, stride))
     caption = f"Normal force summed across the width, one instant in {stride}."
-    section.figures.append((picture, caption))
+    section.show(picture, caption)
     return section
 
 
@@ -73,35 +76,43 @@ def pressure_maps(results: Results, section: Section, time: NDArray, vertical: N
     points = results.array("contact.h5", "points")
     maps = [values for values, _ in shown]
     picture = surface_figures.footprints(points, maps, titles, shown[0][1], 10.2)
-    section.figures.append((picture, "When the vertical force is least, mean, greatest, and last."))
+    caption = "The footprint while rolling; in the still picture when the force is least, mean, greatest, last."
+    section.show(picture, caption, rolling(points, time, normal, area))
 
 
-def spectra(results: Results) -> Section:
-    """Spectra of the variation of the axle force, or, where that is not kept, of the contact force."""
-    name = "spectra.h5"
-    frequency, force = results.array(name, "frequency"), results.optional(name, "axle_force")
-    of = "contact force" if force is None else "axle force"
-    force = results.array(name, "contact_force") if force is None else force
-    section = Section(f"Spectra of the {of}", "Of its variation about the mean, by component.")
-    if len(frequency) < 2:
-        section.notes.append("A run of one step has no spectrum.")
-        return section
-    spacing = quantity(float(frequency[1] - frequency[0]), "Hz")
-    section.facts.append(("spacing of lines", spacing))
-    section.facts += attributes(results, name, (("limit", "Hz"), ("limit_cause", "")))
-    section.figures.append((figures.spectrum(frequency, force, of), "Amplitude spectrum."))
-    centre = results.optional(name, "third_octave/centre")
-    level = results.optional(name, "third_octave/level")
-    if centre is None or level is None or not len(centre):
-        section.notes.append("No third-octave bands in spectra.h5.")
-        return section
-    error, caption = results.optional(name, "third_octave/level_error"), "Third-octave bands, rms."
-    if error is not None and np.isfinite(error).any():
-        caption += " Lines on the bars: estimated error by mesh, modes, step and points."
-    elif error is not None:
-        caption += " The companions of this run were too short to tell the error of a band."
-    section.figures.append((figures.third_octaves(centre, level, error), caption))
-    return section
+def rolling(
+    points: NDArray, time: NDArray, normal: h5py.Dataset, area: NDArray | None
+) -> dict | None:
+    """The footprint in motion; None of points whose area, and so whose pressure, is not known."""
+    if area is None or area.shape != (len(points),) or len(time) < 2:
+        return None
+    stride = max(1, -(-len(time) // PLAYED))
+    values, unit = pressure(np.nan_to_num(sampled(normal, stride)), area)
+    half = np.full(2, np.sqrt(np.median(area)) / 2)
+    return live.footprint(points, half, time[::stride], values, unit)
+
+
+def histories(
+    time: NDArray, forces: Mapping[str, NDArray | None], active: NDArray | None
+) -> dict | None:
+    """Charts of named forces (nt, 3) N by component, and of the number of points in contact (nt,)."""
+    if len(time) < 2:
+        return None
+    there = {name: force for name, force in forces.items() if force is not None}
+    made = [
+        live.chart(
+            time,
+            {f"{name} {component}": force[:, axis] for name, force in there.items()},
+            ("time in s", "force in N"),
+            figures.COLOURS[::2],
+            height=170 if axis < 2 else 230,
+        )
+        for axis, component in reversed(list(enumerate("xyz")))
+    ]
+    if active is not None:
+        curves = {"points in contact": active}
+        made.append(live.chart(time, curves, ("time in s", "number"), ("#52606d",), height=150))
+    return live.charts(*made)
 
 
 def response(results: Results) -> Section:
@@ -116,7 +127,7 @@ def response(results: Results) -> Section:
             greatest = float(np.linalg.norm(path, axis=1).max())
             section.facts.append((f"greatest displacement, {label}", quantity(greatest, "m")))
         picture = figures.driven_points(time, force, moved, names)
-        section.figures.append((picture, "Displacement over time; dashed: the force."))
+        section.show(picture, "Displacement over time; dashed: the force.")
     frequency, receptance = (
         results.optional(name, "frequency"),
         results.optional(name, "receptance"),
@@ -126,9 +137,14 @@ def response(results: Results) -> Section:
         both = [(i, j) for i in range(count) for j in range(i + 1)][:PAIRED]
         pairs = [(f"H {i + 1},{j + 1}", receptance[:, i, j]) for i, j in both]
         picture = figures.receptance(frequency, pairs)
-        section.figures.append(
-            (picture, "Receptance: displacement at i along its force per N at j.")
+        levels = {label: figures.decibels(values) for label, values in pairs}
+        labels = "frequency in Hz", "receptance in dB re 1 m/N"
+        kept = frequency > 0
+        curves = {label: level[kept] for label, level in levels.items()}
+        drawn = live.charts(
+            live.chart(frequency[kept], curves, labels, figures.CYCLE, log=True, height=300)
         )
+        section.show(picture, "Receptance: displacement at i along its force per N at j.", drawn)
     driven = len(results.scene.get("force", []))
     transmissibility.add(results, section, point_names(results.scene, driven))
     if not section.figures:

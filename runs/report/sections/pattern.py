@@ -22,11 +22,11 @@ def tread(results: Results, section: Section) -> None:
         ("deepest groove", quantity(float(depth.max()), "m")),
         ("land of the pattern across the patch", f"{100 * land:.3g} %"),
     ]
-    section.figures.append((
+    section.show(
         _drawn(s, y, depth, points, begun),
         f"Tread pattern: depth over the first {1e3 * min(_SHOWN, s[-1]):.0f} mm around the tire, and at the "
         "contact points when the run begins.",
-    ))  # fmt: skip
+    )  # fmt: skip
 
 
 @figures.styled

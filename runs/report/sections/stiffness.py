@@ -45,9 +45,7 @@ def section(results: Results) -> Section:
     head = tuple(title for *_, title in _COLUMNS)
     made.table = Table(head, [tuple(f"{v:.4g}" for v in row) for row in np.transpose(columns)])
     picture = curve(columns[0], columns[1], columns[5], load)
-    made.figures.append(
-        (picture, "Load and contact area over deflection; dashed: the scene's load.")
-    )
+    made.show(picture, "Load and contact area over deflection; dashed: the scene's load.")
     return made
 
 

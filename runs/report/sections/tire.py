@@ -3,9 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.modal.states import growing
 from tireroad.runs.files.read import Results, Section, Table, attributes
-from tireroad.runs.report import figures, surface_figures
+from tireroad.runs.report import live, surface_figures
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.report.sections import cavity
 
@@ -42,11 +41,9 @@ def static(results: Results) -> Section:
         results.attribute(name, "road_height"),
     )
     size = 1e3 * np.linalg.norm(moved, axis=1).max()
-    section.figures.append(
-        (
-            surface_figures.deformed(points, moved, quads, road),
-            f"Displacement at its true scale, {size:.3g} mm at most. Grey: as made.",
-        )
+    section.show(
+        surface_figures.deformed(points, moved, quads, road),
+        f"Displacement at its true scale, {size:.3g} mm at most. Grey: as made.",
     )
     footprint(results, section)
     cords(results, section)
@@ -90,7 +87,7 @@ def footprint(results: Results, section: Section) -> None:
         section.facts.append(("mean contact pressure", quantity(mean, "Pa")))
         caption = f"Contact pressure of {quantity(float(force[:, 2].sum()), 'N')}"
     picture = surface_figures.footprints(points, [values], ["footprint at rest"], unit, 6.2)
-    section.figures.append((picture, caption + ". Grey dots: surface points that do not touch."))
+    section.show(picture, caption + ". Grey dots: surface points that do not touch.")
 
 
 def pressure(force: NDArray, area: NDArray | None) -> tuple[NDArray, str]:
@@ -134,56 +131,12 @@ def modes(results: Results) -> Section:
     shapes = results.dataset(name, "surface/shape")[:PICTURED]
     titles = [f"{n + 1}: {quantity(float(f), 'Hz')}" for n, f in enumerate(frequency[:PICTURED])]
     picture = surface_figures.modes(points, quads, shapes, titles)
-    section.figures.append((picture, "The lowest mode shapes, exaggerated."))
+    normal = surface_figures.outward(points, quads)
+    turned = live.shapes(points, quads, normal, shapes, titles)
+    section.show(picture, "The lowest mode shapes, exaggerated.", turned)
     return section
 
 
 def _named(wave: int, number: int) -> str:
     """A mode of a round tire by its wave number and its number in the section; -: of none."""
     return f"{wave}, {number}" if wave >= 0 else "-"
-
-
-def rotating(results: Results) -> Section:
-    """Eigenvalues of the rolling tire (rotating.h5)."""
-    name = "rotating.h5"
-    section = Section("Modes of the rolling tire", "Eigenvalues s of the rotating, damped tire.")
-    value = results.array(name, "eigenvalue")
-    # Those of the near-defective block too.
-    block = results.optional(name, "block")
-    every = value if block is None else np.concatenate([value, np.linalg.eigvals(block)])
-    beyond = every[growing(every)]
-    section.facts = attributes(results, name, (("speed", "rad/s"), ("basis_condition", "")))
-    section.facts.append(("growing", quantity(len(beyond))))
-    if len(beyond):
-        worst = beyond[beyond.real.argmax()]
-        section.warnings.append(
-            f"The rolling tire is unstable: {len(beyond)} eigenvalues have Re s > 0, the worst "
-            f"{quantity(float(worst.real), '1/s')} at "
-            f"{quantity(float(abs(worst.imag) / 2 / np.pi), 'Hz')}."
-        )
-    rising = np.flatnonzero(value.imag > 0)
-    rising = rising[np.argsort(value.imag[rising])]
-    columns = {"residual": results.optional(name, "residual")}
-    columns["left residual"] = results.optional(name, "left_residual")
-    present = {key: column for key, column in columns.items() if column is not None}
-    rows = [
-        (
-            quantity(float(value[q].imag / 2 / np.pi), "Hz"),
-            quantity(float(value[q].real), "1/s"),
-            f"{-100.0 * value[q].real / abs(value[q]):.3g} %".replace("-", "−"),
-            *(quantity(float(column[q])) for column in present.values()),
-        )
-        for q in rising[:LISTED]
-    ]
-    section.table = Table(("frequency", "Re s", "of critical damping", *present), rows)
-    cavity.resonances(results, section, name, "air_share", value)
-    if len(rising) > LISTED:
-        listed = f"The table lists {LISTED} of {len(rising)} pairs, by frequency."
-        section.notes.append(listed)
-    section.figures.append((figures.eigenvalues(value), "Eigenvalues with Im s ≥ 0."))
-    speed = results.optional(name, "campbell/speed")
-    if speed is not None:
-        lines = figures.campbell(speed, results.array(name, "campbell/frequency"))
-        text = "Branches followed over speed, on one static state; dashed: n Ω/2π, n = 1 to 8."
-        section.figures.append((lines, text))
-    return section

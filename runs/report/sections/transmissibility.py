@@ -22,11 +22,9 @@ def add(results: Results, section: Section, names: list[str]) -> None:
     if frequency is None or found is None or not len(frequency):
         return
     other = results.optional(name, "transmissibility/free_rim")
-    section.figures.append(
-        (
-            transmissibilities(frequency, found, other, names),
-            "Force on the axle per force at the point, by momentum; dashed: by modes of a tire with a free rim.",
-        )
+    section.show(
+        transmissibilities(frequency, found, other, names),
+        "Force on the axle per force at the point, by momentum; dashed: by modes of a tire with a free rim.",
     )
     if other is not None:
         apart = np.linalg.norm(other - found) / np.linalg.norm(found)

@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from tireroad.contact.levels import nominal
 from tireroad.runs.files.read import Results, Section
-from tireroad.runs.report.figures import COLOURS, RANGE_DB, canvas, encode, styled
+from tireroad.runs.report import live
+from tireroad.runs.report.figures import COLOURS, RANGE_DB, encode, line_canvas, styled
 
 
 def vibration(results: Results) -> Section:
@@ -22,26 +23,24 @@ def vibration(results: Results) -> Section:
         section.notes.append("The run is too short for a line within the band.")
         return section
     level = 10 * np.log10(np.maximum(results.array(name, "mean_square_velocity"), 1e-300) / 1e-18)
-    section.figures.append(
-        (
-            level_lines(frequency, level, "dB re 1 nm/s"),
-            "Mean square velocity, line by line.",
-        )
-    )
+    labels = "frequency in Hz", "level in dB re 1 nm/s"
+    drawn = live.chart(frequency, {"mean square velocity": level}, labels, COLOURS)
+    still = level_lines(frequency, level, "dB re 1 nm/s")
+    section.show(still, "Mean square velocity, line by line.", live.charts(drawn))
     if not len(centre):
         section.notes.append("Too few lines for a third-octave band.")
         return section
     plain = results.array(name, "third_octave/radiated_power_level")
     weighted = results.array(name, "third_octave/radiated_power_level_a_weighted")
     picture = radiated_power(centre, plain, weighted)
-    section.figures.append((picture, "Equivalent radiated power in third-octave bands."))
+    section.show(picture, "Equivalent radiated power in third-octave bands.")
     return section
 
 
 @styled
 def level_lines(frequency: NDArray, level: NDArray, unit: str) -> str:
     """A level (f,) over frequency (f,) Hz."""
-    figure, ((axes,),) = canvas(9.5, 2.8)
+    figure, ((axes,),) = line_canvas(9.5, 2.8)
     axes.plot(frequency, level, color=COLOURS[0], linewidth=1.0)
     top = float(level.max())
     axes.set(xlabel="frequency in Hz", ylabel=f"level in {unit}", ylim=(top - RANGE_DB, top + 5))
@@ -52,7 +51,7 @@ def level_lines(frequency: NDArray, level: NDArray, unit: str) -> str:
 @styled
 def radiated_power(centre: NDArray, plain: NDArray, weighted: NDArray) -> str:
     """Levels (b,) dB re 1 pW, as they are and A-weighted, over band centres (b,) Hz."""
-    figure, ((axes,),) = canvas(9.5, 3.0)
+    figure, ((axes,),) = line_canvas(9.5, 3.0, below=0.62)
     place, top = np.arange(len(centre)), float(plain.max())
     floor = 10.0 * np.floor((top - RANGE_DB) / 10.0)
     for column, (level, name) in enumerate(((plain, "unweighted"), (weighted, "A-weighted"))):

@@ -12,6 +12,7 @@ from tireroad.runs.scene.rules.output import (
     check_vibration,
 )
 from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.tables.accuracy import check_accuracy
 from tireroad.runs.scene.tables.axle import check_axle
 from tireroad.runs.scene.tables.cavity import check_cavity
 from tireroad.runs.scene.tables.contact import check_tread
@@ -192,4 +193,5 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
     (("output", "time", "contact", "force", "rotation"), check_vibration),
     (("time",), _time),
+    (("accuracy", "contact", "road", "time", "output", "force"), check_accuracy),
 )

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.tables.tire import Tire
 
+# Elements around of the meshes that a search may take, where a kind does not say.
+AROUND = (16, 20, 24, 30, 36, 44, 52, 64, 78, 96, 120)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Proportions:
@@ -92,6 +95,20 @@ class SectionKind(Parameters):
     def coarser(self, tire: Tire) -> Self:
         """The kind with half the elements along the section, however few."""
         raise NotImplementedError
+
+    def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
+        """(elements around, along the section) from coarse to fine, each some 1.2 times as fine as the one before,
+        that a search for settings may take; the coarsest can be halved."""
+        along = self.proportions(tire).along
+        return tuple((around, along) for around in AROUND)
+
+    def search_order(self, tire: Tire) -> int:
+        """Order of the elements that a search takes."""
+        return tire.order
+
+    def elements_along(self, along: int) -> Self:
+        """The kind with as many elements along its section, where that can be chosen."""
+        return self
 
     def has_losses(self, tire: Tire) -> bool:
         """Whether a compound has a loss factor."""

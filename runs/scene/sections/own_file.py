@@ -115,9 +115,9 @@ def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
         change |= {"dynamic": region.dynamic} if region.dynamic != 1 else {}
         change |= {"loss_factor": region.loss_factor} if region.loss_factor else {}
     if region is not None and region.material is not None:
-        return Material(region.material.law, region.material.density, **change)
+        return Material(law=region.material.law, density=region.material.density, **change)
     if rubber is None:
-        return Material(tire.material.law, tire.material.density, **change)
+        return Material(law=tire.material.law, density=tire.material.density, **change)
     density = tire.material.density if rubber.density is None else rubber.density
     return compound(rubber.model, density, **rubber.coefficients, **change)
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from tireroad.fem.parameters import choice, flag, integer, number, text, vector
 from tireroad.runs.scene.schema import table, tables
+from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.scene.tables.axle import AxleTable
 from tireroad.runs.scene.tables.contact import Contact, Time
 from tireroad.runs.scene.tables.pattern import PatternTable
@@ -197,15 +198,6 @@ class Output:
         Transmissibility,
         "force on the held axle per force at each driven point, over frequency",
         optional=True,
-    )
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    estimate: bool = flag(
-        True,
-        "error bars of contact and axle force by cheaper companions of the run: half the elements, fewer "
-        "modes, twice the step, twice the spacing of points",
     )
 
 

@@ -68,7 +68,7 @@ def forces(
 
     `scheme` "linear" or "constant". ConvergenceError where the road touches beyond the patch.
     """
-    tire = Recursion(response.resolved(step), step, scheme, job.comm)
+    tire = Recursion(response=response.resolved(step), step=step, scheme=scheme, comm=job.comm)
     loop = make_loop(job.scene.contact, setup, driven_tire(job, tire, step, steps) or tire, step)
     contact, axle = np.zeros((2, steps, 3))
     given = setup.patch, setup.drive, step, steps

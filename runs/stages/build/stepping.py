@@ -80,9 +80,9 @@ def integration(job: Job, plan: Planned, scheme: str) -> Integration:
     """The tire at t = 0, to be taken over the planned steps. Collective."""
     tire: Recursion | Convolution
     if scheme == "convolution":
-        tire = Convolution(plan.response, plan.step, plan.steps)
+        tire = Convolution(response=plan.response, step=plan.step, steps=plan.steps)
     else:
-        tire = Recursion(plan.response, plan.step, scheme, job.comm)
+        tire = Recursion(response=plan.response, step=plan.step, scheme=scheme, comm=job.comm)
     return Integration(tire, plan.step, plan.steps, scheme)
 
 

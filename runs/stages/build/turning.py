@@ -20,7 +20,9 @@ def rolling_shape(turning: Turning) -> Rolling:
         return AT_REST
     # By strain energy there is no damping before there are modes: the shape has inertia alone.
     mass, stiffness = (0.0, 0.0) if isinstance(turning.damping, StrainEnergy) else turning.damping
-    return Rolling(turning.speed, mass, stiffness, turning.inertia)
+    return Rolling(
+        speed=turning.speed, damping=mass, stiffness_damping=stiffness, inertia=turning.inertia
+    )
 
 
 def turning_of(job: Job) -> Turning:

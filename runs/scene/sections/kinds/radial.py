@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.tables.tire import Tire
 
+# (elements around, along) that a search may take.
+FINER = ((16, 14), (20, 18), (24, 22), (30, 26), (36, 32), (44, 38), (52, 46), (64, 56))
+
 
 @section_kind("radial", "the built-in radial passenger tire (docs/radial-tire.md)")
 class RadialSection(SectionKind):
@@ -84,6 +87,12 @@ class RadialSection(SectionKind):
 
     def angles(self, tire: Tire) -> dict[str, float]:
         return {line.name: float(np.degrees(line.angle)) for line in built(self.size).cords}
+
+    def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
+        return FINER
+
+    def elements_along(self, along: int) -> RadialSection:
+        return replace(self, elements_arc=along)
 
     def coarser(self, tire: Tire) -> RadialSection:
         return replace(self, elements_arc=self.elements_arc // 2)

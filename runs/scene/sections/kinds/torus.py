@@ -28,6 +28,21 @@ if TYPE_CHECKING:
 # 30 x 14: 2001.6 N, where 2000 N is known to 0.15 %.
 MESHES = {1: (160, 32), 2: (100, 16), 3: (30, 14)}
 
+# (elements around, along) that a search may take, of the order that is the cheapest for its error.
+FINER = (
+    (16, 8),
+    (20, 10),
+    (24, 12),
+    (28, 14),
+    (34, 16),
+    (40, 20),
+    (48, 24),
+    (58, 28),
+    (70, 34),
+    (84, 42),
+)
+ORDER = 3
+
 
 @section_kind("torus", "a wall between two circles about the section's centre: the thesis's tire")
 class TorusSection(SectionKind):
@@ -150,6 +165,15 @@ class TorusSection(SectionKind):
         wall, arc = (len(line) - 1 for line in lines)
         return 3 * tire.segments * tire.order * (tire.order * wall + 1) * (tire.order * arc - 1)
 
+    def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
+        return FINER
+
+    def search_order(self, tire: Tire) -> int:
+        return ORDER
+
+    def elements_along(self, along: int) -> TorusSection:
+        return replace(self, elements_arc=along)
+
     def coarser(self, tire: Tire) -> TorusSection:
         return replace(self, elements_arc=self.elements_arc // 2)
 
@@ -218,4 +242,6 @@ def rubber(part: Tire | Region) -> Material:
     from tireroad.runs.scene.tables.tire import Material as Table
 
     table = part.material or Table()
-    return Material(table.law, table.density, part.dynamic, part.loss_factor)
+    return Material(
+        law=table.law, density=table.density, dynamic=part.dynamic, loss_factor=part.loss_factor
+    )

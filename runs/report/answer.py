@@ -1,0 +1,125 @@
+"""The answer of a run in a few figures: load, footprint, forces and levels with their errors, first modes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from tireroad.contact.levels import nominal
+from tireroad.fem.errors import InputError
+from tireroad.runs.files.read import Absent, Results
+from tireroad.runs.report.quantities import digits, quantity
+
+Fact = tuple[str, str]
+_MODES = 4
+
+
+def answer(results: Results, told: Mapping[str, Any]) -> list[Fact]:
+    """Facts (what, value) from the files there are and the summary's stages `told`; what is missing is left out."""
+    found: list[Fact] = []
+    for part in (_standing, _rolling, _levels, _power, _modes):
+        try:
+            found += part(results, _Headlines(told))
+        except (Absent, InputError, LookupError, ValueError):
+            continue  # the file's own section says what is wrong
+    return found
+
+
+class _Headlines:
+    """Headline figures and indicators of the summary by stage and name."""
+
+    def __init__(self, told: Mapping[str, Any]) -> None:
+        self._told = told
+
+    def __call__(self, stage: str, name: str) -> float | None:
+        groups = [self._told.get(stage, {}).get(kind) or {} for kind in ("headline", "indicators")]
+        value = (groups[0].get(name) or groups[1].get(name) or {}).get("value")
+        return float(value) if isinstance(value, int | float) else None
+
+
+Given = Callable[[str, str], float | None]
+
+
+def _standing(results: Results, given: Given) -> list[Fact]:
+    """Load, deflection, footprint."""
+    load, sunk, length, width = (
+        float(results.attribute("static.h5", name) or 0.0)
+        for name in ("load", "deflection", "footprint_length", "footprint_width")
+    )
+    found: list[Fact] = []
+    if load and results.optional("static.h5", "contact/force") is not None:
+        error = given("static", "estimated error of the load")
+        found.append(("load at rest", quantity(load, "N") + _plus_minus(error, "%")))
+        found.append(("deflection", quantity(sunk, "m")))
+    if length and width:
+        found.append(("footprint at rest", f"{digits(1e3 * length)} × {digits(1e3 * width)} mm"))
+    return found
+
+
+def _rolling(results: Results, given: Given) -> list[Fact]:
+    """The vertical contact force as the tire rolls."""
+    force = results.array("contact.h5", "total_force")[:, 2]
+    if not len(force):
+        return []
+    mean, spread = (
+        given("accuracy", f"error of the {part} contact force")
+        for part in ("mean", "deviation of the")
+    )
+    return [
+        ("vertical force, rolling", quantity(float(force.mean()), "N") + _plus_minus(mean, "N")),
+        ("it varies by (rms)", quantity(float(force.std()), "N") + _plus_minus(spread, "N")),
+    ]
+
+
+def _levels(results: Results, _: Given) -> list[Fact]:
+    """Sums of the bands, with the error that their bands' errors make at most, and where they end."""
+    end = results.attribute("spectra.h5", "limit")
+    found = [("valid up to", quantity(end, "Hz"))] if end else []
+    centre = results.array("spectra.h5", "third_octave/centre")
+    if not len(centre):
+        return found
+    first, last = nominal(centre[[0, -1]])
+    band = f"{first:g} to {last:g} Hz" if last > first else f"{first:g} Hz band"
+    held = str(results.attribute("spectra.h5", "axle_force_is") or "")
+    axle = "hub force" if held.startswith("force on the hub") else "blocked axle force"
+    for key, what in (("level", axle), ("contact_level", "contact force")):
+        level = results.optional("spectra.h5", f"third_octave/{key}")
+        if level is None:
+            continue
+        text = _summed(level, results.optional("spectra.h5", f"third_octave/{key}_error"))
+        text = f"{text} dB re 1 N"
+        weighted = results.optional("spectra.h5", f"third_octave/{key}_a_weighted")
+        if weighted is not None:
+            text += f", {_summed(weighted, None)} dB(A)"
+        found.insert(-1 if end else len(found), (f"{what} z, {band}", text))
+    return found
+
+
+def _summed(level: np.ndarray, error: np.ndarray | None) -> str:
+    power = 10 ** (level[:, 2] / 10)
+    text = f"{10 * np.log10(max(power.sum(), 1e-300)):.1f}".replace("-", "−")
+    if error is not None and np.isfinite(error[:, 2]).all():
+        text += f" ± {(power * error[:, 2]).sum() / max(power.sum(), 1e-300):.1f}"
+    return text
+
+
+def _power(results: Results, _: Given) -> list[Fact]:
+    """What the outer face would radiate at most."""
+    level = results.array("vibration.h5", "third_octave/radiated_power_level_a_weighted")
+    if not len(level):
+        return []
+    total = 10 * np.log10((10 ** (level / 10)).sum())
+    return [("equivalent radiated power", f"{total:.1f} dB(A) re 1 pW")]
+
+
+def _modes(results: Results, _: Given) -> list[Fact]:
+    """The lowest, standing and undamped."""
+    lowest = results.array("modes.h5", "frequency")[:_MODES]
+    named = ", ".join(f"{value:.4g}" for value in lowest)
+    return [("lowest modes, undamped", f"{named} Hz")] if len(lowest) else []
+
+
+def _plus_minus(error: float | None, unit: str) -> str:
+    return f" ± {quantity(float(f'{error:.2g}'), unit)}" if error else ""

@@ -1,0 +1,129 @@
+"""What a page with script draws in place of a still picture: charts to zoom, shapes to turn.
+
+The scripts are charts.js and shapes.js beside this file, and uPlot 1.6.32 (uplot/, MIT), all written into the page: it
+asks for nothing from anywhere. Without script, and on paper, the still picture is shown.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_HERE = Path(__file__).parent
+MOST = (
+    10_000  # values of a curve; longer ones keep the least and the greatest of each run of values
+)
+_STEPS = 127  # of a coordinate, signed bytes
+
+
+def script() -> str:
+    """All scripts, as text."""
+    names = "uplot/uPlot.iife.min.js", "charts.js", "shapes.js"
+    return "\n".join((_HERE / name).read_text(encoding="utf-8") for name in names)
+
+
+def style() -> str:
+    """uPlot's style sheet, as text."""
+    return (_HERE / "uplot/uPlot.min.css").read_text(encoding="utf-8")
+
+
+def packed(values: Any, kind: str) -> dict[str, str]:
+    """An array for the scripts: little-endian numbers of a `kind` of numpy's, in base 64."""
+    flat = np.ascontiguousarray(values, dtype=np.dtype(kind).newbyteorder("<"))
+    return {"kind": kind, "data": b64encode(flat.tobytes()).decode()}
+
+
+def thinned(x: NDArray, columns: NDArray) -> tuple[NDArray, NDArray]:
+    """x (n,) and columns (n, k) with at most MOST rows: of each run of rows the least, then the greatest, of each column."""
+    width = -(-len(x) // (MOST // 2))
+    if len(x) <= MOST:
+        return x, columns
+    count = len(x) // width
+    blocks = np.nan_to_num(columns[: count * width]).reshape(count, width, -1)
+    ends = np.stack((blocks.min(axis=1), blocks.max(axis=1)), axis=1)
+    starts = x[: count * width : width]
+    middles = x[width // 2 : count * width : width]
+    return np.column_stack((starts, middles)).ravel(), ends.reshape(2 * count, -1)
+
+
+def chart(
+    x: NDArray,
+    curves: Mapping[str, NDArray],
+    labels: tuple[str, str],
+    colours: Sequence[str],
+    *,
+    log: bool = False,
+    dashed: Sequence[str] = (),
+    legend: bool = True,
+    height: int = 240,
+) -> dict[str, Any]:
+    """Curves (n,) by name over x (n,), for charts.js; `labels` of both axes with units. Without `legend` the curve
+    under the pointer is named: for many. A value that is not finite is a gap."""
+    place, values = thinned(np.asarray(x, float), np.column_stack(list(curves.values())))
+    series = [
+        {
+            "name": name,
+            "colour": colours[number % len(colours)],
+            "dashed": name in dashed,
+            "y": packed(values[:, number], "f4"),
+        }
+        for number, name in enumerate(curves)
+    ]
+    return {
+        "x": packed(place, "f4"),
+        "series": series,
+        "labels": labels,
+        "log": log,
+        "legend": legend,
+        "height": height,
+    }
+
+
+def charts(*one: dict[str, Any]) -> dict[str, Any]:
+    """Charts one below the other; their pointers move together."""
+    return {"kind": "charts", "charts": list(one)}
+
+
+def shapes(
+    points: NDArray, quads: NDArray, normal: NDArray, moved: NDArray, titles: Sequence[str]
+) -> dict[str, Any]:
+    """Surface shapes (m, s, 3) on points (s, 3) with quads (q, 4) and unit normals (s, 3), to turn and, as they
+    swing, to watch.
+
+    Coordinates in 127ths of the greatest; each shape's greatest displacement is one.
+    """
+    reach = np.abs(points).max()
+    greatest = np.maximum(np.linalg.norm(moved, axis=2).max(axis=1), 1e-300)
+    return {
+        "kind": "shapes",
+        "points": packed(np.rint(32767 * points / reach), "i2"),
+        "quads": packed(quads, "u4"),
+        "shapes": packed(np.rint(_STEPS * moved / greatest[:, None, None]), "i1"),
+        "across": packed(
+            np.rint(_STEPS * np.einsum("msi,si->ms", moved, normal) / greatest[:, None]), "i1"
+        ),
+        "titles": list(titles),
+    }
+
+
+def footprint(
+    points: NDArray, half: NDArray, time: NDArray, values: NDArray, label: str
+) -> dict[str, Any]:
+    """Values (n, c) at points (c, 3) m, squares of half sizes (2,) m, at the instants time (n,) s, to watch."""
+    top = float(np.nan_to_num(values).max(initial=0.0)) or 1.0
+    touched = (values > 0).any(axis=0)
+    near = touched if touched.any() else np.ones(len(points), bool)
+    return {
+        "kind": "footprint",
+        "points": packed(1e3 * points[near, :2], "f4"),
+        "half": [1e3 * float(size) for size in half],
+        "time": packed(time, "f4"),
+        "values": packed(np.rint(255 * np.clip(np.nan_to_num(values[:, near]) / top, 0, 1)), "u1"),
+        "top": top,
+        "label": label,
+    }

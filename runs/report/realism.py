@@ -1,0 +1,159 @@
+"""What no tire has: figures of a run that lie far out of the usual, told once with the usual range.
+
+The ranges are wide: motorcycle to truck, slick to winter tire. A figure within them may still be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.files.read import Absent, Results
+from tireroad.runs.report.quantities import digits, quantity
+
+_LOWEST = 6  # modes of which the damping is looked at
+_DIFFERS = 0.05  # of the static load, from which the rolling mean is explained
+_OBSTACLES = ("step", "cleat", "iso8608")  # roads that may be high
+
+
+def unusual(results: Results) -> str | None:
+    """One sentence that names all figures out of the usual; None where there are none."""
+    found = [text for check in _CHECKS for text in _asked(check, results)]
+    if not found:
+        return None
+    return "figures that no tire has, and what is usual: " + "; ".join(found)
+
+
+def _asked(check: Callable[[Results], Iterator[str]], results: Results) -> list[str]:
+    """What a check says; nothing where a file or dataset it needs is missing or damaged."""
+    try:
+        return list(check(results))
+    except (Absent, InputError):
+        return []
+
+
+def _number(results: Results, name: str, key: str) -> float:
+    """An attribute; 0 where there is none."""
+    value = results.attribute(name, key)
+    return float(value) if isinstance(value, int | float) else 0.0
+
+
+def _outside(value: float, low: float, high: float) -> bool:
+    return not low <= value <= high
+
+
+def _pressure(results: Results) -> Iterator[str]:
+    """Load over area: near the inflation, more of a stiff carcass and a light load."""
+    force, area = (
+        results.array("static.h5", "contact/force"),
+        results.array("static.h5", "contact/area"),
+    )
+    inflation, active = _number(results, "static.h5", "inflation"), force[:, 2] > 0
+    if inflation > 0 and active.any():
+        mean = float(force[active, 2].sum() / area[active].sum())
+        if _outside(mean / inflation, 0.6, 2.0):
+            yield (
+                f"mean contact pressure {quantity(mean, 'Pa')}, {digits(mean / inflation)} times the inflation "
+                "(0.6 to 2 times)"
+            )
+
+
+def _footprint(results: Results) -> Iterator[str]:
+    length, width = (
+        _number(results, "static.h5", f"footprint_{name}") for name in ("length", "width")
+    )
+    if length > 0 and width > 0 and _outside(length / width, 0.3, 2.5):
+        yield (
+            f"footprint {digits(1e3 * length)} mm long and {digits(1e3 * width)} mm wide "
+            "(length 0.3 to 2.5 times the width)"
+        )
+
+
+def _stiffness(results: Results) -> Iterator[str]:
+    """Secant of load over deflection, and how far the tire is pressed."""
+    load, sunk = (_number(results, "static.h5", name) for name in ("load", "deflection"))
+    if load <= 0 or sunk <= 0:
+        return
+    if _outside(load / sunk, 5e4, 1.5e6):
+        yield f"vertical stiffness {digits(1e-3 * load / sunk)} N/mm (50 to 1500 N/mm)"
+    points = results.array("static.h5", "surface/points")
+    radius = np.hypot(points[:, 0], points[:, 2])
+    height = float(np.ptp(radius))
+    if sunk > 0.35 * height:
+        yield (
+            f"deflection {quantity(sunk, 'm')} of a section {quantity(height, 'm')} high: the load is beyond what "
+            "such a tire is rated for (10 to 20 % of the height at rated load)"
+        )
+
+
+def _mass(results: Results) -> Iterator[str]:
+    mass = _number(results, "static.h5", "mass")
+    if mass > 0 and _outside(mass, 3.0, 90.0):
+        yield f"mass {digits(mass)} kg (3 to 90 kg, motorcycle to truck)"
+
+
+def _tread(results: Results) -> Iterator[str]:
+    contact = results.scene.get("contact", {})
+    modulus = contact.get("youngs_modulus") if contact.get("tread") != "none" else None
+    if modulus and _outside(modulus, 1.5e6, 4e7):
+        yield f"contact.youngs_modulus {quantity(modulus, 'Pa')} of the tread (rubber: 3 to 15 MPa)"
+
+
+def _damping(results: Results) -> Iterator[str]:
+    """Of the lowest motions that swing: half critical and more is no rubber's."""
+    value = results.array("rotating.h5", "eigenvalue")
+    value = value[np.abs(value) > 1.0]
+    lowest = value[np.argsort(np.abs(value))][: 2 * _LOWEST]
+    share = -lowest.real / np.abs(lowest) if len(lowest) else np.zeros(1)
+    if share.max() > 0.5:
+        text = (
+            f"{100 * share.max():.0f} % of critical" if share.max() < 0.999 else "beyond critical"
+        )
+        yield f"damping of the lowest modes up to {text} (0.5 to 10 %): look at [damping] mass"
+
+
+def _road(results: Results) -> Iterator[str]:
+    relief = _number(results, "contact.h5", "road_relief")
+    thickness = results.scene.get("tire", {}).get("thickness")
+    kind = results.scene.get("road", {}).get("kind")
+    if thickness and kind not in _OBSTACLES and relief > thickness:
+        yield (
+            f"a road with {quantity(relief, 'm')} between its lowest and highest spot under a wall "
+            f"{quantity(thickness, 'm')} thick (textures: below 10 mm; is the file in millimetres?)"
+        )
+
+
+_CHECKS = (_pressure, _footprint, _stiffness, _mass, _tread, _damping, _road)
+
+
+def mean_load(results: Results) -> str | None:
+    """Why the mean force while rolling is not the static load, where it differs by 5 % and more; else None."""
+    try:
+        force = results.array("contact.h5", "total_force")[:, 2]
+        load = _number(results, "static.h5", "load")
+    except (Absent, InputError):
+        return None
+    if load <= 0 or len(force) < 2 or abs(force.mean() / load - 1) < _DIFFERS:
+        return None
+    share = force.mean() / load - 1
+    text = (
+        f"The mean vertical force while rolling, {quantity(float(force.mean()), 'N')}, is "
+        f"{100 * abs(share):.0f} % {'above' if share > 0 else 'below'} the {quantity(load, 'N')} at rest: "
+    )
+    road, axle = results.scene.get("road", {}), results.scene.get("axle", {})
+    if axle.get("kind", "fixed") == "corner":
+        return (
+            text
+            + "wheel and body have not come to rest; a longer run, or run-in, shows the load itself."
+        )
+    reason = "the axle is held at its static height, so that the road's height decides"
+    if road.get("kind", "flat") == "flat":
+        return text + reason + "; on a flat road what is left is the settling on the points' grid."
+    if road.get("datum") == "mean":
+        reason += (
+            "; its mean lies on the static road plane (road.datum), and as the tire rests on its highest parts, they "
+            "press in more than the deep ones let go"
+        )
+    return text + reason + '. [axle] kind = "corner" keeps the load; road.offset lowers the road.'

@@ -1,0 +1,162 @@
+"""What the report says of spectra: lines, densities, and third octaves with their errors."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.levels import FEW, nominal
+from tireroad.runs.files.read import Results, Section, Table
+from tireroad.runs.report import figures, live
+from tireroad.runs.report.quantities import quantity
+
+_FILE = "spectra.h5"
+_MORE = (  # (third octaves, what they are of, reference)
+    ("contact_level", "contact force", "dB re 1 N"),
+    ("hub_moment_level", "moment on the hub", "dB re 1 N m"),
+)
+
+
+def spectra(results: Results) -> Section:
+    """Spectra of the variation of the axle force, or, where that is not kept, of the contact force."""
+    frequency, force = results.array(_FILE, "frequency"), results.optional(_FILE, "axle_force")
+    of = "contact force" if force is None else "axle force"
+    contact = results.array(_FILE, "contact_force")
+    force = contact if force is None else force
+    section = Section(f"Spectra of the {of}", "Of its variation about the mean, by component.")
+    if len(frequency) < 2:
+        section.notes.append("A run of one step has no spectrum.")
+        return section
+    spacing = quantity(float(frequency[1] - frequency[0]), "Hz")
+    section.facts.append(("spacing of lines", spacing))
+    for name, key, unit in (
+        ("the model answers up to", "limit", "Hz"),
+        ("which is", "limit_cause", ""),
+        ("the axle force is the", "axle_force_is", ""),
+        ("left out as run-in", "left_out", "s"),
+    ):
+        value = results.attribute(_FILE, key)
+        if value is not None:
+            section.facts.append((name, quantity(value, unit)))
+    octaves(results, section, of)
+    section.show(
+        figures.spectrum(frequency, force, of), "Amplitude spectrum.", _lines(frequency, force, of)
+    )
+    densities(results, section)
+    return section
+
+
+def _lines(frequency: NDArray, force: NDArray, of: str) -> dict:
+    kept = frequency > 0
+    level = figures.decibels(force[kept])
+    level = np.where(level < level.max(initial=-1e3) - figures.RANGE_DB, np.nan, level)
+    curves = dict(zip(figures.COMPONENTS, level.T, strict=True))
+    labels = "frequency in Hz", f"{of} in dB re 1 N"
+    return live.charts(
+        live.chart(frequency[kept], curves, labels, figures.COLOURS, log=True, height=300)
+    )
+
+
+def octaves(results: Results, section: Section, of: str) -> None:
+    """Adds third octaves: of the axle force with their table, of all else there is as pictures."""
+    centre = results.optional(_FILE, "third_octave/centre")
+    level = results.optional(_FILE, "third_octave/level")
+    name, level = ("level", level) if level is not None else ("contact_level", None)
+    if level is None:
+        level = results.optional(_FILE, "third_octave/contact_level")
+    narrow = results.optional(_FILE, "third_octave/too_narrow")
+    if narrow is not None and len(narrow):
+        first, last = nominal(narrow[[0, -1]])
+        section.notes.append(
+            f"The bands from {first:g} to {last:g} Hz hold fewer than three lines and have no level: "
+            "a longer run (time.duration) has closer lines."
+        )
+    if centre is None or level is None or not len(centre):
+        section.notes.append("No third-octave bands in spectra.h5.")
+        return
+    error = results.optional(_FILE, f"third_octave/{name}_error")
+    weighted = results.optional(_FILE, f"third_octave/{name}_a_weighted")
+    few = few_lines(results, len(centre))
+    picture = figures.third_octaves(centre, level, error, f"{of}, rms, in dB re 1 N", few)
+    section.show(picture, _caption(of, error, few))
+    section.table = _table(results, centre, level, weighted, error)
+    for key, what, reference in _MORE:
+        more = results.optional(_FILE, f"third_octave/{key}")
+        if more is None or key == name:
+            continue
+        error = results.optional(_FILE, f"third_octave/{key}_error")
+        picture = figures.third_octaves(centre, more, error, f"{what}, rms, in {reference}", few)
+        section.show(picture, _caption(what, error, few))
+
+
+def few_lines(results: Results, count: int) -> NDArray:
+    """(b,): whether a band holds fewer lines than a level wants."""
+    held = results.optional(_FILE, "third_octave/lines")
+    return np.zeros(count, bool) if held is None else held < FEW
+
+
+def _caption(of: str, error: NDArray | None, few: NDArray) -> str:
+    caption = f"Third-octave bands of the {of}, rms."
+    if error is not None and np.isfinite(error).any():
+        caption += " Lines on the bars: estimated error by mesh, modes, step and points."
+    elif error is not None:
+        caption += " The companions of this run were too short to tell the error of a band."
+    if few.any():
+        caption += f" Pale: fewer than {FEW} lines in the band, a level of chance."
+    return caption
+
+
+def _table(
+    results: Results,
+    centre: NDArray,
+    level: NDArray,
+    weighted: NDArray | None,
+    error: NDArray | None,
+) -> Table:
+    """The vertical levels, their errors and how sure they are."""
+    sure = results.optional(_FILE, "third_octave/confidence")
+    head = ["band, Hz", "z, dB re 1 N"]
+    columns = [[f"{c:g}" for c in nominal(centre)], _texts(level[:, 2])]
+    if error is not None:
+        head.append("error, dB")
+        columns.append([f"± {e:.1f}" if np.isfinite(e) else "unknown" for e in error[:, 2]])
+    if weighted is not None:
+        head.append("z, dB(A)")
+        columns.append(_texts(weighted[:, 2]))
+    if sure is not None:
+        head.append("95 %, by length, dB")
+        columns.append([f"{low:+.1f} to {high:+.1f}".replace("-", "−") for low, high in sure])
+    return Table(tuple(head), list(zip(*columns, strict=True)))
+
+
+def _texts(level: NDArray) -> list[str]:
+    return [f"{v:.1f}".replace("-", "−") if v > figures.SILENT else "none" for v in level]
+
+
+def densities(results: Results, section: Section) -> None:
+    """Adds the power spectral densities of the vertical forces."""
+    frequency = results.optional(_FILE, "density/frequency")
+    if frequency is None or len(frequency) < 3:
+        return
+    found = {
+        what: results.optional(_FILE, f"density/{key}")
+        for what, key in (("contact force z", "contact_force"), ("axle force z", "axle_force"))
+    }
+    curves = {
+        what: figures.decibels(values[1:, 2]) / 2
+        for what, values in found.items()
+        if values is not None
+    }
+    segment, averages = (results.array(_FILE, f"density/{k}") for k in ("segment", "averages"))
+    low, high = results.array(_FILE, "density/confidence")
+    labels = "frequency in Hz", "density in dB re 1 N²/Hz"
+    drawn = live.charts(
+        live.chart(frequency[1:], curves, labels, figures.COLOURS[::2], log=True, height=280)
+    )
+    section.show(
+        figures.lines(frequency[1:], curves, labels, figures.COLOURS[::2]),
+        f"Power spectral density by Welch: Hann windows of {quantity(float(segment), 's')}, half overlapping, "
+        f"{int(averages)} averages. That of the stationary process lies between {low:.1f} and +{high:.1f} dB of it "
+        "in 95 % of all cases.".replace("-", "−"),
+        drawn,
+    )

@@ -1,0 +1,87 @@
+"""The table [accuracy]: how sure the answer is, and how sure it shall be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import choice, flag, integer, number
+
+if TYPE_CHECKING:
+    from tireroad.runs.scene.tables.scene import Scene
+
+Where = Callable[[tuple[str, ...], str], InputError]
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    estimate: bool = flag(
+        True,
+        "error bars of contact and axle force by cheaper companions of the run: half the elements, fewer "
+        "modes, twice the step, twice the spacing of points",
+    )
+    target: float | None = number(
+        None,
+        "-",
+        "largest estimated error wanted of the vertical force named by of: relative L2 norm of what varies up to "
+        "up_to, and relative error of the mean; mesh, modes, residual, points and step are then searched for",
+        least=1e-3,
+        most=1,
+    )
+    target_db: float | None = number(
+        None,
+        "dB",
+        "the same of every third octave below up_to; with target: both hold",
+        least=0.05,
+        most=20,
+    )
+    of: str = choice("axle_force", ("axle_force", "contact_force"), "force whose error is wanted")
+    up_to: float = number(
+        400.0, "Hz", "highest frequency of which the error is told", least=1, most=1e5
+    )
+    search: bool = flag(
+        True,
+        "with a target: search for settings that meet it; false: keep those of the scene, as in the scene that a "
+        "search writes",
+    )
+    trials: int = integer(12, "number of settings that a search tries at most", least=1, most=100)
+    budget: float | None = number(
+        None,
+        "s",
+        "duration of a search, its earlier part included, after which no further settings are tried",
+        least=1,
+        most=1e8,
+    )
+
+    @property
+    def aimed(self) -> bool:
+        """Whether an error is asked for."""
+        return self.target is not None or self.target_db is not None
+
+    @property
+    def searches(self) -> bool:
+        """Whether settings are searched for."""
+        return self.aimed and self.search
+
+
+def check_accuracy(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """What a target needs of the other tables."""
+    wanted = scene.accuracy
+    if not wanted.aimed:
+        return
+    key = ("accuracy", "target" if wanted.target is not None else "target_db")
+    if not wanted.estimate:
+        raise error(key, "is met by the estimated error: it needs accuracy.estimate = true")
+    if scene.contact is None or scene.road is None or scene.time is None:
+        raise error(key, "is of the forces of a tire on a road: add [contact], [road] and [time]")
+    if wanted.of == "axle_force" and not scene.output.axle_force:
+        raise error(("accuracy", "of"), '= "axle_force" needs output.axle_force = true')
+    if scene.road.kind == "flat" and scene.road.motion.kind == "none" and not scene.force:
+        raise error(key, "is of what varies, and nothing drives the tire: take another road")
+    if wanted.up_to * scene.time.duration < 4:
+        raise error(
+            ("accuracy", "up_to"),
+            f"= {wanted.up_to:g} Hz is not seen in {scene.time.duration:g} s: four periods at least",
+        )

@@ -1,0 +1,1 @@
+"""Settings that meet an error asked for ([accuracy] target), at least cost."""

@@ -1,0 +1,126 @@
+"""Which settings to try next: those that are predicted to meet the target at least cost.
+
+From a trial's errors by cause, each falling as a known power of its size (contact.error_bars.ORDERS), and from its
+measured seconds by stage, scaled by how the sizes of the stages grow (scene.extent.estimate), rungs are climbed one
+by one: each time the one that takes away most of the squared error for its cost, until the target would be met.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from tireroad.contact.error_bars import ORDERS
+from tireroad.runs.process.memory import available_memory
+from tireroad.runs.scene.extent.demand import DOUBTFUL
+from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.search.journal import Trial
+from tireroad.runs.search.settings import CAUSES, Ladders, Settings, applied, size_ratio
+from tireroad.runs.search.shares import worst
+
+AIM = 0.9  # of the target: what a plan is made for, as the known orders hold in the limit only
+AT_ONCE = {"mesh": 2, "modes": 2, "points": 2, "step": 1}  # rungs in one plan at most: likewise
+# Of the target: a cause is made smaller only above the first; above the second (as four equal shares are) where
+# another cause alone keeps the plan from the target, so that none is finer than that one will need.
+SMALL, EVEN = 0.25, 0.5
+_STAGE = {"contact": "contact loop"}  # by its name in the estimate
+_LEAST = 1e-3  # s
+
+
+def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
+    """The next settings after a trial that misses its target; None where no finer ones are left or fit into memory.
+
+    Reads the road's file; on one process, as what it finds depends on the memory that is free.
+    """
+    scene = ladders.scene
+    if trial.found is None:
+        return _after_failure(ladders, trial, processes)
+    over, now = trial.found.over(scene.accuracy), trial.settings
+    costs = _Costs(scene, trial)
+    begun = now.rungs
+    while worst(over)[0] > AIM:
+        choices = [
+            (cause, finer)
+            for cause, finer in ladders.finer(now)
+            if finer.rungs[cause] - begun[cause] <= AT_ONCE[cause] and fits(scene, finer, processes)
+        ]
+        choices = _worthwhile(over, choices)
+        if not choices:
+            break
+        cause, finer = max(choices, key=lambda one: _worth(over, one[0], now, one[1], costs))
+        over, now = _finer(over, cause, now, finer), finer
+    return now if now != trial.settings else None
+
+
+def _worthwhile(
+    over: np.ndarray, choices: list[tuple[str, Settings]]
+) -> list[tuple[str, Settings]]:
+    """The choices whose cause is a part of the error that counts; those that are unknown alone, where some are."""
+    errors = over[:, worst(over)[1]]
+    known = dict(zip(CAUSES, errors, strict=True))
+    unknown = [one for one in choices if not np.isfinite(known[one[0]])]
+    if not np.isfinite(errors).all():
+        return unknown  # its companion fails: what is that coarse is made finer first
+    climbing = {cause for cause, _ in choices}
+    stuck = any(error > AIM for cause, error in known.items() if cause not in climbing)
+    return [one for one in choices if known[one[0]] > AIM * (EVEN if stuck else SMALL)]
+
+
+def fits(scene: Scene, settings: Settings, processes: int) -> bool:
+    """Whether the memory that is free holds a run with these settings."""
+    needed = processes * sum(estimate(applied(scene, settings)).memory.values())
+    return needed < DOUBTFUL * available_memory()
+
+
+def _after_failure(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
+    """A rung up with the mesh and the step: what does not come to an end at all is coarse in one of them."""
+    rungs = trial.settings.rungs
+    found = ladders.at(rungs | {"mesh": rungs["mesh"] + 1, "step": rungs["step"] + 1})
+    return found if found is not None and fits(ladders.scene, found, processes) else None
+
+
+def _worth(over: np.ndarray, cause: str, now: Settings, finer: Settings, costs: _Costs) -> float:
+    """Squared error that the finer settings take away, for the seconds that they add."""
+    row, figure = CAUSES.index(cause), worst(over)[1]
+    if not np.isfinite(over[row, figure]):
+        return np.inf
+    after = _finer(over, cause, now, finer)
+    gain = over[row, figure] ** 2 - after[row, figure] ** 2
+    return float(gain) / max(costs(finer) - costs(now), _LEAST)
+
+
+def _finer(over: np.ndarray, cause: str, now: Settings, finer: Settings) -> np.ndarray:
+    """Predicted errors with a cause's size made smaller; one that was unknown is hoped to be as asked for."""
+    after = over.copy()
+    row = CAUSES.index(cause)
+    known = np.isfinite(after[row])
+    after[row] = np.where(known, after[row] * size_ratio(cause, now, finer) ** ORDERS[cause], 0.0)
+    return after
+
+
+class _Costs:
+    """Seconds of a run with given settings, predicted from a trial's."""
+
+    def __init__(self, scene: Scene, trial: Trial) -> None:
+        self._scene, self._measured = scene, trial.seconds
+        self._model: dict[str, Mapping[str, float]] = {}
+        self._base = self._estimated(trial.settings)
+
+    def __call__(self, settings: Settings) -> float:
+        """Of all stages; of those that the model does not know, as the others grow."""
+        wanted, known, before = self._estimated(settings), 0.0, 0.0
+        for stage, seconds in self._measured.items():
+            part = _STAGE.get(stage, stage)
+            if self._base.get(part):
+                known += seconds * wanted[part] / self._base[part]
+                before += seconds
+        rest = sum(self._measured.values()) - before
+        return known + rest * (known / before if before else 1.0)
+
+    def _estimated(self, settings: Settings) -> Mapping[str, float]:
+        key = str(settings)
+        if key not in self._model:
+            self._model[key] = estimate(applied(self._scene, settings)).seconds
+        return self._model[key]

@@ -1,0 +1,233 @@
+"""The search: trials of ever finer settings, from coarse, until the estimated error is as asked for."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import time
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from mpi4py import MPI
+
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.files.cache import VARIABLE
+from tireroad.runs.files.checksum import signed
+from tireroad.runs.files.disk import write_text
+from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.scene.plan import STAGES
+from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.search.journal import Journal, Trial
+from tireroad.runs.search.planning import planned
+from tireroad.runs.search.settings import Ladders, Settings, aim, applied
+from tireroad.runs.search.shares import CAUSES, Found, shown, worst
+from tireroad.runs.stages.pipeline import Finished, run_scene
+
+CHOSEN = "chosen.toml"
+FOLDER = "search"
+
+
+@dataclass(frozen=True)
+class Search:
+    """A scene whose settings are searched for, with results in `directory`."""
+
+    scene: Scene
+    directory: Path
+    comm: MPI.Comm
+    petsc_options: list[str]
+
+    def run(self) -> None:
+        """Trials until one meets the target, then the run with its settings, from its stages.
+
+        Collective. ConvergenceError where none meets it within the limits: the results are then those of the
+        trial that came nearest.
+        """
+        on_root(self.comm, lambda: self._begin())
+        observe.say(f"search    for {aim(self.scene.accuracy)}")
+        tried: list[Trial] = []
+        why = ""
+        settings: Settings | None = self._ladders.first()
+        while settings is not None:
+            tried.append(self._trial(settings, len(tried) + 1))
+            if self._met(tried[-1]):
+                self._keep(tried[-1])
+                return
+            why = self._limit(tried)
+            settings = None if why else on_root(self.comm, lambda: self._next(tried[-1]))
+        self._give_up(
+            tried,
+            why or "no finer settings are left, or the memory that is free does not hold them",
+        )
+
+    @cached_property
+    def _ladders(self) -> Ladders:
+        return Ladders.of(self.scene)
+
+    @cached_property
+    def _journal(self) -> Journal:
+        """Root process only."""
+        return Journal(self.directory, self.scene)
+
+    @property
+    def _cache(self) -> Path:
+        """Where the stages of trials are kept: where the user keeps those of all runs, or in the folder."""
+        return Path(os.environ.get(VARIABLE) or self.directory / FOLDER / "cache")
+
+    def _begin(self) -> None:
+        """The scene as it is asked for stands in the folder until settings are found. Root process only."""
+        write_text(self.directory / "scene.toml", signed(dumps(self.scene)))
+        _ = self._journal
+
+    def _next(self, last: Trial) -> Settings | None:
+        return planned(self._ladders, last, self.comm.size)
+
+    def _trial(self, settings: Settings, number: int) -> Trial:
+        """A trial, or what is known of it from before; its line is shown. Collective."""
+        before = on_root(self.comm, lambda: self._journal.known(settings))
+        observe.say(f"  trial {number}: {settings}{' (from before)' if before else ''}")
+        trial = before or self._tried(settings)
+        if not before:
+            on_root(self.comm, lambda: self._journal.add(trial))
+        observe.say(f"    {self._line(trial)}")
+        return trial
+
+    def _line(self, trial: Trial) -> str:
+        cost = f"{sum(trial.seconds.values()):.3g} s a run, {trial.spent:.3g} s of them new"
+        if trial.found is None:
+            return f"failed: {trial.failed}"
+        return f"error {shown(trial.found.over(self.scene.accuracy), self.scene.accuracy)}; scheme {trial.scheme}; {cost}"
+
+    def _tried(self, settings: Settings) -> Trial:
+        """Run the scene with settings up to its error bars, in a folder of its own. Collective."""
+        began = time.perf_counter()
+        folder = self.directory / FOLDER / "trial"
+        on_root(self.comm, lambda: folder.mkdir(parents=True, exist_ok=True))
+        try:
+            with observe.only_log():
+                done = run_scene(
+                    applied(self.scene, settings),
+                    folder,
+                    self.comm,
+                    until="accuracy",
+                    fresh=False,
+                    petsc_options=self.petsc_options,
+                    cache=self._cache,
+                )
+                product, scheme = done.done["accuracy"].product, done.done["contact"].product.scheme
+        except (ConvergenceError, InputError) as error:
+            spent = self.comm.bcast(time.perf_counter() - began)
+            return Trial(settings, {}, spent, failed=str(error))
+        seconds = on_root(self.comm, lambda: self._seconds(folder))
+        spent = self.comm.bcast(time.perf_counter() - began)
+        return Trial(settings, seconds, spent, Found.of(product, self.scene.accuracy), scheme)
+
+    def _seconds(self, folder: Path) -> dict[str, float]:
+        """Seconds by stage of the trial in the folder, as each took when it was computed. Root process only."""
+        stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
+        return {
+            name: sum(entry["cost"].values()) or entry["seconds"]
+            for name, entry in stages.items()
+            if entry["status"] != "skipped"
+        }
+
+    def _met(self, trial: Trial) -> bool:
+        return trial.found is not None and worst(trial.found.over(self.scene.accuracy))[0] <= 1
+
+    def _limit(self, tried: list[Trial]) -> str:
+        """Which limit of the search is reached; "" where it may go on."""
+        wanted = self.scene.accuracy
+        spent = sum(trial.spent for trial in tried)
+        if len(tried) >= wanted.trials:
+            return f"accuracy.trials = {wanted.trials} are done"
+        if wanted.budget is not None and spent >= wanted.budget:
+            return f"accuracy.budget = {wanted.budget:g} s is spent ({spent:.0f} s)"
+        return ""
+
+    def _keep(self, trial: Trial) -> None:
+        """The run with a trial's settings, from its stages; its scene written back. Collective."""
+        chosen = applied(self.scene, trial.settings)
+        on_root(self.comm, lambda: write_text(self.directory / CHOSEN, signed(dumps(chosen))))
+        observe.say(f"  chosen: {trial.settings}; {self.directory / CHOSEN} needs no search")
+        self._final(chosen)
+        on_root(self.comm, lambda: shutil.rmtree(self.directory / FOLDER, ignore_errors=True))
+
+    def _final(self, scene: Scene) -> None:
+        """The results of settings that were tried, in the folder. Collective."""
+        done = run_scene(
+            scene,
+            self.directory,
+            self.comm,
+            until=None,
+            fresh=False,
+            petsc_options=self.petsc_options,
+            cache=self._cache,
+        )
+        _tell(scene, done)
+
+    def _give_up(self, tried: list[Trial], why: str) -> None:
+        """Results of the nearest trial, and ConvergenceError with what it reached. Collective."""
+        wanted = self.scene.accuracy
+        ended = [trial for trial in tried if trial.found is not None]
+        if not ended:
+            raise ConvergenceError(
+                f"accuracy: no trial came to its end ({why}); the last: {tried[-1].failed}"
+            )
+        best = min(
+            ended, key=lambda trial: worst(trial.found.over(wanted))[0] if trial.found else 0.0
+        )
+        assert best.found is not None
+        over = best.found.over(wanted)
+        largest = CAUSES[int(over[:, worst(over)[1]].argmax())]
+        self._final(applied(self.scene, best.settings))
+        on_root(self.comm, lambda: self._begin())
+        raise ConvergenceError(
+            f"accuracy: the target is not met: {why}. Reached {shown(over, wanted)} with {best.settings}; largest part: "
+            f"{largest}. Its results are in {self.directory}; take a larger target, or raise accuracy.trials or "
+            "accuracy.budget and run again: what was tried is kept"
+        )
+
+
+def run(
+    scene: Scene,
+    directory: Path,
+    comm: MPI.Comm,
+    *,
+    until: str | None,
+    fresh: bool,
+    petsc_options: list[str],
+) -> None:
+    """A run as the user starts it: with a search where the scene has a target and goes on to its forces; `fresh`:
+    nothing of earlier runs and trials is reused. Collective.
+    """
+    if not scene.accuracy.searches or (until and STAGES.index(until) < STAGES.index("accuracy")):
+        given = scene, directory, comm
+        done = run_scene(*given, until=until, fresh=fresh, petsc_options=petsc_options)
+        _tell(scene, done)
+        return
+    if fresh:
+        on_root(comm, lambda: _forget(directory))
+    Search(scene, directory, comm, petsc_options).run()
+
+
+def _tell(scene: Scene, done: Finished) -> None:
+    """Whether the error that is asked for is met, where it has been estimated. Collective."""
+    if not scene.accuracy.aimed or "accuracy" not in done.done:
+        return
+    over = Found.of(done.done["accuracy"].product, scene.accuracy).over(scene.accuracy)
+    text = f"estimated error of the {scene.accuracy.of.replace('_', ' ')}: {shown(over, scene.accuracy)}"
+    if worst(over)[0] <= 1:
+        observe.say(f"{text}, within the target")
+    else:
+        observe.warn(
+            f"{text}, more than the target: accuracy.search = true looks for better settings"
+        )
+
+
+def _forget(directory: Path) -> None:
+    """Root process only."""
+    shutil.rmtree(directory / FOLDER, ignore_errors=True)
+    Journal.forget(directory)

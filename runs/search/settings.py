@@ -1,0 +1,169 @@
+"""What a search chooses: mesh, modes, residual, points and step of a scene, each on a ladder from coarse to fine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from tireroad.contact.error_bars import ORDERS
+from tireroad.runs.scene.schema import Pitch
+from tireroad.runs.scene.tables.accuracy import Accuracy
+from tireroad.runs.scene.tables.scene import Scene
+
+CAUSES = tuple(ORDERS)
+FINER = 2**0.5  # of a rung of modes and points; of the step, twice that
+RUNGS = 10
+MODES = 2.25  # highest mode over the highest frequency of interest on the lowest rung: an answer ends at half of it
+SAMPLES = 8  # steps in the period of that frequency on the lowest rung
+PASSING = 2.25  # contact points that pass in that period at least
+POINTS = 1 / 32  # of the outer radius: the largest spacing of points
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One choice: `mesh` (elements around and from bead to bead) of an `order`, modes `up_to` Hz, `residual`,
+    `pitch` m of the points, `step` s. `rungs` on the ladders by cause."""
+
+    mesh: tuple[int, int]
+    order: int
+    up_to: float
+    residual: str
+    pitch: float
+    step: float
+    rungs: dict[str, int]
+
+    def __str__(self) -> str:
+        around, along = self.mesh
+        return (
+            f"{around} x {along} elements of order {self.order}, modes up to {self.up_to:.4g} Hz, residual "
+            f"{self.residual}, points {1e3 * self.pitch:.3g} mm, step {1e3 * self.step:.3g} ms"
+        )
+
+
+@dataclass(frozen=True)
+class Ladders:
+    """The rungs that a `scene` (its wheel at `speed` m/s over the road) has for each cause of error."""
+
+    scene: Scene
+    speed: float
+
+    @classmethod
+    def of(cls, scene: Scene) -> Ladders:
+        """Of a resolved scene; the speed by its outer radius."""
+        turning = scene.rotation.speed if scene.rotation else 0.0
+        return cls(scene, turning * scene.tire.proportions().outer_radius)
+
+    def at(self, rungs: dict[str, int]) -> Settings | None:
+        """The settings on these rungs; None where a ladder has no such rung."""
+        meshes = self._meshes
+        if rungs["mesh"] >= len(meshes) or max(rungs.values()) > RUNGS:
+            return None
+        step = self._step / 2 ** rungs["step"]
+        return Settings(
+            mesh=meshes[rungs["mesh"]],
+            order=self.scene.tire.shape.search_order(self.scene.tire),
+            up_to=MODES * self.scene.accuracy.up_to * FINER ** rungs["modes"],
+            residual=self._residual,
+            pitch=self._pitch / FINER ** rungs["points"],
+            step=step,
+            rungs=dict(rungs),
+        )
+
+    def first(self) -> Settings:
+        """The coarsest settings."""
+        found = self.at(dict.fromkeys(CAUSES, 0))
+        assert found is not None
+        return found
+
+    def finest(self) -> Settings:
+        """The finest ones."""
+        top = {cause: RUNGS for cause in CAUSES} | {"mesh": len(self._meshes) - 1}
+        found = self.at(top)
+        assert found is not None
+        return found
+
+    def finer(self, settings: Settings) -> Iterator[tuple[str, Settings]]:
+        """(cause, settings one rung up on its ladder) of each that has one."""
+        for cause in CAUSES:
+            found = self.at(settings.rungs | {cause: settings.rungs[cause] + 1})
+            if found is not None:
+                yield cause, found
+
+    @property
+    def _meshes(self) -> tuple[tuple[int, int], ...]:
+        return self.scene.tire.shape.meshes(self.scene.tire)
+
+    @property
+    def _residual(self) -> str:
+        """Rolling belts couple kept modes with the rest: attachment modes know of it (docs/method.md)."""
+        turning = self.scene.rotation is not None and self.scene.rotation.speed > 0
+        belted = bool(self.scene.tire.cords) or self.scene.tire.section != "torus"
+        simple = self.scene.rotation is None or self.scene.rotation.method == "projected"
+        return "attachment" if turning and belted and simple else "static"
+
+    @property
+    def _pitch(self) -> float:
+        largest = POINTS * self.scene.tire.proportions().outer_radius
+        if self.speed:
+            largest = min(largest, self.speed / (PASSING * self.scene.accuracy.up_to))
+        return largest
+
+    @property
+    def _step(self) -> float:
+        assert self.scene.time is not None
+        duration, up_to = self.scene.time.duration, self.scene.accuracy.up_to
+        return duration / math.ceil(duration * up_to * SAMPLES)
+
+
+def bounds(scene: Scene) -> list[str]:
+    """What `check` says of the search that a run of the scene begins with."""
+    ladders, wanted = Ladders.of(scene), scene.accuracy
+    limit = f" or {wanted.budget:g} s" if wanted.budget is not None else ""
+    return [
+        f"search for {aim(wanted)}: mesh, modes, residual, points and step as given are not used",
+        f"  from  {ladders.first()}",
+        f"  to    {ladders.finest()}, as far as the memory holds it",
+        f"  in {wanted.trials} trials{limit} at most; sizes and costs below are those of the first",
+    ]
+
+
+def aim(wanted: Accuracy) -> str:
+    """The target in words."""
+    asked = [f"{100 * wanted.target:.3g} %"] if wanted.target is not None else []
+    asked += [f"{wanted.target_db:.3g} dB"] if wanted.target_db is not None else []
+    return f"settings with {' and '.join(asked)} of the {wanted.of.replace('_', ' ')} up to {wanted.up_to:g} Hz"
+
+
+def size_ratio(cause: str, one: Settings, other: Settings) -> float:
+    """Size of what makes the error in `other` over that in `one`: below 1 where `other` is finer."""
+    sizes = {
+        "mesh": (1 / one.mesh[0], 1 / other.mesh[0]),
+        "modes": (1 / one.up_to, 1 / other.up_to),
+        "points": (one.pitch, other.pitch),
+        "step": (one.step, other.step),
+    }
+    before, after = sizes[cause]
+    return after / before
+
+
+def applied(scene: Scene, settings: Settings, *, search: bool = False) -> Scene:
+    """The scene with the settings in it, and without a search unless it is wanted."""
+    assert scene.contact is not None and scene.time is not None
+    around, along = settings.mesh
+    return replace(
+        scene,
+        tire=replace(
+            scene.tire,
+            segments=around,
+            order=settings.order,
+            shape=scene.tire.shape.elements_along(along),
+        ),
+        # The companion of the mesh tells it, and for the forces that are asked for.
+        static=replace(scene.static, error_estimate=False),
+        modal=replace(scene.modal, up_to=settings.up_to),
+        greens=replace(scene.greens, residual=settings.residual, dynamic=None, band=None),
+        contact=replace(scene.contact, points=Pitch(settings.pitch, settings.pitch)),
+        time=replace(scene.time, step=settings.step, scheme="auto"),
+        accuracy=replace(scene.accuracy, search=search),
+    )

@@ -1,0 +1,92 @@
+"""Figures that no tire has are told once, with the usual range; those of a tire are not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic_results import sealed, write_results
+
+from tireroad.runs.files.read import Results
+from tireroad.runs.report.realism import mean_load, unusual
+
+PASSENGER = {"load": 4000.0, "deflection": 0.020, "inflation": 2.2e5, "mass": 9.3}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A passenger tire's figures (205/60 R15 at 4 kN, published with MF-Swift) in the files of a run."""
+    directory = write_results(tmp_path / "run", steps=64, modes=6)
+    with sealed(directory / "static.h5", "a") as file:
+        file.attrs.update(PASSENGER, footprint_length=0.137, footprint_width=0.143)
+        force, area = file["contact/force"], file["contact/area"]
+        force[:, 2] *= 4000.0 / force[:, 2].sum()
+        area[:] = 4000.0 / 2.6e5 / np.count_nonzero(force[:, 2])
+    with sealed(directory / "rotating.h5", "a") as file:
+        value = file["eigenvalue"][:]
+        file["eigenvalue"][:] = 1j * value.imag - 0.05 * np.abs(value.imag)
+    with sealed(directory / "contact.h5", "a") as file:
+        file["total_force"][:, 2] *= 4000.0 / file["total_force"][:, 2].mean()
+        file.attrs["road_relief"] = 0.002
+    return directory
+
+
+def told(directory: Path, **scene: dict) -> str | None:
+    with Results(directory, {"contact": {"youngs_modulus": 8e6}} | scene) as results:
+        return unusual(results)
+
+
+def test_a_tire_is_not_remarked_on(folder: Path) -> None:
+    assert told(folder, tire={"thickness": 0.014}, road={"kind": "texture"}) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"mass": 0.5}, "mass 0.5 kg (3 to 90 kg"),
+        ({"deflection": 1e-4}, "vertical stiffness 40 000 N/mm (50 to 1500"),
+        ({"deflection": 0.075}, "beyond what such a tire is rated for"),
+        ({"footprint_width": 0.02}, "footprint 137 mm long and 20 mm wide"),
+        ({"inflation": 4e4}, "6.5 times the inflation (0.6 to 2 times)"),
+    ],
+)
+def test_each_figure_is_told_with_its_range(folder: Path, change: dict, said: str) -> None:
+    with sealed(folder / "static.h5", "a") as file:
+        file.attrs.update(change)
+    text = told(folder).replace("\u202f", " ")
+    assert said in text
+    assert text.startswith("figures that no tire has")
+
+
+def test_the_tread_the_road_and_the_damping(folder: Path) -> None:
+    assert "340 MPa of the tread (rubber: 3 to 15" in told(
+        folder, contact={"youngs_modulus": 3.4e8}
+    )
+    with sealed(folder / "contact.h5", "a") as file:
+        file.attrs["road_relief"] = 1.6
+    scene = {"tire": {"thickness": 0.012}, "road": {"kind": "grid"}}
+    assert "is the file in millimetres" in told(folder, **scene)
+    assert told(folder, **scene | {"road": {"kind": "step"}}) is None
+    with sealed(folder / "rotating.h5", "a") as file:
+        file["eigenvalue"][0] = -250.0 + 200.0j
+    assert "damping of the lowest modes up to 78 % of critical" in told(folder)
+
+
+def test_the_mean_load_is_explained_where_it_differs(folder: Path) -> None:
+    with Results(folder, {"road": {"kind": "cobblestones", "datum": "mean"}}) as results:
+        assert mean_load(results) is None
+    with sealed(folder / "contact.h5", "a") as file:
+        file["total_force"][:, 2] *= 1.2
+    with Results(folder, {"road": {"kind": "cobblestones", "datum": "mean"}}) as results:
+        text = mean_load(results)
+    assert "20 % above the 4" in text
+    assert "held at its static height" in text
+    with Results(folder, {"axle": {"kind": "corner"}, "road": {"kind": "sine"}}) as results:
+        assert "have not come to rest" in mean_load(results)
+
+
+def test_missing_files_are_no_remark(tmp_path: Path) -> None:
+    with Results(tmp_path, {}) as results:
+        assert unusual(results) is None
+        assert mean_load(results) is None
