@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tireroad.fem.transient.linear import FullTire
 from tireroad.runs.stages.build.setup import probes
 from tireroad.runs.thesis.claim import Claim
 from tireroad.runs.thesis.figure import Reproduced, figure
-from tireroad.runs.thesis.figures.simplified import Array, Simplified
+from tireroad.runs.thesis.figures.simplified import Array, Simplified, full_tire
 from tireroad.runs.thesis.plots import Curve, Panel, lines
 from tireroad.runs.thesis.runner import Scenes
 from tireroad.runs.validation.histories import Trial, follow
@@ -47,22 +46,15 @@ def by_modes(scenes: Scenes, *settings: str) -> Moved:
 
 
 def by_all_unknowns(scenes: Scenes) -> Moved:
-    """Full finite elements on the same points, without the brush: by symmetry it does not act. Collective."""
+    """Full finite elements on the same points, without the brush: by symmetry it does not act. Once. Collective."""
+    return scenes.once("moved road, all unknowns", lambda: _by_all_unknowns(scenes))
+
+
+def _by_all_unknowns(scenes: Scenes) -> Moved:
     run = scenes.run(SCENE, "contact.brush_stiffness=", until="greens")
-    job, wheel = run.job, run.wheel
+    job, step = run.job, float(run.job.scene.time.step)
     alone = replace(job, scene=replace(job.scene, force=()))
-    points = probes(alone, run.static, run.setup)
-    step = job.scene.time.step
-    tire = FullTire(
-        wheel.operators,
-        wheel.rotation,
-        wheel.speed,
-        (job.scene.damping.mass, 0.0),
-        step,
-        points.outputs,
-        points.loads,
-        spectral_radius=RADIUS,
-    )
+    tire = full_tire(run, probes(alone, run.static, run.setup), step, RADIUS)
     found = follow(Trial(job.scene.contact, run.setup, job.scene.time.duration), tire, step, 0.0)
     lowest = int(np.linalg.norm(run.setup.patch.points[:, :2], axis=1).argmin())
     moved = np.zeros((len(found.values["displacement"]), 3))

@@ -13,12 +13,13 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
 from tireroad.modal.rolling import rolling_modes
-from tireroad.runs.stages.build.setup import probes
+from tireroad.runs.stages.build.setup import Probes, probes
 from tireroad.runs.stages.pipeline import Finished
 from tireroad.runs.thesis.runner import Scenes
 
 Array = NDArray[np.floating]
 SCENE = "figure-6.2"
+AVERAGE = 1.0  # spectral radius of average acceleration: the least error where nothing touches
 VERTICAL = slice(2, 3)  # of x, y, z at the driven point
 
 
@@ -57,24 +58,13 @@ class Simplified:
 
     def history(self, response: Response, force: Array, step: float) -> Array:
         """Displacement (n,) m under a force (n,) N from rest."""
-        return self._marched(Recursion(response, step, "linear", self.comm), force)[:, 0]
+        return self._marched(
+            Recursion(response=response, step=step, scheme="linear", comm=self.comm), force
+        )[:, 0]
 
     def full_history(self, force: Array, step: float) -> Array:
-        """The same of all unknowns: average acceleration, the least error where nothing touches."""
-        return self._marched(self._full_tire(step), force)[:, 2]
-
-    def _full_tire(self, step: float) -> FullTire:
-        wheel, points = self.run.wheel, self._points
-        return FullTire(
-            wheel.operators,
-            wheel.rotation,
-            wheel.speed,
-            (self.run.job.scene.damping.mass, 0.0),
-            step,
-            points.outputs,
-            points.loads,
-            spectral_radius=1.0,
-        )
+        """The same of all unknowns."""
+        return self._marched(full_tire(self.run, self._points, step, AVERAGE), force)[:, 2]
 
     @cached_property
     def compliance(self) -> float:
@@ -90,6 +80,22 @@ class Simplified:
                 tire.advance(force[k : k + 1])
                 moved[k] = free + tire.same_step @ force[k : k + 1]
         return moved
+
+
+def full_tire(run: Finished, points: Probes, step: float, radius: float) -> FullTire:
+    """All unknowns of a run's standing tire between probes, in steps of `step` s, by a scheme of this spectral
+    radius. Collective."""
+    wheel = run.wheel
+    return FullTire(
+        operators=wheel.operators,
+        rotation=wheel.rotation,
+        speed=wheel.speed,
+        damping=(run.job.scene.damping.mass, 0.0),
+        step=step,
+        outputs=points.outputs,
+        loads=points.loads,
+        spectral_radius=radius,
+    )
 
 
 def sine(frequency: float, duration: float, step: float) -> tuple[Array, Array]:
