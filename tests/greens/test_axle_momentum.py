@@ -15,7 +15,7 @@ def test_transmissibility_of_an_oscillator() -> None:
     """(k + i omega c) / (k - omega^2 m + i omega c): what spring and damper pass on."""
     frequency = np.linspace(0.5, 12.0, 24)
     shape = np.ones((1, 1)) / np.sqrt(MASS)  # mass-normalised
-    projection = Projection(np.array([STIFFNESS / MASS]), np.zeros((3, 1)))
+    projection = Projection(squares=np.array([STIFFNESS / MASS]), momentum=np.zeros((3, 1)))
     states = standing(projection, (DAMPING / MASS, 0.0))
     carried = np.array([[0.0], [0.0], [np.sqrt(MASS)]])  # int rho u per unit coordinate
     response = couple(states, shape, shape, carried)
@@ -34,7 +34,7 @@ def test_what_no_state_has_follows_statically() -> None:
     one = np.ones((1, 1))
     nothing = replace(
         couple(
-            standing(Projection(np.ones(1), np.zeros((3, 1))), (0.1, 0.0)),
+            standing(Projection(squares=np.ones(1), momentum=np.zeros((3, 1))), (0.1, 0.0)),
             0 * one,
             0 * one,
             np.zeros((3, 1)),
