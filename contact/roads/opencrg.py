@@ -35,13 +35,14 @@ HARMLESS_MODIFIERS = (
 )  # fmt: skip
 
 
-def read_opencrg(file: Path, holes: str = "refuse", end: str = "refuse") -> Grid:
+def read_opencrg(file: Path | str, holes: str = "refuse", end: str = "refuse") -> Grid:
     """The road of an OpenCRG file as a Grid: x = u from its beginning, y = v to the left, z in m.
 
     Formats LRFI, LDFI, KRBI (also where none is named) and KDBI; long sections numbered or `at v
     =`. `holes` and `end` as in Grid. InputError names file and line or byte of what is missing,
     damaged or not supported.
     """
+    file = Path(file)
     if not file.is_file():
         raise InputError(f"road.file {file}: no such file")
     try:

@@ -1,5 +1,6 @@
 """The elements a scene has by default, and a radial tire by its size."""
 
+import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
@@ -49,7 +50,12 @@ def test_unknowns_are_those_of_the_section(tmp_path, given):
     [
         ('section = "radial"\nsize = "foo"', "like"),
         ('section = "radial"\nthickness = 0.01', "belongs to section = torus"),
-        ('section = "radial"\n[[tire.cords]]\nname = "x"', "by its size"),
+        (
+            'section = "radial"\n[[tire.cords]]\nname = "x"',
+            "one of cap ply, belt 2, belt 1, carcass",
+        ),
+        ('section = "radial"\n[[tire.region]]\narc = [0, 9]', "one of tread, skim"),
+        ('section = "radial"\n[[tire.region]]\nname = "ply"\ndepth = [0, 0.5]', "the size's"),
         ('section = "radial"\n[tire.material]\ndensity = 1.0', "by its size"),
         ('size = "205/60 R15"', "belongs to section = radial"),
     ],
@@ -57,6 +63,31 @@ def test_unknowns_are_those_of_the_section(tmp_path, given):
 def test_a_radial_tire_says_what_it_does_not_take(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
         scene(tmp_path, f"[tire]\n{text}\n")
+
+
+def test_a_radial_tire_of_other_compounds_and_cords(tmp_path):
+    """By their names; all others stay the built-in ones, and the hash of the stage follows."""
+    plain = scene(tmp_path, '[tire]\nsection = "radial"\n').tire
+    text = """[tire]
+section = "radial"
+[[tire.region]]
+name = "tread"
+loss_factor = 0.4
+[tire.region.material]
+youngs_modulus = 6e6
+[[tire.cords]]
+name = "belt 1"
+angle = 30.0
+"""
+    tire = scene(tmp_path, text).tire
+    before, after = plain.shape.rubbers(plain), tire.shape.rubbers(tire)
+    assert after["tread"].law.youngs_modulus == 6e6 and after["tread"].loss_factor == 0.4
+    assert after["tread"].dynamic == before["tread"].dynamic
+    assert {n for n in before if before[n] != after[n]} == {"tread"}
+    one, other = ({c.name: c for c in t.shape.cords(t)} for t in (plain, tire))
+    assert [n for n in one if one[n] != other[n]] == ["belt 1"]
+    assert np.degrees(other["belt 1"].angle) == pytest.approx(30)
+    assert tire.shape.angles(tire)["belt 1"] == 30
 
 
 def test_a_section_file_is_a_tire(tmp_path):

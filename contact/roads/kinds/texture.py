@@ -75,6 +75,7 @@ class Tiles:
         self._pitch = spec.cut_off / PER_WAVE
         self._shape = self._places()
         self._filter: Array | None = None
+        self._tiles: dict[int, Array] = {}
         self._halves: dict[int, Array] = {}
         self.spacing = 0.5 * spec.cut_off
 
@@ -104,6 +105,14 @@ class Tiles:
         z = fft.irfft2(fft.rfft2(rng.standard_normal(self._shape)) * self._filter, self._shape)
         return z * (spec.rms / z.std())
 
+    def _drawn(self, number: int) -> Array:
+        """The tile `number`; the last two are kept, as each takes part in two halves."""
+        if number not in self._tiles:
+            if len(self._tiles) > 1:
+                del self._tiles[next(iter(self._tiles))]
+            self._tiles[number] = self._tile(number)
+        return self._tiles[number]
+
     def _half(self, number: int) -> Array:
         """Heights over the overlap of tiles number - 1 and number, with the row that follows."""
         if number not in self._halves:
@@ -111,7 +120,7 @@ class Tiles:
                 del self._halves[next(iter(self._halves))]
             half = self._shape[0] // 2
             share = 0.5 * np.pi * (np.arange(half + 1) / half)[:, None]
-            before, here = self._tile(number - 1), self._tile(number)
+            before, here = self._drawn(number - 1), self._drawn(number)
             # The row that follows the earlier tile's end has no weight.
             ending = np.concatenate([before[half:], before[:1]])
             self._halves[number] = np.cos(share) * ending + np.sin(share) * here[: half + 1]

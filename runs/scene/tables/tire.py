@@ -51,7 +51,9 @@ def _loss_factor():
 
 @dataclass(frozen=True)
 class Region:
-    name: str | None = text(None, "name of the region in the file; not for a torus")
+    name: str | None = text(
+        None, "region of a file, or compound of a radial tire, that this changes; not for a torus"
+    )
     arc: tuple[float, float] = vector(
         (0.0, 45.0), "deg", "start and end, measured from the crown", least=0, most=175
     )
@@ -72,7 +74,10 @@ class Region:
 
 @dataclass(frozen=True)
 class Cords:
-    name: str = text("ply", "name of this line of cords in results and messages")
+    name: str = text(
+        "ply",
+        "name of this line of cords in results and messages; of a line that a file or a radial tire has: its cords are replaced",
+    )
     depth: float = number(
         0.006, "m", "depth under the outer face of the undeformed wall", least=0, most=5
     )

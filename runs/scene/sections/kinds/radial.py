@@ -1,7 +1,8 @@
-"""`section = "radial"`: the built-in passenger tire, all of it by its size (docs/radial-tire.md)."""
+"""`section = "radial"`: the built-in passenger tire by its size (docs/radial-tire.md)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -12,13 +13,15 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import integer, text
 from tireroad.fem.sections.ring import Ring
 from tireroad.runs.scene.sections.kind import Proportions, SectionKind, section_kind
+from tireroad.runs.scene.sections.own_file import region_of
 from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:
     from tireroad.fem.sections.construction import Construction
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
-    from tireroad.runs.scene.tables.tire import Tire
+    from tireroad.runs.scene.tables.tire import Cords as Line
+    from tireroad.runs.scene.tables.tire import Region, Tire
 
 # (elements around, along) that a search may take.
 FINER = ((16, 14), (20, 18), (24, 22), (30, 26), (36, 32), (44, 38), (52, 46), (64, 56))
@@ -26,7 +29,7 @@ FINER = ((16, 14), (20, 18), (24, 22), (30, 26), (36, 32), (44, 38), (52, 46), (
 
 @section_kind("radial", "the built-in radial passenger tire (docs/radial-tire.md)")
 class RadialSection(SectionKind):
-    """Layers, compounds and cords by the size."""
+    """Layers by the size; compounds and cords too, unless [[tire.region]] or [[tire.cords]] name one."""
 
     segments = 30
 
@@ -40,15 +43,17 @@ class RadialSection(SectionKind):
         return replace(self, elements_arc=self.elements_arc or 26), order, segments
 
     def check(self, tire: Tire, source: Source) -> None:
-        default = type(tire)()
-        for key in ("material", "region", "cords"):
-            if getattr(tire, key) != getattr(default, key):
-                text = "is of a torus: a radial tire has all of it by its size"
-                source.add(("tire", key), text)
+        if tire.material != type(tire)().material:
+            text = "is of a torus: a radial tire has compounds by its size; [[tire.region]] changes one"
+            source.add(("tire", "material"), text)
         try:
-            built(self.size)
+            construction = built(self.size)
         except InputError as problem:
             source.add(("tire", "size"), str(problem).removeprefix("tire.size "))
+            return
+        lines = [line.name for line in construction.cords]
+        _known("region", tire.region, list(construction.compounds), source)
+        _known("cords", tire.cords, lines, source)
 
     def proportions(self, tire: Tire) -> Proportions:
         ring = self.ring(tire)
@@ -65,10 +70,10 @@ class RadialSection(SectionKind):
         return _ring(self.size, tire.segments, self.elements_arc, tire.order, tire.footprint_size)
 
     def rubbers(self, tire: Tire) -> dict[str, Material]:
-        from tireroad.fem.tire.material import compound
-
-        compounds = built(self.size).compounds
-        return {name: compound("neo-hookean", **values) for name, values in compounds.items()}
+        return {
+            name: _compound(region_of(tire, name), dict(values))
+            for name, values in built(self.size).compounds.items()
+        }
 
     def rubber(self, tire: Tire) -> tuple[float, float, float]:
         """Of the softest compound, in which the wall bends most."""
@@ -79,14 +84,20 @@ class RadialSection(SectionKind):
     def cords(self, tire: Tire) -> list[Cords]:
         from tireroad.fem.tire.cords import Cords
 
-        places = {"under", "to"}
-        return [
-            Cords(**{key: value for key, value in vars(line).items() if key not in places})
-            for line in built(self.size).cords
-        ]
+        changed = {line.name: line for line in tire.cords}
+        places = {"under", "to", "depth", "arc"}
+        found = []
+        for line in built(self.size).cords:
+            given = changed.get(line.name)
+            values = {key: v for key, v in vars(given or line).items() if key not in places}
+            if given is not None:
+                values["angle"] = float(np.radians(given.angle))
+            found.append(Cords(**values))
+        return found
 
     def angles(self, tire: Tire) -> dict[str, float]:
-        return {line.name: float(np.degrees(line.angle)) for line in built(self.size).cords}
+        own = {line.name: float(np.degrees(line.angle)) for line in built(self.size).cords}
+        return own | super().angles(tire)
 
     def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
         return FINER
@@ -100,6 +111,40 @@ class RadialSection(SectionKind):
     def has_losses(self, tire: Tire) -> bool:
         """All compounds of the built-in tire have one."""
         return True
+
+
+def _known(table: str, given: Sequence[Region | Line], names: list[str], source: Source) -> None:
+    """Note what names no part of the tire, names it twice, or gives a part a place that it has already."""
+    default = type(given[0])() if given else None
+    for number, one in enumerate(given):
+        path = ("tire", table, str(number))
+        if one.name not in names:
+            source.add((*path, "name"), f"must be one of {', '.join(names)} in a radial tire")
+        elif one.name in [other.name for other in given[:number]]:
+            source.add((*path, "name"), f'= "{one.name}" is taken')
+        for key in ("arc", "depth", "side"):
+            if getattr(one, key, None) != getattr(default, key, None):
+                source.add((*path, key), "is the size's in a radial tire: leave it out")
+
+
+def _compound(region: Region | None, values: dict[str, float]) -> Material:
+    """A built-in compound, with what a [[tire.region]] of its name changes."""
+    from tireroad.fem.tire.material import Material, compound
+
+    if region is None:
+        return compound("neo-hookean", **values)
+    if region.dynamic != 1:
+        values["dynamic"] = region.dynamic
+    if region.loss_factor:
+        values["loss_factor"] = region.loss_factor
+    if region.material is None:
+        return compound("neo-hookean", **values)
+    return Material(
+        law=region.material.law,
+        density=region.material.density,
+        dynamic=values["dynamic"],
+        loss_factor=values["loss_factor"],
+    )
 
 
 @lru_cache(maxsize=4)
