@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
@@ -15,6 +16,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
 from tireroad.runs.stages.build.setup import driven_points
 from tireroad.runs.stages.build.stepping import Integration, integration, planned
+from tireroad.runs.stages.build.transmissibility import transmissibility
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
@@ -35,6 +37,7 @@ class ResponseStage(Computed[PointResponse]):
     """What the prescribed forces do, alone or in contact."""
 
     name: ClassVar[str] = "response"
+    static: Done[StaticState]
     wheel: Done[Wheel]
     greens: Done[Responses]
     contact: Done[ContactHistory] | None = None
@@ -49,6 +52,9 @@ class ResponseStage(Computed[PointResponse]):
             "receptance": asdict(output.receptance) if output.receptance else None,
             "contact": self.contact.key if self.contact else None,
             "axle_force": output.axle_force,
+            "transmissibility": asdict(output.transmissibility)
+            if output.transmissibility
+            else None,
             "also": [output.velocity, output.acceleration, output.impulse],
         }
 
@@ -64,6 +70,9 @@ class ResponseStage(Computed[PointResponse]):
             curves["impulse"] = self._impulse(record, curves["time"][0]), "m/(N s)"
         if scene.output.receptance:
             curves |= self._in_frequency(record)
+        if scene.output.transmissibility:
+            given = self.static.product, self._response
+            curves |= transmissibility(self.job, record, *given)
         return PointResponse(curves)
 
     def write(self, file, product: PointResponse) -> None:

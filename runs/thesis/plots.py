@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.runs.report.comparison_figures import CYCLE
-from tireroad.runs.report.figures import canvas, encode, envelope, styled
+from tireroad.runs.report.figures import CYCLE, canvas, encode, envelope, styled
 
 Array = NDArray[np.floating]
 

@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -29,6 +29,7 @@ class Scenes:
 
     directory: Path
     comm: MPI.Comm
+    _found: dict[str, Any] = field(default_factory=dict)
 
     def load(self, name: str, *settings: str) -> Scene:
         """The scene of a name with settings ("a.b=value") laid over it. Not collective."""
@@ -46,6 +47,12 @@ class Scenes:
             )
             stack.enter_context(observe.quiet())
             return run_scene(scene, folder, self.comm, until=until, fresh=False, petsc_options=[])
+
+    def once(self, name: str, make: Callable[[], T]) -> T:
+        """What figures share beside stages: made at the first time, kept in memory by name. Collective."""
+        if name not in self._found:
+            self._found[name] = make()
+        return self._found[name]
 
 
 def kept(run: Finished, stage: str, pick: Callable[[Any], T]) -> T:

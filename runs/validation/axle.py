@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from scipy import sparse
 
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.model import SmallMotions
-from tireroad.greens.response import Response
+from tireroad.greens.axle import by_momentum, from_moment
 from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.standing import solved
 from tireroad.runs.measure.tabulate import Table
@@ -116,10 +116,9 @@ def _off(found: np.ndarray, exact: np.ndarray) -> tuple[float, float]:
     return 100 * float(mean), 100 * float(np.abs(far).max() / np.abs(exact).max())
 
 
-def _from_moment(loads: sparse.csr_matrix, moment: np.ndarray) -> np.ndarray:
-    """Sum of the unit loads less the rate of momentum, from the first moment (f, 3, k) kg m/N."""
-    total = loads.toarray().reshape(loads.shape[0], -1, 3).sum(axis=1).T
-    return total + (2 * np.pi * FREQUENCY[:, None, None]) ** 2 * moment
+def _total(loads: sparse.csr_matrix) -> np.ndarray:
+    """Sum (3, k) of each unit load."""
+    return loads.toarray().reshape(loads.shape[0], -1, 3).sum(axis=1).T
 
 
 def _full(tires: Tires) -> Found:
@@ -128,7 +127,9 @@ def _full(tires: Tires) -> Found:
     wheel, none = tires.wheel, sparse.csr_matrix((0, loads.shape[1]))
     full = wheel.rotating_stiffness, wheel.rotating_damping
     moment = receptance(wheel.operators, *full, none, loads, FREQUENCY, moment=True)
-    return Found("full FE", "all", _from_moment(loads, moment), time.perf_counter() - began)
+    return Found(
+        "full FE", "all", from_moment(_total(loads), moment, FREQUENCY), time.perf_counter() - began
+    )
 
 
 def _momentum(tires: Tires, count: int) -> Found:
@@ -136,13 +137,7 @@ def _momentum(tires: Tires, count: int) -> Found:
     loads = tires.probes.loads
     began = time.perf_counter()
     response = tires.response(count, "attachment")
-    moment: Response = replace(
-        response,
-        output=response.momentum,
-        block_output=response.block_momentum,
-        residual=np.zeros((3, loads.shape[0])),
-    )
-    transfer = _from_moment(loads, moment.receptance(FREQUENCY))
+    transfer = by_momentum(response, _total(loads), FREQUENCY)
     return Found("momentum", count, transfer, time.perf_counter() - began)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tireroad.runs.files.read import Absent, Results, Section, attributes
 from tireroad.runs.report import figures, live, realism, surface_figures
 from tireroad.runs.report.quantities import quantity
-from tireroad.runs.report.sections import corner, pattern
+from tireroad.runs.report.sections import corner, pattern, transmissibility
 from tireroad.runs.report.sections.tire import pressure
 
 SAMPLED = 400  # instants read of a (time, point) dataset: the file may be larger than memory
@@ -145,6 +145,8 @@ def response(results: Results) -> Section:
             live.chart(frequency[kept], curves, labels, figures.CYCLE, log=True, height=300)
         )
         section.show(picture, "Receptance: displacement at i along its force per N at j.", drawn)
+    driven = len(results.scene.get("force", []))
+    transmissibility.add(results, section, point_names(results.scene, driven))
     if not section.figures:
         raise Absent(f"{name} holds neither displacement over time nor receptance")
     return section

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.scene.tables.cavity import has_air
 from tireroad.runs.scene.tables.scene import Scene
 
 Where = Callable[[tuple[str, ...], str], InputError]
@@ -20,6 +21,25 @@ def check_receptance(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         raise error(("output", "receptance"), "is read at driven points: add a [[force]]")
     path = "output", "receptance", "step"
     _count(path, "frequencies", receptance.to, receptance.step, "Hz", MOST_FREQUENCIES, error)
+
+
+def check_transmissibility(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """What the force on the axle per force on the tread needs."""
+    wanted = scene.output.transmissibility
+    if wanted is None:
+        return
+    path = "output", "transmissibility"
+    if not scene.force:
+        raise error(path, "is from driven points to the axle: add a [[force]]")
+    if scene.modal.rim == "free" or scene.axle.kind != "fixed":
+        raise error(
+            path, 'is the force on a held axle: take modal.rim = "fixed", axle.kind = "fixed"'
+        )
+    if wanted.free_rim and has_air(scene):
+        raise error(
+            (*path, "free_rim"), "has no air in the tire: take 0, or take out [tire.cavity]"
+        )
+    _count((*path, "step"), "frequencies", wanted.to, wanted.step, "Hz", MOST_FREQUENCIES, error)
 
 
 def check_campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:

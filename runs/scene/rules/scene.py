@@ -5,7 +5,12 @@ from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.rules.full import full_matrices
-from tireroad.runs.scene.rules.output import check_campbell, check_receptance, check_vibration
+from tireroad.runs.scene.rules.output import (
+    check_campbell,
+    check_receptance,
+    check_transmissibility,
+    check_vibration,
+)
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.accuracy import check_accuracy
 from tireroad.runs.scene.tables.axle import check_axle
@@ -110,14 +115,14 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 
 def _force(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    receptance = scene.output.receptance
+    sought = scene.output.receptance or scene.output.transmissibility
     for key in ("velocity", "acceleration"):
         if scene.contact is not None and getattr(scene.output, key):
             raise error(
                 ("output", key),
                 "is not available in scenes with [contact]: leave it out, or take out [contact]",
             )
-    if scene.force and scene.time is None and receptance is None:
+    if scene.force and scene.time is None and sought is None:
         raise error(("force",), "has nothing to drive: add [time] or output.receptance")
     for number, force in enumerate(scene.force):
         if not any(force.direction):
@@ -178,6 +183,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("damping", "rotation", "output"), full_matrices),
     (("contact", "road", "time", "static", "rotation"), _contact),
     (("output", "force"), check_receptance),
+    (("output", "force", "modal", "axle", "tire"), check_transmissibility),
     (("rotation",), check_campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),

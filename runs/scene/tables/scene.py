@@ -165,6 +165,18 @@ class Receptance:
 
 
 @dataclass(frozen=True)
+class Transmissibility:
+    to: float = number(300.0, "Hz", "highest frequency", least=1e-3, most=1e6)
+    step: float = number(2.0, "Hz", "step between two frequencies", least=1e-4, most=1e6)
+    free_rim: int = integer(
+        0,
+        "number of modes of the tire with a free rim, by which it is found a second way; 0: by momentum alone",
+        least=0,
+        most=100000,
+    )
+
+
+@dataclass(frozen=True)
 class Output:
     spectra: bool = flag(True, "spectra of the contact force and the axle force")
     axle_force: bool = flag(True, "axle force, from the momentum of the tire")
@@ -181,6 +193,11 @@ class Output:
     )
     receptance: Receptance | None = table(
         Receptance, "receptances between the driven points", optional=True
+    )
+    transmissibility: Transmissibility | None = table(
+        Transmissibility,
+        "force on the held axle per force at each driven point, over frequency",
+        optional=True,
     )
 
 

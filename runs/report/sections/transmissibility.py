@@ -1,0 +1,55 @@
+"""The axle's share of the report on point forces: force on the held axle per force on the tread."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.runs.files.read import Results, Section
+from tireroad.runs.report.figures import COLOURS, COMPONENTS, canvas, encode, styled
+from tireroad.runs.report.quantities import quantity
+
+POINTS = 3  # drawn at most
+LEAST = 1e-4  # of the largest: what is smaller is rounding by symmetry
+
+
+def add(results: Results, section: Section, names: list[str]) -> None:
+    """The curves of response.h5, where it has them, by momentum and by the free rim."""
+    name = "response.h5"
+    frequency, found = (
+        results.optional(name, f"transmissibility/{part}") for part in ("frequency", "momentum")
+    )
+    if frequency is None or found is None or not len(frequency):
+        return
+    other = results.optional(name, "transmissibility/free_rim")
+    section.show(
+        transmissibilities(frequency, found, other, names),
+        "Force on the axle per force at the point, by momentum; dashed: by modes of a tire with a free rim.",
+    )
+    if other is not None:
+        apart = np.linalg.norm(other - found) / np.linalg.norm(found)
+        fact = "axle force by the free rim off that by momentum"
+        section.facts.append((fact, quantity(100 * float(apart), "%")))
+
+
+@styled
+def transmissibilities(
+    frequency: NDArray, found: NDArray, other: NDArray | None, names: list[str]
+) -> str:
+    """Magnitudes of (f, 3, k) in dB re 1, a row a point."""
+    rows = min(found.shape[2], POINTS)
+    figure, axes = canvas(9.5, 2.4 * rows + 0.4, rows, sharex=True)
+    floor = LEAST * np.abs(found).max()
+    for point in range(rows):
+        here = axes[point, 0]
+        for column, component in enumerate(COMPONENTS):
+            for values, dashes in ((found, "-"), (other, "--")):
+                if values is None or np.abs(found[:, column, point]).max() < floor:
+                    continue
+                level = 20 * np.log10(np.maximum(np.abs(values[:, column, point]), floor))
+                label = component if dashes == "-" else None
+                here.plot(frequency, level, dashes, color=COLOURS[column], label=label)
+        here.set(title=names[point], ylabel="dB re 1 N/N")
+        here.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)
+    axes[-1, 0].set_xlabel("frequency in Hz")
+    return encode(figure)

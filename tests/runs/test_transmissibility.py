@@ -1,0 +1,60 @@
+"""`output.transmissibility`: force on the axle per force on the tread, two ways, in a file and on the page."""
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.process import observe
+from tireroad.runs.scene.load import load
+from tireroad.runs.stages.build.transmissibility import apart
+from tireroad.runs.stages.pipeline import run_scene
+
+SCENE = """
+[tire]
+segments = 8
+elements_arc = 4
+order = 2
+[tire.material]
+youngs_modulus = 48e6
+[static]
+steady_rolling = false
+[modal]
+count = 20
+[damping]
+mass = 100.0
+[greens]
+residual = "attachment"
+[rotation]
+speed = 60.0
+[[force]]
+[[force]]
+angle = 30.0
+arc = 10.0
+[output]
+transmissibility = { to = 150.0, step = 25.0, free_rim = 30 }
+"""
+
+
+@pytest.mark.parametrize("changed", ["modal.rim=free", "axle.kind=free", "force="])
+def test_refused_where_no_axle_is_held_or_nothing_drives(tmp_path, changed: str) -> None:
+    (tmp_path / "a.toml").write_text(SCENE)
+    with pytest.raises(InputError):
+        load(tmp_path / "a.toml", [changed])
+
+
+def test_both_ways_agree_and_slow_forces_pass(tmp_path) -> None:
+    """Two modal bases of one mesh, 1 % at most below 150 Hz (8 segments: rolling also by the lumped mass)."""
+    (tmp_path / "a.toml").write_text(SCENE)
+    with observe.quiet():
+        run_scene(load(tmp_path / "a.toml"), tmp_path, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])  # fmt: skip
+    with h5py.File(tmp_path / "response.h5") as file:
+        group = file["transmissibility"]
+        frequency, momentum, free = (group[k][:] for k in ("frequency", "momentum", "free_rim"))
+        assert {group[k].attrs["unit"] for k in ("momentum", "free_rim")} == {"-"}
+    assert frequency == pytest.approx(25.0 * np.arange(1, 7))
+    assert momentum.shape == free.shape == (6, 3, 2)
+    assert apart(free, momentum) < 0.01
+    page = (tmp_path / "report.html").read_text()
+    assert "Force on the axle per force at the point" in page
