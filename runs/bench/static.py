@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from tireroad.runs.bench.launched import launched
+from tireroad.runs.bench.parts.launched import launched
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
 

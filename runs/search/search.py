@@ -121,18 +121,9 @@ class Search:
         except (ConvergenceError, InputError) as error:
             spent = self.comm.bcast(time.perf_counter() - began)
             return Trial(settings, {}, spent, failed=str(error))
-        seconds = on_root(self.comm, lambda: self._seconds(folder))
+        cost = on_root(self.comm, lambda: seconds(folder))
         spent = self.comm.bcast(time.perf_counter() - began)
-        return Trial(settings, seconds, spent, Found.of(product, self.scene.accuracy), scheme)
-
-    def _seconds(self, folder: Path) -> dict[str, float]:
-        """Seconds by stage of the trial in the folder, as each took when it was computed. Root process only."""
-        stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
-        return {
-            name: sum(entry["cost"].values()) or entry["seconds"]
-            for name, entry in stages.items()
-            if entry["status"] != "skipped"
-        }
+        return Trial(settings, cost, spent, Found.of(product, self.scene.accuracy), scheme)
 
     def _met(self, trial: Trial) -> bool:
         return trial.found is not None and worst(trial.found.over(self.scene.accuracy))[0] <= 1
@@ -189,6 +180,16 @@ class Search:
             f"{largest}. Its results are in {self.directory}; take a larger target, or raise accuracy.trials or "
             "accuracy.budget and run again: what was tried is kept"
         )
+
+
+def seconds(folder: Path) -> dict[str, float]:
+    """Seconds by stage of the run in a folder, as each took when it was computed. Not collective."""
+    stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
+    return {
+        name: sum(entry["cost"].values()) or entry["seconds"]
+        for name, entry in stages.items()
+        if entry["status"] != "skipped"
+    }
 
 
 def run(

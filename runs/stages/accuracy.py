@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tireroad.contact.error_bars import SHARES, Bars, bars, told, total
+from tireroad.contact.error_bars import SHARES, Bars, Told, bars, told, total
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.state import StaticState
@@ -16,6 +16,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.stages.build.loop import Forces
 from tireroad.runs.stages.build.model_limit import model_limit
 from tireroad.runs.stages.build.run_in import first_step
 from tireroad.runs.stages.companions import Given, companion
@@ -26,8 +27,8 @@ from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 SHARE = 0.33  # of the run's own cost, that all companions together take
 _FEWEST = 64  # steps that a companion repeats at the least
-_LOOPS = 2.2  # time loops that four companions take for each step they repeat
-_COARSE = 0.15  # of the cost before the loop, on elements of twice the size
+_LOOPS = 2.0  # time loops that four companions take for each step they repeat
+_COARSE = 0.18  # of the cost before the loop, on elements of twice the size
 FORCES = ("contact_force", "axle_force")
 _UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
 
@@ -96,15 +97,14 @@ class AccuracyStage(Computed[Accuracy]):
         for cause, share in SHARES.items():
             try:
                 with record.timing(cause):
-                    forces = companion(cause, given)
+                    forces, beside = companion(cause, given)
             except (ConvergenceError, InputError) as error:
                 absent[cause] = str(error)
                 continue
-            first = round(start * history.step / forces.step)
-            for name, other in (("contact_force", forces.contact), ("axle_force", forces.axle)):
-                if name in exact:
-                    off = told(other[first:], forces.step, limit, up_to)
-                    found[name][cause] = bars(exact[name], off, share)
+            off = _told(forces, start * history.step, limit, up_to)
+            other = _told(beside, start * history.step, limit, up_to) if beside else exact
+            for name in exact:
+                found[name][cause] = bars(other[name], off[name], share)
         product = Accuracy(
             centre=exact["contact_force"].centre,
             window=steps * history.step,
@@ -186,6 +186,13 @@ class AccuracyStage(Computed[Accuracy]):
             by_cause=by_cause,
             absent=absent,
         )
+
+
+def _told(forces: Forces, start: float, limit: float, up_to: float) -> dict[str, Told]:
+    """What is told of the forces of a companion after `start` s."""
+    first = round(start / forces.step)
+    both = {"contact_force": forces.contact, "axle_force": forces.axle}
+    return {name: told(values[first:], forces.step, limit, up_to) for name, values in both.items()}
 
 
 def _describe(record: Record, product: Accuracy, runs: Mapping[str, np.ndarray]) -> None:

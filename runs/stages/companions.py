@@ -8,9 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
+from tireroad.contact.chatter import choose, oscillation
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.thinned import thinned
-from tireroad.fem.errors import InputError
+from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process import observe
@@ -59,10 +60,43 @@ class Given:
         """The patch in its static state."""
         return settled(self.job, self.setup, self.response, self.nodal_force)
 
-    def repeated(self, setup: ContactSetup, response: Response, coarser: int = 1) -> Forces:
-        """The loop by another setup (settled), response or a step `coarser` times as long. Collective."""
-        steps = coarser * self.step, self.steps // coarser
-        return forces(self.job, setup, response, *steps, self.scheme)
+    @cached_property
+    def longer(self) -> Forces:
+        """The run with twice its step. Collective."""
+        return self.repeated(self.settled, self.response, coarser=2)
+
+    @cached_property
+    def base(self) -> Forces | None:
+        """The run with twice the step where companions of points, modes and mesh, with that step too, are compared
+        with it, at half the cost; None where its steps leave out a state or do not resolve the contact's
+        oscillation, and those of the run do. Collective."""
+        step, spec = 2 * self.step, self.job.scene.contact
+        kept = self.response.resolved(step)
+        if len(kept.every) < len(self.response.resolved(self.step).every):
+            return None
+        steps = oscillation(spec, self.settled.patch, kept, step)
+        if self.scheme == "linear" and choose(steps).scheme != "linear":
+            return None
+        try:
+            return self.longer
+        except (ConvergenceError, InputError):
+            return None
+
+    def of(self, job: Job) -> Given:
+        """The same with another job; its base stays that of the run."""
+        other = replace(self, job=job)
+        other.__dict__["base"] = self.base
+        return other
+
+    def repeated(
+        self, setup: ContactSetup, response: Response, coarser: int | None = None
+    ) -> Forces:
+        """The loop by another setup (settled), response or a step `coarser` times as long, by default that of
+        `base`. Collective."""
+        times = coarser or (1 if self.base is None else 2)
+        return forces(
+            self.job, setup, response, times * self.step, self.steps // times, self.scheme
+        )
 
 
 def settled(job: Job, setup: ContactSetup, response: Response, force: np.ndarray) -> ContactSetup:
@@ -72,7 +106,7 @@ def settled(job: Job, setup: ContactSetup, response: Response, force: np.ndarray
 
 def longer_step(given: Given) -> Forces:
     """Twice the time step. Collective."""
-    return given.repeated(given.settled, given.response, coarser=2)
+    return given.longer
 
 
 def fewer_points(given: Given) -> Forces:
@@ -88,7 +122,7 @@ def fewer_points(given: Given) -> Forces:
         job = replace(job, scene=replace(job.scene, contact=contact))
     setup = replace(given.setup, patch=thinned(patch))
     setup = settled(job, setup, given.response, given.nodal_force)
-    return replace(given, job=job).repeated(setup, given.response)
+    return given.of(job).repeated(setup, given.response)
 
 
 def fewer_modes(given: Given) -> Forces:
@@ -110,7 +144,7 @@ def coarser_mesh(given: Given) -> Forces:
             done[kind.name] = found
     response, state = done["greens"].product.contact, done["static"].product
     setup = settled(job, done["setup"].product, response, state.force)
-    return forces(job, setup, response, given.step, given.steps, given.scheme)
+    return given.of(job).repeated(setup, response)
 
 
 def coarser_job(job: Job) -> Job:
@@ -154,7 +188,11 @@ COMPANIONS: dict[str, Callable[[Given], Forces]] = {
 """By the cause of the error that each is for (contact.error_bars.SHARES)."""
 
 
-def companion(cause: str, given: Given) -> Forces:
-    """The forces of a companion, without a word. Collective; InputError or ConvergenceError where there is none."""
+def companion(cause: str, given: Given) -> tuple[Forces, Forces | None]:
+    """The forces of a companion, and those they are compared with (None: the run's own), without a word.
+
+    Collective; InputError or ConvergenceError where there is none.
+    """
     with observe.quiet():
-        return COMPANIONS[cause](given)
+        beside = None if cause == "step" else given.base
+        return COMPANIONS[cause](given), beside

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
@@ -17,6 +16,7 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.press import place
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
+from tireroad.fem.timing import Timing
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
@@ -91,7 +91,7 @@ class StaticStage(Computed[StaticState]):
         with record.timing("mesh and forms"):
             equilibrium = Equilibrium(self.job.tire.body, rolling)
         loader = Loader(equilibrium, _show)
-        began = time.perf_counter()
+        began = Timing.clock()
         try:
             _press(loader, wanted)
         except ConvergenceError as error:
@@ -99,7 +99,7 @@ class StaticStage(Computed[StaticState]):
             cause = with_cause(error, loader, rolling, lambda other: _press(other, wanted))
             raise ConvergenceError(f"{cause}{kept}") from None
         record.cost |= equilibrium.cost
-        record.cost["other"] = time.perf_counter() - began - sum(equilibrium.cost.values())
+        record.cost["other"] = Timing.clock() - began - sum(equilibrium.cost.values())
         return static_state(equilibrium, loader.touch), loader
 
     def _keep_last(self, loader: Loader) -> str:

@@ -74,7 +74,7 @@ def contact_force(folder) -> np.ndarray:
     ("cause", "sets"),
     [
         ("step", ("time.step=2e-4",)),
-        ("mesh", ("tire.segments=10", "tire.elements_arc=4")),
+        ("mesh", ("time.step=2e-4", "tire.segments=10", "tire.elements_arc=4")),
     ],
 )
 def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
@@ -89,7 +89,9 @@ def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
         steps=300,
     )
     other, _ = run(cause, "contact", *sets)
-    found = companion(cause, given).contact
+    forces, beside = companion(cause, given)
+    assert forces.step == 2e-4 and (beside is None) == (cause == "step")
+    found = forces.contact
     assert found[:, 2] == pytest.approx(contact_force(other)[:, 2], rel=1e-8)
 
 

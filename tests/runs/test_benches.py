@@ -8,6 +8,7 @@ import pytest
 
 from tireroad.runs.bench import convergence, error_bars, headline, pareto, scaling, skipping
 from tireroad.runs.bench.floors import exponent
+from tireroad.runs.bench.parts.rolling_cases import Case
 from tireroad.runs.bench.rough_road import Mesh
 from tireroad.runs.measure import tabulate
 from tireroad.runs.measure.measured_page import _shown, page
@@ -182,7 +183,7 @@ def test_convergence_tells_what_each_change_costs(tmp_path, monkeypatch) -> None
 def test_error_bars_are_compared_with_a_finer_run(tmp_path) -> None:
     coarse = {"segments": 16, "arc": 8, "order": 2, "modes": 16, "pitch": 0.01, "step": 4e-4}
     fine = coarse | {"modes": 24, "step": 2e-4}
-    cases = [("soft", "texture", 40.0)]
+    cases = [Case("soft", "texture", 40.0)]
     shares, every = error_bars.tables(tmp_path, cases, coarse, fine, 0.05)
     assert {row[0] for row in shares.rows} >= {"mean", "deviation", "all"}
     assert all(row[3] >= 0 and row[4] >= 0 for row in every.rows)

@@ -7,7 +7,7 @@ from tireroad.contact.model import step_solver
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.spectra import distance
 from tireroad.runs.measure.tabulate import modules
-from tireroad.runs.validation import rolling
+from tireroad.runs.validation import rolling, schemes
 from tireroad.runs.validation.comparison import Comparison
 from tireroad.runs.validation.histories import History, follow
 from tireroad.runs.validation.moved_road import SCENE
@@ -105,3 +105,16 @@ def test_modes_linear_and_large_motions_agree_where_all_should(tires) -> None:
     assert distance(linear, modal, 0.02).worst < 5e-3
     few = follow(trial, *tires.modal(Choice(10, "none", step))).values["contact force"]
     assert distance(linear, few, 0.02).worst > 0.05
+
+
+def test_the_scheme_that_is_chosen_is_held_against_a_finer_step(tires) -> None:
+    """Both schemes come nearer to the finer step, linear forces by their second order; the one that is chosen is
+    the better one where the steps resolve the contact."""
+    response = tires.response(30, "static")
+    exact = schemes._follow(tires, response, 2.5e-5, "linear")
+    rows = [schemes._row(tires, response, exact, 1e7, "static", step) for step in (4e-4, 1e-4)]
+    for _, _, _, _, chosen, its, *off in rows:
+        assert its == off[schemes.SCHEMES.index(chosen)]
+    (*_, coarse, constant), (*_, fine, _) = rows
+    assert float(fine) < float(coarse) / 4
+    assert rows[1][4] == "linear" and float(constant) > float(coarse)

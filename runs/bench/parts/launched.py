@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tireroad.fem.errors import ConvergenceError
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def launched(scene: Path, out: Path, until: str, processes: int, *more: str) -> dict:

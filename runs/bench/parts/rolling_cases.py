@@ -1,0 +1,129 @@
+"""The cases on which estimated errors and searches are judged: 3 tires, 4 roads, 2 speeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import h5py
+import numpy as np
+from mpi4py import MPI
+
+from tireroad.runs.process import observe
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages.pipeline import Finished, run_scene
+
+TIRES = {
+    "soft": "",
+    "thick": "thickness = 0.016\n",
+    "belted": "",
+}
+BELTS = """
+[[tire.cords]]
+name = "belt"
+depth = 0.006
+arc = [-30.0, 30.0]
+angle = 0.0
+youngs_modulus = 2e9
+"""
+ROADS = {
+    "sine": 'kind = "sine"\namplitude = 2e-4\nwavelength = 0.15',
+    "cleat": 'kind = "cleat"\nheight = 0.003\nlength = 0.02\nposition = 0.3',
+    "texture": 'kind = "texture"\nrms = 2e-4\nroll_off = 0.2\ncut_off = 0.03',
+    "cobblestones": 'kind = "cobblestones"\njoint_depth = 0.003\nheight_scatter = 0.0002',
+}
+SPEEDS = (30.0, 60.0)  # rad/s
+# m, of the patch: the same on every road, so that what comes before the loop is shared
+REACH = 0.012
+SCENE = """
+name = "case"
+[tire]
+footprint_size = 0.25
+{tire}[tire.material]
+youngs_modulus = 48e6
+{cords}
+[static]
+load = 500.0
+error_estimate = false
+[damping]
+mass = 300.0
+[rotation]
+speed = {speed}
+[contact]
+youngs_modulus = 1e7
+reach = {reach}
+[road]
+{road}
+[time]
+duration = {duration}
+"""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A `tire` on a `road` at a `speed` (rad/s)."""
+
+    tire: str
+    road: str
+    speed: float
+
+    def __str__(self) -> str:
+        return f"{self.tire}, {self.road}, {self.speed:g} rad/s"
+
+    @property
+    def wheel(self) -> str:
+        """What all roads share."""
+        return f"{self.tire}-{self.speed:g}"
+
+    def scene(self, folder: Path, duration: float, *sets: str) -> Scene:
+        """The scene, with keys of --set laid over it; its file goes to the folder."""
+        from tireroad.runs.scene.load import load
+
+        folder.mkdir(parents=True, exist_ok=True)
+        text = SCENE.format(
+            tire=TIRES[self.tire],
+            cords=BELTS if self.tire == "belted" else "",
+            road=ROADS[self.road],
+            speed=self.speed,
+            reach=REACH,
+            duration=duration,
+        )
+        (folder / "given.toml").write_text(text)
+        return load(folder / "given.toml", sets)
+
+
+CASES = tuple(Case(*one) for one in product(TIRES, ROADS, SPEEDS))
+
+
+def sets(
+    *, segments: int, arc: int, order: int, modes: int, pitch: float, step: float
+) -> tuple[str, ...]:
+    """Settings of mesh, modes, points and step as of --set."""
+    return (
+        f"tire.segments={segments}",
+        f"tire.elements_arc={arc}",
+        f"tire.order={order}",
+        f"modal.count={modes}",
+        f"contact.points={{ dx = {pitch}, dy = {pitch} }}",
+        f"time.step={step}",
+    )
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What a run left: its products, and the `total_force` and `axle_force` (n, 3) N."""
+
+    done: Finished
+    forces: dict[str, np.ndarray]
+    step: float
+
+
+def driven(scene: Scene, folder: Path, until: str) -> Driven:
+    """Run a scene, without a word. Collective."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with observe.quiet():
+        done = run_scene(scene, folder, MPI.COMM_WORLD, until=until, fresh=False, petsc_options=[])
+    with h5py.File(folder / "contact.h5") as file:
+        forces = {name: file[name][:] for name in ("total_force", "axle_force")}
+    return Driven(done, forces, done.done["contact"].product.step)
