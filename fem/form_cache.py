@@ -39,9 +39,14 @@ announce: Callable[[str], None] = logging.getLogger(__name__).warning
 
 
 def kept_in() -> Path:
-    """The folder of compiled forms of this Python, in `$XDG_CACHE_HOME` or `~/.cache`."""
+    """The folder of compiled forms of this Python, in the user's cache."""
+    return user_folder() / f"forms-{sys.implementation.cache_tag}"
+
+
+def user_folder() -> Path:
+    """The program's folder in the user's cache, `$XDG_CACHE_HOME` or `~/.cache`."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(base) / "tireroad" / f"forms-{sys.implementation.cache_tag}"
+    return Path(base) / "tireroad"
 
 
 def compiled(comm: Any, make: Callable[[Path], Any]) -> Any:

@@ -105,6 +105,15 @@ def _compare(compare: argparse.ArgumentParser) -> None:
     compare.add_argument("--out", type=Path, metavar="DIR", default=Path("results/compare"))
 
 
+def _cache(cache: argparse.ArgumentParser) -> None:
+    cache.add_argument(
+        "--clear", action="store_true", help="remove them; result folders keep theirs"
+    )
+    cache.add_argument(
+        "--unused-for", type=float, default=0.0, metavar="DAYS", help="with --clear: only these"
+    )
+
+
 def _bench(bench: argparse.ArgumentParser) -> None:
     bench.add_argument("names", nargs="*", metavar="NAME", help="all by default")
     bench.add_argument("--out", type=Path, metavar="FILE.json", help="also a page beside it")
@@ -157,6 +166,9 @@ COMMANDS = {
     "sweep": Command("a family of runs that share what they can, in one table", _sweep),
     "compare": Command("two to twelve runs in one page and one table", _compare),
     "info": Command("what a result file holds: datasets, shapes, units, provenance", _file),
+    "cache": Command(
+        "finished stages that runs share, by TIREROAD_CACHE or in the user's cache", _cache
+    ),
     "bench": Command(
         "run time against error, scaling and floors, measured on this machine", _bench
     ),

@@ -46,6 +46,7 @@ def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
 
 
 def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
+    from tireroad.runs.files.cache import share_with_later_runs
     from tireroad.runs.files.folder import check_kept_scene, claimed
     from tireroad.runs.scene.load import load
 
@@ -56,6 +57,7 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
     directory = args.out if args.out is not None else Path("results") / scene.name
     mpi.start_petsc(petsc_options)
     form_cache.announce = observe.say
+    share_with_later_runs()
     with ExitStack() as stack:
 
         def claim() -> None:
@@ -154,6 +156,16 @@ def _results(directory: Path) -> Path:
     return directory
 
 
+def _cache(args: argparse.Namespace) -> None:
+    from tireroad.runs.files.cache import Cache, share_with_later_runs
+
+    share_with_later_runs()
+    cache = Cache()
+    if args.clear:
+        print(cache.clear(args.unused_for))
+    print(cache.described())
+
+
 def _compare(args: argparse.Namespace) -> None:
     from tireroad.runs.report.compare import compare
 
@@ -175,6 +187,7 @@ ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
     "info": _info,
     "bench": _bench,
     "validate": _validate,
+    "cache": _cache,
 }
 
 

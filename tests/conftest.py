@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from started import ROOT, environment
 
+os.environ["TIREROAD_CACHE"] = "off"  # the user's has stages of earlier runs
+
 
 @pytest.fixture(scope="module", autouse=True)
 def released(request: pytest.FixtureRequest) -> Iterator[None]:

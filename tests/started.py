@@ -13,6 +13,7 @@ MPIRUN = {
     "OMPI_MCA_orte_execute_quiet": "1",
     "OMPI_MCA_btl": "self,vader",
     "OMPI_MCA_odls_base_sigkill_timeout": "0",
+    "TIREROAD_CACHE": "off",
 }
 """What the launcher sets for mpirun, where pytest was started without it."""
 

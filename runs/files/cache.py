@@ -1,7 +1,9 @@
 """Finished stages that several result folders share, kept by stage and hash of inputs.
 
-The environment variable TIREROAD_CACHE names the folder; without it there is none. Files are linked,
-not copied, where the file system allows it: result files are never written to in place.
+The environment variable TIREROAD_CACHE names the folder, "off" none. `run` uses one in the user's cache where it
+is not set: of the stages that another road or another time does not change, up to `LARGEST` bytes, the
+longest unused going first. Files are linked, not copied, where the file system allows it: result files are never
+written to in place.
 """
 
 from __future__ import annotations
@@ -10,23 +12,104 @@ import fcntl
 import json
 import os
 import shutil
+import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
+
+from tireroad.fem.form_cache import user_folder
 from tireroad.runs.files import store
 from tireroad.runs.files.disk import replacing, write_text
+from tireroad.runs.process import observe
 
-VARIABLE = "TIREROAD_CACHE"
+VARIABLE, OFF = "TIREROAD_CACHE", "off"
+SHARED = ("static", "modes", "rotating", "greens", "stiffness")  # what the user's own folder keeps
+LARGEST = 10e9  # bytes of it
+
+
+def own_folder() -> Path:
+    """The folder of stages in the user's cache."""
+    return user_folder() / "stages"
+
+
+def share_with_later_runs() -> None:
+    """From now on stages are kept in the user's cache, unless the variable says otherwise."""
+    os.environ.setdefault(VARIABLE, str(own_folder()))
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A finished stage in a cache: its file, bytes, and the time (s since 1970) of its last use."""
+
+    path: Path
+    size: int
+    used: float
+
+    @property
+    def stage(self) -> str:
+        """Its name."""
+        return self.path.name.partition("-")[0]
+
+    def remove(self) -> None:
+        """Take it out of the cache; result folders that have it keep it."""
+        for path in (self.path.with_suffix(".json"), self.path):
+            with suppress(OSError):
+                path.unlink()
 
 
 class Cache:
-    """The shared folder, or nothing where the variable is not set. Root process only."""
+    """The shared folder, or nothing. Root process only."""
 
     def __init__(self, folder: str | Path | None = None) -> None:
-        given = folder or os.environ.get(VARIABLE)
-        self.folder = Path(given) if given else None
+        given = folder or os.environ.get(VARIABLE) or OFF
+        self.folder = None if given == OFF else Path(given)
+        self._own = self.folder == own_folder()
+
+    def entries(self) -> list[Kept]:
+        """What is kept, the longest unused first."""
+        found = []
+        for path in self.folder.glob("*-*.h5") if self.folder else ():
+            with suppress(OSError):  # another process has just removed it
+                used = path.with_suffix(".json").stat().st_mtime
+                found.append(Kept(path, path.stat().st_size, used))
+        return sorted(found, key=lambda one: one.used)
+
+    def described(self) -> str:
+        """A table of what is kept, the last used first, with its size as a whole."""
+        kept = self.entries()[::-1]
+        lines = [f"{'stage':10s}{'scene':26s}{'MB':>9s}  last used"]
+        for one in kept:
+            with suppress(OSError), h5py.File(one.path) as file:
+                when = time.strftime("%Y-%m-%d %H:%M", time.localtime(one.used))
+                scene = str(file.attrs.get("scene_name", "?"))[:24]
+                lines.append(f"{one.stage:10s}{scene:26s}{one.size / 1e6:9.1f}  {when}")
+        total = sum(one.size for one in kept) / 1e9
+        most = f", at most {LARGEST / 1e9:g} GB" if self._own else ""
+        return "\n".join([*lines, f"{len(kept)} stages, {total:.2f} GB in {self.folder}{most}"])
+
+    def clear(self, unused_for: float) -> str:
+        """Remove what was not used for so many days; says what."""
+        old = [one for one in self.entries() if time.time() - one.used >= 86400 * unused_for]
+        for one in old:
+            one.remove()
+        for lock in self.folder.glob("*.lock") if self.folder and not unused_for else ():
+            with suppress(OSError):
+                lock.unlink()
+        return f"{len(old)} stages removed, {sum(one.size for one in old) / 1e9:.2f} GB"
+
+    def _prune(self) -> None:
+        """Remove the longest unused of the user's own cache until it is no larger than it may be."""
+        kept = self.entries() if self._own else []
+        total = sum(one.size for one in kept)
+        for one in kept:
+            if total <= LARGEST:
+                return
+            one.remove()
+            total -= one.size
 
     def place(self, stage: str, key: str) -> Path:
         """Where a stage's file is kept."""
@@ -44,30 +127,41 @@ class Cache:
         except (OSError, ValueError):
             return None
         _link(self.place(stage, key), path)
+        with suppress(OSError):
+            os.utime(self._figures(stage, key), (time.time(), time.time()))
         return figures
 
     def keep(self, stage: str, key: str, path: Path, figures: Mapping[str, Any]) -> None:
         """Keep a finished file and its figures for others. What cannot be kept is computed again there."""
-        if self.folder is not None:
+        if self.folder is not None and (stage in SHARED or not self._own):
             with suppress(OSError):
                 self.folder.mkdir(parents=True, exist_ok=True)
                 text = json.dumps(figures, default=store.plain)
                 write_text(self._figures(stage, key), text)
                 _link(path, self.place(stage, key))
+                self._prune()
 
     def _figures(self, stage: str, key: str) -> Path:
         return self.place(stage, key).with_suffix(".json")
 
     @contextmanager
     def claimed(self, stage: str, key: str) -> Iterator[None]:
-        """While inside, other runs that want the same file wait: it is computed once."""
+        """While inside, other runs that want the same file wait: it is computed once.
+
+        Where the folder or its file system has no locks, it may be computed twice.
+        """
         if self.folder is None:
             yield
             return
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with self.place(stage, key).with_suffix(".lock").open("w") as lock:
-            with suppress(OSError):  # a file system without locks: it may be computed twice
-                fcntl.flock(lock, fcntl.LOCK_EX)
+        with ExitStack() as held:
+            with suppress(OSError):
+                self.folder.mkdir(parents=True, exist_ok=True)
+                lock = held.enter_context(self.place(stage, key).with_suffix(".lock").open("w"))
+                try:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    observe.say(f"{stage:9s} waits: another run computes the same")
+                    fcntl.flock(lock, fcntl.LOCK_EX)
             yield
 
 

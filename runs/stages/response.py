@@ -11,6 +11,7 @@ from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
+from tireroad.modal.basis import ModalBasis
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
@@ -38,6 +39,7 @@ class ResponseStage(Computed[PointResponse]):
 
     name: ClassVar[str] = "response"
     static: Done[StaticState]
+    modes: Done[ModalBasis]
     wheel: Done[Wheel]
     greens: Done[Responses]
     contact: Done[ContactHistory] | None = None
@@ -71,7 +73,8 @@ class ResponseStage(Computed[PointResponse]):
         if scene.output.receptance:
             curves |= self._in_frequency(record)
         if scene.output.transmissibility:
-            given = self.static.product, self._response
+            highest = float(self.modes.product.frequency[-1])
+            given = self.static.product, self._response, highest
             curves |= transmissibility(self.job, record, *given)
         return PointResponse(curves)
 

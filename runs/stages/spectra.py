@@ -24,6 +24,8 @@ from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 _FEWEST = 32  # steps of which a spectrum says anything
 
+ROUNDING = 1e-12  # of the largest line: what is below is none
+
 
 @dataclass(frozen=True, kw_only=True)
 class Spectra:
@@ -170,9 +172,9 @@ class SpectraStage(Computed[Spectra]):
 
 
 def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
-    """The largest line of the vertical axle force, away from the mean."""
+    """The largest line of the vertical axle force, away from the mean; none of a tire that stands still."""
     band = np.arange(min(3, len(frequency)), len(frequency))
-    if len(band):
+    if np.abs(axle[band, 2]).max(initial=0.0) > ROUNDING * np.abs(axle[:, 2]).max(initial=0.0):
         peak = band[np.abs(axle[band, 2]).argmax()]
         record.headline["largest vertical axle force"] = (float(np.abs(axle[peak, 2])), "N")
         record.headline["at"] = (float(frequency[peak]), "Hz")

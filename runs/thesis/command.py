@@ -72,7 +72,7 @@ def _entry(one: Figure, scenes: Scenes) -> output.Entry:
     began = time.perf_counter()
     try:
         found = one.compute(scenes)
-    except ConvergenceError as error:
+    except (ConvergenceError, InputError) as error:  # an input error: too little memory or disk
         return output.Entry(one, time.perf_counter() - began, failed=str(error))
     picture = on_root(scenes.comm, found.picture) if found.picture else ""
     return output.Entry(one, time.perf_counter() - began, found, picture)

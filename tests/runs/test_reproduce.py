@@ -6,13 +6,15 @@ import math
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from tireroad.contact.tread.compliance import rectangle_potential
-from tireroad.fem.errors import InputError
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.arguments import REPRODUCE
 from tireroad.runs.scene.load import load
 from tireroad.runs.thesis.claim import UNEXPLAINED, Claim, verdict
-from tireroad.runs.thesis.command import known
-from tireroad.runs.thesis.figure import chosen
+from tireroad.runs.thesis.command import known, reproduce
+from tireroad.runs.thesis.figure import FIGURES, Figure, chosen
 from tireroad.runs.thesis.figures import half_space
 from tireroad.runs.thesis.runner import FOLDER
 
@@ -63,6 +65,51 @@ def test_claims_that_compare_nothing(wrong: dict) -> None:
 def test_verdict_of_a_figure() -> None:
     assert verdict((claim(2.0), claim(2.1))) == "agrees"
     assert verdict((claim(2.0), claim(3.0), claim(4.0))) == "differs in 2 of 3"
+
+
+def test_every_figure_that_numbers_can_reproduce_is_there_and_in_the_help() -> None:
+    figures = [
+        f"figure-{one}"
+        for one in [
+            "4.2",
+            "4.3",
+            "4.4",
+            "4.5",
+            "5.5",
+            "6.2",
+            "6.3",
+            "6.5",
+            "7.1",
+            "7.2",
+            "7.3",
+            "7.4",
+            "C.1",
+            "C.2",
+            "D.1",
+        ]
+    ]
+    assert list(known()) == figures + [f"table-B.{k}" for k in (1, 2, 3, 4)]
+    for name in (
+        "figure-4.2 to figure-4.5",
+        "figure-7.1 to figure-7.4",
+        "figure-D.1",
+        "table-B.1 to table-B.4",
+    ):
+        assert name in REPRODUCE
+
+
+def test_a_figure_that_gives_up_does_not_end_the_others(tmp_path, monkeypatch) -> None:
+    def gives_up(scenes) -> None:
+        raise ConvergenceError("no balance")
+
+    known()
+    broken = Figure(name="figure-5.5", title="broken", thesis="-", compute=gives_up)
+    monkeypatch.setitem(FIGURES, "figure-5.5", broken)
+    with pytest.raises(ConvergenceError, match=r"1 of 2 gave up: figure-5\.5: no balance"):
+        reproduce(["figure-5.5", "figure-D.1"], tmp_path / "out", MPI.COMM_SELF)
+    found = json.loads((tmp_path / "out" / "reproduce.json").read_text())["figures"]
+    assert [one["verdict"] for one in found] == ["not computed", "differs in 1 of 5"]
+    assert found[0]["shows"] == "no balance"
 
 
 def test_unknown_name_names_the_nearest() -> None:

@@ -1,5 +1,7 @@
 """`output.transmissibility`: force on the axle per force on the tread, two ways, in a file and on the page."""
 
+import json
+
 import h5py
 import numpy as np
 import pytest
@@ -56,5 +58,9 @@ def test_both_ways_agree_and_slow_forces_pass(tmp_path) -> None:
     assert frequency == pytest.approx(25.0 * np.arange(1, 7))
     assert momentum.shape == free.shape == (6, 3, 2)
     assert apart(free, momentum) < 0.01
+    stage = json.loads((tmp_path / "summary.json").read_text())["stages"]["response"]
+    with h5py.File(tmp_path / "modes.h5") as file:
+        assert file["frequency"][-1] < 2 * 150.0  # so the band goes beyond half the highest mode
+    assert any("half the highest mode" in text for text in stage["warnings"])
     page = (tmp_path / "report.html").read_text()
     assert "Force on the axle per force at the point" in page

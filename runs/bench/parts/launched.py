@@ -17,6 +17,7 @@ def launched(scene: Path, out: Path, until: str, processes: int, *more: str) -> 
     command = [str(ROOT / "tireroad"), "run", str(scene), "--until", until]
     command += ["--out", str(out), "-n", str(processes), *more]
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    environment["TIREROAD_CACHE"] = "off"  # what is timed is computed
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     if done.returncode:
         raise ConvergenceError(f"bench: {' '.join(command)} failed:\n{done.stderr[-2000:]}")

@@ -11,6 +11,7 @@ from scipy import sparse
 
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
+from tireroad.runs.files.store import opened
 from tireroad.runs.stages.build.point_forces import histories
 from tireroad.runs.stages.build.setup import components, probes
 from tireroad.runs.stages.job import Job
@@ -47,7 +48,7 @@ class Forces:
         if history is not None:
             time, step = history.time, history.step
         else:
-            with h5py.File(job.path("response")) as file:
+            with opened(job.path("response")) as file:
                 time = file["time"][1:]  # the ends of the steps
             step = float(time[0])
         return Forces(job=job, setup=setup, time=time, step=step, seen=seen)

@@ -46,6 +46,9 @@ class RadialSection(SectionKind):
         if tire.material != type(tire)().material:
             text = "is of a torus: a radial tire has compounds by its size; [[tire.region]] changes one"
             source.add(("tire", "material"), text)
+        if tire.order == 1:
+            text = "= 1: linear elements between cords do not bend, and no static state is found: take 2 or 3"
+            source.add(("tire", "order"), text)
         try:
             construction = built(self.size)
         except InputError as problem:

@@ -1,0 +1,100 @@
+"""Stages that runs share: of another road, in the user's cache, bounded, listed and cleared."""
+
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tireroad.runs.cli import main
+from tireroad.runs.files import cache as shared
+from tireroad.runs.files.cache import Cache
+
+SCENE = """
+[tire]
+segments = 8
+elements_arc = 4
+order = 2
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 300.0
+[modal]
+count = 8
+[rotation]
+speed = 50.0
+[contact]
+[road]
+[time]
+duration = 0.004
+step = 2e-4
+[accuracy]
+estimate = false
+"""
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A user whose cache of stages is empty; compiled forms stay where they are."""
+    monkeypatch.delenv("TIREROAD_CACHE")
+    monkeypatch.setattr(shared, "user_folder", lambda: tmp_path / "cache")
+    return tmp_path
+
+
+def run(folder: Path, name: str, *overrides: str) -> str:
+    """The log of a run into folder/name."""
+    (folder / "scene.toml").write_text(SCENE)
+    changed = [part for one in overrides for part in ("--set", one)]
+    out = folder / name
+    assert (
+        main(["run", str(folder / "scene.toml"), "--out", str(out), "--until", "contact", *changed])
+        == 0
+    )
+    return (out / "log.txt").read_text()
+
+
+def test_another_road_takes_what_the_first_found(home: Path, capsys) -> None:
+    first = run(home, "one", "road.kind=flat")
+    assert "reused" not in first
+    second = run(home, "two", "road.kind=sine", "road.amplitude=1e-4")
+    for stage in ("static", "modes", "rotating"):
+        assert f"{stage:9s} reused: computed from the same inputs by another run" in second
+    assert "contact   done" in second
+    kept = {one.stage for one in Cache().entries()}
+    assert {"static", "modes", "rotating"} <= kept and "contact" not in kept
+    with h5py.File(home / "one" / "modes.h5") as one, h5py.File(home / "two" / "modes.h5") as two:
+        np.testing.assert_array_equal(one["frequency"][:], two["frequency"][:])
+    capsys.readouterr()
+    assert main(["cache"]) == 0
+    listed = capsys.readouterr().out
+    assert "static    scene" in listed and "at most 10 GB" in listed
+    assert main(["cache", "--clear", "--unused-for", "1"]) == 0
+    assert "0 stages removed" in capsys.readouterr().out
+    assert main(["cache", "--clear"]) == 0
+    assert not Cache().entries() and (home / "two" / "static.h5").is_file()
+
+
+def test_the_longest_unused_goes_first(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shared.share_with_later_runs()
+    monkeypatch.setattr(shared, "LARGEST", 2500)
+    source = home / "stage.h5"
+    for number, name in enumerate("abc"):
+        source.write_bytes(b"x" * 1000)
+        Cache().keep("static", name, source, {})
+        figures = Cache().place("static", name).with_suffix(".json")
+        if figures.exists():
+            os.utime(figures, (number, number))
+        source.unlink()
+    assert [one.path.name for one in Cache().entries()] == ["static-b.h5", "static-c.h5"]
+
+
+def test_a_cache_that_cannot_be_written_is_none(home: Path) -> None:
+    (home / "cache").write_text("a file")
+    assert "static    done" in run(home, "one", "time=", "contact=", "road=")
+
+
+def test_off_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TIREROAD_CACHE", "off")
+    shared.share_with_later_runs()
+    assert Cache().folder is None and Cache().entries() == []
