@@ -11,6 +11,7 @@ import numpy as np
 from tireroad.contact.grid_patch import make_grid_patch, settle
 from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import Patch, make_patch
+from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
 from tireroad.contact.rolling import Drive
 from tireroad.contact.tread.pattern import Pattern
@@ -65,16 +66,32 @@ class ContactSetup:
 
     @property
     def drive(self) -> Drive:
-        """The road as the time loop asks for it; a pattern's depth is road that is missing, but for what the
-        static state knows of it."""
+        """The road as the time loop asks for it: the mean over each point's rectangle where it resolves less than
+        that; a pattern's depth is road that is missing, but for what the static state knows of it."""
+        road = (
+            CellMean(self.road, self.patch.points[:, 1], self.patch.half_sizes)
+            if self.fine
+            else self.road
+        )
         if self.pattern is None:
-            return Drive(self.road.height, self.rolled.motion, self.rolled.speed)
-        pattern, road, begun = self.pattern, self.road, self.begun
+            return Drive(road.height, self.rolled.motion, self.rolled.speed)
+        pattern, begun = self.pattern, self.begun
 
         def height(along: np.ndarray, across: np.ndarray) -> np.ndarray:
             return road.height(along, across) - (pattern.depth(along, across) - begun)
 
         return Drive(height, self.rolled.motion, self.rolled.speed)
+
+    @property
+    def fine(self) -> bool:
+        """Whether the road has waves shorter than two points along or across, which the points cannot tell."""
+        return self.road.spacing < 2 * float(self.patch.half_sizes.max())
+
+    @property
+    def shortest(self) -> float:
+        """Half the shortest wave (m) that the points meet as they roll: of the road, or, where it is finer, of theirs."""
+        pitch = 2 * float(self.patch.half_sizes[~self.patch.edge, 0].min(initial=np.inf))
+        return max(self.road.spacing, pitch) if np.isfinite(pitch) else self.road.spacing
 
     @property
     def begun(self) -> np.ndarray:

@@ -140,6 +140,7 @@ class PreparedRoad:
     ) -> None:
         self._road, self._shift, self._level, self._offset = road, shift, level, offset
         self._lead, self._run_in = reach[0], run_in
+        self.end = reach[1]  # the farthest x (m) that `height` may be asked for
         self._span = (reach[1] - reach[0]) * (1.0 + 1e-9)
         self.spacing = road.spacing
         self.filled: int = getattr(road, "filled", 0)

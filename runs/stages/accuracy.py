@@ -86,6 +86,8 @@ class AccuracyStage(Computed[Accuracy]):
         start = first_step(setup, self.job.scene.road, history.time)
         start += start % 2  # where a step of the companion of twice the step begins
         steps = self._window(start, len(history.time))
+        if steps - start < 2:
+            return self._none("the run is too short for a companion of twice the step")
         limit = model_limit(setup, self.rotating.product, history.step).frequency
         up_to = min(limit, self.job.scene.accuracy.up_to)
         given = self._given(steps)

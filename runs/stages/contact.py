@@ -139,7 +139,7 @@ class ContactStage(Stage[ContactHistory]):
     def _shortest_period(self) -> float:
         """Of all that excites the tire, s."""
         scene, setup = self.job.scene, self.setup.product
-        passing = passing_period(scene.road, setup.road.spacing, setup.rolled.speed)
+        passing = passing_period(scene.road, setup.shortest, setup.rolled.speed)
         return min(passing, shortest_period(scene.force))
 
     def _loop(self, record: Record, setup: ContactSetup, tire, step: float) -> Loop:

@@ -157,7 +157,9 @@ def _steps(scene: Scene, modes: int) -> int:
     step = min(time.duration / 200, TURN / (2 * math.pi * highest_frequency(scene, modes)))
     travel = least_travel(scene)
     if scene.contact is not None and travel > 0:
-        step = min(step, made(scene.road.surface).spacing / 8 / (travel / time.duration))
+        spacing, points = made(scene.road.surface).spacing, scene.contact.points
+        spacing = max(spacing, points.dx) if isinstance(points, Pitch) else spacing
+        step = min(step, spacing / 8 / (travel / time.duration))
     fastest = max((force.frequency for force in scene.force), default=0.0)
     if scene.road is not None and scene.road.motion.kind == "sine":
         fastest = max(fastest, scene.road.motion.frequency)
