@@ -6,6 +6,7 @@ matplotlib's Figure objects only: no window, no global state.
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from io import BytesIO
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -46,16 +47,14 @@ SILENT = -1000.0  # dB: nothing at all, rounded
 LEAST_BANDS = 8  # for which there is room
 
 
-def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more: object) -> tuple:
+def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more: Any) -> tuple:
     """Figure of width × height inches and its axes (rows, columns), laid out so that nothing overlaps."""
     figure, axes = bare_canvas(width, height, rows, columns, **more)
     figure.set_layout_engine("constrained")
     return figure, axes
 
 
-def bare_canvas(
-    width: float, height: float, rows: int = 1, columns: int = 1, **more: object
-) -> tuple:
+def bare_canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more: Any) -> tuple:
     """The same without layout: the caller places the axes."""
     figure = Figure(figsize=(width, height))
     FigureCanvasAgg(figure)
@@ -63,7 +62,7 @@ def bare_canvas(
 
 
 def line_canvas(
-    width: float, height: float, rows: int = 1, below: float = 0.42, **more: object
+    width: float, height: float, rows: int = 1, below: float = 0.42, **more: Any
 ) -> tuple:
     """The same for one column of line charts, with margins known beforehand: in half the time. `below` inches for
     the labels of the lowest axis."""
