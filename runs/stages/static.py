@@ -164,10 +164,10 @@ def _estimate(record: Record, state: StaticState, loader: Loader) -> None:
         observe.say(f"  error of the load not estimated: {found}")
         return
     record.indicators["estimated error of the load"] = (100 * found.relative, "%")
+    to = f"ever smaller elements: {found.load:.5g} N" if found.signed else "of unknown sign"
     observe.say(
-        f"  estimated error of the load at this height of the road: {100 * found.relative:.2g} % (ever "
-        f"smaller elements: {found.load:.5g} N); of the footprint's elements {100 * found.footprint:.2g} %, of "
-        f"the rest {100 * found.bulk:.2g} %; {found.unknowns} unknowns with finer elements there"
+        f"  estimated error of the load at this height of the road: {100 * found.relative:.2g} % ({to}); of "
+        f"the footprint's elements {100 * found.footprint:.2g} %, of the rest {100 * found.bulk:.2g} %; {found.unknowns} unknowns with finer elements there"
     )
     if found.relative > COARSE:
         record.warnings.append(

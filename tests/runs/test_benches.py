@@ -6,7 +6,15 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from tireroad.runs.bench import convergence, error_bars, headline, pareto, scaling, skipping
+from tireroad.runs.bench import (
+    accuracy_on_demand,
+    convergence,
+    error_bars,
+    headline,
+    pareto,
+    scaling,
+    skipping,
+)
 from tireroad.runs.bench.floors import exponent
 from tireroad.runs.bench.parts.rolling_cases import Case
 from tireroad.runs.bench.rough_road import Mesh
@@ -14,6 +22,8 @@ from tireroad.runs.measure import tabulate
 from tireroad.runs.measure.measured_page import _shown, page
 from tireroad.runs.measure.plots import drawn
 from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.search.journal import Trial
+from tireroad.runs.search.settings import CAUSES, Settings
 
 TINY = Mesh(10, 5, 0.5)
 VOID = {"meta", "img", "link", "br"}
@@ -188,3 +198,22 @@ def test_error_bars_are_compared_with_a_finer_run(tmp_path) -> None:
     assert {row[0] for row in shares.rows} >= {"mean", "deviation", "all"}
     assert all(row[3] >= 0 and row[4] >= 0 for row in every.rows)
     check_page([shares, every], 0)
+
+
+def test_searches_are_judged_by_the_least_cost() -> None:
+    rungs = dict.fromkeys(CAUSES, 0)
+    seconds = {"static": 5.0, "modes": 3.0, "contact": 1.0, "accuracy": 2.0}
+    trials = [
+        Trial(Settings((16, 8), 3, 200.0, "static", 0.01, 1e-3, rungs | finer), seconds, 11.0)
+        for finer in ({}, {"step": 1}, {"step": 1, "mesh": 1})
+    ]
+    # The finer step computes the loop and its error bars anew, the finer mesh everything.
+    assert accuracy_on_demand._spent(trials) == 11.0 + 3.0 + 11.0
+    target = accuracy_on_demand.TARGET
+    found = [
+        accuracy_on_demand.Outcome("a", True, 0.9 * target, 0.8 * target, 12.0, 8.0, 20.0, 0.01),
+        accuracy_on_demand.Outcome("b", False, 2.0 * target, 3.0 * target, 10.0, None, 30.0, 0.01),
+    ]
+    tables = [accuracy_on_demand._summary(found, rungs), accuracy_on_demand._every(found)]
+    assert [row[1] for row in tables[0].rows] == [50.0, 1.5, 1.5, 2.5, 2.5]
+    check_page(tables, 0)
