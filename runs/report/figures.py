@@ -6,6 +6,7 @@ matplotlib's Figure objects only: no window, no global state.
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from io import BytesIO
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -46,20 +47,26 @@ SILENT = -1000.0  # dB: nothing at all, rounded
 LEAST_BANDS = 8  # for which there is room
 
 
-def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more: object) -> tuple:
+def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more: Any) -> tuple:
     """Figure of width × height inches and its axes (rows, columns), laid out so that nothing overlaps."""
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure, axes = bare_canvas(width, height, rows, columns, **more)
+    figure.set_layout_engine("constrained")
+    return figure, axes
+
+
+def bare_canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more: Any) -> tuple:
+    """The same without layout: the caller places the axes."""
+    figure = Figure(figsize=(width, height))
     FigureCanvasAgg(figure)
     return figure, figure.subplots(rows, columns, squeeze=False, **more)
 
 
 def line_canvas(
-    width: float, height: float, rows: int = 1, below: float = 0.42, **more: object
+    width: float, height: float, rows: int = 1, below: float = 0.42, **more: Any
 ) -> tuple:
     """The same for one column of line charts, with margins known beforehand: in half the time. `below` inches for
     the labels of the lowest axis."""
-    figure = Figure(figsize=(width, height))
-    FigureCanvasAgg(figure)
+    figure, axes = bare_canvas(width, height, rows, **more)
     figure.subplots_adjust(
         left=0.66 / width,
         right=1 - 0.12 / width,
@@ -67,7 +74,7 @@ def line_canvas(
         top=1 - 0.27 / height,
         hspace=0.3 if rows > 1 else 0.2,
     )
-    return figure, figure.subplots(rows, squeeze=False, **more)
+    return figure, axes
 
 
 def encode(figure: Figure, kind: str = "svg", dpi: int = 130) -> str:

@@ -14,7 +14,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
-from tireroad.runs.report.figures import COLOURS, MUTED, canvas, encode, styled
+from tireroad.runs.report.figures import COLOURS, MUTED, bare_canvas, canvas, encode, styled
 
 PRESSURE = LinearSegmentedColormap.from_list(
     "pressure", ("#ffffff", "#fdd9a0", "#f59053", "#d4402f", "#7f1d3f", "#2b0a2e")
@@ -82,7 +82,8 @@ def carry(field: NDArray, ends: NDArray, weight: NDArray) -> NDArray:
 @styled
 def deformed(points: NDArray, moved: NDArray, quads: NDArray, road: float | None) -> str:
     """The loaded tire in three panels: surface, side view and section; road (m) or None."""
-    figure, axes = canvas(10.2, 3.9, 1, 3, gridspec_kw={"width_ratios": (1.25, 1.0, 0.75)})
+    figure, axes = bare_canvas(10.2, 3.9, 1, 3, gridspec_kw={"width_ratios": (1.25, 1.0, 0.75)})
+    figure.subplots_adjust(0.01, 0.16, 0.99, 0.93, 0.22)
     size = 1e3 * np.linalg.norm(moved, axis=1)
     scale = ScalarMappable(Normalize(size.min(), max(size.max(), 1e-9)), "YlGnBu")
     if road is not None:
@@ -131,7 +132,11 @@ def _profile(
 @styled
 def modes(points: NDArray, quads: NDArray, shapes: NDArray, titles: Sequence[str]) -> str:
     """Mode shapes (m, s, 3), m ≤ 6, exaggerated; coloured by the displacement along the normal."""
-    figure, axes = canvas(9.8, 3.35 * (1 + (len(titles) > 3)), 1 + (len(titles) > 3), 3)
+    rows = 1 + (len(titles) > 3)
+    height = 3.35 * rows
+    # Axes without labels need no layout, which takes as long as the drawing.
+    figure, axes = bare_canvas(9.8, height, rows, 3)
+    figure.subplots_adjust(0.0, 0.6 / height, 1.0, 1 - 0.25 / height, 0.05, 0.1)
     radius = np.hypot(points[:, 0], points[:, 2]).max()
     normal = outward(points, quads)
     for here in axes.flat[len(titles) :]:
@@ -143,14 +148,9 @@ def modes(points: NDArray, quads: NDArray, shapes: NDArray, titles: Sequence[str
         drawn = points + BULGE * radius / greatest * shape
         paint(here, drawn, quads, scale.to_rgba(across[quads].mean(axis=1)))
         here.set_title(title)
-    figure.colorbar(
-        scale,
-        ax=axes,
-        location="bottom",
-        shrink=0.4,
-        aspect=40,
-        label="displacement along the normal",
-    )
+    beside = figure.add_axes((0.3, 0.42 / height, 0.4, 0.1 / height))
+    label = "displacement along the normal"
+    figure.colorbar(scale, cax=beside, orientation="horizontal", label=label)
     return encode(figure, "png", dpi=110)
 
 
