@@ -15,9 +15,9 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices import probe
-from tireroad.fem.sections.locate import interpolation, locate
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.split import split_ring
+from tireroad.fem.static.carried_over import sampled
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
@@ -93,7 +93,7 @@ def _taken_over(loader: Loader, ring: Ring, rolling: Rolling) -> Loader:
     """The same tire on other elements in the same state. Collective."""
     body = loader.body
     other = Body(body.comm, ring, body.materials, cords=body.plies.cords)
-    other.set_displacement(_sampled(body, body.displacement(), other))
+    other.set_displacement(sampled(body.lattice, body.displacement(), other.lattice))
     companion = Loader(Equilibrium(other, rolling), lambda progress: None)
     companion.equilibrium.pressure.value = loader.equilibrium.pressure.value
     return companion
@@ -148,15 +148,3 @@ def _touched(nodes: np.ndarray, corners: np.ndarray, lattice: Lattice, closed: b
     held = nodes[index % len(nodes)].any(axis=1)
     wide = np.pad(held, 1, mode="wrap" if closed else "constant")
     return wide[2:] | held | wide[:-2]
-
-
-def _sampled(body: Body, values: np.ndarray, other: Body) -> np.ndarray:
-    """Values (n, 3) of a body's nodes at the nodes of another one of the same tire."""
-    lattice, target = body.lattice, other.lattice
-    section = lattice.tire.section
-    place = locate(section.nodes, section.cells, section.order, target.section)
-    across = interpolation(lattice.cells_2d, lattice.edge, lattice.shape[1], place)
-    first, shape = probe.line_shape(lattice.ring_corners, lattice.edge, target.ring)
-    index = (first[:, None] + np.arange(len(lattice.edge))) % lattice.shape[0]
-    around = np.einsum("ka,kanx->knx", shape, values.reshape(*lattice.shape, 3)[index])
-    return np.stack([across @ ring for ring in around]).reshape(-1, 3)

@@ -143,7 +143,7 @@ class AccuracyStage(Computed[Accuracy]):
     def _given(self, steps: int) -> Given:
         return Given(
             job=self.job,
-            nodal_force=self.static.product.force,
+            static=self.static.product,
             setup=self.setup.product,
             response=self.greens.product.contact,
             rolling=self.rotating.product,

@@ -12,6 +12,8 @@ from tireroad.contact.chatter import choose, oscillation
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.thinned import thinned
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.static.carried_over import carried_over
+from tireroad.fem.static.state import StaticState
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process import observe
@@ -43,11 +45,11 @@ LEAST = (8, 4)  # elements around and along that a companion has
 
 @dataclass(frozen=True, kw_only=True)
 class Given:
-    """A run: its `job`, the static forces of the outer face (s,) N, patch and road (not settled), response
+    """A run: its `job`, its static state, patch and road (not settled), response
     and rolling modes, and the first `steps` of `step` s of its loop, by a `scheme`, that companions repeat."""
 
     job: Job
-    nodal_force: np.ndarray
+    static: StaticState
     setup: ContactSetup
     response: Response
     rolling: RollingModes
@@ -58,7 +60,7 @@ class Given:
     @cached_property
     def settled(self) -> ContactSetup:
         """The patch in its static state."""
-        return settled(self.job, self.setup, self.response, self.nodal_force)
+        return settled(self.job, self.setup, self.response, self.static.force)
 
     @cached_property
     def longer(self) -> Forces:
@@ -121,7 +123,7 @@ def fewer_points(given: Given) -> Forces:
         contact = replace(job.scene.contact, brush_stiffness=4 * brush)
         job = replace(job, scene=replace(job.scene, contact=contact))
     setup = replace(given.setup, patch=thinned(patch))
-    setup = settled(job, setup, given.response, given.nodal_force)
+    setup = settled(job, setup, given.response, given.static.force)
     return given.of(job).repeated(setup, given.response)
 
 
@@ -137,14 +139,25 @@ def fewer_modes(given: Given) -> Forces:
 def coarser_mesh(given: Given) -> Forces:
     """Elements of twice the size, from the static state on. Collective."""
     job = coarser_job(given.job)
-    done: dict[str, Done] = {}
+    near, done = _from_the_run_s(given, job), dict[str, Done]()
+    if near is not None:
+        done["static"] = Done("", lambda: near)
     for kind in UP_TO_GREENS:
-        found = _made(job, kind, done)
+        found = None if kind.name in done else _made(job, kind, done)
         if found is not None:
             done[kind.name] = found
     response, state = done["greens"].product.contact, done["static"].product
     setup = settled(job, done["setup"].product, response, state.force)
     return given.of(job).repeated(setup, response)
+
+
+def _from_the_run_s(given: Given, job: Job) -> StaticState | None:
+    """The coarser mesh's static state by a few steps from the run's; None where it has to be found from the
+    beginning: at a deflection, which counts from its own first touch. Collective."""
+    wanted = job.scene.static
+    if wanted.deflection is not None:
+        return None
+    return carried_over(given.static, given.job.tire, job.tire, wanted.load)
 
 
 def coarser_job(job: Job) -> Job:

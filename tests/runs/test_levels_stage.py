@@ -76,3 +76,11 @@ def test_a_record_too_short_for_bands_says_so(history: ContactHistory) -> None:
     record = Record()
     levels.describe(record, levels.told(history, 9500, 200.0))
     assert record.headline["bands left out, narrower than three lines"][0] == "20 to 160 Hz"
+
+
+def test_sums_have_names_that_do_not_change_with_the_bands(history: ContactHistory) -> None:
+    record = Record()
+    levels.describe(record, levels.told(history, 0, 400.0))
+    assert record.headline["bands"][0].endswith(" to 315 Hz")
+    value, unit = record.headline["level of the vertical contact force"]
+    assert (value, unit) == (pytest.approx(20 * np.log10(2 / np.sqrt(2)), abs=0.05), "dB re 1 N")

@@ -118,6 +118,10 @@ acceleration = true
 to = 20.0
 step = 10.0
 direct = 1
+[output.transmissibility]
+to = 20.0
+step = 10.0
+free_rim = 4
 """
 )
 FULL = (

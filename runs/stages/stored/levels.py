@@ -85,20 +85,25 @@ def describe(record: Record, found: dict[str, np.ndarray]) -> None:
     """The sums over all bands, vertical, and what the record is too short for."""
     names = found["third_octave/nominal"]
     if len(names):
-        band = f"{names[0]:g} to {names[-1]:g} Hz"
+        record.headline["bands"] = (_named(names), "-")
         for name, what in (("contact_level", "contact force"), ("level", "force on the axle")):
             for suffix, letter in (("", ""), (WEIGHTED, "(A)")):
                 level = found.get(f"third_octave/{name}{suffix}")
                 if level is not None:
                     total = 10 * np.log10((10 ** (level[:, 2] / 10)).sum())
-                    record.headline[f"vertical {what}, {band}, dB{letter}"] = (
+                    kind = "A-weighted level" if letter else "level"
+                    record.headline[f"{kind} of the vertical {what}"] = (
                         float(total),
                         f"dB{letter} re 1 N",
                     )
     narrow = levels.nominal(found["third_octave/too_narrow"])
     if len(narrow):
-        text = f"{narrow[0]:g} to {narrow[-1]:g} Hz" if len(narrow) > 1 else f"{narrow[0]:g} Hz"
-        record.headline["bands left out, narrower than three lines"] = (text, "-")
+        record.headline["bands left out, narrower than three lines"] = (_named(narrow), "-")
+
+
+def _named(bands: np.ndarray) -> str:
+    """The first and the last."""
+    return f"{bands[0]:g} to {bands[-1]:g} Hz" if len(bands) > 1 else f"{bands[0]:g} Hz"
 
 
 def write(file: h5py.File, found: dict[str, np.ndarray]) -> None:

@@ -97,7 +97,7 @@ def standing(scenes: Scenes) -> Reproduced:
     found, source = as_thesis(scenes, 0.0, 5000.0), "section 7.1.1, figure 7.1"
     x, y = found.middle
     return Reproduced(
-        shows=f"{found.load:.0f} N on {int((found.force > 0).sum())} nodes, its centre at ({1e3 * x:.3f}, {1e3 * y:.3f}) mm; in the middle half of the patch's length the "
+        shows=f"{found.load:.0f} N on {int((found.force > 0).sum())} nodes, its centre at ({round(1e3 * x, 3) + 0.0:.3f}, {round(1e3 * y, 3) + 0.0:.3f}) mm; in the middle half of the patch's length the "
         f"pressure on the middle line is {found.inside:.2f} of that beside it, and the ends carry most.",
         claims=(
             _centre("centre of pressure, x", source, float(x), tolerance=MIDDLE),
@@ -140,7 +140,7 @@ def _forward(ways: dict[str, list[Spread]], titles: list[str], source: str) -> R
         for k in (1, 2):
             claims.append(
                 Claim(
-                    what=f"centre of pressure, {titles[k]}, {way}; the thesis: further forward than at {titles[k - 1]}",
+                    what=f"centre of pressure, {titles[k]}, {way}: ahead of that at {titles[k - 1]}",
                     unit="m",
                     thesis=max(x[k - 1], 0.0),
                     source=source,
@@ -148,7 +148,7 @@ def _forward(ways: dict[str, list[Spread]], titles: list[str], source: str) -> R
                     relation="above",
                 )
             )
-    told = {way: ", ".join(f"{1e3 * one.middle[0]:.2f}" for one in cases) for way, cases in ways.items()}  # fmt: skip
+    told = {way: ", ".join(f"{round(1e3 * one.middle[0], 2) + 0.0:.2f}" for one in cases) for way, cases in ways.items()}  # fmt: skip
     loads = ", ".join(f"{one.load:.0f}" for one in ways[AT_REST])
     return Reproduced(
         shows="; ".join(f"{way}: centre of pressure {x} mm ahead of the middle" for way, x in told.items())

@@ -52,6 +52,13 @@ def _agreement(g: np.ndarray, fourier: np.ndarray, what: str, source: str) -> Cl
     )  # fmt: skip
 
 
+def _at_once(g: np.ndarray) -> Claim:
+    return Claim(what="|g(0)| over the largest value: by (3.11) and (5.3) it answers the present force", unit="-", thesis=0.0,
+                 source="(3.11), (5.3): g(0) Δt", relation="above", tolerance=1e-9, found=float(np.abs(g[0]).max() / np.abs(g).max()),
+                 because="g(0) = 0: the sum over all eigenpairs u wᵀ/a vanishes; here the force is taken linear over the step",
+                 right=0.0, by="Σ u wᵀ/a = 0")  # fmt: skip
+
+
 def _decay(response: Response, what: str, source: str, because: str = "") -> Claim:
     rate = float(-response.every.real.mean())
     return Claim(what=f"mean decay rate of the states, {what}", unit="1/s", thesis=250.0, source=source, found=rate,
@@ -82,6 +89,7 @@ def standing(scenes: Scenes) -> Reproduced:
         claims=(
             _agreement(g, fourier, "Ω = 0", source),
             _decay(response, "Ω = 0", "caption of figure 4.2, γ1 = 500"),
+            _at_once(g),
         ),
         picture=lambda: lines([_panel("Ω = 0", times, g, fourier)], 1),
         caption="Both ways lie on each other.",

@@ -1,0 +1,43 @@
+"""A static state taken over to other elements of the same tire, as a start that is near."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tireroad.fem.matrices import probe
+from tireroad.fem.sections.locate import interpolation, locate
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.state import StaticState, static_state
+from tireroad.fem.tire.mesh import Lattice
+
+if TYPE_CHECKING:
+    from tireroad.fem.model import TireModel
+
+
+def carried_over(
+    state: StaticState, tire: TireModel, other: TireModel, load: float | None
+) -> StaticState | None:
+    """The static state of the `other` elements of the same tire, by Newton's method from the `state` of these.
+
+    Inflation, rolling and height of the road stay; with a `load` (N) the road carries that instead. The first
+    touch is not looked for: that of the state is kept. None where no balance is found. Collective.
+    """
+    body = other.body
+    body.set_displacement(sampled(tire.lattice, state.displacement, body.lattice))
+    equilibrium = Equilibrium(body, state.rolling)
+    equilibrium.pressure.value = state.inflation
+    step = equilibrium.solve(state.road_height, load=load)
+    return static_state(equilibrium, state.touch_height) if step.converged else None
+
+
+def sampled(lattice: Lattice, values: np.ndarray, target: Lattice) -> np.ndarray:
+    """Values (n, 3) of a lattice's nodes at the nodes of another one of the same tire."""
+    section = lattice.tire.section
+    place = locate(section.nodes, section.cells, section.order, target.section)
+    across = interpolation(lattice.cells_2d, lattice.edge, lattice.shape[1], place)
+    first, shape = probe.line_shape(lattice.ring_corners, lattice.edge, target.ring)
+    index = (first[:, None] + np.arange(len(lattice.edge))) % lattice.shape[0]
+    around = np.einsum("ka,kanx->knx", shape, values.reshape(*lattice.shape, 3)[index])
+    return np.stack([across @ ring for ring in around]).reshape(-1, 3)
