@@ -56,10 +56,6 @@ class Shifted:
         answer.destroy()
         return out
 
-    def apply(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
-        """out = (A - sigma I)^-1 right, one column."""
-        self._factor.solve(right, out)
-
     def destroy(self) -> None:
         """Free the factor, the largest memory of the eigensolver: petsc4py does not when it goes."""
         self._factor.destroy()

@@ -3,7 +3,7 @@
 The diagonal mass makes it the standard problem of A = M^-1/2 K M^-1/2, which symmetries split: equal
 segments by wave number (circulant), or else mirror planes or a half turn (symmetry). The
 inertia of each part, L D L^T by MUMPS, says how many eigenvalues lie below a value and so where to slice
-(spectrum); SLEPc extracts the eigenpairs of each slice (slices). Residuals and orthonormality
+(spectrum); block Lanczos extracts the eigenpairs of each slice (slices, lanczos). Residuals and orthonormality
 are then measured on A itself.
 """
 

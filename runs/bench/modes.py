@@ -165,7 +165,8 @@ def _plain(comm: MPI.Comm, operators) -> Table:
         ],
         [[plain, own, plain / own, count, found.inertia_count]],
         [
-            "Both solve M^-1/2 K M^-1/2 by Krylov-Schur and MUMPS; the ratio is that of the symmetries: "
+            "Both solve M^-1/2 K M^-1/2 by MUMPS, SLEPc by Krylov-Schur with one vector, this program by block "
+            "Lanczos; the ratio is that of the blocks and of the symmetries: "
             + ", ".join(found.symmetries or ("none",))
         ],
     )
