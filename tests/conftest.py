@@ -1,10 +1,12 @@
 """What several tests need: the repository, the measured roads, the program started as users do."""
 
+import ctypes
 import gc
 import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -15,12 +17,17 @@ os.environ["TIREROAD_CACHE"] = "off"  # the user's has stages of earlier runs
 
 @pytest.fixture(scope="module", autouse=True)
 def released(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Matrices and factors that a module keeps for its tests end with it: workers grew to 5 GB."""
+    """What a module keeps for its tests ends with it, and the C library gives its memory back.
+
+    Without that workers grew to 7 GB: 1.4 GB after one module, 0.3 GB of them in use.
+    """
     yield
     for kept in vars(request.module).values():
         if hasattr(kept, "cache_clear") and kept.__module__ == request.module.__name__:
             kept.cache_clear()
     gc.collect()
+    with suppress(OSError, AttributeError):  # of glibc alone
+        ctypes.CDLL("libc.so.6").malloc_trim(0)
 
 
 @pytest.fixture(scope="session")

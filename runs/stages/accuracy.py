@@ -27,8 +27,8 @@ from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 SHARE = 0.33  # of the run's own cost, that all companions together take
 _FEWEST = 64  # steps that a companion repeats at the least
-_LOOPS = 2.0  # time loops that four companions take for each step they repeat
-_COARSE = 0.18  # of the cost before the loop, on elements of twice the size
+_LOOPS = 2.3  # time loops that four companions take for each step they repeat
+_COARSE = 0.14  # of the cost before the loop, on elements of twice the size
 FORCES = ("contact_force", "axle_force")
 _UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
 
