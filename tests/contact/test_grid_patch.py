@@ -171,7 +171,7 @@ def test_a_grid_needs_a_tread_and_a_sane_pitch(tread) -> None:
 
 
 def test_solver_by_the_number_of_touching_points(tread, monkeypatch) -> None:
-    cases = (0.004, 1500, ActiveSet), (0.002, 1500, UsualSet), (0.002, 50, ProjectedCG)
+    cases = (0.004, 1000, ActiveSet), (0.002, 1000, UsualSet), (0.002, 50, ProjectedCG)
     for pitch, most, solver in cases:
         monkeypatch.setattr(model, "MOST_TOUCHING", most)
         _, _, patch = patches(tread, 3e-3, pitch)
