@@ -1,5 +1,6 @@
 """`tireroad test`: the suite on one process, then its tests marked `mpi` on 2 and on 3.
 
+With `--fast` only those on one process that are not marked `slow`, of a few seconds at most each.
 A test under mpirun fails when it fails on any process. When it fails on one and the others wait
 for ever in a collective call, they are ended together. Run as a module, this file is the worker:
 `python3 -m tireroad.runs.process.testing FOLDER PROCESSES [pytest arguments]`.
@@ -160,13 +161,17 @@ def run_tests(arguments: list[str]) -> int:
     if not (ROOT / "tests").is_dir():
         print("error: the tests are not installed: run them in a checkout", file=sys.stderr)
         return 2
+    counts: tuple[int, ...] = (1, *PARALLEL)
+    if "--fast" in arguments:
+        arguments.remove("--fast")
+        arguments[:0], counts = ["-m", "not slow and not mpi"], (1,)
     arguments = [_from_root(argument) for argument in arguments]
     if not sys.stdout.isatty():  # mpirun gives its processes a terminal of their own
         arguments.insert(0, "--color=no")
     totals = dict.fromkeys(("passed", "failed", "skipped"), 0)
     collected = 0
     with tempfile.TemporaryDirectory() as name:
-        for processes in (1, *PARALLEL):
+        for processes in counts:
             print(f"--- on {processes} process{'es' if processes > 1 else ''}", flush=True)
             status, outcomes, found = _run(Path(name), processes, arguments)
             if status == int(pytest.ExitCode.USAGE_ERROR):

@@ -31,6 +31,7 @@ def test_last_fails():
 def run(launch, folder: Path, text: str, *arguments: str):
     file = folder / "test_sample.py"
     file.write_text(text)
+    (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n    mpi\n    slow\n")
     done = launch("-m", "runs", "test", *arguments, file)
     return done, done.stdout.splitlines()[-1]
 
@@ -38,6 +39,12 @@ def run(launch, folder: Path, text: str, *arguments: str):
 def test_all_runs_are_summed(launch, tmp_path: Path) -> None:
     done, last = run(launch, tmp_path, SUITE)
     assert (done.returncode, last) == (0, "4 passed, 0 failed, 1 skipped")
+
+
+def test_the_fast_part_is_on_one_process_without_slow_ones(launch, tmp_path: Path) -> None:
+    slow = "\n@pytest.mark.slow\ndef test_long():\n    assert False\n"
+    done, last = run(launch, tmp_path, SUITE + slow, "--fast")
+    assert (done.returncode, last) == (0, "1 passed, 0 failed, 1 skipped")
 
 
 def test_failure_on_one_process_fails(launch, tmp_path: Path) -> None:
