@@ -125,7 +125,7 @@ class Loader:
     def carry(self, load: float) -> float:
         """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket.
 
-        States on the way may be out of balance; where that fails they may not: an error leaves a good one.
+        States on the way may be out of balance; the one that an error leaves is not.
         """
         if load <= 0:
             raise InputError(f"static.load = {load:g} N: a road carries a positive load")
@@ -133,6 +133,8 @@ class Loader:
         try:
             return self._seek(load, _NEAR * load)
         except ConvergenceError:
+            if self.equilibrium.solve(self.equilibrium.road_height).converged:
+                raise
             self.body.u.x.array[:] = start
             return self._seek(load, 0.0)
 

@@ -74,11 +74,11 @@ def test_many_contact_nodes():
     assert state.load == pytest.approx(4e3, rel=1e-6)
 
 
-def test_more_than_a_thousand_contact_nodes():
+def test_hundreds_of_contact_nodes():
     state = converged(
-        inflation=4e4, deflection=0.05, youngs_modulus=4.8e6, mesh=(150, 56, 1), size=0.1
+        inflation=4e4, deflection=0.05, youngs_modulus=4.8e6, mesh=(70, 28, 1), size=0.1
     )
-    assert (state.force > 0).sum() > 1000
+    assert (state.force > 0).sum() > 200
     assert state.gap.min() == 0.0
 
 
