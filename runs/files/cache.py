@@ -41,6 +41,12 @@ def share_with_later_runs() -> None:
     os.environ.setdefault(VARIABLE, str(own_folder()))
 
 
+def shared_folder(own: Path) -> Path:
+    """Where a family of runs keeps all its stages: the folder the variable names, else its `own`."""
+    given = os.environ.get(VARIABLE)
+    return own if given in (None, "", OFF, str(own_folder())) else Path(given)
+
+
 @dataclass(frozen=True)
 class Kept:
     """A finished stage in a cache: its file, bytes, and the time (s since 1970) of its last use."""

@@ -147,8 +147,9 @@ def _spread(group: h5py.Group, over: h5py.Dataset) -> Columns:
     for name, held in group.items():
         if held.ndim < 2 or held.shape[-1] != 3 or len(held) != len(over):
             continue
-        label, values = NAMES.get(name, name.replace("_", " ")), held[()].reshape(len(over), -1, 3)
-        for point in range(values.shape[1]):
+        points = held.shape[1] if held.ndim > 2 else 1
+        label, values = NAMES.get(name, name.replace("_", " ")), held[()].reshape(-1, points, 3)
+        for point in range(points):
             place = f" {point + 1}" if held.ndim > 2 else ""
             columns |= _components(label + place, values[:, point], held.attrs["unit"])
     return columns

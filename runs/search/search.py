@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import time
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.files.cache import VARIABLE
+from tireroad.runs.files.cache import shared_folder
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.process import observe
@@ -74,8 +73,8 @@ class Search:
 
     @property
     def _cache(self) -> Path:
-        """Where the stages of trials are kept: where the user keeps those of all runs, or in the folder."""
-        return Path(os.environ.get(VARIABLE) or self.directory / FOLDER / "cache")
+        """Where the stages of trials are kept."""
+        return shared_folder(self.directory / FOLDER / "cache")
 
     def _begin(self) -> None:
         """The scene as it is asked for stands in the folder until settings are found. Root process only."""

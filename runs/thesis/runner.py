@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-from tireroad.runs.files.cache import VARIABLE
+from tireroad.runs.files.cache import VARIABLE, shared_folder
 from tireroad.runs.files.folder import claimed
 from tireroad.runs.process import mpi, observe
 from tireroad.runs.scene.load import load
@@ -64,7 +64,7 @@ def kept(run: Finished, stage: str, pick: Callable[[Any], T]) -> T:
 def sharing(folder: Path) -> Iterator[None]:
     """While inside, runs share their stages through `folder`, or through the user's own cache."""
     before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = before or str(folder)
+    os.environ[VARIABLE] = str(shared_folder(folder))
     try:
         yield
     finally:
