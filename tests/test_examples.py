@@ -11,6 +11,8 @@ import pytest
 from tireroad.fem.tire.law import MATERIALS
 from tireroad.runs.scene.sections.kind import SECTIONS
 
+pytestmark = pytest.mark.slow
+
 SCENE = """
 [tire]
 segments = 12

@@ -180,6 +180,7 @@ def test_friction_beyond_any_answer_is_refused() -> None:
         run(BrushLaw(3e7, 2.0, (0.1, 0.0)), 50, tire=tire)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("iterative", [False, True])
 @pytest.mark.parametrize("pulse", [False, True])
@@ -213,6 +214,7 @@ def test_a_loop_goes_on_with_the_same_bits(iterative: bool, pulse: bool) -> None
         assert np.array_equal(one.axle_force, other.axle_force)
 
 
+@pytest.mark.slow
 def test_a_brush_by_area_is_the_same_on_every_grid() -> None:
     """Sticking on a rigid tire: k_A s int (way from the entry) dA, for an ellipse k_A s 8/3 a^2 b; by points it grows."""
     slip, per_area, forces = 2e-3, 5e7, {"area": [], "point": []}

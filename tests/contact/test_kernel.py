@@ -130,6 +130,7 @@ def test_layer_under_even_pressure_and_deep_layer() -> None:
         LayerInfluence(young, nu, 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
 @pytest.mark.parametrize("thickness", [1e-4, 1e-3, 5e-3, 1.0])
 def test_layer_is_positive_definite(nu: float, thickness: float) -> None:
@@ -145,6 +146,7 @@ def test_layer_is_positive_definite(nu: float, thickness: float) -> None:
         assert np.all(matrix.diagonal() < half.diagonal()), spacing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sides", [(0.01, 0.01), (0.05, 0.08), (0.004, 0.12)])
 @pytest.mark.parametrize("place", [(0.0, 0.0), (0.006, 0.003), (0.03, -0.1)])
 def test_layer_under_a_rectangle(sides, place) -> None:

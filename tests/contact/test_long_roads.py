@@ -14,6 +14,8 @@ from tireroad.contact.roads.road import make_road
 from tireroad.contact.roads.rows import ArrayRows, FileRows, pieces
 from tireroad.fem.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 LENGTH, STEP, WIDTH = 10_000.0, 0.01, 41
 HEADER = """$ROAD_CRG
 REFERENCE_LINE_INCREMENT = 0.01

@@ -29,6 +29,7 @@ def test_cleat_and_step() -> None:
         Cleat(length=0.02, ramp=0.03)
 
 
+@pytest.mark.slow
 def test_iso8608_has_its_class_spectrum() -> None:
     pitch = 0.05
     x = pitch * np.arange(200_000)
@@ -57,6 +58,7 @@ def test_iso8608_is_smooth_repeatable_and_bounded() -> None:
     assert road.highest(3, 40, 0, 0) < heights.max() + 1e-3
 
 
+@pytest.mark.slow
 def test_ten_kilometres_take_no_more_memory_than_ten_metres() -> None:
     road = Iso8608(road_class="C", shortest_wave=0.5).make()
     patch = np.linspace(-0.1, 0.1, 50)
@@ -90,6 +92,7 @@ def test_texture_spectrum() -> None:
         Texture(roll_off=1.0, cut_off=1e-5)
 
 
+@pytest.mark.slow
 def test_texture_is_continuous_repeatable_and_bounded() -> None:
     road, again = (Texture(roll_off=0.02, cut_off=0.002, seed=1).make() for _ in range(2))
     half = 0.16
@@ -102,6 +105,7 @@ def test_texture_is_continuous_repeatable_and_bounded() -> None:
     assert road.lowest(-1, 1, -1, 1) <= z.min() and z.max() <= road.highest(-1, 1, -1, 1)
 
 
+@pytest.mark.slow
 def test_texture_never_repeats_and_keeps_its_variance_along() -> None:
     """The mean over many places of z(x) z(x + lag) is near 0 at every lag, that of z z near rms²."""
     road = Texture(roll_off=0.02, cut_off=0.002, seed=1).make()

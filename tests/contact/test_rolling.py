@@ -50,6 +50,7 @@ def test_flat_road_at_rest_stays_at_rest_bit_for_bit(scheme: str, speed: float) 
     assert solver.factorisations == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "order"), [("linear", 2.0), ("constant", 1.0)])
 def test_order_of_convergence_with_residual(scheme: str, order: float) -> None:
     response = STRIP.response(PATCH.points, 5, 2, residual=6)

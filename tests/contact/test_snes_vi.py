@@ -64,6 +64,7 @@ def test_thousands_of_points_without_a_matrix() -> None:
     assert found.factorisations == 0 and found.residual < 1e-9
 
 
+@pytest.mark.slow
 def test_solvers_left_at_exit_do_not_crash_the_interpreter() -> None:
     # pytest keeps what a test made until the interpreter ends, after PETSc has ended.
     other = f"{__file__}::test_thousands_of_points_without_a_matrix"

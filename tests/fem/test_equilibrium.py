@@ -126,6 +126,7 @@ def test_a_standing_tire_keeps_both_mirror_planes(make_body):
     np.testing.assert_allclose(force[1:], force[:0:-1], atol=1e-9 * force.max())
 
 
+@pytest.mark.slow
 def test_damping_of_the_rolling_shape_tilts_the_footprint_forward(make_body):
     """Thesis, figures 7.2 and 7.3; turning the other way it tilts the other way."""
     arms = []
@@ -238,6 +239,7 @@ def test_newton_steps_do_not_grow_towards_incompressibility(make_body, ratio):
     assert max(step.step.iterations for step in steps) <= 8
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     "rolling",

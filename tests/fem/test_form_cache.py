@@ -14,6 +14,8 @@ from started import environment
 from tireroad.fem import form_cache
 from tireroad.fem.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 CODE = """
 import sys
 import ufl

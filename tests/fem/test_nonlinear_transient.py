@@ -16,6 +16,8 @@ from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.nonlinear import NonlinearTire
 
+pytestmark = pytest.mark.slow
+
 INFLATION = 1e5
 DAMPING = (400.0, 1e-6)
 NONE = (0.0, 0.0)

@@ -14,6 +14,8 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_curve import load_curve, slopes
 from tireroad.fem.static.loading import Loader
 
+pytestmark = pytest.mark.slow
+
 PRESSURE = 2e5
 
 

@@ -15,6 +15,7 @@ from tireroad.fem.static.virtual_work import Rolling
 SPEED, DAMPING, INFLATION = 60.0, 300.0, 2e5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", ["full", "doppler"])
 def test_a_little_more_load_moves_it_as_the_rotating_stiffness_says(make_body, inertia) -> None:
     """du = K_Omega^-1 df between two states a thousandth of the deflection apart; with the other
@@ -45,6 +46,7 @@ def test_a_little_more_load_moves_it_as_the_rotating_stiffness_says(make_body, i
     assert off[other] > 20 * off[inertia]
 
 
+@pytest.mark.slow
 def test_without_centrifugal_forces_a_round_tire_does_not_grow(make_body) -> None:
     """The body rate of an axisymmetric shape vanishes: the doppler state of the inflated tire is the
     one at rest, to what the elements round of a circle; with the full inertia its crown moves out."""

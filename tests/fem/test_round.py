@@ -45,6 +45,7 @@ def _loader(body) -> Loader:
     return Loader(Equilibrium(body, ROLLING), lambda progress: None)
 
 
+@pytest.mark.slow
 def test_the_round_start_leaves_the_whole_ring_nothing_to_look_for(belted):
     """The same state as by load steps of the whole ring, which twists, with one or two tangents of it."""
     at_once, by_steps = _loader(belted()), _loader(belted())
@@ -58,6 +59,7 @@ def test_the_round_start_leaves_the_whole_ring_nothing_to_look_for(belted):
     assert abs(wanted[lowest, 0]).max() > 0.01 * abs(wanted).max()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_any_number_of_processes_inflates_alike(belted):
     """The section is solved by one process, the ring by all."""

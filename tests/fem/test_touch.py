@@ -59,6 +59,7 @@ def test_no_place_on_the_face_is_lower():
     assert anywhere.min() - 1e-5 < surface.lowest() <= anywhere.min()
 
 
+@pytest.mark.slow
 def test_a_tire_whose_crown_is_no_node_touches_below_its_nodes(make_body):
     equilibrium = Equilibrium(make_body(order=3, segments=8, arc=5))
     loader = Loader(equilibrium, lambda progress: None)

@@ -25,6 +25,8 @@ from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
 from tireroad.modal.standing import sites
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
 SPOTS = [(0.0, 0.0), (0.15, 0.1), (-0.2, -0.3), (1.0, 0.5)]

@@ -77,6 +77,7 @@ def off(found: np.ndarray, exact: np.ndarray) -> float:
     return float(error.max())
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_every_residual_on_the_free_rim() -> None:
     """Against the full matrices, near 0 Hz where all but the drift is the static answer, and above."""
@@ -111,6 +112,7 @@ def test_static_answer_is_the_pseudo_inverse() -> None:
     assert np.abs(found.residual).max() < 1e-9 * np.abs(exact).max()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("speed", [0.0, 60.0])
 def test_axle_force_of_the_free_rim_is_that_from_momentum(speed) -> None:
@@ -129,6 +131,7 @@ def test_axle_force_of_the_free_rim_is_that_from_momentum(speed) -> None:
     assert off(found, exact) < (1e-3 if speed else 1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.0, 60.0])
 def test_axle_force_from_few_modes(speed) -> None:
     """Sixty modes and attachments of rim and loads, against all modes."""

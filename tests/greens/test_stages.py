@@ -59,6 +59,7 @@ def off(stages: dict) -> float:
     return next(v["value"] for name, v in indicators.items() if "off the full" in name)
 
 
+@pytest.mark.slow
 def test_every_residual_and_its_distance_from_the_full_matrices(run) -> None:
     """From one set of modes; the modes reused, attachments find all their unknowns again."""
     distance = {}
@@ -72,6 +73,7 @@ def test_every_residual_and_its_distance_from_the_full_matrices(run) -> None:
     assert max(distance["second-order"], distance["attachment"]) < distance["static"] / 3
 
 
+@pytest.mark.slow
 def test_stored_responses_give_the_same_again(run) -> None:
     """A longer run reuses the Green's functions from their file, residual states included."""
     options = "--set", "greens.residual=second-order", "--until", "response"
@@ -84,6 +86,7 @@ def test_stored_responses_give_the_same_again(run) -> None:
         assert np.array_equal(file["displacement"][: len(short)], short)
 
 
+@pytest.mark.slow
 def test_velocity_and_acceleration_are_the_rates(run) -> None:
     out, _ = run("--set", "greens.residual=static", "--until", "response")
     with h5py.File(out / "response.h5") as file:
@@ -96,6 +99,7 @@ def test_velocity_and_acceleration_are_the_rates(run) -> None:
         assert np.abs(slope - rate[1:-1])[1:].max() < 0.02 * np.abs(rate).max()
 
 
+@pytest.mark.slow
 def test_impulse_response_is_that_of_the_stored_states(run) -> None:
     """Starts from nothing, and its transform at 0 Hz is the static flexibility of the states."""
     out, _ = run("--set", "greens.residual=none", "--until", "response")
@@ -107,6 +111,7 @@ def test_impulse_response_is_that_of_the_stored_states(run) -> None:
     assert np.abs(g.sum(axis=0) * step - receptance).max() < 0.05 * np.abs(receptance).max()
 
 
+@pytest.mark.slow
 def test_states_made_static_are_told(run) -> None:
     few = "--set", "greens.dynamic=15", "--set", "greens.band=60"
     out, stages = run("--set", "greens.residual=static", *few, "--until", "response")
@@ -117,6 +122,7 @@ def test_states_made_static_are_told(run) -> None:
         assert file["force/eigenvalue"].shape == (15,)
 
 
+@pytest.mark.slow
 def test_states_of_the_full_problem_take_the_static_residual_only(run, launch, tmp_path) -> None:
     """Its own states complete with K_Omega^-1; residuals that complete the modes are refused."""
     full = "--set", "rotation.method=full", "--set", "rotation.count=20", "--until", "response"

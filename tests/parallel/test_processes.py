@@ -4,6 +4,8 @@ import h5py
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 SCENE = """
 name = "small"
 [tire]

@@ -25,6 +25,8 @@ from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.search.journal import Trial
 from tireroad.runs.search.settings import CAUSES, Settings
 
+pytestmark = pytest.mark.slow
+
 TINY = Mesh(10, 5, 0.5)
 VOID = {"meta", "img", "link", "br"}
 

@@ -51,6 +51,7 @@ def run(tmp_path_factory, launch):
     return started
 
 
+@pytest.mark.slow
 def test_an_undamped_standing_tire_keeps_what_it_takes(run) -> None:
     """Also what the residual flexibility holds, which counted as lost before."""
     found, warnings = run("standing", "[damping]\nmass = 0.0\n")
@@ -63,6 +64,7 @@ def test_an_undamped_standing_tire_keeps_what_it_takes(run) -> None:
     assert not warnings
 
 
+@pytest.mark.slow
 def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run) -> None:
     found, warnings = run("rolling", "[damping]\nmass = 400.0\n[rotation]\nspeed = 50.0\n")
     lost, drive = (
@@ -88,6 +90,7 @@ STIFF = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["linear", "constant", "auto"])
 def test_a_stiff_tread_on_long_steps_chatters_where_forces_are_linear(run, scheme: str) -> None:
     """The balance fails then; forces constant over the step, which "auto" takes, balance with what they take."""

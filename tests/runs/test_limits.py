@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 SCENE = """
 name = "limits"
 tire = {segments = 12, elements_arc = 4, material = {youngs_modulus = 48e6}}
@@ -20,6 +22,7 @@ def _run(launch, folder: Path, *overrides: str):
     return launch("-m", "runs", "run", folder / "scene.toml", "--out", folder / "out", *given)
 
 
+@pytest.mark.slow
 def test_too_much_speed_is_named(launch, tmp_path: Path) -> None:
     """1000 rad/s: no rolling shape. Not "the tire may fold": at rest the same loads converge."""
     done = _run(launch, tmp_path, "rotation.speed=1000", "road=", "contact=", "static.load=")
@@ -28,6 +31,7 @@ def test_too_much_speed_is_named(launch, tmp_path: Path) -> None:
     assert "fold" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_road_up_to_the_flanks_is_named(launch, tmp_path: Path) -> None:
     done = _run(launch, tmp_path, "road.offset=0.5")
     assert done.returncode == 2, done.stderr
@@ -36,6 +40,7 @@ def test_a_road_up_to_the_flanks_is_named(launch, tmp_path: Path) -> None:
     assert again.returncode == 2 and "contact.points" in again.stderr
 
 
+@pytest.mark.slow
 def test_states_of_the_full_matrices_carry_a_contact(launch, tmp_path: Path) -> None:
     """Their coordinates are not the modes': the energy balance tells the work alone (it crashed)."""
     done = _run(launch, tmp_path, "rotation.method=full", "road.kind=flat")
@@ -43,6 +48,7 @@ def test_states_of_the_full_matrices_carry_a_contact(launch, tmp_path: Path) -> 
     assert "J into the tire" in done.stdout
 
 
+@pytest.mark.slow
 def test_beyond_the_critical_speed_is_said(launch, tmp_path: Path) -> None:
     """On the shape at rest modes exist beyond it; what is computed has little meaning."""
     still = ("static.steady_rolling=false", "rotation.speed=600", "damping.mass=0")

@@ -39,6 +39,7 @@ sys.exit(mpi.guarded(comm, cases[sys.argv[1]]))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 3])
 @pytest.mark.parametrize(
     ("case", "status", "message"),

@@ -8,6 +8,8 @@ import pytest
 
 from tireroad.runs.stages import pipeline
 
+pytestmark = pytest.mark.slow
+
 TIRE = """
 [tire]
 segments = 20

@@ -18,6 +18,8 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.report import figures, surface_figures
 from tireroad.runs.report.page import write_report
 
+pytestmark = pytest.mark.slow
+
 TITLES = {
     "static.h5": "Loaded tire and footprint",
     "contact.h5": "Rolling contact",

@@ -81,6 +81,7 @@ def measured(page: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[int, 
     return {int(width): json.loads(unescape(told)) for width, told in found}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_page_is_drawn_and_fits(measured: dict[int, dict], width: int) -> None:
     """The first figure is on the second screen (844 px high on a phone) at the latest."""
@@ -94,6 +95,7 @@ def test_the_page_is_drawn_and_fits(measured: dict[int, dict], width: int) -> No
     assert found["first"] < 2 * 844
 
 
+@pytest.mark.slow
 def test_the_page_prints(page: Path, tmp_path: Path) -> None:
     paper = tmp_path / "page.pdf"
     browse(tmp_path, "--virtual-time-budget=4000", f"--print-to-pdf={paper}", page.as_uri())

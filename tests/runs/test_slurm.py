@@ -13,6 +13,8 @@ from started import environment
 
 import tireroad
 
+pytestmark = pytest.mark.slow
+
 SCENE = """
 name = "base"
 [tire]

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from started import ROOT, environment
 
+pytestmark = pytest.mark.slow
+
 PROGRAM = [sys.executable, "-P", "-m", "runs"]
 LONG = 600  # s that the slowest machine may take
 

@@ -12,6 +12,8 @@ from started import ROOT, environment
 
 from tireroad.runs.files.disk import part_of, remove_leftovers
 
+pytestmark = pytest.mark.slow
+
 PROGRAM = [sys.executable, "-P", "-m", "runs"]
 LONG = 600
 

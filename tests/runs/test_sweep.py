@@ -12,6 +12,8 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.sweep.definition import read
 
+pytestmark = pytest.mark.slow
+
 SCENE = """
 name = "base"
 [tire]

@@ -36,6 +36,7 @@ def run(launch, folder: Path, text: str, *arguments: str):
     return done, done.stdout.splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_all_runs_are_summed(launch, tmp_path: Path) -> None:
     done, last = run(launch, tmp_path, SUITE)
     assert (done.returncode, last) == (0, "4 passed, 0 failed, 1 skipped")
@@ -47,6 +48,7 @@ def test_the_fast_part_is_on_one_process_without_slow_ones(launch, tmp_path: Pat
     assert (done.returncode, last) == (0, "1 passed, 0 failed, 1 skipped")
 
 
+@pytest.mark.slow
 def test_failure_on_one_process_fails(launch, tmp_path: Path) -> None:
     done, last = run(launch, tmp_path, SUITE + BROKEN)
     assert (done.returncode, last) == (1, "5 passed, 2 failed, 1 skipped")
@@ -60,6 +62,7 @@ def test_suite_that_cannot_run_fails(launch, tmp_path: Path, text: str) -> None:
     assert last.startswith("0 passed")
 
 
+@pytest.mark.slow
 def test_collection_counts_all_runs(launch, tmp_path: Path) -> None:
     done, last = run(launch, tmp_path, SUITE, "--collect-only", "-q")
     assert (done.returncode, last) == (0, "5 collected")

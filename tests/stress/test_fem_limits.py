@@ -8,6 +8,8 @@ from tireroad.fem.static.state import StaticState
 from tireroad.runs.validation import stress_fem
 from tireroad.runs.validation.stress_fem import Attempt, Ended, attempts, result
 
+pytestmark = pytest.mark.slow
+
 
 def ended(**asked) -> Ended:
     """What came of it; whatever that is, the state in the end is one of equilibrium."""

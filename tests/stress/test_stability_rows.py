@@ -5,6 +5,7 @@ import pytest
 from tireroad.runs.validation import stress_greens, stress_modal
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", [stress_modal, stress_greens], ids=["modal", "greens"])
 def test_every_case_ends_well(package) -> None:
     rows = package.rows()
@@ -14,6 +15,7 @@ def test_every_case_ends_well(package) -> None:
         assert caught and caught != "not caught", case
 
 
+@pytest.mark.slow
 def test_each_case_ends_as_it_should() -> None:
     """Only what has no answer is refused; what has no vectors of its own goes to a block, nothing else does."""
     modal = {case: (what, caught) for _, case, what, caught in stress_modal.rows()}
@@ -39,6 +41,7 @@ def test_greens_functions_are_the_exponentials() -> None:
         assert float(what.removeprefix("amplitudes drift by ").split()[0]) < 1e-9, case
 
 
+@pytest.mark.slow
 def test_a_growing_motion_and_a_buckled_tire_are_named() -> None:
     rows = {case: (what, caught) for _, case, what, caught in stress_modal.rows()}
     assert "grows at" in rows["twice the critical speed"][0]

@@ -84,6 +84,7 @@ def tire() -> TireModel:
     return TireModel(section, lambda: Body(COMM, section, rubber))
 
 
+@pytest.mark.slow
 def test_the_chain_gives_what_the_program_gives(tire, tmp_path, launch) -> None:
     static = press(tire, inflation=2e5, load=300.0, rolling=Rolling(speed=SPEED, damping=500.0))
     motions = SmallMotions(tire, static)

@@ -18,6 +18,8 @@ from tireroad.fem.tire.material import compound
 from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.tire.wall import Region
 
+pytestmark = pytest.mark.slow
+
 RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
 HEIGHT, CONVERGED = -0.3184244, 532.8  # m, N
 

@@ -165,6 +165,7 @@ def test_damping_beyond_the_modes():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_any_number_of_processes_has_the_same_loss_factors():
     """Modes and losses of a tire shared by all processes, against this process alone."""

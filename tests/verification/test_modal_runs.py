@@ -6,6 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 TIRE = """
 [tire]
 segments = 16

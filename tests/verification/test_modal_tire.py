@@ -18,6 +18,8 @@ from tireroad.modal.solver import quadratic, undamped
 from tireroad.modal.solver.agreement import truncation
 from tireroad.modal.standing import sites
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 INFLATION = 2e5
 SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}

@@ -17,6 +17,7 @@ from tireroad.runs.stages.build.tire import make_body
 PRESSURE = 2.2e5
 
 
+@pytest.mark.slow
 def test_first_modes_and_mass_beside_the_public_ones():
     """205/60 R15, rim held, no road: within 10 % of lateral 42.4, wind-up 59.0, yaw 53.5, vertical 77.2 Hz, 9.3 kg."""
     tire = InflatedRing(radial("205/60 R15"), 26, 2, PRESSURE)
@@ -24,6 +25,7 @@ def test_first_modes_and_mass_beside_the_public_ones():
     assert tire.weight == pytest.approx(9.3, rel=0.03)
 
 
+@pytest.mark.slow
 def test_three_dimensional_elements_against_fourier_series(tmp_path):
     """Inflated, with cords and dynamic moduli: two codes, the same section, 0.1 % in the six lowest frequencies."""
     path = tmp_path / "radial.toml"
@@ -39,6 +41,7 @@ def test_three_dimensional_elements_against_fourier_series(tmp_path):
     np.testing.assert_allclose(modes.frequency, wanted, rtol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "width"), [("175/65 R14", 175), ("255/35 R20", 255)])
 def test_sizes_inflate_to_about_what_they_say(size, width):
     """Width within 4 %, radius within 1 %, moved by less than 6 mm."""

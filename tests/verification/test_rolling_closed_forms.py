@@ -60,6 +60,7 @@ def carter(share: float, cells: int):
     return x, found / (pitch * width), exact, found.sum() / total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.2, 0.6, 1.3])
 def test_carters_rolling_cylinder(share: float) -> None:
     """Bristles a thousand times stiffer than the half-space under them: what is left is the half-space.
@@ -79,6 +80,7 @@ def test_carters_rolling_cylinder(share: float) -> None:
     assert sticks.sum() * pitch == pytest.approx(2 * HALF * max(1 - share, 0), abs=4 * pitch)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slip", [0.002, 0.01, 0.03, 0.2])
 def test_pacejkas_brush(slip: float) -> None:
     """Bristles on a rigid body under parabolic pressure."""

@@ -19,6 +19,8 @@ from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import sites
 
+pytestmark = pytest.mark.slow
+
 COMM = MPI.COMM_WORLD
 RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
 

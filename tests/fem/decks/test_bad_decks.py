@@ -276,6 +276,7 @@ DECKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DECKS)
 def test_mutants(tmp_path, name):
     """300 damaged copies of each deck: a section or an InputError, nothing else."""
