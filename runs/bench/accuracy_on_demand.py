@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -17,7 +15,7 @@ from tireroad.contact.error_bars import Told, bars, told
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import by_processor
 from tireroad.runs.bench.parts.rolling_cases import CASES, Case, Driven, driven
-from tireroad.runs.files.cache import VARIABLE
+from tireroad.runs.files.cache import sharing
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
 from tireroad.runs.search.journal import Journal, Trial
@@ -73,23 +71,10 @@ def tables(folder: Path, cases: Iterable[Case], grid: Mapping, reference: Mappin
     found = []
     for case in cases:
         observe.say(f"  {case} ...")
-        with by_processor(), _shared(folder / case.wheel / "cache"):
+        with by_processor(), sharing(folder / case.wheel / "cache"):
             found.append(_outcome(folder / case.wheel, case, grid, reference))
         observe.say(f"    {found[-1]}")
     return [_summary(found, reference), _every(found)]
-
-
-@contextmanager
-def _shared(cache: Path) -> Iterator[None]:
-    """While inside, all runs share their finished stages; each knows what they took when they were computed."""
-    before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = str(cache)
-    try:
-        yield
-    finally:
-        del os.environ[VARIABLE]
-        if before is not None:
-            os.environ[VARIABLE] = before
 
 
 def _outcome(folder: Path, case: Case, grid: Mapping, reference: Mapping) -> Outcome:

@@ -47,6 +47,19 @@ def shared_folder(own: Path) -> Path:
     return own if given in (None, "", OFF, str(own_folder())) else Path(given)
 
 
+@contextmanager
+def sharing(folder: Path) -> Iterator[None]:
+    """While inside, all runs share their finished stages through a folder."""
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = str(folder)
+    try:
+        yield
+    finally:
+        del os.environ[VARIABLE]
+        if before is not None:
+            os.environ[VARIABLE] = before
+
+
 @dataclass(frozen=True)
 class Kept:
     """A finished stage in a cache: its file, bytes, and the time (s since 1970) of its last use."""

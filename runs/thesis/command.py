@@ -11,11 +11,12 @@ from pathlib import Path
 from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.files.cache import shared_folder, sharing
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.thesis import figures, output
 from tireroad.runs.thesis.figure import FIGURES, Figure, chosen
-from tireroad.runs.thesis.runner import Scenes, sharing
+from tireroad.runs.thesis.runner import Scenes
 
 
 def known() -> dict[str, Figure]:
@@ -40,7 +41,7 @@ def reproduce(names: Sequence[str], directory: Path, comm: MPI.Comm) -> None:
     wanted = chosen(names, known())
     on_root(comm, lambda: _made(directory))
     scenes, entries, began = Scenes(directory, comm), [], time.perf_counter()
-    with sharing(directory / "cache"):
+    with sharing(shared_folder(directory / "cache")):
         for one in wanted:
             entries.append(_entry(one, scenes))
             page = on_root(

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import re
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-from tireroad.runs.files.cache import VARIABLE, shared_folder
 from tireroad.runs.files.folder import claimed
 from tireroad.runs.process import mpi, observe
 from tireroad.runs.scene.load import load
@@ -58,15 +56,3 @@ class Scenes:
 def kept(run: Finished, stage: str, pick: Callable[[Any], T]) -> T:
     """What `pick(file)` returns of a stage's file, on every process. Collective."""
     return run.job.read(run.job.path(stage), pick)
-
-
-@contextmanager
-def sharing(folder: Path) -> Iterator[None]:
-    """While inside, runs share their stages through `folder`, or through the user's own cache."""
-    before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = str(shared_folder(folder))
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[VARIABLE]
