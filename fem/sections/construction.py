@@ -15,11 +15,10 @@ from scipy.interpolate import PchipInterpolator
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections import bead
-from tireroad.fem.sections.footprint import ring_corners
 from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.outline import Outline
-from tireroad.fem.sections.ring import Ring, section_angles, wall_thickness
+from tireroad.fem.sections.ring import Ring, revolved
 
 LEAST = (6, 2)  # elements around and along: below, a tire is none
 
@@ -116,15 +115,7 @@ class Construction:
                 return None
             return self.ring(segments // 2, elements // 2, order, footprint_size)
 
-        section = self.section(elements, order)
-        return Ring(
-            section=section,
-            ring_corners=ring_corners(segments, footprint_size),
-            arc_corners=section_angles(section),
-            thickness=wall_thickness(section),
-            height=float(np.ptp(section.nodes[:, 0])),
-            coarser=coarser,
-        )
+        return revolved(self.section(elements, order), segments, footprint_size, coarser)
 
     def _check(self) -> None:
         names = [layer.name for layer in self.layers]

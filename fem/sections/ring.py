@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from tireroad.fem.sections.footprint import ring_corners
 from tireroad.fem.sections.mesh2d import SectionMesh
 
 
@@ -67,6 +68,23 @@ class Ring:
         """Whether each edge of the outer chain runs against its cell's coordinate."""
         start = self.section.chain(self.section.outer)[:: self.order][:-1]
         return self.section.side(self.section.outer)[:, 0] != start
+
+
+def revolved(
+    section: SectionMesh,
+    segments: int,
+    footprint_size: float,
+    coarser: Callable[[], Ring | None],
+) -> Ring:
+    """A section drawn in any way, in so many elements around, with the scales that follow from its mesh."""
+    return Ring(
+        section=section,
+        ring_corners=ring_corners(segments, footprint_size),
+        arc_corners=section_angles(section),
+        thickness=wall_thickness(section),
+        height=float(np.ptp(section.nodes[:, 0])),
+        coarser=coarser,
+    )
 
 
 def section_angles(section: SectionMesh) -> np.ndarray:

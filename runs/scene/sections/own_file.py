@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.scene.sections.parts import cords_of, losses_of, region_of
 
 if TYPE_CHECKING:
     from tireroad.fem.decks.compounds import Rubber
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.sections.kinds.file import FileSection
-    from tireroad.runs.scene.tables.tire import Region, Tire
+    from tireroad.runs.scene.tables.tire import Tire
 
 
 def _keys(tire: Tire) -> FileSection:
@@ -65,11 +66,6 @@ def fingerprint(tire: Tire) -> str:
     return found.hexdigest()
 
 
-def region_of(tire: Tire, name: str) -> Region | None:
-    """The scene's [[tire.region]] of a region of the file."""
-    return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)
-
-
 def check_regions(tire: Tire, own: OwnSection) -> None:
     """That every [[tire.region]] names one of the file."""
     known = {name.upper() for name in own.mesh.regions}
@@ -111,9 +107,7 @@ def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
     change = {"dynamic": tire.dynamic, "loss_factor": tire.loss_factor}
     if rubber is not None:
         change = {"dynamic": rubber.dynamic, "loss_factor": rubber.loss_factor}
-    if region is not None:
-        change |= {"dynamic": region.dynamic} if region.dynamic != 1 else {}
-        change |= {"loss_factor": region.loss_factor} if region.loss_factor else {}
+    change |= losses_of(region)
     if region is not None and region.material is not None:
         return Material(law=region.material.law, density=region.material.density, **change)
     if rubber is None:
@@ -126,16 +120,13 @@ def own_cords(tire: Tire) -> list[Cords]:
     """The cords on the lines of the file: of [[tire.cords]] by name, else of the file."""
     from tireroad.fem.tire.cords import Cords
 
-    given = {cords.name: cords for cords in tire.cords}
+    given = {cords.name: cords_of(cords) for cords in tire.cords}
     found = [
         Cords(**{key: value for key, value in vars(ply).items() if key != "sides"})
         for ply in own_section(tire).plies
         if ply.name not in given
     ]
-    for cords in given.values():
-        values = {k: v for k, v in vars(cords).items() if k not in ("depth", "arc", "angle")}
-        found.append(Cords(angle=float(np.radians(cords.angle)), **values))
-    return found
+    return found + list(given.values())
 
 
 def described(tire: Tire) -> list[str]:

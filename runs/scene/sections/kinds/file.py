@@ -9,10 +9,11 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import choice, filename, flag, text, texts
-from tireroad.fem.sections.ring import Ring, section_angles, wall_thickness
-from tireroad.fem.sections.torus import LEAST, ring_corners
+from tireroad.fem.sections.ring import Ring, revolved
+from tireroad.fem.sections.torus import LEAST
 from tireroad.runs.scene.sections import own_file
 from tireroad.runs.scene.sections.kind import Proportions, SectionKind, section_kind
+from tireroad.runs.scene.sections.parts import proportions_of
 from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:
@@ -59,15 +60,7 @@ class FileSection(SectionKind):
             source.add_as_is(("tire", "file"), str(error))
 
     def proportions(self, tire: Tire) -> Proportions:
-        ring, mesh = self.ring(tire), own_file.own_section(tire).mesh
-        return Proportions(
-            outer_radius=float(mesh.nodes[:, 0].max()),
-            height=ring.height / 2,
-            thickness=ring.thickness,
-            half_angle=float(np.degrees(np.abs(ring.arc_corners).max())),
-            along=len(mesh.outer),
-            through=max(1, round(len(mesh.cells) / len(mesh.outer))),
-        )
+        return proportions_of(self.ring(tire), own_file.own_section(tire).mesh)
 
     def ring(self, tire: Tire) -> Ring:
         mesh = own_file.own_section(tire).mesh.of_order(tire.order)
@@ -110,11 +103,4 @@ def _revolved(mesh: SectionMesh, segments: int, footprint_size: float) -> Ring:
         half = segments // 2
         return _revolved(mesh, half, footprint_size) if half >= LEAST[0] else None
 
-    return Ring(
-        section=mesh,
-        ring_corners=ring_corners(segments, footprint_size),
-        arc_corners=section_angles(mesh),
-        thickness=wall_thickness(mesh),
-        height=float(np.ptp(mesh.nodes[:, 0])),
-        coarser=coarser,
-    )
+    return revolved(mesh, segments, footprint_size, coarser)

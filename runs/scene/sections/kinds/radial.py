@@ -13,7 +13,12 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import integer, text
 from tireroad.fem.sections.ring import Ring
 from tireroad.runs.scene.sections.kind import Proportions, SectionKind, section_kind
-from tireroad.runs.scene.sections.own_file import region_of
+from tireroad.runs.scene.sections.parts import (
+    cords_of,
+    losses_of,
+    proportions_of,
+    region_of,
+)
 from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:
@@ -60,14 +65,7 @@ class RadialSection(SectionKind):
 
     def proportions(self, tire: Tire) -> Proportions:
         ring = self.ring(tire)
-        return Proportions(
-            outer_radius=float(ring.section.nodes[:, 0].max()),
-            height=ring.height / 2,
-            thickness=ring.thickness,
-            half_angle=float(np.degrees(np.abs(ring.arc_corners).max())),
-            along=len(ring.section.outer),
-            through=len(built(self.size).layers),
-        )
+        return proportions_of(ring, ring.section)
 
     def ring(self, tire: Tire) -> Ring:
         return _ring(self.size, tire.segments, self.elements_arc, tire.order, tire.footprint_size)
@@ -87,16 +85,12 @@ class RadialSection(SectionKind):
     def cords(self, tire: Tire) -> list[Cords]:
         from tireroad.fem.tire.cords import Cords
 
-        changed = {line.name: line for line in tire.cords}
-        places = {"under", "to", "depth", "arc"}
-        found = []
-        for line in built(self.size).cords:
-            given = changed.get(line.name)
-            values = {key: v for key, v in vars(given or line).items() if key not in places}
-            if given is not None:
-                values["angle"] = float(np.radians(given.angle))
-            found.append(Cords(**values))
-        return found
+        changed = {line.name: cords_of(line) for line in tire.cords}
+        own = (
+            Cords(**{key: value for key, value in vars(line).items() if key not in ("under", "to")})
+            for line in built(self.size).cords
+        )
+        return [changed.get(line.name, line) for line in own]
 
     def angles(self, tire: Tire) -> dict[str, float]:
         own = {line.name: float(np.degrees(line.angle)) for line in built(self.size).cords}
@@ -134,13 +128,8 @@ def _compound(region: Region | None, values: dict[str, float]) -> Material:
     """A built-in compound, with what a [[tire.region]] of its name changes."""
     from tireroad.fem.tire.material import Material, compound
 
-    if region is None:
-        return compound("neo-hookean", **values)
-    if region.dynamic != 1:
-        values["dynamic"] = region.dynamic
-    if region.loss_factor:
-        values["loss_factor"] = region.loss_factor
-    if region.material is None:
+    values |= losses_of(region)
+    if region is None or region.material is None:
         return compound("neo-hookean", **values)
     return Material(
         law=region.material.law,

@@ -14,6 +14,7 @@ from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
 from tireroad.runs.scene.sections.kind import Proportions, SectionKind, section_kind
+from tireroad.runs.scene.sections.parts import cords_of
 from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:
@@ -183,16 +184,7 @@ class TorusSection(SectionKind):
         }
 
     def cords(self, tire: Tire) -> list[Cords]:
-        from tireroad.fem.tire.cords import Cords
-
-        placed = {"depth", "arc", "angle"}
-        return [
-            Cords(
-                angle=float(np.radians(line.angle)),
-                **{key: value for key, value in vars(line).items() if key not in placed},
-            )
-            for line in tire.cords
-        ]
+        return [cords_of(line) for line in tire.cords]
 
     def _torus(self, tire: Tire) -> Torus:
         return Torus(

@@ -1,0 +1,48 @@
+"""What kinds of section share: cords and compounds of a scene's tables, sizes of a ring."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tireroad.runs.scene.sections.kind import Proportions
+
+if TYPE_CHECKING:
+    from tireroad.fem.sections.mesh2d import SectionMesh
+    from tireroad.fem.sections.ring import Ring
+    from tireroad.fem.tire.cords import Cords
+    from tireroad.runs.scene.tables.tire import Cords as Line
+    from tireroad.runs.scene.tables.tire import Region, Tire
+
+
+def cords_of(line: Line) -> Cords:
+    """The cords of a [[tire.cords]], wherever they lie."""
+    from tireroad.fem.tire.cords import Cords
+
+    values = {k: v for k, v in vars(line).items() if k not in ("depth", "arc", "angle")}
+    return Cords(angle=float(np.radians(line.angle)), **values)
+
+
+def region_of(tire: Tire, name: str) -> Region | None:
+    """The scene's [[tire.region]] of that name."""
+    return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)
+
+
+def losses_of(region: Region | None) -> dict[str, float]:
+    """Dynamic modulus and loss factor that a [[tire.region]] gives, where they are not 1 and 0."""
+    given = {} if region is None else {"dynamic": region.dynamic, "loss_factor": region.loss_factor}
+    neutral = {"dynamic": 1.0, "loss_factor": 0.0}
+    return {key: value for key, value in given.items() if value != neutral[key]}
+
+
+def proportions_of(ring: Ring, drawn: SectionMesh) -> Proportions:
+    """Sizes of a ring whose section was drawn so, of whatever order."""
+    return Proportions(
+        outer_radius=float(drawn.nodes[:, 0].max()),
+        height=ring.height / 2,
+        thickness=ring.thickness,
+        half_angle=float(np.degrees(np.abs(ring.arc_corners).max())),
+        along=len(drawn.outer),
+        through=max(1, round(len(drawn.cells) / len(drawn.outer))),
+    )
