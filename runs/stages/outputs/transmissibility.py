@@ -1,0 +1,102 @@
+"""Force on the held axle per force at the driven points, over frequency: by momentum, and by a free rim."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tireroad.fem.model import SmallMotions
+from tireroad.fem.parameters import integer, number
+from tireroad.greens.axle import by_momentum
+from tireroad.greens.small_motions import wheel_of
+from tireroad.modal.standing import standing_modes
+from tireroad.runs.scene.outputs import (
+    MOST_FREQUENCIES,
+    OUTPUTS,
+    Curves,
+    Output,
+    Where,
+    check_steps,
+)
+from tireroad.runs.scene.tables.cavity import has_air
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages.build.driven import Driven
+from tireroad.runs.stages.build.setup import driven_points
+from tireroad.runs.stages.build.turning import turning_of
+from tireroad.runs.stages.record import Record
+
+# Of the highest mode. Of a tire of 48 MPa with 60, 120, 250 modes (311, 448, 687 Hz) the two ways are 0.5, 0.25, 0.2 %
+# apart up to half of it, and 40, 3, 0.2 % up to 300 Hz.
+LIMIT = 0.5
+FREQUENCY, MOMENTUM, FREE_RIM = (
+    f"transmissibility/{name}" for name in ("frequency", "momentum", "free_rim")
+)
+
+
+@OUTPUTS.register(
+    "transmissibility", "force on the held axle per force at each driven point, over frequency"
+)
+class Transmissibility(Output):
+    to: float = number(300.0, "Hz", "highest frequency", least=1e-3, most=1e6)
+    step: float = number(2.0, "Hz", "step between two frequencies", least=1e-4, most=1e6)
+    free_rim: int = integer(
+        0,
+        "number of modes of the tire with a free rim, by which it is found a second way; 0: by momentum alone",
+        least=0,
+        most=100000,
+    )
+
+    def check(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
+        """Points, an axle that is held, steps."""
+        if scene.modal.rim == "free" or scene.axle.kind != "fixed":
+            raise error(
+                path, 'is the force on a held axle: take modal.rim = "fixed", axle.kind = "fixed"'
+            )
+        if self.free_rim and has_air(scene):
+            raise error(
+                (*path, "free_rim"), "has no air in the tire: take 0, or take out [tire.cavity]"
+            )
+        check_steps(
+            (*path, "step"), "frequencies", self.to, self.step, "Hz", error, most=MOST_FREQUENCIES
+        )
+
+    def curves(self, seen: Driven, record: Record) -> Curves:
+        """The curves (f, 3, k), -, of k driven points, from `step` to `to` Hz: force of the tire on the axle per
+        force. By the momentum of the response's states and, where the scene asks for it, by modes of the tire
+        with a free rim (greens.axle): each checks the other. Collective.
+        """
+        frequency = self.step * np.arange(1, round(self.to / self.step) + 1)
+        loads, _ = driven_points(seen.job)
+        total = loads.toarray().reshape(loads.shape[0], -1, 3).sum(axis=1).T
+        with record.timing("transmissibility"):
+            found = by_momentum(seen.response, total, frequency)
+        peak = np.unravel_index(np.abs(found).argmax(), found.shape)
+        record.headline["largest force on the axle per force"] = (float(np.abs(found[peak])), "-")
+        record.headline["force on the axle is largest at"] = (float(frequency[peak[0]]), "Hz")
+        curves: Curves = {FREQUENCY: (frequency, "Hz"), MOMENTUM: (found, "-")}
+        highest = float(seen.modes.product.frequency[-1])
+        if self.free_rim:
+            with record.timing("free rim"):
+                other, top = self._by_free_rim(seen, loads, frequency)
+            highest = min(highest, top)
+            curves[FREE_RIM] = other, "-"
+            name = f"axle force by the free rim off that by momentum up to {self.to:.4g} Hz"
+            record.indicators[name] = (apart(other, found), "-")
+        if self.to > LIMIT * highest:
+            record.warnings.append(
+                f"output.transmissibility goes to {self.to:g} Hz; beyond {LIMIT * highest:.4g} Hz, half the highest mode, "
+                "it lacks the modes left out: take more of them (modal.count, output.transmissibility.free_rim)"
+            )
+        return curves
+
+    def _by_free_rim(self, seen: Driven, loads, frequency: np.ndarray) -> tuple[np.ndarray, float]:
+        """By modes of the same static state with its rim let go; the highest of them, Hz. Collective."""
+        job, turning = seen.job, turning_of(seen.job)
+        motions = SmallMotions(job.tire, seen.static, rim="free", road=job.scene.modal.road)
+        basis = standing_modes(motions, count=self.free_rim, rotation=turning.speed != 0)
+        wheel = wheel_of(motions, turning, projection=basis.projection)
+        return wheel.axle(basis.modes, loads, frequency), float(basis.frequency[-1])
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Distance of two transmissibilities over the other's size, both as root mean squares over all entries."""
+    return float(np.linalg.norm(one - other) / np.linalg.norm(other))
