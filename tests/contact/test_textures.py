@@ -129,6 +129,8 @@ def test_a_laser_profile_is_cleaned_openly(tmp_path) -> None:
     file, x, z = measured(tmp_path, spoiled)
     road = LaserFile(file=file, across="ruts", shortest_wave=5e-4).make()
     inner = (x > 0.01) & (x < 0.99)
+    for begin in (5000, 12_000):  # nothing is known of the gaps
+        inner[begin - 50 : begin + 130] = False
     assert np.abs(road.height(x, 0 * x) - z)[inner].max() < 1e-4
     assert "160 missing" in road.notes[0] and "ruts" in road.notes[1]
     outliers = int(road.notes[0].split("and ")[1].split()[0])

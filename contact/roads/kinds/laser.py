@@ -94,12 +94,9 @@ class LaserFile(Levelled):
         try:
             text = path.read_text(encoding="utf-8-sig")
             lines = [row for row in text.splitlines() if row.strip() and not row.startswith("#")]
-            begin = (
-                1
-                if lines
-                and any(c.isalpha() for c in lines[0].lower().replace("nan", "").replace("e", ""))
-                else 0
-            )
+            begin = 1 if lines and _is_heading(lines[0]) else 0
+            if len(lines) - begin < 3:
+                raise InputError(f"{source}: {len(lines) - begin} heights are no road")
             check_count(path, len(lines))
             table = np.loadtxt(lines[begin:], delimiter=",", ndmin=2, dtype=float)
         except UnicodeDecodeError as error:
@@ -109,10 +106,10 @@ class LaserFile(Levelled):
         return self._line(table, source)
 
     def _line(self, table: Array, source: str) -> _Line:
-        if table.shape[1] not in (1, 2) or len(table) < 3:
+        if table.shape[1] not in (1, 2):
             raise InputError(
                 f"{source}: {table.shape[0]} lines of {table.shape[1]} numbers; a measured line has one "
-                "height a line, or x and a height, and three lines at least"
+                "height a line, or x and a height"
             )
         profile = table[:, -1] * UNITS[self.height_unit]
         if np.isinf(profile).any():
@@ -154,3 +151,12 @@ class LaserFile(Levelled):
                 f"{heights:.3g} heights, more than {MOST_HEIGHTS:g}: take a longer road.shortest_wave, a smaller "
                 'road.width or across = "ruts", or cut the file'
             )
+
+
+def _is_heading(line: str) -> bool:
+    """Whether a line's first field is no number."""
+    try:
+        float(line.split(",")[0])
+    except ValueError:
+        return True
+    return False

@@ -1,9 +1,9 @@
 """A measured profile made whole: outliers of a laser taken out, gaps bridged, and all of it counted.
 
 An outlier lies further from the median of 11 neighbours than `limit` times 1.4826 times the median distance of all points
-from theirs, and further than 20 um: of Gaussian noise the factor is the standard deviation, and a laser's own noise
-stays. Gaps, outliers included, are bridged by straight lines up to a length; longer ones are refused, as what would stand
-there is invented.
+from theirs, and further than 50 um: of Gaussian noise the factor is the standard deviation, and a laser's own noise and
+the crests of fine waves stay. Gaps, outliers included, are bridged by straight lines up to a length; longer ones are
+refused, as what would stand there is invented.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
 _NEIGHBOURS = 11
-_NOISE = 20e-6  # m
+_NOISE = 50e-6  # m
 MOST_LOST = 0.1  # share of a profile that may be bridged
 
 
