@@ -5,14 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 
+from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
+from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
+from tireroad.modal.standing import standing_modes
 from tireroad.runs.stages.build.point_forces import directions, histories
+from tireroad.runs.stages.build.setup import driven_points
 from tireroad.runs.stages.build.stepping import Integration
+from tireroad.runs.stages.build.turning import turning_of
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.stage import Done
@@ -46,6 +52,22 @@ class Driven:
     def of_contact(self, name: str) -> Array:
         """An array of contact.h5 by its name, e.g. "normal_force" (nt, c) N, on every process. Collective."""
         return self.job.read(self.job.path("contact"), lambda file: file[name][:])
+
+    def points(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """Loads (k, 3 s) of unit forces along the given ones, and readings (3 k, 3 s) of their points."""
+        return driven_points(self.job)
+
+    def by_free_rim(self, count: int, frequency: Array) -> tuple[Array, float]:
+        """Force (f, 3, k) of the tire on the held axle per given force, by `count` modes of the same static state with
+        its rim let go; the highest of them, Hz. Collective."""
+        turning = turning_of(self.job)
+        motions = SmallMotions(
+            self.job.tire, self.static, rim="free", road=self.job.scene.modal.road
+        )
+        basis = standing_modes(motions, count=count, rotation=turning.speed != 0)
+        wheel = wheel_of(motions, turning, projection=basis.projection)
+        found = wheel.axle(basis.modes, self.points()[0], frequency)
+        return found, float(basis.frequency[-1])
 
     @property
     def drifts(self) -> bool:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from tireroad.runs.scene.outputs import OUTPUTS, Curves, Output
-from tireroad.runs.stages.build.driven import Driven
-from tireroad.runs.stages.record import Record
+
+if TYPE_CHECKING:
+    from tireroad.runs.stages.build.driven import Driven
+    from tireroad.runs.stages.record import Record
 
 
 @OUTPUTS.register("acceleration", "acceleration of the driven points")

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from tireroad.runs.scene.outputs import OUTPUTS, Curves, Output
-from tireroad.runs.stages.build.driven import Driven
-from tireroad.runs.stages.record import Record
+
+if TYPE_CHECKING:
+    from tireroad.runs.stages.build.driven import Driven
+    from tireroad.runs.stages.record import Record
 
 
 @OUTPUTS.register(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from tireroad.fem.parameters import integer, number
@@ -13,10 +15,11 @@ from tireroad.runs.scene.outputs import (
     Where,
     check_steps,
 )
-from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.build.driven import Driven
-from tireroad.runs.stages.build.setup import driven_points
-from tireroad.runs.stages.record import Record
+
+if TYPE_CHECKING:
+    from tireroad.runs.scene.tables.scene import Scene
+    from tireroad.runs.stages.build.driven import Driven
+    from tireroad.runs.stages.record import Record
 
 
 @OUTPUTS.register("receptance", "receptances between the driven points")
@@ -60,7 +63,7 @@ class Receptance(Output):
     def _by_full_matrices(self, seen: Driven, record: Record) -> Curves:
         """The same receptances without modes, at a few frequencies, and how far the modes are off."""
         frequency = self.to * np.arange(1, self.direct + 1) / self.direct
-        loads, readings = driven_points(seen.job)
+        loads, readings = seen.points()
         with record.timing("receptance of the full matrices"):
             full = seen.wheel.product.receptance(readings, loads, frequency)
         off = seen.response.receptance(frequency) - full

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from tireroad.fem.model import SmallMotions
 from tireroad.fem.parameters import integer, number
-from tireroad.greens.axle import by_momentum
-from tireroad.greens.small_motions import wheel_of
-from tireroad.modal.standing import standing_modes
 from tireroad.runs.scene.outputs import (
     MOST_FREQUENCIES,
     OUTPUTS,
@@ -18,11 +16,11 @@ from tireroad.runs.scene.outputs import (
     check_steps,
 )
 from tireroad.runs.scene.tables.cavity import has_air
-from tireroad.runs.scene.tables.scene import Scene
-from tireroad.runs.stages.build.driven import Driven
-from tireroad.runs.stages.build.setup import driven_points
-from tireroad.runs.stages.build.turning import turning_of
-from tireroad.runs.stages.record import Record
+
+if TYPE_CHECKING:
+    from tireroad.runs.scene.tables.scene import Scene
+    from tireroad.runs.stages.build.driven import Driven
+    from tireroad.runs.stages.record import Record
 
 # Of the highest mode. Of a tire of 48 MPa with 60, 120, 250 modes (311, 448, 687 Hz) the two ways are 0.5, 0.25, 0.2 %
 # apart up to half of it, and 40, 3, 0.2 % up to 300 Hz.
@@ -64,8 +62,10 @@ class Transmissibility(Output):
         force. By the momentum of the response's states and, where the scene asks for it, by modes of the tire
         with a free rim (greens.axle): each checks the other. Collective.
         """
+        from tireroad.greens.axle import by_momentum
+
         frequency = self.step * np.arange(1, round(self.to / self.step) + 1)
-        loads, _ = driven_points(seen.job)
+        loads, _ = seen.points()
         total = loads.toarray().reshape(loads.shape[0], -1, 3).sum(axis=1).T
         with record.timing("transmissibility"):
             found = by_momentum(seen.response, total, frequency)
@@ -76,7 +76,7 @@ class Transmissibility(Output):
         highest = float(seen.modes.product.frequency[-1])
         if self.free_rim:
             with record.timing("free rim"):
-                other, top = self._by_free_rim(seen, loads, frequency)
+                other, top = seen.by_free_rim(self.free_rim, frequency)
             highest = min(highest, top)
             curves[FREE_RIM] = other, "-"
             name = f"axle force by the free rim off that by momentum up to {self.to:.4g} Hz"
@@ -87,14 +87,6 @@ class Transmissibility(Output):
                 "it lacks the modes left out: take more of them (modal.count, output.transmissibility.free_rim)"
             )
         return curves
-
-    def _by_free_rim(self, seen: Driven, loads, frequency: np.ndarray) -> tuple[np.ndarray, float]:
-        """By modes of the same static state with its rim let go; the highest of them, Hz. Collective."""
-        job, turning = seen.job, turning_of(seen.job)
-        motions = SmallMotions(job.tire, seen.static, rim="free", road=job.scene.modal.road)
-        basis = standing_modes(motions, count=self.free_rim, rotation=turning.speed != 0)
-        wheel = wheel_of(motions, turning, projection=basis.projection)
-        return wheel.axle(basis.modes, loads, frequency), float(basis.frequency[-1])
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> float:
