@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 from mpi4py import MPI
 
+from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.pipeline import Finished, run_scene
@@ -119,11 +120,19 @@ class Driven:
     step: float
 
 
-def driven(scene: Scene, folder: Path, until: str) -> Driven:
-    """Run a scene, without a word. Collective."""
+def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> Driven:
+    """Run a scene, without a word; stages are shared through a `cache`. Collective."""
     folder.mkdir(parents=True, exist_ok=True)
     with observe.quiet():
-        done = run_scene(scene, folder, MPI.COMM_WORLD, until=until, fresh=False, petsc_options=[])
+        done = run_scene(
+            scene,
+            folder,
+            MPI.COMM_WORLD,
+            until=until,
+            fresh=False,
+            petsc_options=[],
+            cache=cache,
+        )
     with h5py.File(folder / "contact.h5") as file:
         forces = {name: file[name][:] for name in ("total_force", "axle_force")}
     return Driven(done, forces, done.done["contact"].product.step)
