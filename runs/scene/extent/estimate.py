@@ -19,6 +19,8 @@ DENSE = 1000
 """Contact points up to which a tread's matrix is kept (contact.model.DENSE_POINTS)."""
 BLOCK = 512
 """Steps of contact results held between two writes (stages.stored.contact_file)."""
+PIVOT = 5
+"""Copies of the matrix of the points that touch, while it is pivoted (contact.solver.pivot)."""
 PACKED = 0.3
 """Size of contact.h5 over its numbers: most forces are 0 (measured: 0.24 on stones, 0.29 on texture)."""
 
@@ -109,18 +111,24 @@ def _each_step(scene: Scene, points: int) -> int:
 def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
     directions = 3 if scene.contact.rubs else 1
     loads = directions * size.nodes
-    grid = scene.contact.points != "nodes" and size.points > DENSE
     parts = {
         "flexibility of the patch": 8.0 * 2 * size.free * loads,
         "contact": 16.0 * 4 * loads * 2 * size.modes
         + 8.0 * 3 * loads**2
-        + (0.0 if grid else 8.0 * 3 * size.points**2)
+        + 8.0 * _matrices_of_points(scene, size) * size.points**2
         + 8.0 * BLOCK * size.points * (3 + directions),
         "time series": 8.0 * size.steps * 24,
     }
     if scene.time.scheme == "convolution":
         parts["time series"] += 8.0 * size.steps * loads**2
     return parts
+
+
+def _matrices_of_points(scene: Scene, size: Sizes) -> int:
+    """How many matrices of the contact points there are at once."""
+    if scene.contact.points == "nodes" or size.points <= DENSE:
+        return 3
+    return PIVOT if scene.contact.solver == "active-set" else 0
 
 
 def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
