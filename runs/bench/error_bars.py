@@ -24,6 +24,7 @@ from tireroad.runs.bench.parts.rolling_cases import (
     CASES,
     DURATION,
     FINE,
+    TIRES,
     Case,
     Driven,
     Recorded,
@@ -53,7 +54,7 @@ def tables(
 ) -> list[Table]:
     """Of the `cases`; settings of the run and of the far finer one. On one process."""
     found: list[Effectivity] = []
-    for case in sorted(cases, key=lambda case: (case.tire, case.speed)):
+    for case in sorted(cases, key=lambda case: (list(TIRES).index(case.tire), case.speed)):
         where = _Where(folder / case.wheel, kept, case, duration, coarse, fine)
         file = kept / "error_bars" / f"{str(case).replace(', ', '-').replace(' ', '_')}.json"
         some = _known(file, [coarse, fine, duration])
