@@ -56,7 +56,7 @@ def tables(
     found: list[Effectivity] = []
     for case in sorted(cases, key=lambda case: (list(TIRES).index(case.tire), case.speed)):
         where = _Where(folder / case.wheel, kept, case, duration, coarse, fine)
-        file = kept / "error_bars" / f"{str(case).replace(', ', '-').replace(' ', '_')}.json"
+        file = kept / "error_bars" / f"{case.wheel}-{case.road}.json"
         some = _known(file, [coarse, fine, duration])
         if some is None:
             observe.say(f"  {case} ...")
