@@ -47,6 +47,6 @@ def test_a_tire_whose_crown_is_no_node_touches_below_its_nodes(make_body):
     equilibrium = Equilibrium(make_body(order=3, segments=8, arc=5))
     loader = Loader(equilibrium, lambda progress: None)
     loader.inflate(2e5)
-    assert loader.touch < equilibrium.tread_height().min() - 1e-5
+    assert loader.touch < equilibrium.road.tread_height().min() - 1e-5
     loader.carry(50.0)
     assert loader.load() == pytest.approx(50.0, rel=1e-8)
