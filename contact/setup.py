@@ -19,6 +19,7 @@ from tireroad.greens.response import Response
 
 # What the tire may give way beyond the road's own height, m: the smallest reach of the patch.
 _MARGIN = 5e-3
+_RUNG = 1.1
 
 
 class OuterFace(Protocol):
@@ -163,7 +164,8 @@ def _under(road: RoadUnderTire, patch: Patch, rolled: Rolled) -> PreparedRoad:
 def _reach(face: OuterFace, road: RoadUnderTire, rolled: Rolled) -> float:
     """Static gap up to which a point can touch: the road's highest spot, its motion, a margin.
 
-    The highest spot depends on the strip, the strip on the patch: two rounds settle it.
+    The highest spot depends on the strip, the strip on the patch: two rounds settle it. Rounded up to a power of
+    `_RUNG` margins: roads of one kind have the same patch then, and share its Green's functions.
     """
     reach = rolled.lift + _MARGIN
     for _ in range(2):
@@ -172,4 +174,4 @@ def _reach(face: OuterFace, road: RoadUnderTire, rolled: Rolled) -> float:
         x0, x1, y0, y1 = patch.extent
         highest = max(strip.highest(x0, x1 + rolled.travel, y0, y1), 0.0)
         reach = 1.5 * (highest + rolled.lift) + _MARGIN
-    return reach
+    return _MARGIN * _RUNG ** np.ceil(np.log(reach / _MARGIN) / np.log(_RUNG) - 1e-9)

@@ -46,7 +46,7 @@ def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
 
 
 def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> None:
-    from tireroad.runs.files.cache import share_with_later_runs
+    from tireroad.runs.files.cache import Cache
     from tireroad.runs.files.folder import check_kept_scene, claimed
     from tireroad.runs.scene.load import load
 
@@ -57,7 +57,6 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
     directory = args.out if args.out is not None else Path("results") / scene.name
     mpi.start_petsc(petsc_options)
     form_cache.announce = observe.say
-    share_with_later_runs()
     with ExitStack() as stack:
 
         def claim() -> None:
@@ -75,6 +74,7 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
                 until=args.until,
                 fresh=args.fresh,
                 petsc_options=petsc_options,
+                cache=Cache.of_user(),
             )
         except (InputError, ConvergenceError) as error:
             observe.log(f"error: {error}")
@@ -157,10 +157,9 @@ def _results(directory: Path) -> Path:
 
 
 def _cache(args: argparse.Namespace) -> None:
-    from tireroad.runs.files.cache import Cache, share_with_later_runs
+    from tireroad.runs.files.cache import Cache
 
-    share_with_later_runs()
-    cache = Cache()
+    cache = Cache.of_user()
     if args.clear:
         print(cache.clear(args.unused_for))
     print(cache.described())

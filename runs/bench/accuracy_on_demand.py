@@ -15,7 +15,7 @@ from tireroad.contact.error_bars import Told, bars, told
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import by_processor
 from tireroad.runs.bench.parts.rolling_cases import CASES, Case, Driven, driven
-from tireroad.runs.files.cache import sharing
+from tireroad.runs.files.cache import Cache
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
 from tireroad.runs.search.journal import Journal, Trial
@@ -71,7 +71,7 @@ def tables(folder: Path, cases: Iterable[Case], grid: Mapping, reference: Mappin
     found = []
     for case in cases:
         observe.say(f"  {case} ...")
-        with by_processor(), sharing(folder / case.wheel / "cache"):
+        with by_processor():
             found.append(_outcome(folder / case.wheel, case, grid, reference))
         observe.say(f"    {found[-1]}")
     return [_summary(found, reference), _every(found)]
@@ -103,7 +103,7 @@ def _searched(folder: Path, scene) -> tuple[bool, list[Trial]]:
     ended = True
     try:
         with observe.quiet():
-            Search(scene, folder, MPI.COMM_WORLD, []).run()
+            Search(scene, folder, MPI.COMM_WORLD, [], _cache(folder.parent)).run()
     except ConvergenceError:
         ended = False
     return ended, [trial for trial in Journal(folder, scene).trials if trial.found is not None]
@@ -113,7 +113,7 @@ def _reference(folder: Path, ladders: Ladders, rungs: Mapping) -> tuple[Driven, 
     """The reference, and its own error as its companions estimate it. Collective."""
     settings = ladders.at(dict(rungs))
     scene = applied(ladders.scene, settings)
-    run = driven(scene, folder / "reference", "accuracy")
+    run = driven(scene, folder / "reference", "accuracy", _cache(folder))
     bar = run.done.done["accuracy"].product.total(scene.accuracy.of)
     return run, float(bar.history[2])
 
@@ -121,7 +121,12 @@ def _reference(folder: Path, ladders: Ladders, rungs: Mapping) -> tuple[Driven, 
 def _driven(folder: Path, ladders: Ladders, settings: Settings) -> Driven:
     """A run with settings, from stages that those of the same wheel share. Collective."""
     scene = applied(ladders.scene, settings)
-    return driven(scene, folder / "grid", "contact")
+    return driven(scene, folder / "grid", "contact", _cache(folder))
+
+
+def _cache(folder: Path) -> Cache:
+    """Of all that a wheel's roads share, in the wheel's folder."""
+    return Cache(folder / "cache")
 
 
 def _cost(spent: Mapping[str, float]) -> float:

@@ -32,7 +32,7 @@ from tireroad.runs.bench.parts.rolling_cases import (
     recorded,
     sets,
 )
-from tireroad.runs.files.cache import sharing
+from tireroad.runs.files.cache import Cache
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.identity import identity
 from tireroad.runs.measure.tabulate import Table
@@ -60,8 +60,7 @@ def tables(
         some = _known(file, [coarse, fine, duration])
         if some is None:
             observe.say(f"  {case} ...")
-            with sharing(where.folder / "cache"):
-                some = list(_judged(where))
+            some = list(_judged(where))
             _keep(file, [coarse, fine, duration], some)
         found += some
         good = np.mean([one.good for one in some if one.cause == ALL])
@@ -100,13 +99,19 @@ class _Where:
     def own(self) -> Driven:
         """The run with its error bars."""
         scene = self.case.scene(self.folder, self.duration, *sets(**self.coarse))
-        return driven(scene, self.folder / "run", "spectra")
+        return driven(scene, self.folder / "run", "spectra", self._cache)
 
     def finer(self, *names: str) -> Recorded:
         """With some of its settings as fine as the reference's."""
         keys = self.coarse | {name: self.fine[name] for name in names if name in self.fine}
         scene = self.case.scene(self.folder, self.duration, *sets(**keys))
-        return recorded(scene, self.folder / "-".join(("fine", *names)), self.kept / "forces")
+        folder = self.folder / "-".join(("fine", *names))
+        return recorded(scene, folder, self.kept / "forces", self._cache)
+
+    @property
+    def _cache(self) -> Cache:
+        """Of the stages that the roads and the settings share."""
+        return Cache(self.folder / "cache")
 
 
 _MESH = ("segments", "arc", "order", "footprint", "modes")

@@ -1,8 +1,8 @@
 """Finished stages that several result folders share, kept by stage and hash of inputs.
 
-The environment variable TIREROAD_CACHE names the folder, "off" none. `run` uses one in the user's cache where it
-is not set: of the stages that another road or another time does not change, up to `LARGEST` bytes, the
-longest unused going first. Files are linked, not copied, where the file system allows it: result files are never
+The environment variable TIREROAD_CACHE names the folder of a command, "off" none; where it is not set that is one
+in the user's cache: of the stages that another road or another time does not change, up to `LARGEST` bytes, the
+longest unused going first. A run from a script has the cache that it is given, by default none. Files are linked, not copied, where the file system allows it: result files are never
 written to in place.
 """
 
@@ -36,30 +36,6 @@ def own_folder() -> Path:
     return user_folder() / "stages"
 
 
-def share_with_later_runs() -> None:
-    """From now on stages are kept in the user's cache, unless the variable says otherwise."""
-    os.environ.setdefault(VARIABLE, str(own_folder()))
-
-
-def shared_folder(own: Path) -> Path:
-    """Where a family of runs keeps all its stages: the folder the variable names, else its `own`."""
-    given = os.environ.get(VARIABLE)
-    return own if given in (None, "", OFF, str(own_folder())) else Path(given)
-
-
-@contextmanager
-def sharing(folder: Path) -> Iterator[None]:
-    """While inside, all runs share their finished stages through a folder."""
-    before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = str(folder)
-    try:
-        yield
-    finally:
-        del os.environ[VARIABLE]
-        if before is not None:
-            os.environ[VARIABLE] = before
-
-
 @dataclass(frozen=True)
 class Kept:
     """A finished stage in a cache: its file, bytes, and the time (s since 1970) of its last use."""
@@ -80,13 +56,26 @@ class Kept:
                 path.unlink()
 
 
+@dataclass(frozen=True)
 class Cache:
-    """The shared folder, or nothing. Root process only."""
+    """The shared `folder`, or nothing. What reads and writes it is for the root process only."""
 
-    def __init__(self, folder: str | Path | None = None) -> None:
-        given = folder or os.environ.get(VARIABLE) or OFF
-        self.folder = None if given == OFF else Path(given)
-        self._own = self.folder == own_folder()
+    folder: Path | None = None
+
+    @classmethod
+    def of_user(cls) -> Cache:
+        """As the variable says, by default the user's own."""
+        given = os.environ.get(VARIABLE) or str(own_folder())
+        return cls(None if given == OFF else Path(given))
+
+    def of_family(self, folder: Path) -> Cache:
+        """Where a family of runs keeps all its stages: in its own `folder`, unless the user has named one."""
+        return Cache(folder) if self.folder is None or self._own else self
+
+    @property
+    def _own(self) -> bool:
+        """Whether it is the user's own, which is bounded."""
+        return self.folder == own_folder()
 
     def entries(self) -> list[Kept]:
         """What is kept, the longest unused first."""
@@ -182,6 +171,9 @@ class Cache:
                     observe.say(f"{stage:9s} waits: another run computes the same")
                     fcntl.flock(lock, fcntl.LOCK_EX)
             yield
+
+
+NO_CACHE = Cache()
 
 
 def _link(source: Path, target: Path) -> None:

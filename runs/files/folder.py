@@ -96,11 +96,19 @@ def check_owner(directory: Path, scene_name: str) -> None:
         )
 
 
+def make_folder(directory: Path) -> None:
+    """The folder and those above it, where they are not there. Root process only; InputError where they cannot be."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unusable(directory, error) from None
+
+
 @contextmanager
 def claimed(directory: Path, scene_name: str) -> Iterator[None]:
     """The folder made, checked, and held against a second run while inside. Root process only."""
+    make_folder(directory)
     try:
-        directory.mkdir(parents=True, exist_ok=True)
         handle = os.open(directory, os.O_RDONLY)
     except OSError as error:
         raise _unusable(directory, error) from None

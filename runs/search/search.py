@@ -12,7 +12,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.files.cache import shared_folder
+from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.process import observe
@@ -32,12 +32,13 @@ FOLDER = "search"
 
 @dataclass(frozen=True)
 class Search:
-    """A scene whose settings are searched for, with results in `directory`."""
+    """A scene whose settings are searched for, with results in `directory`; `cache`: of the user."""
 
     scene: Scene
     directory: Path
     comm: MPI.Comm
     petsc_options: list[str]
+    cache: Cache = NO_CACHE
 
     def run(self) -> None:
         """Trials until one meets the target, then the run with its settings, from its stages.
@@ -72,9 +73,9 @@ class Search:
         return Journal(self.directory, self.scene)
 
     @property
-    def _cache(self) -> Path:
+    def _cache(self) -> Cache:
         """Where the stages of trials are kept."""
-        return shared_folder(self.directory / FOLDER / "cache")
+        return self.cache.of_family(self.directory / FOLDER / "cache")
 
     def _begin(self) -> None:
         """The scene as it is asked for stands in the folder until settings are found. Root process only."""
@@ -199,18 +200,26 @@ def run(
     until: str | None,
     fresh: bool,
     petsc_options: list[str],
+    cache: Cache = NO_CACHE,
 ) -> None:
     """A run as the user starts it: with a search where the scene has a target and goes on to its forces; `fresh`:
     nothing of earlier runs and trials is reused. Collective.
     """
     if not scene.accuracy.searches or (until and STAGES.index(until) < STAGES.index("accuracy")):
-        given = scene, directory, comm
-        done = run_scene(*given, until=until, fresh=fresh, petsc_options=petsc_options)
+        done = run_scene(
+            scene,
+            directory,
+            comm,
+            until=until,
+            fresh=fresh,
+            petsc_options=petsc_options,
+            cache=cache,
+        )
         _tell(scene, done)
         return
     if fresh:
         on_root(comm, lambda: _forget(directory))
-    Search(scene, directory, comm, petsc_options).run()
+    Search(scene, directory, comm, petsc_options, cache).run()
 
 
 def _tell(scene: Scene, done: Finished) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -15,11 +16,12 @@ from tireroad.fem.static.state import StaticState
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.stages.build.loop import Forces
 from tireroad.runs.stages.build.model_limit import model_limit
 from tireroad.runs.stages.build.run_in import first_step
-from tireroad.runs.stages.companions import Given, companion
+from tireroad.runs.stages.companions import COARSER, Given, companion
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Computed, Done
@@ -118,6 +120,13 @@ class AccuracyStage(Computed[Accuracy]):
         _describe(record, product, runs)
         return product
 
+    def produce(self, key: str, record: Record) -> Accuracy:
+        """As any stage; what a companion left for a run that goes on after a stop is of no use then. Collective."""
+        product = super().produce(key, record)
+        folder = self.job.directory / COARSER
+        on_root(self.job.comm, lambda: shutil.rmtree(folder, ignore_errors=True))
+        return product
+
     @property
     def _at_rest(self) -> bool:
         scene = self.job.scene
@@ -143,7 +152,7 @@ class AccuracyStage(Computed[Accuracy]):
     def _given(self, steps: int) -> Given:
         return Given(
             job=self.job,
-            static=self.static.product,
+            static=self.static,
             setup=self.setup.product,
             response=self.greens.product.contact,
             rolling=self.rotating.product,

@@ -16,7 +16,9 @@ from tireroad.fem.static.carried_over import carried_over
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
+from tireroad.runs.files.folder import make_folder
 from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.build.cavity import AirColumn
 from tireroad.runs.stages.build.loop import Forces, forces
 from tireroad.runs.stages.build.setup import Setup
@@ -25,8 +27,9 @@ from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.modes import Fields, ModesStage, Motions
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
-from tireroad.runs.stages.stage import Computed, Done, Part, Shared
+from tireroad.runs.stages.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
+from tireroad.runs.stages.stored.obtained import obtained
 
 UP_TO_GREENS: tuple[type[Part], ...] = (
     StaticStage,
@@ -40,6 +43,7 @@ UP_TO_GREENS: tuple[type[Part], ...] = (
     GreensStage,
 )
 FEWER = 1 / np.sqrt(2)  # of the highest mode: up to where the companion keeps states
+COARSER = "coarser"  # the folder in the run's own where its coarser companion's stages are, until they are of no use
 LEAST = (8, 4)  # elements around and along that a companion has
 
 
@@ -49,7 +53,7 @@ class Given:
     and rolling modes, and the first `steps` of `step` s of its loop, by a `scheme`, that companions repeat."""
 
     job: Job
-    static: StaticState
+    static: Done[StaticState]
     setup: ContactSetup
     response: Response
     rolling: RollingModes
@@ -60,7 +64,7 @@ class Given:
     @cached_property
     def settled(self) -> ContactSetup:
         """The patch in its static state."""
-        return settled(self.job, self.setup, self.response, self.static.force)
+        return settled(self.job, self.setup, self.response, self.static.product.force)
 
     @cached_property
     def longer(self) -> Forces:
@@ -123,7 +127,7 @@ def fewer_points(given: Given) -> Forces:
         contact = replace(job.scene.contact, brush_stiffness=4 * brush)
         job = replace(job, scene=replace(job.scene, contact=contact))
     setup = replace(given.setup, patch=thinned(patch))
-    setup = settled(job, setup, given.response, given.static.force)
+    setup = settled(job, setup, given.response, given.static.product.force)
     return given.of(job).repeated(setup, given.response)
 
 
@@ -136,32 +140,48 @@ def fewer_modes(given: Given) -> Forces:
     return given.repeated(given.settled, kept)
 
 
+@dataclass(frozen=True, kw_only=True)
+class CoarserStatic(StaticStage):
+    """The coarser mesh's static state by a few steps from that of the `run`; from the beginning at a deflection,
+    which counts from its own first touch, and where those steps find no balance."""
+
+    run: Job
+    near: Done[StaticState]
+
+    def inputs(self) -> dict:
+        """Of any static state, and where it starts."""
+        return super().inputs() | {"near": self.near.key}
+
+    def compute(self, record: Record) -> StaticState:
+        """Collective."""
+        wanted = self.job.scene.static
+        if wanted.deflection is None:
+            given = self.near.product, self.run.tire, self.job.tire, wanted.load
+            if (found := carried_over(*given)) is not None:
+                return found
+        return super().compute(record)
+
+
 def coarser_mesh(given: Given) -> Forces:
     """Elements of twice the size, from the static state on. Collective."""
-    job = coarser_job(given.job)
-    near, done = _from_the_run_s(given, job), dict[str, Done]()
-    if near is not None:
-        done["static"] = Done("", lambda: near)
+    job, done = coarser_job(given.job), dict[str, Done]()
+    on_root(job.comm, lambda: make_folder(job.directory))
     for kind in UP_TO_GREENS:
-        found = None if kind.name in done else _made(job, kind, done)
-        if found is not None:
+        part = (
+            CoarserStatic(job=job, run=given.job, near=given.static)
+            if kind is StaticStage
+            else kind.taken(job, done)
+        )
+        if (found := _made(job, kind, part, done)) is not None:
             done[kind.name] = found
     response, state = done["greens"].product.contact, done["static"].product
     setup = settled(job, done["setup"].product, response, state.force)
     return given.of(job).repeated(setup, response)
 
 
-def _from_the_run_s(given: Given, job: Job) -> StaticState | None:
-    """The coarser mesh's static state by a few steps from the run's; None where it has to be found from the
-    beginning: at a deflection, which counts from its own first touch. Collective."""
-    wanted = job.scene.static
-    if wanted.deflection is not None:
-        return None
-    return carried_over(given.static, given.job.tire, job.tire, wanted.load)
-
-
 def coarser_job(job: Job) -> Job:
-    """The same scene on half the elements around, and bead to bead where the scene says how many.
+    """The same scene on half the elements around, and bead to bead where the scene says how many; its stages are
+    shared as those of any run, in a folder beside the run's own.
 
     InputError where the mesh is too coarse to be halved.
     """
@@ -178,17 +198,15 @@ def coarser_job(job: Job) -> Job:
         tire=coarse,
         static=replace(static, error_estimate=False),
     )
-    return Job(scene, job.directory, job.comm)
+    return replace(job, scene=scene, directory=job.directory / COARSER, found={})
 
 
-def _made(job: Job, kind: type[Part], done: dict[str, Done]) -> Done | None:
-    """A part of the chain in memory, no file read or written; None where it adds nothing. Collective."""
+def _made(job: Job, kind: type[Part], part: Part | None, done: dict[str, Done]) -> Done | None:
+    """What a part of the chain adds to what is done; None where it adds nothing. Collective."""
     if kind is RotatingStage and not job.speed:
         return RotatingStage.instead(job, done)
-    part = kind.taken(job, done)
-    if isinstance(part, Computed):
-        product = part.compute(Record())
-        return Done("", lambda: product)
+    if isinstance(part, Stage):
+        return obtained(part).done
     return Done("", part.make) if isinstance(part, Shared) else None
 
 

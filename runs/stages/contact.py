@@ -35,6 +35,7 @@ from tireroad.runs.stages.build.watch import Watch
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Done, Stage
+from tireroad.runs.stages.stored import road_file
 from tireroad.runs.stages.stored.contact_file import (
     ContactFile,
     ContactHistory,
@@ -131,6 +132,7 @@ class ContactStage(Stage[ContactHistory]):
             file.finish()
         _describe(record, totals, loop.solver, chosen, chosen.steps - done)
         pattern.describe(record, setup)
+        road_file.describe(record, setup)
         if chosen.scheme != "convolution":
             work = works(chosen.scheme, totals.work, driven if self.job.scene.force else None)
             given = self.rotating.product, response, loop.tire.snapshot(), work

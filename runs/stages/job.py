@@ -14,6 +14,7 @@ from tireroad.fem.axle import Axle
 from tireroad.fem.model import TireModel
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files import store
+from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.axle import axle_of
@@ -25,14 +26,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Job:
-    """The scene, where its results go, and the processes that compute them; `fresh`: reuse nothing; `cache`: a
-    folder of finished stages shared with other runs (runs.files.cache), the user's own where it is None."""
+    """The scene, where its results go, and the processes that compute them; `fresh`: reuse nothing; `cache`:
+    finished stages shared with other runs, by default none."""
 
     scene: Scene
     directory: Path
     comm: MPI.Comm
     fresh: bool = False
-    cache: Path | None = None
+    cache: Cache = NO_CACHE
     found: dict[str, float] = field(default_factory=dict)
 
     @property

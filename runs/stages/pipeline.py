@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from mpi4py import MPI
 
@@ -17,8 +15,7 @@ from tireroad.fem.static.state import StaticState
 from tireroad.greens.coupling import Wheel
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
-from tireroad.runs.files import store
-from tireroad.runs.files.cache import Cache
+from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.folder import Summary
@@ -34,8 +31,8 @@ from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.parts import PARTS
-from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Done, Part, Shared, Stage
+from tireroad.runs.stages.stored.obtained import obtained
 
 
 @dataclass(frozen=True)
@@ -89,11 +86,11 @@ def run_scene(
     until: str | None,
     fresh: bool,
     petsc_options: list[str],
-    cache: Path | None = None,
+    cache: Cache = NO_CACHE,
 ) -> Finished:
     """Run the stages a scene needs into the directory; what they left in memory. Collective.
 
-    `cache`: a folder of stages shared with other runs, instead of the user's (runs.files.cache).
+    `cache`: finished stages shared with other runs, by default none.
     """
     job = Job(scene, directory, comm, fresh, cache)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
@@ -144,49 +141,24 @@ def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done |
 
 
 def _run(stage: Stage, summary: Summary) -> Done:
-    """Reuse the stage's file, of this folder or of the shared cache, or compute it. Collective."""
+    """The stage's product, with a word on where it comes from and what it cost. Collective."""
     job, name = stage.job, stage.name
     began = time.perf_counter()
-    key, path = store.wanted_hash(name, stage.inputs()), job.path(name)
-    with ExitStack() as claim:
-        reason, source, known = on_root(job.comm, lambda: _looked_up(job, name, key, claim))
-        if not reason:
-            observe.say(f"{name:9s} reused: computed from the same inputs {source}")
-            on_root(job.comm, lambda: summary.record(name, "reused", reason="same inputs", **known))
-            return Done(key, stage.stored)
-        if reason != "absent":
-            observe.say(f"{name:9s} computed anew: {path.name} is there, but {reason}")
-        record = Record()
-        product = stage.produce(key, record)
-        figures = vars(record)
-        on_root(job.comm, lambda: Cache(job.cache).keep(name, key, path, figures))
+    found = obtained(stage)
+    record = found.record
+    if record is None:
+        observe.say(f"{name:9s} reused: computed from the same inputs {found.reused}")
+        known = {"reason": "same inputs", **found.known}
+        on_root(job.comm, lambda: summary.record(name, "reused", **known))
+        return found.done
     record.indicators["largest memory of a process so far"] = (_peak(job.comm), "GB")
     seconds = time.perf_counter() - began
     for text in record.warnings:
         observe.warn(f"{name}: {text}")
     observe.say(f"{name:9s} done in {seconds:.1f} s: {record.line()}")
+    figures = vars(record)
     on_root(job.comm, lambda: summary.record(name, "computed", seconds=seconds, **figures))
-    return Done(key, lambda: product)
-
-
-def _looked_up(job: Job, name: str, key: str, claim: ExitStack) -> tuple[str, str, dict[str, Any]]:
-    """(why the stage has to be computed, "" when not; by which run it was; figures that this folder's
-    summary lacks). Root process only.
-
-    What has to be computed is claimed: another run that wants the same waits until it is in the cache.
-    """
-    if job.fresh:
-        return "absent", "", {}
-    path = job.path(name)
-    reason = store.why_not(path, key, name)
-    if not reason:
-        return "", "before", {}
-    cache = Cache(job.cache)
-    claim.enter_context(cache.claimed(name, key))
-    figures = cache.fetch(name, key, path)
-    if figures is None:
-        return reason, "", {}
-    return "", "by another run", figures
+    return found.done
 
 
 def _peak(comm: MPI.Comm) -> float:

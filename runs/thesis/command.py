@@ -11,7 +11,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.files.cache import shared_folder, sharing
+from tireroad.runs.files.cache import Cache
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.thesis import figures, output
@@ -40,15 +40,15 @@ def reproduce(names: Sequence[str], directory: Path, comm: MPI.Comm) -> None:
     """
     wanted = chosen(names, known())
     on_root(comm, lambda: _made(directory))
-    scenes, entries, began = Scenes(directory, comm), [], time.perf_counter()
-    with sharing(shared_folder(directory / "cache")):
-        for one in wanted:
-            entries.append(_entry(one, scenes))
-            page = on_root(
-                comm,
-                lambda: output.write(entries, directory, time.perf_counter() - began, comm.size),
-            )
-            observe.say(f"{one.name:12s} {entries[-1].verdict:20s} {entries[-1].seconds:7.1f} s")
+    cache = Cache.of_user().of_family(directory / "cache")
+    scenes, entries, began = Scenes(directory, comm, cache), [], time.perf_counter()
+    for one in wanted:
+        entries.append(_entry(one, scenes))
+        page = on_root(
+            comm,
+            lambda: output.write(entries, directory, time.perf_counter() - began, comm.size),
+        )
+        observe.say(f"{one.name:12s} {entries[-1].verdict:20s} {entries[-1].seconds:7.1f} s")
     observe.say(
         f"{page} and reproduce.json, reproduce.csv beside it: {time.perf_counter() - began:.1f} s"
     )

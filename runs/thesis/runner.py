@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
+from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.folder import claimed
 from tireroad.runs.process import mpi, observe
 from tireroad.runs.scene.load import load
@@ -23,10 +24,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Scenes:
-    """Runs scenes of `runs/thesis/scenes` into `directory`/runs on the processes of `comm`."""
+    """Runs scenes of `runs/thesis/scenes` into `directory`/runs on the processes of `comm`, stages shared through
+    a `cache`."""
 
     directory: Path
     comm: MPI.Comm
+    cache: Cache = NO_CACHE
     _found: dict[str, Any] = field(default_factory=dict)
 
     def load(self, name: str, *settings: str) -> Scene:
@@ -44,7 +47,15 @@ class Scenes:
                 self.comm, lambda: stack.enter_context(claimed(folder, scene.name)) and None
             )
             stack.enter_context(observe.quiet())
-            return run_scene(scene, folder, self.comm, until=until, fresh=False, petsc_options=[])
+            return run_scene(
+                scene,
+                folder,
+                self.comm,
+                until=until,
+                fresh=False,
+                petsc_options=[],
+                cache=self.cache,
+            )
 
     def once(self, name: str, make: Callable[[], T]) -> T:
         """What figures share beside stages: made at the first time, kept in memory by name. Collective."""

@@ -82,7 +82,7 @@ def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
     _, done = whole
     given = Given(
         job=done.job,
-        static=done.static,
+        static=done.done["static"],
         setup=done.setup,
         response=done.greens.contact,
         rolling=done.rolling,

@@ -10,6 +10,7 @@ import pytest
 from tireroad.runs.cli import main
 from tireroad.runs.files import cache as shared
 from tireroad.runs.files.cache import Cache
+from tireroad.runs.stages import companions
 
 SCENE = """
 [tire]
@@ -42,13 +43,13 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def run(folder: Path, name: str, *overrides: str) -> str:
-    """The log of a run into folder/name."""
+def run(folder: Path, name: str, *overrides: str, up_to: str = "contact") -> str:
+    """The log of a run into folder/name, up to a stage."""
     (folder / "scene.toml").write_text(SCENE)
     changed = [part for one in overrides for part in ("--set", one)]
     out = folder / name
     assert (
-        main(["run", str(folder / "scene.toml"), "--out", str(out), "--until", "contact", *changed])
+        main(["run", str(folder / "scene.toml"), "--out", str(out), "--until", up_to, *changed])
         == 0
     )
     return (out / "log.txt").read_text()
@@ -61,7 +62,7 @@ def test_another_road_takes_what_the_first_found(home: Path, capsys) -> None:
     for stage in ("static", "modes", "rotating"):
         assert f"{stage:9s} reused: computed from the same inputs by another run" in second
     assert "contact   done" in second
-    kept = {one.stage for one in Cache().entries()}
+    kept = {one.stage for one in Cache.of_user().entries()}
     assert {"static", "modes", "rotating"} <= kept and "contact" not in kept
     with h5py.File(home / "one" / "modes.h5") as one, h5py.File(home / "two" / "modes.h5") as two:
         np.testing.assert_array_equal(one["frequency"][:], two["frequency"][:])
@@ -72,21 +73,49 @@ def test_another_road_takes_what_the_first_found(home: Path, capsys) -> None:
     assert main(["cache", "--clear", "--unused-for", "1"]) == 0
     assert "0 stages removed" in capsys.readouterr().out
     assert main(["cache", "--clear"]) == 0
-    assert not Cache().entries() and (home / "two" / "static.h5").is_file()
+    assert not Cache.of_user().entries() and (home / "two" / "static.h5").is_file()
+
+
+def test_another_road_takes_the_coarser_companion_of_the_first(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only contact runs are new; the error bars are those of a run that computed all by itself."""
+    sure = (
+        "accuracy.estimate=true",
+        "tire.segments=16",
+        "tire.elements_arc=8",
+        "contact.points={dx=0.01,dy=0.01}",
+        "road.kind=sine",
+    )
+    until = (*sure, "road.amplitude=1.2e-4")
+    run(home, "one", *sure, "road.amplitude=1e-4", up_to="accuracy")
+    assert [one.stage for one in Cache.of_user().entries()].count("static") == 2
+    assert not (home / "one" / "coarser").exists()
+    with monkeypatch.context() as patched:
+        patched.setattr(companions, "carried_over", None)  # would fail if it were called
+        second = run(home, "two", *until, up_to="accuracy")
+    assert "greens    reused" in second and "not estimated" not in second
+    monkeypatch.setenv("TIREROAD_CACHE", "off")
+    run(home, "alone", *until, up_to="accuracy")
+    for force in ("contact_force", "axle_force"):
+        found = []
+        for name in ("two", "alone"):
+            with h5py.File(home / name / "accuracy.h5") as file:
+                found.append(file[force]["mesh"]["deviation"][:])
+        assert found[0][2] == pytest.approx(found[1][2], rel=1e-9) and found[0][2] > 0
 
 
 def test_the_longest_unused_goes_first(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shared.share_with_later_runs()
     monkeypatch.setattr(shared, "LARGEST", 2500)
     source = home / "stage.h5"
     for number, name in enumerate("abc"):
         source.write_bytes(b"x" * 1000)
-        Cache().keep("static", name, source, {})
-        figures = Cache().place("static", name).with_suffix(".json")
+        Cache.of_user().keep("static", name, source, {})
+        figures = Cache.of_user().place("static", name).with_suffix(".json")
         if figures.exists():
             os.utime(figures, (number, number))
         source.unlink()
-    assert [one.path.name for one in Cache().entries()] == ["static-b.h5", "static-c.h5"]
+    assert [one.path.name for one in Cache.of_user().entries()] == ["static-b.h5", "static-c.h5"]
 
 
 def test_a_cache_that_cannot_be_written_is_none(home: Path) -> None:
@@ -96,5 +125,4 @@ def test_a_cache_that_cannot_be_written_is_none(home: Path) -> None:
 
 def test_off_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TIREROAD_CACHE", "off")
-    shared.share_with_later_runs()
-    assert Cache().folder is None and Cache().entries() == []
+    assert Cache.of_user().folder is None and Cache.of_user().entries() == []

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 from mpi4py import MPI
 
+from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.process import observe
 from tireroad.runs.scene.resolved import dumps
@@ -156,23 +157,31 @@ class Driven(Recorded):
     done: Finished
 
 
-def driven(scene: Scene, folder: Path, until: str) -> Driven:
-    """Run a scene, without a word. Collective."""
+def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> Driven:
+    """Run a scene, without a word; stages are shared through a `cache`. Collective."""
     folder.mkdir(parents=True, exist_ok=True)
     with observe.quiet():
-        done = run_scene(scene, folder, MPI.COMM_WORLD, until=until, fresh=False, petsc_options=[])
+        done = run_scene(
+            scene,
+            folder,
+            MPI.COMM_WORLD,
+            until=until,
+            fresh=False,
+            petsc_options=[],
+            cache=cache,
+        )
     with h5py.File(folder / "contact.h5") as file:
         forces = {name: file[name][:] for name in NAMES}
     return Driven(forces, done.done["contact"].product.step, done)
 
 
-def recorded(scene: Scene, folder: Path, kept: Path) -> Recorded:
+def recorded(scene: Scene, folder: Path, kept: Path, cache: Cache = NO_CACHE) -> Recorded:
     """The forces of a run in the folder, from the folder `kept` where a bench left those of the same scene: by
     whatever state of the program, until they are removed there. On one process."""
     bare = replace(scene, accuracy=Accuracy(estimate=False))
     file = kept / f"{hashlib.sha256(dumps(bare).encode()).hexdigest()[:16]}.npz"
     if not file.exists():
-        run = driven(bare, folder, "contact")
+        run = driven(bare, folder, "contact", cache)
         kept.mkdir(parents=True, exist_ok=True)
         with replacing(file) as part, part.open("wb") as opened:
             forces = [run.forces[name] for name in NAMES]

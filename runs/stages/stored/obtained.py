@@ -1,0 +1,61 @@
+"""The product of a stage: of its own file, of the shared cache, or computed."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from typing import Any
+
+from tireroad.runs.files import store
+from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.stage import Done, Stage
+
+
+@dataclass(frozen=True, kw_only=True)
+class Obtained:
+    """What is `done`, with the `record` of the computation; of a product that was `reused`, from where, and the
+    figures `known` of it from elsewhere."""
+
+    done: Done
+    record: Record | None = None
+    reused: str = ""
+    known: dict[str, Any] = field(default_factory=dict)
+
+
+def obtained(stage: Stage) -> Obtained:
+    """Reuse the stage's file, of its folder or of the shared cache, or compute it. Collective."""
+    job, name = stage.job, stage.name
+    key, path = store.wanted_hash(name, stage.inputs()), job.path(name)
+    with ExitStack() as claim:
+        reason, source, known = on_root(job.comm, lambda: _looked_up(stage, key, claim))
+        if not reason:
+            return Obtained(done=Done(key, stage.stored), reused=source, known=known)
+        if reason != "absent":
+            observe.say(f"{name:9s} computed anew: {path.name} is there, but {reason}")
+        record = Record()
+        product = stage.produce(key, record)
+        figures = vars(record).copy()
+        on_root(job.comm, lambda: job.cache.keep(name, key, path, figures))
+    return Obtained(done=Done(key, lambda: product), record=record)
+
+
+def _looked_up(stage: Stage, key: str, claim: ExitStack) -> tuple[str, str, dict[str, Any]]:
+    """(why the stage has to be computed, "" when not; by which run it was; figures that its folder's
+    summary lacks). Root process only.
+
+    What has to be computed is claimed: another run that wants the same waits until it is in the cache.
+    """
+    job, name = stage.job, stage.name
+    if job.fresh:
+        return "absent", "", {}
+    path = job.path(name)
+    reason = store.why_not(path, key, name)
+    if not reason:
+        return "", "before", {}
+    claim.enter_context(job.cache.claimed(name, key))
+    figures = job.cache.fetch(name, key, path)
+    if figures is None:
+        return reason, "", {}
+    return "", "by another run", figures
