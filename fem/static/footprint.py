@@ -51,35 +51,26 @@ def _edge_rule(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def footprint(
-    shape: tuple[int, int],
-    positions: np.ndarray,
-    pressure: np.ndarray,
-    gap: np.ndarray,
-    area: np.ndarray,
+    shape: tuple[int, int], positions: np.ndarray, pressure: np.ndarray, gap: np.ndarray
 ) -> Footprint:
     """Extent of the contact on a face of `shape` (around, along); arrays (s,), positions (s, 3).
 
     Where a smooth body lets go of a plane, the gap opens as d^(3/2) (1 + c d) of the distance d to the edge (Johnson,
     Contact Mechanics, 1985, 5.3), so gap^(2/3) through the next three nodes of a line tells where it begins. That is the
-    edge, up to half a node's spacing inside the last node that presses, which stands for that much.
+    edge, up to half a node's spacing inside the last node that presses, which stands for that much. The area is the
+    mean of those that the lines around and the lines across cover.
     """
     inside = (pressure > 0).reshape(shape)
     if not inside.any():
         return Footprint(0.0, 0.0, 0.0)
     start = _opposite(inside)
-    grid, opening, shadow, inside = (
-        np.roll(
-            values.reshape(*shape, -1).squeeze(-1) if k else values.reshape(*shape, 3), -start, 0
-        )
-        for k, values in enumerate((positions, np.maximum(gap, 0.0), area, inside))
-    )
-    ring, arc = (
-        _Lines.of(grid, opening, inside),
-        _Lines.of(grid.swapaxes(0, 1), opening.T, inside.T),
-    )
-    # Lines across an end of the contact have a node of it at most, whose place says nothing of that end.
-    length, width = np.ptp(ring.edge[:, 0]), np.ptp(arc.edge[:, 1])
-    return Footprint(float(length), float(width), float((shadow * ring.cover * arc.cover.T).sum()))
+    grid, opening = positions.reshape(*shape, 3), np.maximum(gap, 0.0).reshape(shape)
+    grid, opening, inside = (np.roll(values, -start, 0) for values in (grid, opening, inside))
+    ring = _Lines.of(grid, opening, inside, axis=0)
+    arc = _Lines.of(grid.swapaxes(0, 1), opening.T, inside.T, axis=1)
+    (x0, x1), (y0, y1) = ring.ends, arc.ends
+    area = (ring.area(arc.ends) + arc.area(ring.ends)) / 2
+    return Footprint(x1 - x0, y1 - y0, area)
 
 
 def _opposite(inside: np.ndarray) -> int:
@@ -92,55 +83,65 @@ def _opposite(inside: np.ndarray) -> int:
 
 @dataclass(frozen=True)
 class _Lines:
-    """Contact along the lines of an axis of the face: `edge` (k, 3) m its ends, `cover` (n, m) the covered share of
-    what each node stands for."""
+    """Contact along the k lines of the face in one direction that have some: `ends` m in that direction, of each line
+    the length `chord` (k,) m and its `place` (k,) m in the other direction."""
 
-    edge: np.ndarray
-    cover: np.ndarray
+    ends: tuple[float, float]
+    chord: np.ndarray
+    place: np.ndarray
 
     @classmethod
-    def of(cls, points: np.ndarray, gap: np.ndarray, inside: np.ndarray) -> _Lines:
-        """Along the first axis of points (n, m, 3) m with a gap (n, m) m, `inside` (n, m) where they press."""
-        share, kept = (inside[:-1] & inside[1:]).astype(float), inside.copy()
+    def of(cls, points: np.ndarray, gap: np.ndarray, inside: np.ndarray, axis: int) -> _Lines:
+        """Along the first index of points (n, m, 3) m with a gap (n, m) m, `inside` (n, m) where they press; `axis` 0
+        where that is along x."""
+        share = (inside[:-1] & inside[1:]).astype(float)
         edge = []
         for forward in (True, False):
             turn = slice(None, None, 1 if forward else -1)
             for last, line in zip(*np.nonzero(inside[turn][:-1] & ~inside[turn][1:]), strict=True):
-                at = _Edge.of(
-                    points[turn][:, line], gap[turn][:, line], inside[turn][:, line], last
-                )
-                edge.append(at.place)
-                segment, node = (last, last) if forward else (-1 - last, -1 - last)
-                if at.part >= 0:
-                    share[segment, line] = at.part
-                else:  # the last node that presses is itself beyond the edge
-                    share[segment - 1 if forward else segment + 1, line] += at.part
-                    kept[node, line] = False
-        return cls(np.array(edge), _cover(share, kept))
+                here = points[turn][:, line], gap[turn][:, line], inside[turn][:, line]
+                place, part = _edge(*here, last)
+                edge.append(place[axis])
+                # The last node that presses may itself be beyond the edge: then the segment before it is shorter.
+                share[turn][last if part >= 0 else last - 1, line] += part
+        length = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=2)
+        some = inside.any(axis=0)
+        across = (
+            np.where(inside, points[..., 1 - axis], 0.0).sum(axis=0)[some]
+            / inside.sum(axis=0)[some]
+        )
+        order = np.argsort(across)
+        chord = np.maximum((share * length).sum(axis=0), 0.0)[some]
+        return cls((float(min(edge)), float(max(edge))), chord[order], across[order])
+
+    def area(self, between: tuple[float, float]) -> float:
+        """Area (m2) of a contact that ends, across the lines, at the two places `between` m, round as an ellipse beyond
+        the outermost lines."""
+        low, high = between
+        held = (self.place >= low) & (self.place <= high)
+        chord, place = self.chord[held], self.place[held]
+        if not len(place):
+            return float(np.pi / 4 * self.chord.max() * (high - low))
+        round_ = np.pi / 4 if len(place) == 1 else 2 / 3
+        ends = chord[0] * (place[0] - low) + chord[-1] * (high - place[-1])
+        return float(np.trapz(chord, place) + round_ * ends)
 
 
-@dataclass(frozen=True)
-class _Edge:
-    """The `place` (3,) m of a contact's end on a line, as a `part` of the segment beyond the last node that presses;
-    below 0 of the one before it."""
-
-    place: np.ndarray
-    part: float
-
-    @classmethod
-    def of(cls, points: np.ndarray, gap: np.ndarray, inside: np.ndarray, last: int) -> _Edge:
-        """From the nodes (n, 3) of a line of which `last` presses and the next does not."""
-        free = last + 1 + np.arange(_NODES)
-        free = free[free < len(points)]
-        free = free[~np.logical_or.accumulate(inside[free])]
-        step = np.linalg.norm(np.diff(points[max(last - 1, 0) : free[-1] + 1, :2], axis=0), axis=1)
-        before = float(step[0]) if last > 0 else 0.0
-        away = np.cumsum(step[1 if last > 0 else 0 :])
-        least = -before / 2 if last > 0 and inside[last - 1] else 0.0
-        at = float(np.clip(_begins(away, gap[free] ** (2 / 3)), least, away[0]))
-        other, part = (last + 1, at / float(away[0])) if at >= 0 else (last - 1, at / before)
-        place = points[last] + abs(part) * (points[other] - points[last])
-        return cls(place, part)
+def _edge(
+    points: np.ndarray, gap: np.ndarray, inside: np.ndarray, last: int
+) -> tuple[np.ndarray, float]:
+    """The place (3,) m where a contact ends on a line of nodes (n, 3), of which `last` presses and the next does not, and
+    the part of the segment beyond that node; below 0 of the one before it."""
+    free = last + 1 + np.arange(_NODES)
+    free = free[free < len(points)]
+    free = free[~np.logical_or.accumulate(inside[free])]
+    step = np.linalg.norm(np.diff(points[max(last - 1, 0) : free[-1] + 1, :2], axis=0), axis=1)
+    before = float(step[0]) if last > 0 else 0.0
+    away = np.cumsum(step[1 if last > 0 else 0 :])
+    least = -before / 2 if last > 0 and inside[last - 1] else 0.0
+    at = float(np.clip(_begins(away, gap[free] ** (2 / 3)), least, away[0]))
+    other, part = (last + 1, at / float(away[0])) if at >= 0 else (last - 1, at / before)
+    return points[last] + abs(part) * (points[other] - points[last]), part
 
 
 _NODES = 3  # beyond the contact, that tell where it ends
@@ -160,13 +161,3 @@ def _begins(away: np.ndarray, rise: np.ndarray) -> float:
     if slope <= 0:
         return 0.0
     return float(away[0] - 2 * rise[0] / (slope + np.sqrt(square)))
-
-
-def _cover(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Covered share (n, m) of each node's two half segments, of those of the segments (n - 1, m)."""
-    both = np.pad(share, ((1, 1), (0, 0)))
-    covered = (
-        np.where(inside, np.minimum(1, 2 * side), np.maximum(0, 2 * side - 1))
-        for side in (both[:-1], both[1:])
-    )
-    return np.add(*covered) / 2
