@@ -9,11 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from tireroad.contact.chatter import choose, oscillation
+from tireroad.contact.error_bars import orders, share
+from tireroad.contact.respaced import halved, thinned
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.thinned import thinned
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.carried_over import carried_over
 from tireroad.fem.static.state import StaticState
+from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.folder import make_folder
@@ -43,6 +45,7 @@ UP_TO_GREENS: tuple[type[Part], ...] = (
     GreensStage,
 )
 FEWER = 1 / np.sqrt(2)  # of the highest mode: up to where the companion keeps states
+ACROSS = 8  # points along the footprint and across it, below which twice their spacing tells nothing of them
 COARSER = "coarser"  # the folder in the run's own where its coarser companion's stages are, until they are of no use
 LEAST = (8, 4)  # elements around and along that a companion has
 
@@ -115,20 +118,38 @@ def longer_step(given: Given) -> Forces:
     return given.longer
 
 
-def fewer_points(given: Given) -> Forces:
-    """Every other point of the grid both ways. Collective."""
+def other_points(given: Given) -> Forces:
+    """Every other point of the grid both ways, or, of a footprint that holds few, twice as many. Collective."""
     job, patch = given.job, given.setup.patch
     if patch.places is None:
         raise InputError(
             "the points are nodes of the mesh: take a grid, contact.points = { dx, dy }"
         )
+    coarser = points_ratio(given) > 1
     brush = job.scene.contact.brush_stiffness
-    if brush is not None:  # of a point that stands for four
-        contact = replace(job.scene.contact, brush_stiffness=4 * brush)
+    if brush is not None:  # of a point that stands for four, or for a quarter
+        contact = replace(job.scene.contact, brush_stiffness=brush * (4 if coarser else 0.25))
         job = replace(job, scene=replace(job.scene, contact=contact))
-    setup = replace(given.setup, patch=thinned(patch))
+    if coarser:
+        patch = thinned(patch)
+    else:
+        surface = TreadSurface(job.tire.lattice, given.static.product.positions)
+        patch = halved(patch, surface, given.static.product.road_height)
+    setup = replace(given.setup, patch=patch)
     setup = settled(job, setup, given.response, given.static.product.force)
     return given.of(job).repeated(setup, given.response)
+
+
+def points_ratio(given: Given) -> float:
+    """Spacing of the companion's points over the run's. The pressure of a footprint some points wide changes from spacing
+    to spacing by where they happen to lie (cobblestones, 17 mm wide, points 16, 11.3, 8, 5.7 and 4 mm apart: mean
+    547, 515, 521, 548, 545 N): there only finer points tell, and those that touch are few."""
+    patch = given.settled.patch
+    touching = patch.points[patch.force > 0, :2]
+    if patch.places is None or not len(touching):
+        return 2.0
+    count = np.rint(np.ptp(touching, axis=0) / patch.places.spacing) + 1
+    return 2.0 if count.min() >= ACROSS else 0.5
 
 
 def fewer_modes(given: Given) -> Forces:
@@ -212,18 +233,22 @@ def _made(job: Job, kind: type[Part], part: Part | None, done: dict[str, Done]) 
 
 COMPANIONS: dict[str, Callable[[Given], Forces]] = {
     "step": longer_step,
-    "points": fewer_points,
+    "points": other_points,
     "modes": fewer_modes,
     "mesh": coarser_mesh,
 }
-"""By the cause of the error that each is for (contact.error_bars.SHARES)."""
+"""By the cause of the error that each is for (contact.error_bars.CAUSES)."""
 
 
-def companion(cause: str, given: Given) -> tuple[Forces, Forces | None]:
-    """The forces of a companion, and those they are compared with (None: the run's own), without a word.
+def companion(cause: str, given: Given) -> tuple[Forces, Forces | None, float]:
+    """The forces of a companion, those they are compared with (None: the run's own), and the share of their
+    difference that is the error, without a word.
 
     Collective; InputError or ConvergenceError where there is none.
     """
     with observe.quiet():
         beside = None if cause == "step" else given.base
-        return COMPANIONS[cause](given), beside
+        found = COMPANIONS[cause](given)
+    ratio = {"step": 2.0, "points": points_ratio(given), "modes": 1 / FEWER, "mesh": 2.0}[cause]
+    order = orders(given.job.tire.section.order)[cause]
+    return found, beside, share(ratio, order)

@@ -7,10 +7,10 @@ from tireroad.contact import model
 from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle
 from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
+from tireroad.contact.respaced import halved, thinned
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.usual_set import UsualSet
-from tireroad.contact.thinned import thinned
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.tread_surface import TreadSurface
@@ -149,6 +149,29 @@ def test_every_other_point_is_a_grid_of_twice_the_pitch(tread) -> None:
     assert coarse.area == pytest.approx(6.4e-5)
     near, other = coarse.points[~coarse.edge], wanted.points[~wanted.edge]
     assert near[np.lexsort(near.T)] == pytest.approx(other[np.lexsort(other.T)], abs=1e-9)
+
+
+def test_four_points_in_each_rectangle_are_a_grid_of_half_the_pitch(tread) -> None:
+    """They stand for what the one did: their weights' mean is its own, and they lie on the surface."""
+    _, positions, road = tread
+    _, surface, coarse = patches(tread, 3e-3, 0.008)
+    fine = halved(coarse, surface, road)
+    i, j = np.divmod(fine.places.place, fine.places.shape[1])
+    places = np.stack([i, j], axis=1) * fine.places.spacing
+    assert np.ptp(fine.points[:, :2] - places, axis=0) == pytest.approx(0.0, abs=1e-9)
+    assert fine.line.tolist() == j.tolist() and fine.area == pytest.approx(1.6e-5)
+    inner = coarse.points[~coarse.edge]
+    near = np.abs(fine.points[:, None, :2] - inner[:, :2]).max(axis=2) < 0.0041
+    assert (near.sum(axis=0) == 4).all()
+    assert np.asarray(fine.weights.sum(axis=1)) == pytest.approx(1.0)
+    mean = near.T @ fine.weights / 4
+    read, wanted = (
+        mean @ positions[fine.index],
+        coarse.weights[~coarse.edge] @ positions[coarse.index],
+    )
+    assert np.abs(read - wanted).max() < 2e-5
+    ring, arc, _ = surface.locate(*fine.points[:, :2].T)
+    assert fine.points[:, 2] == pytest.approx(surface.at(ring, arc)[:, 2], abs=1e-12)
 
 
 def test_a_grid_needs_a_tread_and_a_sane_pitch(tread) -> None:

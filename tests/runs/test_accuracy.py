@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.error_bars import SHARES
+from tireroad.contact.error_bars import CAUSES
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.companions import Given, coarser_job, companion
@@ -100,10 +100,10 @@ def test_bars_are_in_the_summary_and_beside_the_bands(whole):
     folder, _ = whole
     stages = json.loads((folder / "summary.json").read_text())["stages"]
     told = stages["accuracy"]
-    assert set(told["cost"]) == set(SHARES)
+    assert set(told["cost"]) == set(CAUSES)
     assert told["headline"]["error of the mean contact force"]["value"] > 0
     with h5py.File(folder / "accuracy.h5") as file:
-        assert set(file["contact_force"]) == set(SHARES)
+        assert set(file["contact_force"]) == set(CAUSES)
     with h5py.File(folder / "spectra.h5") as file:
         shape = file["third_octave/level"].shape
         assert file["third_octave/level_error"].shape == shape
