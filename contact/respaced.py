@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -37,38 +38,35 @@ def thinned(patch: Patch) -> Patch:
     )
 
 
-def halved(patch: Patch, surface: Surface, road_height: float) -> Patch:
-    """Four points in the rectangle of each of before, on the same nodes; not yet settled.
+def halved(patch: Patch, surface: Surface, road_height: float, reach: float) -> Patch:
+    """Points at multiples of half the spacing, those of before among them, on the same nodes; not yet settled.
 
-    For a patch on a grid, as `thinned`; `surface` and `road_height` (m) are those it was made from. Outermost points
+    For a patch on a grid, as `thinned`; `surface`, `road_height` and `reach` (m) are those it was made from. Points
     beyond those of before, where no road is prepared, or whose rectangles reach beyond the nodes are left out.
     """
-    places = patch.places
-    assert places is not None
-    spacing = places.spacing[0] / 2, places.spacing[1] / 2
-    base = np.rint(patch.points[:, :2] / places.spacing).astype(int)
-    quarters = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
-    number = (2 * base[:, None] + quarters).reshape(-1, 2)
-    x, y = ((number - 0.5) * spacing).T
+    assert patch.places is not None
+    along, across = (step / 2 for step in patch.places.spacing)
+    number = 2 * np.rint(patch.points[:, :2] / patch.places.spacing).astype(int)
+    first, last = number.min(axis=0), number.max(axis=0)
+    steps = np.array(list(product((-1, 0, 1), repeat=2)))
+    number = np.unique((number[:, None] + steps).reshape(-1, 2).clip(first, last), axis=0)
+    x, y = (number * (along, across)).T
     ring, arc, found = surface.locate(x, y)
-    here = over_cells(surface, np.stack([x, y], axis=-1), spacing, ring, arc)[:, patch.index]
-    covered = np.asarray(here.sum(axis=1)).ravel()
-    first = number.min(axis=0)
+    weights = over_cells(surface, np.stack([x, y], axis=-1), (along, across), ring, arc)
+    weights = weights[:, patch.index].tocsr()
+    held = found & (np.asarray(weights.sum(axis=1)).ravel() > 1 - 1e-9)
+    x, y, weights, number = x[held], y[held], weights[held], number[held]
+    height = surface.at(ring, arc)[held, 2]
     row, column = (number - first).T
     shape = int(row.max()) + 1, int(column.max()) + 1
-    x0, x1, y0, y1 = patch.extent
-    found &= (x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1)
-    kept = np.flatnonzero(found & (covered > 1 - 1e-9))
-    kept = kept[np.argsort((row * shape[1] + column)[kept])]
-    height = surface.at(ring, arc)[kept, 2]
     return replace(
         patch,
-        points=np.stack([x[kept], y[kept], height], axis=-1),
-        half_sizes=patch.half_sizes[kept // 4] / 2,
-        force=np.zeros(len(kept)),
+        points=np.stack([x, y, height], axis=-1),
+        half_sizes=np.tile((along / 2, across / 2), (len(x), 1)),
+        force=np.zeros(len(x)),
         gap=height - road_height,
-        edge=patch.edge[kept // 4],
-        line=column[kept],
-        weights=here[kept].tocsr(),
-        places=GridPlaces(shape, spacing, (row * shape[1] + column)[kept]),
+        edge=height - road_height > reach,
+        line=column,
+        weights=weights,
+        places=GridPlaces(shape, (along, across), row * shape[1] + column),
     )

@@ -134,7 +134,9 @@ def other_points(given: Given) -> Forces:
         patch = thinned(patch)
     else:
         surface = TreadSurface(job.tire.lattice, given.static.product.positions)
-        patch = halved(patch, surface, given.static.product.road_height)
+        height = given.static.product.road_height
+        assert height is not None
+        patch = halved(patch, surface, height, given.setup.reach)
     setup = replace(given.setup, patch=patch)
     setup = settled(job, setup, given.response, given.static.product.force)
     return given.of(job).repeated(setup, given.response)
