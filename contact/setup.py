@@ -15,6 +15,7 @@ from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
 from tireroad.contact.rolling import Drive
 from tireroad.contact.tread.pattern import Pattern
+from tireroad.fem.static.road_shape import RoadShape
 from tireroad.greens.response import Response
 
 # What the tire may give way beyond the road's own height, m: the smallest reach of the patch.
@@ -37,6 +38,12 @@ class OuterFace(Protocol):
     def shape(self) -> tuple[int, int]: ...
     @property
     def road_height(self) -> float | None: ...
+    @property
+    def normal_force(self) -> np.ndarray: ...
+    @property
+    def seen(self) -> np.ndarray: ...
+    @property
+    def road(self) -> RoadShape: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,8 +150,9 @@ def contact_setup(
         from tireroad.fem.static.tread_surface import TreadSurface
 
         assert face.road_height is not None, "contact needs a tire that stands on a road"
-        surface = TreadSurface(lattice, face.positions)
+        surface = TreadSurface(lattice, face.seen)
         patch = make_grid_patch(surface, face.road_height, patch, spacing, reach)
+    patch = _on_shape(patch, face.road)
     if pattern is not None:
         pattern.land(patch.points[~patch.edge, 1])
     under = _under(road, patch, rolled)
@@ -152,7 +160,21 @@ def contact_setup(
 
 
 def _nodes(face: OuterFace, reach: float) -> Patch:
-    return make_patch(face.positions, face.half_sizes, face.force, face.gap, face.shape, reach)
+    given = face.half_sizes, face.normal_force, face.gap, face.shape, reach
+    return make_patch(face.seen, *given)
+
+
+def _on_shape(patch: Patch, road: RoadShape) -> Patch:
+    """The patch with its points where they are, and gaps, forces and motions counted along the road's normal."""
+    if road.flat:
+        return patch
+    x, y, height = patch.points.T
+    return replace(
+        patch,
+        points=np.stack([x, y, height + road.height(x, y)], axis=-1),
+        gap=patch.gap / road.stretch(x, y),
+        frames=road.frames(x, y),
+    )
 
 
 def _under(road: RoadUnderTire, patch: Patch, rolled: Rolled) -> PreparedRoad:

@@ -14,8 +14,9 @@ from petsc4py import PETSc
 from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
+from tireroad.fem.static.road_shape import FLAT, RoadShape
 from tireroad.fem.static.shape_damping import ShapeDamping
-from tireroad.fem.static.step import Step
+from tireroad.fem.static.stepping import Step
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,
@@ -38,14 +39,15 @@ class Equilibrium:
 
     `inflation` (Pa) may be changed between solves; `solve` starts from the body's displacement and
     puts it back when it does not converge. `road_height` (m) is that of the last state that did;
-    `cost`: seconds by part.
+    `cost`: seconds by part; `road`: its shape, of a level plane here (fem.static.curved has others).
     """
+
+    road: RoadShape = FLAT
 
     def __init__(self, body: Body, rolling: Rolling = AT_REST) -> None:
         self.body, self.rolling = body, rolling
-        self.cost = Timing()
+        self.cost, self.pressure = Timing(), fem.Constant(body.mesh, 0.0)
         self.road_height: float | None = None
-        self.pressure = fem.Constant(body.mesh, 0.0)
         self._before = fem.Function(body.space)
         residual = static_residual(body, self.pressure, rolling)
         self._damping: ShapeDamping | None = None
@@ -64,8 +66,7 @@ class Equilibrium:
         self._tread_z = body.space.tabulate_dof_coordinates()[body.tread, 2]
         self._vertical = 3 * body.tread + 2  # owned dofs that can meet the road
         self._height = -np.inf
-        self._active = np.zeros(len(body.tread), dtype=bool)
-        self._force = np.zeros(len(body.tread))
+        self._active, self._force = np.zeros(len(body.tread), dtype=bool), np.zeros(len(body.tread))
         self._scale, self._stiffness = self._yardsticks()
         damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
         self._system = self._make_system("lu" if damped else "cholesky")
@@ -83,8 +84,8 @@ class Equilibrium:
     ) -> Step:
         """Equilibrium with the road plane at the given height (m), or without a road. Collective.
 
-        With a `load` (N) the road is moved, from the given height on, until it carries that. `allowed`
-        N may stay out of balance in a state that is only on the way to another.
+        With a `load` (N) the road is moved until it carries that. `allowed` N may stay out of balance in a
+        state that is only on the way to another.
         Newton's method and the active set of the road in one loop: a dof is held where
         f - c gap > 0, with c the dof's own stiffness; that is the complementarity condition for any
         c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Held dofs are put on
@@ -154,10 +155,10 @@ class Equilibrium:
         return self._system.take(self.matrix, held, -self._gap()[self._active])
 
     def _move(self, closing: Moved | None, load: float | None) -> str:
-        """One linearised step to balance, held dofs to the road; with a load, the road to that. Collective.
+        """One linearised step to balance, held dofs to the road; with a load, the road to that; or why not. Collective.
 
-        Why it cannot be taken, or nothing. The road's force is the reaction of the linearised problem;
-        what is out of balance is no force of the road (seen: held dofs let go and caught for ever).
+        The road's force is the reaction of the linearised problem; what is out of balance is no force of the
+        road (seen: held dofs let go and caught for ever).
         """
         field, held = self.body.u.x, self._vertical[self._active]
         out = self._work.array_r.copy()
@@ -175,7 +176,7 @@ class Equilibrium:
         self._before.x.array[:] = field.array
         field.array[: len(change)] += change
         # To the last bit on the road: rounding of the solve would leave a gap or a penetration.
-        field.array[held] = (self._height - self._tread_z)[self._active]
+        field.array[held] = self._to_road()[self._active]
         field.scatter_forward()
         return ""
 
@@ -189,11 +190,9 @@ class Equilibrium:
         return self.body.comm.allreduce(float(force.sum()))
 
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
-        """Under a vertical traction in place of the road: the height (m) that the face gains by one step of
-        Newton's method from the present state, and that by a newton more. Collective.
-
-        `weights` (s,) of the outer face's nodes, of sum 1, say where the `load` (N) acts and the height is read.
-        """
+        """Under a vertical traction in place of the road, `load` (N) by `weights` (s,) of sum 1 of the outer face's
+        nodes: the height (m) that the face, weighted alike, gains by one step of Newton's method from the
+        present state, and that by a newton more. Collective."""
         self._before.x.array[:] = self.body.u.x.array
         out = self._assemble_residual().copy()
         self._assemble_tangent()
@@ -215,12 +214,13 @@ class Equilibrium:
         """Height z + u_z of the owned tread nodes, m, in the order of `body.tread`."""
         return self._tread_z + self.body.u.x.array[self._vertical]
 
-    def _yardsticks(self) -> tuple[float, np.ndarray]:
-        """Force scale, N, and stiffness of each owned tread dof, N/m, of the undeformed body.
+    def _to_road(self) -> np.ndarray:
+        """Displacement u_z (m) that puts each owned tread node on the road."""
+        return self._height - self._tread_z
 
-        The scale is the typical stiffness of a dof times the wall, so that 1e-12 of it is far below
-        any load of interest.
-        """
+    def _yardsticks(self) -> tuple[float, np.ndarray]:
+        """Force scale, N, the typical stiffness of a dof times the wall (1e-12 of it is far below any load of
+        interest), and stiffness of each owned tread dof, N/m, of the undeformed body."""
         self._before.x.array[:] = self.body.u.x.array
         self._assemble_tangent()
         diagonal = self.matrix.getDiagonal()

@@ -9,9 +9,9 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.parallel import on_root
-from tireroad.fem.static.equilibrium import Equilibrium, Step
+from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.round import RoundEquilibrium
-from tireroad.fem.static.stepping import Attempt, Show, march
+from tireroad.fem.static.stepping import Attempt, Show, Step, march
 from tireroad.fem.static.tread_surface import TreadSurface
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
@@ -41,12 +41,10 @@ class _Known:
 
 
 class Loader:
-    """Brings the body of one equilibrium problem to the wanted state. All methods are collective."""
+    """Brings the body of one equilibrium to the wanted state, all along the wheel's z. All methods are collective."""
 
     def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]) -> None:
-        self.equilibrium = equilibrium
-        self.body = equilibrium.body
-        self.report = report
+        self.equilibrium, self.body, self.report = equilibrium, equilibrium.body, report
         self.newton_steps = 0
         self._touch: float | None = None
 
@@ -106,10 +104,12 @@ class Loader:
         return self.equilibrium.road_height - self.touch
 
     def lowest(self) -> float:
-        """Height of the lowest point of the outer face between its nodes, m. Collective."""
+        """Height of the lowest point of the outer face over the road's shape, m. Collective."""
         lattice = self.body.lattice
         moved = self.body.surface(self.body.owned(self.body.u.x.array))
-        return TreadSurface(lattice, lattice.points(lattice.face) + moved).lowest()
+        places = lattice.points(lattice.face) + moved
+        places[:, 2] -= self.equilibrium.road.height(*places[:, :2].T)
+        return TreadSurface(lattice, places).lowest()
 
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
@@ -245,6 +245,6 @@ class Loader:
         march(tried, start, end, first, show)
 
     def _report(self, what: str, value: float, unit: str, step: Step) -> None:
-        force = self.equilibrium.contact_force()
-        total, active = self.load(), self.body.comm.allreduce(int((force > 0).sum()))
-        self.report(Progress(what, value, unit, total, active, step))
+        touching = int((self.equilibrium.contact_force() > 0).sum())
+        active = self.body.comm.allreduce(touching)
+        self.report(Progress(what, value, unit, self.load(), active, step))

@@ -80,7 +80,9 @@ class ContactStage(Stage[ContactHistory]):
         response, setup = self.greens.product.contact, self.setup.product
         plan = planned(self.job, record, response, self._shortest_period())
         with record.timing("tread and solver"):
-            setup, rise = setup.settled(response, self.static.product.force, self.job.scene.contact)
+            setup, rise = setup.settled(
+                response, self.static.product.normal_force, self.job.scene.contact
+            )
             if rise:
                 record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
             begun = begun_with(self.job, key)

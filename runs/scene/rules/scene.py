@@ -11,6 +11,7 @@ from tireroad.runs.scene.rules.output import (
     check_transmissibility,
     check_vibration,
 )
+from tireroad.runs.scene.rules.road import check_shape
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.accuracy import check_accuracy
 from tireroad.runs.scene.tables.axle import check_axle
@@ -192,6 +193,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("pattern", "contact"), check_pattern),
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
     (("output", "time", "contact", "force", "rotation"), check_vibration),
+    (("static", "road", "modal", "tire"), check_shape),
     (("time",), _time),
     (("accuracy", "contact", "road", "time", "output", "force"), check_accuracy),
 )

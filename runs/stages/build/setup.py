@@ -66,7 +66,7 @@ def rolling_radius(job: Job, state: StaticState) -> float:
 
 
 def components(job: Job) -> tuple[int, ...]:
-    """Directions of the contact forces: z, and with a brush x and y after it."""
+    """Directions of the contact forces: normal to the road, and with a brush along and across it after that."""
     return (2, 0, 1) if job.scene.contact.rubs else (2,)
 
 
@@ -87,7 +87,13 @@ def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
     if setup is None:
         return Probes("force", readings, loads)
     count, index = len(state.points), setup.patch.index
-    parts = [probe.nodes(index, count, part) for part in components(job)]
+    frames = state.frames
+    parts = [
+        probe.nodes(index, count, part)
+        if frames is None
+        else probe.along(index, count, frames[index, part])
+        for part in components(job)
+    ]
     if job.scene.force:
         parts += [loads, readings]
     points = sparse.vstack(parts, format="csr")
