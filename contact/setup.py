@@ -15,7 +15,7 @@ from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
 from tireroad.contact.rolling import Drive
 from tireroad.contact.tread.pattern import Pattern
-from tireroad.fem.static.road_shape import RoadShape
+from tireroad.fem.static.curved.shape import RoadShape
 from tireroad.greens.response import Response
 
 # What the tire may give way beyond the road's own height, m: the smallest reach of the patch.

@@ -8,7 +8,7 @@ import numpy as np
 
 from tireroad.fem.matrices import probe
 from tireroad.fem.sections.locate import interpolation, locate
-from tireroad.fem.static.curved import make_equilibrium
+from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.tire.mesh import Lattice
 

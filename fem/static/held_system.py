@@ -26,8 +26,11 @@ class Moved:
 class System(Protocol):
     """The linearised equilibrium as Newton's method needs it; as `HeldSystem` says."""
 
-    closing: Moved
-    raising: Moved
+    @property
+    def closing(self) -> Moved: ...
+
+    @property
+    def raising(self) -> Moved: ...
 
     def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
         """Factorise; False when the matrix is singular. Collective."""

@@ -39,7 +39,7 @@ def load_curve(loader: Loader, deflections: Sequence[float]) -> list[CurvePoint]
     Each step starts from a line through the two states before it; ConvergenceError where one does not
     converge by halved steps either.
     """
-    upright = loader.equilibrium.road.upright
+    upright = loader.equilibrium.shape.upright
     raised = loader.visit([deflection / upright for deflection in deflections])
     return [_point(loader, deflection * upright) for deflection in raised]
 
@@ -57,7 +57,7 @@ def _point(loader: Loader, deflection: float) -> CurvePoint:
     return CurvePoint(
         deflection,
         state.load,
-        loader.equilibrium.road_stiffness() / loader.equilibrium.road.upright**2,
+        loader.equilibrium.road_stiffness() / loader.equilibrium.shape.upright**2,
         state.footprint(),
         int((state.force > 0).sum()),
         state.rolling_radius(),

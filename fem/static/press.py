@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.model import TireModel
-from tireroad.fem.static.curved import make_equilibrium
+from tireroad.fem.static.curved.balance import make_equilibrium
+from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.loading import Loader, Progress
-from tireroad.fem.static.road_shape import FLAT, RoadShape
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 
@@ -52,8 +52,8 @@ def place(
         if value is not None and not math.isfinite(value):
             raise InputError(f"{name} = {value:g} must be finite")
     if load is not None:
-        loader.carry(load * loader.equilibrium.road.upright)
+        loader.carry(load * loader.equilibrium.shape.upright)
     elif deflection is not None:
-        loader.deflect(deflection / loader.equilibrium.road.upright)
+        loader.deflect(deflection / loader.equilibrium.shape.upright)
     elif road_height is not None:
         loader.deflect(road_height - loader.touch)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
-from tireroad.fem.static.road_shape import FLAT, RoadShape
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cord_forces import CordForce, cord_forces
 from tireroad.fem.tire.mesh import Lattice
@@ -146,7 +146,7 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         road_height=road_height,
         inflation=float(equilibrium.pressure.value),
         rolling=equilibrium.rolling,
-        road=equilibrium.road,
+        road=equilibrium.shape,
         cords=cord_forces(body),
         mass=body.comm.allreduce(float(body.nodal_mass()[::3].sum())),
     )

@@ -9,21 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tireroad.fem.errors import LoadingStopped
+from tireroad.fem.static.equilibrium import Step
 
 _SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
 _LARGEST = 4  # times the first step
 _EASY = 6  # tangents up to which the next load step may grow
-
-
-@dataclass(frozen=True)
-class Step:
-    """How one equilibrium solve ended: `iterations` tangents, `residual` relative to the force scale."""
-
-    converged: bool
-    iterations: int
-    residual: float
-    reason: str
-
 
 Attempt = Callable[[float], Step]
 

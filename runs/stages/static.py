@@ -9,7 +9,7 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.model import TireModel
-from tireroad.fem.static.curved import make_equilibrium
+from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.diagnosis import with_cause
 from tireroad.fem.static.load_error import load_error
 from tireroad.fem.static.loading import Loader

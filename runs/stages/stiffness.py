@@ -9,7 +9,7 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.road_stiffness import RoadStiffness, road_stiffness
-from tireroad.fem.static.curved import make_equilibrium
+from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.load_curve import CurvePoint, load_curve, slopes
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.state import StaticState

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.fem.static.curved import make_equilibrium
+from tireroad.fem.static.curved.balance import make_equilibrium
+from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.press import place
-from tireroad.fem.static.road_shape import FLAT, RoadShape
 from tireroad.fem.static.state import static_state
 
 SHAPES = {
@@ -20,7 +20,9 @@ SHAPES = {
 
 def pressed(make_body, road, comm=MPI.COMM_SELF, **given):
     """(state, loader) of the tire under 1500 N, or as given."""
-    equilibrium = make_equilibrium(make_body(comm=comm, segments=16, footprint_size=0.3), road=road)
+    equilibrium = make_equilibrium(
+        make_body(comm=comm, segments=16, footprint_size=0.3), shape=road
+    )
     loader = Loader(equilibrium, lambda progress: None)
     loader.inflate(2e5)
     wanted = {"load": None, "deflection": None, "road_height": None} | (given or {"load": 1500.0})
@@ -62,7 +64,7 @@ def test_pressed_on_it_the_tire_is_in_balance_with_what_is_normal_to_it(name, ma
     assert touching.sum() > 3 and np.abs(height[touching]).max() < 1e-15
     assert height[~touching].min() > 0
     equilibrium = loader.equilibrium
-    equilibrium._active[:] = False  # the plain forces
+    equilibrium.road.active[:] = False  # the plain forces
     out = equilibrium._assemble_residual().reshape(-1, 3)
     face = loader.body.surface
     assert np.abs(out[face.local] - state.push[face.place]).max() < 1e-9 * state.force.max()

@@ -1,14 +1,14 @@
 """What no single key can tell: contradictions between tables, and what this version leaves out."""
 
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.rules.full import full_matrices
 from tireroad.runs.scene.rules.output import (
     check_campbell,
-    check_receptance,
-    check_transmissibility,
+    check_outputs,
     check_vibration,
 )
 from tireroad.runs.scene.rules.road import check_shape
@@ -116,14 +116,8 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 
 def _force(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    sought = scene.output.receptance or scene.output.transmissibility
-    for key in ("velocity", "acceleration"):
-        if scene.contact is not None and getattr(scene.output, key):
-            raise error(
-                ("output", key),
-                "is not available in scenes with [contact]: leave it out, or take out [contact]",
-            )
-    if scene.force and scene.time is None and sought is None:
+    sought = any(fields(kind) for _, kind in scene.output.kinds)
+    if scene.force and scene.time is None and not sought:
         raise error(("force",), "has nothing to drive: add [time] or output.receptance")
     for number, force in enumerate(scene.force):
         if not any(force.direction):
@@ -183,8 +177,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("modal", "static", "rotation", "contact", "damping", "greens"), _modal),
     (("damping", "rotation", "output"), full_matrices),
     (("contact", "road", "time", "static", "rotation"), _contact),
-    (("output", "force"), check_receptance),
-    (("output", "force", "modal", "axle", "tire"), check_transmissibility),
+    (("output", "force", "modal", "axle", "tire", "damping", "contact"), check_outputs),
     (("rotation",), check_campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),

@@ -12,52 +12,81 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.road_shape import FLAT, RoadShape
+from tireroad.fem.static.road import Road
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 
 
-def make_equilibrium(body: Body, rolling: Rolling = AT_REST, road: RoadShape = FLAT) -> Equilibrium:
+def make_equilibrium(
+    body: Body, rolling: Rolling = AT_REST, shape: RoadShape = FLAT
+) -> Equilibrium:
     """The problem of a body on a road of that shape. Collective."""
-    return Equilibrium(body, rolling) if road.flat else CurvedEquilibrium(body, rolling, road)
+    return Equilibrium(body, rolling) if shape.flat else CurvedEquilibrium(body, rolling, shape)
 
 
-class CurvedEquilibrium(Equilibrium):
-    """As `Equilibrium`, its height of the road being that under the axle. Collective."""
+class CurvedRoad(Road):
+    """As `Road`, its height being that under the axle."""
 
-    def __init__(self, body: Body, rolling: Rolling, road: RoadShape) -> None:
-        self._curved: PETSc.Mat | None = None
+    def __init__(self, body: Body, shape: RoadShape) -> None:
+        super().__init__(body)
         self._across = body.space.tabulate_dof_coordinates()[body.tread, :2]
-        super().__init__(body, rolling)
-        self.road = road
+        self._shape = shape
 
-    def _places(self) -> tuple[np.ndarray, np.ndarray]:
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
         """x and y of the owned tread nodes, m."""
-        field = self.body.u.x.array
-        x, y = (self._across[:, k] + field[self._vertical - 2 + k] for k in (0, 1))
+        field = self._body.u.x.array
+        x, y = (self._across[:, k] + field[self.dofs - 2 + k] for k in (0, 1))
         return x, y
 
     def tread_height(self) -> np.ndarray:
-        """Height of the owned tread nodes over the road's shape, m, in the order of `body.tread`."""
-        return super().tread_height() - self.road.height(*self._places())
+        """Height of the owned tread nodes over the road's shape, m."""
+        return super().tread_height() - self._shape.height(*self.places())
 
-    def _to_road(self) -> np.ndarray:
-        return super()._to_road() + self.road.height(*self._places())
+    def lay_on(self) -> None:
+        """As of a level road. Collective."""
+        field = self._body.u.x
+        level = self.height + self._shape.height(*self.places()) - self._z
+        field.array[self.held] = level[self.active]
+        field.scatter_forward()
+
+    def slopes(self) -> tuple[np.ndarray, np.ndarray]:
+        """s_x and s_y at the held nodes."""
+        along, across = self._shape.slopes(*self.places())
+        return along[self.active], across[self.active]
+
+    def turning(self) -> np.ndarray:
+        """f s_xx of the held nodes, N/m."""
+        return (self._shape.curvature(self.places()[0]) * self.force)[self.active]
+
+
+class CurvedEquilibrium(Equilibrium):
+    """As `Equilibrium`, its heights of the road being those under the axle. Collective."""
+
+    road: CurvedRoad
+
+    def __init__(self, body: Body, rolling: Rolling, shape: RoadShape) -> None:
+        self._curved: PETSc.Mat | None = None
+        self.shape = shape
+        super().__init__(body, rolling)
+
+    def _make_road(self) -> CurvedRoad:
+        return CurvedRoad(self.body, self.shape)
 
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
         """As on a level road: without one in its linearised step."""
-        kept, self._active = self._active, np.zeros_like(self._active)
+        kept, self.road.active = self.road.active, np.zeros_like(self.road.active)
         try:
             return super().sinking(weights, load)
         finally:
-            self._active = kept
+            self.road.active = kept
 
     def _assemble_residual(self) -> np.ndarray:
         """T^T out."""
         super()._assemble_residual()
-        out, held = self._work.array, self._vertical[self._active]
-        for back, slope in zip((2, 1), self._slopes(), strict=True):
+        out, held = self._work.array, self.road.held
+        for back, slope in zip((2, 1), self.road.slopes(), strict=True):
             out[held - back] += slope * out[held]
         return self._work.array_r
 
@@ -65,31 +94,24 @@ class CurvedEquilibrium(Equilibrium):
         """T^T K T, and the turning of the force."""
         self.matrix = self._local_tangent
         super()._assemble_tangent()
-        if self._height == -np.inf:
+        if self.road.height == -np.inf:
             return
         if self._curved is not None:
             self._curved.destroy()
         transform = self._transform()
         self.matrix = self._curved = self.matrix.ptap(transform)
         transform.destroy()
-        x, _ = self._places()
-        turning = (self.road.curvature(x) * self._force)[self._active]
         diagonal = self.matrix.getDiagonal()
-        diagonal.array[self._vertical[self._active] - 2] += turning
+        diagonal.array[self.road.held - 2] += self.road.turning()
         self.matrix.setDiagonal(diagonal)
-
-    def _slopes(self) -> tuple[np.ndarray, np.ndarray]:
-        """s_x and s_y at the held nodes."""
-        along, across = self.road.slopes(*self._places())
-        return along[self._active], across[self._active]
 
     def _transform(self) -> PETSc.Mat:
         """T, in rows of this process's dofs."""
         count, first = len(self._work.array_r), self.matrix.getOwnershipRange()[0]
-        held = self._vertical[self._active]
+        held = self.road.held
         rows = np.concatenate([np.arange(count), held, held])
         columns = np.concatenate([np.arange(count), held - 2, held - 1]) + first
-        values = np.concatenate([np.ones(count), *self._slopes()])
+        values = np.concatenate([np.ones(count), *self.road.slopes()])
         whole = self.matrix.getSize()[0]
         local = sparse.csr_matrix((values, (rows, columns)), shape=(count, whole))
         parts = (part.astype(PETSc.IntType) for part in (local.indptr, local.indices))
