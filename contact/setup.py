@@ -12,6 +12,7 @@ from tireroad.contact.grid_patch import make_grid_patch, settle
 from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
+from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
 from tireroad.contact.rolling import Drive
 from tireroad.contact.tread.pattern import Pattern
@@ -64,13 +65,15 @@ class Rolled:
 
 @dataclass(frozen=True, kw_only=True)
 class ContactSetup:
-    """The `patch` of points whose static gap is within `reach` (m), and the strip of `road` under it."""
+    """The `patch` of points whose static gap is within `reach` (m), the strip of `road` under it, and the `slip`
+    of the wheel, (s_x, s_y) or (c, 2), as contact.tread.brush has it."""
 
     patch: Patch
     reach: float
     road: PreparedRoad
     rolled: Rolled
     pattern: Pattern | None = None
+    slip: np.ndarray | tuple[float, float] = (0.0, 0.0)
 
     @property
     def drive(self) -> Drive:
@@ -113,6 +116,12 @@ class ContactSetup:
         x0, x1, y0, y1 = self.patch.extent
         strip = x0, x1 + self.rolled.travel, y0, y1
         return self.road.highest(*strip) - self.road.lowest(*strip)
+
+    def smooth(self, duration: float) -> ContactSetup:
+        """The same on a road without heights, at rest, for `duration` s; a slick."""
+        still = replace(self.rolled, duration=duration, motion=lambda time: 0.0, lift=0.0)
+        road = _under(RoadUnderTire(Flat()), self.patch, still)
+        return replace(self, road=road, rolled=still, pattern=None)
 
     def settled(self, response: Response, nodal_force: np.ndarray, spec: Spec) -> tuple:
         """(setup, rise in m): a grid of points takes up the static load that the finite elements gave to

@@ -77,3 +77,33 @@ def test_roads_that_cannot_be(tmp_path, old, new, named) -> None:
     (tmp_path / "scene.toml").write_text(SCENE.replace(old, new))
     with pytest.raises(InputError, match=named):
         load(tmp_path / "scene.toml")
+
+
+@pytest.mark.slow
+def test_a_freely_rolling_wheel_is_not_dragged(tmp_path, launch) -> None:
+    """On a smooth road, cambered: none of the force along the road is left, some of it across (camber thrust)."""
+    scene = tmp_path / "scene.toml"
+    text = SCENE.replace("speed = 40.0", "speed = 40.0\nfree_rolling = true")
+    scene.write_text(text.replace("duration = 0.01", "duration = 0.05"))
+    done = launch("-m", "runs", "run", scene, "--out", tmp_path / "out", "--until", "contact")
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert "slip of free rolling" in done.stdout
+    with h5py.File(tmp_path / "out" / "contact.h5") as contact:
+        total = contact["total_force"][:]
+    assert abs(total[-20:, 0].mean()) < 2e-3 * 800.0
+    assert abs(total[-1, 1]) > 5.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("brush_stiffness_per_area = 1e8\nfriction = 0.8", "", "brush_stiffness_per_area"),
+        ("friction = 0.8", "friction = 0.0", "any slip is free"),
+        ("speed = 40.0", "speed = 0.0", "a wheel that turns"),
+    ],
+)
+def test_free_rolling_that_cannot_be(tmp_path, old, new, named) -> None:
+    text = SCENE.replace("[rotation]\n", "[rotation]\nfree_rolling = true\n")
+    (tmp_path / "scene.toml").write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=named):
+        load(tmp_path / "scene.toml")
