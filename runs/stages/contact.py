@@ -21,7 +21,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
 from tireroad.runs.stages.build import pattern
 from tireroad.runs.stages.build.energy import Losses, describe_energy, works
-from tireroad.runs.stages.build.loop import driven_tire, make_loop
+from tireroad.runs.stages.build.loop import driven_tire, freely_rolling, make_loop
 from tireroad.runs.stages.build.point_forces import shortest_period
 from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, told
 from tireroad.runs.stages.build.stepping import (
@@ -63,6 +63,9 @@ class ContactStage(Stage[ContactHistory]):
             "road": [asdict(scene.road), pattern.inputs(self.job)],
             "file": store.file_hash(scene.road.file) if scene.road.file else None,
             "speed": self.setup.product.rolled.speed,
+            "slip": [scene.rotation.free_rolling, scene.rotation.slip_angle]
+            if scene.rotation
+            else None,
             "axle_force": scene.output.axle_force,
             "forces": [asdict(force) for force in scene.force],
             "time": {k: v for k, v in asdict(scene.time).items() if k != "checkpoint"},
@@ -80,11 +83,14 @@ class ContactStage(Stage[ContactHistory]):
         response, setup = self.greens.product.contact, self.setup.product
         plan = planned(self.job, record, response, self._shortest_period())
         with record.timing("tread and solver"):
-            setup, rise = setup.settled(response, self.static.product.force, self.job.scene.contact)
+            setup, rise = setup.settled(
+                response, self.static.product.normal_force, self.job.scene.contact
+            )
             if rise:
                 record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
             begun = begun_with(self.job, key)
             chosen = chosen_scheme(self.job, record, setup, plan, begun)
+            setup = self._rolling_freely(record, setup, plan, chosen.scheme)
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
         observe.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
@@ -97,6 +103,17 @@ class ContactStage(Stage[ContactHistory]):
             forget_checkpoint(self.job)
             chosen = told(record, Chosen(*WATCHED))
             self._attempt(key, record, setup, plan, chosen.scheme, False)
+
+    def _rolling_freely(self, record: Record, setup: ContactSetup, plan: Planned, scheme: str):
+        """With the slip of free rolling, where the scene wants that. Collective."""
+        rotation, response = self.job.scene.rotation, self.greens.product.contact
+        if rotation is None or not rotation.free_rolling:
+            return setup
+        # Found about the present setup, whose slip has nothing found yet.
+        setup, slip = freely_rolling(self.job, setup, response, plan.step, scheme)
+        self.job.found["free slip"] = slip
+        record.headline["slip of free rolling"] = (100 * slip, "%")
+        return setup
 
     def _attempt(
         self,
