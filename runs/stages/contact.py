@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.chatter import LIMIT, Chatter, Chosen, warning
+from tireroad.contact.chatter import Chatter, Chosen
 from tireroad.contact.model import solver_name
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
@@ -25,7 +25,6 @@ from tireroad.runs.stages.build.loop import driven_tire, freely_rolling, make_lo
 from tireroad.runs.stages.build.point_forces import shortest_period
 from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, told
 from tireroad.runs.stages.build.stepping import (
-    Integration,
     Planned,
     integration,
     passing_period,
@@ -35,13 +34,17 @@ from tireroad.runs.stages.build.watch import Watch
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Done, Stage
-from tireroad.runs.stages.stored import road_file
+from tireroad.runs.stages.stored import contact_figures, road_file
 from tireroad.runs.stages.stored.contact_file import (
     ContactFile,
     ContactHistory,
     begun_with,
     forget_checkpoint,
 )
+
+LINEAR = (
+    1 / 3
+)  # of the static deflection: motion of the contact up to which a linear tire is trusted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +150,8 @@ class ContactStage(Stage[ContactHistory]):
             busy = (time.thread_time() - began) / max(chosen.steps - done, 1)
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
-        _describe(record, totals, loop.solver, chosen, chosen.steps - done)
+        contact_figures.describe(record, totals, loop.solver, chosen, chosen.steps - done)
+        contact_figures.excursion(record, totals.figures.excursion, self.static.product.deflection)
         pattern.describe(record, setup)
         road_file.describe(record, setup)
         if chosen.scheme != "convolution":
@@ -214,27 +218,3 @@ def beyond_unique(friction: float | None, limit: float) -> list[str]:
         f"contact.friction = {friction:g} is more than {limit:.3g}, up to which a step is sure to have "
         "one answer: where points slip there may be another; lower it, or take a softer tread"
     ]
-
-
-def _describe(record: Record, counted: Totals, solver, chosen: Integration, taken: int) -> None:
-    """`taken`: the steps of this run, without those before its checkpoint."""
-    totals, chattering = counted.figures, counted.alternation.worst
-    record.headline |= {
-        "mean load": (float(totals.sum / totals.steps), "N"),
-        "least load": (float(totals.least), "N"),
-        "largest load": (float(totals.most), "N"),
-        "points touching at most": (totals.most_active, "-"),
-        "step": (chosen.step, "s"),
-        "scheme": (chosen.scheme, "-"),
-        "time a step": (record.cost["time loop"] / max(taken, 1) * 1e6, "us"),
-    }
-    record.indicators |= {
-        "worst complementarity residual": (float(totals.residual), "-"),
-        "largest penetration": (float(totals.penetration), "m"),
-        "factorisations": (solver.factorisations, "-"),
-        "points that change back from step to step, at worst": (chattering, "-"),
-    }
-    if chattering > LIMIT:
-        record.warnings.append(warning(chattering))
-    if totals.least == 0:
-        record.warnings.append("the tire lost contact with the road for a while")
