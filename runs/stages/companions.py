@@ -10,7 +10,7 @@ import numpy as np
 
 from tireroad.contact.chatter import choose, oscillation
 from tireroad.contact.error_bars import orders, share
-from tireroad.contact.respaced import halved, thinned
+from tireroad.contact.respaced import halved, ratio, thinned
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.carried_over import carried_over
@@ -45,7 +45,6 @@ UP_TO_GREENS: tuple[type[Part], ...] = (
     GreensStage,
 )
 FEWER = 1 / np.sqrt(2)  # of the highest mode: up to where the companion keeps states
-ACROSS = 8  # points along the footprint and across it, below which twice their spacing tells nothing of them
 COARSER = "coarser"  # the folder in the run's own where its coarser companion's stages are, until they are of no use
 LEAST = (8, 4)  # elements around and along that a companion has
 
@@ -125,7 +124,7 @@ def other_points(given: Given) -> Forces:
         raise InputError(
             "the points are nodes of the mesh: take a grid, contact.points = { dx, dy }"
         )
-    coarser = points_ratio(given) > 1
+    coarser = ratio(given.settled.patch) > 1
     brush = job.scene.contact.brush_stiffness
     if brush is not None:  # of a point that stands for four, or for a quarter
         contact = replace(job.scene.contact, brush_stiffness=brush * (4 if coarser else 0.25))
@@ -133,25 +132,13 @@ def other_points(given: Given) -> Forces:
     if coarser:
         patch = thinned(patch)
     else:
-        surface = TreadSurface(job.tire.lattice, given.static.product.positions)
+        surface = TreadSurface(job.tire.lattice, given.static.product.seen)
         height = given.static.product.road_height
         assert height is not None
         patch = halved(patch, surface, height, given.setup.reach)
     setup = replace(given.setup, patch=patch)
     setup = settled(job, setup, given.response, given.static.product.normal_force)
     return given.of(job).repeated(setup, given.response)
-
-
-def points_ratio(given: Given) -> float:
-    """Spacing of the companion's points over the run's. The pressure of a footprint some points wide changes from spacing
-    to spacing by where they happen to lie (cobblestones, 17 mm wide, points 16, 11.3, 8, 5.7 and 4 mm apart: mean
-    547, 515, 521, 548, 545 N): there only finer points tell, and those that touch are few."""
-    patch = given.settled.patch
-    touching = patch.points[patch.force > 0, :2]
-    if patch.places is None or not len(touching):
-        return 2.0
-    count = np.rint(np.ptp(touching, axis=0) / patch.places.spacing) + 1
-    return 2.0 if count.min() >= ACROSS else 0.5
 
 
 def fewer_modes(given: Given) -> Forces:
@@ -251,6 +238,7 @@ def companion(cause: str, given: Given) -> tuple[Forces, Forces | None, float]:
     with observe.quiet():
         beside = None if cause == "step" else given.base
         found = COMPANIONS[cause](given)
-    ratio = {"step": 2.0, "points": points_ratio(given), "modes": 1 / FEWER, "mesh": 2.0}[cause]
+    points = ratio(given.settled.patch) if cause == "points" else 2.0
+    size = {"step": 2.0, "points": points, "modes": 1 / FEWER, "mesh": 2.0}[cause]
     order = orders(given.job.tire.section.order)[cause]
-    return found, beside, share(ratio, order)
+    return found, beside, share(size, order)
