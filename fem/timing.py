@@ -19,6 +19,12 @@ class Timing(dict[str, float]):
         yield
         self[part] = self.get(part, 0.0) + Timing.clock() - began
 
+    def take(self, other: Timing) -> None:
+        """Add the seconds of another solver, which starts from none again."""
+        for part, seconds in other.items():
+            self[part] = self.get(part, 0.0) + seconds
+        other.clear()
+
 
 @contextmanager
 def by_processor() -> Iterator[None]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tireroad.fem.tire.law import MATERIALS
+from tireroad.runs.scene.outputs import OUTPUTS
 from tireroad.runs.scene.sections.kind import SECTIONS
 
 pytestmark = pytest.mark.slow
@@ -113,6 +114,17 @@ def test_own_section() -> None:
     SECTIONS.forget("ellipse")
     assert circle == pytest.approx(575.9, rel=1e-3)
     assert ellipse == pytest.approx(594.6, rel=1e-3)
+
+
+def test_own_output(capfd: pytest.CaptureFixture[str]) -> None:
+    """Points 5 mm apart: the tire at rest touches on 50 mm or so; pinned when it was written."""
+    import own_output
+
+    length = own_output.main()
+    OUTPUTS.forget("footprint_length")
+    assert length.min() == pytest.approx(0.050, abs=1e-9)
+    assert length.max() == pytest.approx(0.055, abs=1e-9)
+    assert "mean length of the footprint 0.0508 m" in capfd.readouterr().out
 
 
 def test_read_results(launch, tmp_path: Path) -> None:

@@ -81,6 +81,7 @@ class Grid:
         self._length = float(x[-1] - x[0])
         self._sides = float(y[0]), float(y[-1])
         self.filled = 0
+        self.notes: tuple[str, ...] = ()  # what was done to the measurement, for the user
 
     def _over(self, rows: slice, columns: slice) -> Window:
         place = rows.start, columns

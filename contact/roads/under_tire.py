@@ -2,20 +2,25 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.roads.levelling import Level, mean_level, wave_level
+from tireroad.contact.roads.texture.levels import Texture, texture_of
+from tireroad.contact.roads.texture.repeated import Repeated
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import Parameters, number
+from tireroad.fem.parameters import Parameters, choice, number
 
 Array = NDArray[np.float64]
 
 # Pieces a strip is cut into for its bounds, at least: the level changes slowly over one.
 PIECES = 64
 LONGEST = 0.25  # m
+# The texture that is told: of that many metres at most and at least, points at most, points this far apart at most.
+_SEEN, _LEAST_SEEN, _MOST_SEEN, _COARSEST = 20.0, 0.1, 100_000, 1e-3
 
 
 class Road(Protocol):
@@ -63,12 +68,20 @@ class Placement(Parameters):
     offset: float = number(
         0.0, "m", "height added to the whole road, positive up", least=-10, most=10
     )
+    drum_radius: float | None = number(
+        None,
+        "m",
+        "the road lies on a drum of this radius, and repeats after its circumference; absent: a plane",
+        least=0.1,
+        most=1e4,
+    )
+    drum: str = choice("outside", ("outside", "inside"), "side of the drum that the tire runs on")
 
 
 class RoadUnderTire:
     """A road placed under the axle; `prepare` cuts out the strip a run drives over.
 
-    start, lateral, run_in, offset (m): see Placement; datum: "mean" subtracts the strip's mean
+    start, lateral, run_in, offset, drum_radius (m), drum: see Placement; datum: "mean" subtracts the strip's mean
     height, "zero" nothing; longest_wave (m): longer waves are filtered out too.
     """
 
@@ -82,12 +95,16 @@ class RoadUnderTire:
         offset: float = 0.0,
         datum: str = "zero",
         longest_wave: float | None = None,
+        drum_radius: float | None = None,
+        drum: str = "outside",
     ) -> None:
         if datum not in ("mean", "zero"):
             raise InputError(f'road: datum = "{datum}" is unknown: take "mean" or "zero"')
         if not run_in >= 0.0:
             raise InputError(f"road: run_in {run_in:g} m must not be negative")
-        self.road, self._datum = road, datum
+        if drum_radius is not None and np.isfinite(road.spacing):
+            road = Repeated(road, 2 * np.pi * drum_radius)
+        self.road, self._datum, self.drum = road, datum, drum
         self._start, self._lateral, self._run_in, self._offset = start, lateral, run_in, offset
         self._longest_wave = longest_wave
 
@@ -126,7 +143,8 @@ class PreparedRoad:
     """z(x, y) = s((x - lead)/run_in) [h(x + start, y + lateral) + offset - level] in m.
 
     s is the smoothstep, x the distance from the axle's starting point, y from the tire's middle.
-    Also a `Road`, apart from `prepare`. `filled` counts the holes that were filled.
+    Also a `Road`, apart from `prepare`. `filled` counts the holes that were filled, `notes` says what else was
+    done to a measured road.
     """
 
     def __init__(
@@ -144,6 +162,7 @@ class PreparedRoad:
         self._span = (reach[1] - reach[0]) * (1.0 + 1e-9)
         self.spacing = road.spacing
         self.filled: int = getattr(road, "filled", 0)
+        self.notes: tuple[str, ...] = getattr(road, "notes", ())
 
     @property
     def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -177,6 +196,18 @@ class PreparedRoad:
             return (ahead > 0.0).astype(float)
         s = np.minimum(np.maximum(ahead / self._run_in, 0.0), 1.0)
         return s * s * s * (10.0 + s * (6.0 * s - 15.0))
+
+    @cached_property
+    def texture(self) -> Texture | None:
+        """What the middle line says, where it is no longer eased in, over 20 m at most; None of a road without
+        resolution (flat), or too short to tell."""
+        first = self._lead + self._run_in
+        length = min(self.end - first, _SEEN)
+        if not (np.isfinite(self.spacing) and length >= _LEAST_SEEN):
+            return None
+        pitch = max(min(0.25 * self.spacing, _COARSEST), length / _MOST_SEEN)
+        x: Array = np.float64(first) + np.float64(pitch) * np.arange(int(length / pitch))
+        return texture_of(self.height(np.asarray(x), np.zeros(len(x))), pitch)
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """Upper bound (m) of the heights in a strip, the flat start included."""

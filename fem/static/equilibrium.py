@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
+from tireroad.fem.static.road import Road
 from tireroad.fem.static.shape_damping import ShapeDamping
 from tireroad.fem.static.step import Step
 from tireroad.fem.static.virtual_work import (
@@ -38,8 +39,10 @@ class Equilibrium:
 
     `inflation` (Pa) may be changed between solves; `solve` starts from the body's displacement and
     puts it back when it does not converge. `road_height` (m) is that of the last state that did;
-    `cost`: seconds by part.
+    `cost`: seconds by part; the road's `shape` is a level plane here (fem.static.curved has others).
     """
+
+    shape: RoadShape = FLAT
 
     def __init__(self, body: Body, rolling: Rolling = AT_REST) -> None:
         self.body, self.rolling = body, rolling
@@ -61,14 +64,13 @@ class Equilibrium:
         self._work = fem.petsc.create_vector(self._residual)
         rim = body.rim[body.rim < body.nodes]
         self._rim = (3 * rim[:, None] + np.arange(3)).ravel()
-        self._tread_z = body.space.tabulate_dof_coordinates()[body.tread, 2]
-        self._vertical = 3 * body.tread + 2  # owned dofs that can meet the road
-        self._height = -np.inf
-        self._active = np.zeros(len(body.tread), dtype=bool)
-        self._force = np.zeros(len(body.tread))
-        self._scale, self._stiffness = self._yardsticks()
+        self.road = self._make_road()
+        self._scale = self._yardsticks()
         damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
         self._system = self._make_system("lu" if damped else "cholesky")
+
+    def _make_road(self) -> Road:
+        return Road(self.body)
 
     def _make_system(self, kind: str) -> System:
         return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
@@ -92,16 +94,16 @@ class Equilibrium:
         A tangent serves for as long as each step with it leaves a fifth of the error or less.
         """
         field = self.body.u.x
-        kept = field.array.copy(), self._active.copy(), self._force.copy()
-        self._height = -np.inf if road_height is None else road_height
+        kept = field.array.copy(), self.road.active.copy(), self.road.force.copy()
+        self.road.height = -np.inf if road_height is None else road_height
         self._before.x.array[:] = field.array
         error, tangents = 0.0, 0
         while True:
-            changed, last = self._choose_active(), error
+            changed, last = self.road.choose(), error
             error = self._error(load)
             reason = self._stopped(error, changed, tangents, allowed / self._scale)
             if reason == "converged":
-                self.road_height = None if road_height is None else self._height
+                self.road_height = None if road_height is None else self.road.height
                 return Step(True, tangents, error, reason)
             closing = None
             if not reason and (changed or not error < _SERVES * last):
@@ -111,7 +113,7 @@ class Equilibrium:
             reason = reason or self._move(closing, load)
             if reason:
                 break
-        field.array[:], self._active, self._force = kept
+        field.array[:], self.road.active, self.road.force = kept
         return Step(False, tangents, error, reason)
 
     def _stopped(self, error: float, changed: bool, tangents: int, allowed: float) -> str:
@@ -123,25 +125,13 @@ class Equilibrium:
             return "an element is inside out" if self._inside_out() else "converged"
         return "" if tangents < MOST_STEPS else f"no convergence in {MOST_STEPS} Newton steps"
 
-    def _choose_active(self) -> bool:
-        """Take the active set of the present state; whether it is another one on any process."""
-        wanted = self._force > self._stiffness * self._gap()
-        changed = bool((wanted != self._active).any())
-        self._active = wanted
-        self._force[~wanted] = 0.0
-        return self.body.comm.allreduce(changed, op=MPI.LOR)
-
-    def _gap(self) -> np.ndarray:
-        """Height of the owned tread dofs above the road, m; infinite without one."""
-        return self.tread_height() - self._height
-
     def _error(self, load: float | None) -> float:
         """Norm of what is out of balance over the force scale, distance to the road as the dof's force."""
         with self.cost("assembly"):
             out = self._assemble_residual().copy()
-        out[self._vertical] -= self._force
-        distance = (self._stiffness * self._gap())[self._active]
-        parts = np.array([out @ out + distance @ distance, self._force.sum()])
+        out[self.road.dofs] -= self.road.force
+        distance = self.road.distance()
+        parts = np.array([out @ out + distance @ distance, self.road.force.sum()])
         square, total = self.body.comm.allreduce(parts)
         missing = 0.0 if load is None else load - total
         return float(np.hypot(np.sqrt(square), missing)) / self._scale
@@ -150,8 +140,7 @@ class Equilibrium:
         """Assemble and factorise at the present state, the held dofs on their way to the road."""
         with self.cost("assembly"):
             self._assemble_tangent()
-        held = self._vertical[self._active]
-        return self._system.take(self.matrix, held, -self._gap()[self._active])
+        return self._system.take(self.matrix, self.road.held, -self.road.gap()[self.road.active])
 
     def _move(self, closing: Moved | None, load: float | None) -> str:
         """One linearised step to balance, held dofs to the road; with a load, the road to that. Collective.
@@ -159,7 +148,7 @@ class Equilibrium:
         Why it cannot be taken, or nothing. The road's force is the reaction of the linearised problem;
         what is out of balance is no force of the road (seen: held dofs let go and caught for ever).
         """
-        field, held = self.body.u.x, self._vertical[self._active]
+        field, held = self.body.u.x, self.road.held
         out = self._work.array_r.copy()
         change, force = self._system.solve(-out, closing)
         force += out[held]
@@ -169,14 +158,12 @@ class Equilibrium:
             if not rate > 0:
                 return "the road meets nothing that resists"
             rise = (load - total) / rate
-            self._height += rise
+            self.road.height += rise
             change, force = change + rise * further, force + rise * more
-        self._force[self._active] = force
+        self.road.force[self.road.active] = force
         self._before.x.array[:] = field.array
         field.array[: len(change)] += change
-        # To the last bit on the road: rounding of the solve would leave a gap or a penetration.
-        field.array[held] = (self._height - self._tread_z)[self._active]
-        field.scatter_forward()
+        self.road.lay_on()
         return ""
 
     def road_stiffness(self) -> float:
@@ -205,18 +192,29 @@ class Equilibrium:
         gained = [push @ self._system.solve(right)[0] for right in (load * push - out, push)]
         return tuple(self.body.comm.allreduce(np.array(gained)))
 
+    def load(self) -> float:
+        """Total vertical force of the road, N. Collective."""
+        return self.road.load()
+
+    def points(self) -> int:
+        """Nodes that the road presses on. Collective."""
+        return self.road.points()
+
     def contact_force(self) -> np.ndarray:
         """Vertical force of the road on the owned nodes (nodes,), N; not negative. Not collective."""
-        force = np.zeros(self.body.nodes)
-        force[self.body.tread] = self._force
-        return force
+        return self.road.at_nodes()
 
-    def tread_height(self) -> np.ndarray:
-        """Height z + u_z of the owned tread nodes, m, in the order of `body.tread`."""
-        return self._tread_z + self.body.u.x.array[self._vertical]
+    def resume(self, displacement: np.ndarray, force: np.ndarray, height: float | None) -> Step:
+        """Solve from a state found by other means: displacement (n, 3) m and force of the road (n,) N of all
+        lattice nodes, on a road at `height` (m). What is in balance stays as it is. Collective.
+        """
+        self.body.set_displacement(displacement)
+        if height is not None:
+            self.road.take(force[self.body.ids], height)
+        return self.solve(height)
 
-    def _yardsticks(self) -> tuple[float, np.ndarray]:
-        """Force scale, N, and stiffness of each owned tread dof, N/m, of the undeformed body.
+    def _yardsticks(self) -> float:
+        """Force scale, N, of the undeformed body, whose stiffness the road is told.
 
         The scale is the typical stiffness of a dof times the wall, so that 1e-12 of it is far below
         any load of interest.
@@ -225,7 +223,8 @@ class Equilibrium:
         self._assemble_tangent()
         diagonal = self.matrix.getDiagonal()
         typical = diagonal.norm() / np.sqrt(diagonal.size)
-        return self.body.ring.thickness * typical, diagonal.array[self._vertical].copy()
+        self.road.stiffness = diagonal.array[self.road.dofs].copy()
+        return self.body.ring.thickness * typical
 
     def _assemble_residual(self) -> np.ndarray:
         """Forces out of balance at the owned dofs, N; on the rim 0, where the wheel takes them."""

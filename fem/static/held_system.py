@@ -26,8 +26,11 @@ class Moved:
 class System(Protocol):
     """The linearised equilibrium as Newton's method needs it; as `HeldSystem` says."""
 
-    closing: Moved
-    raising: Moved
+    @property
+    def closing(self) -> Moved: ...
+
+    @property
+    def raising(self) -> Moved: ...
 
     def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
         """Factorise; False when the matrix is singular. Collective."""
@@ -68,6 +71,9 @@ class HeldSystem:
             self.raising = self._moved(matrix, np.ones(len(held)))
             matrix.zeroRowsColumns(rows, 1.0)
         with self._timing("factorisation"):
+            self._ksp.setOperators(
+                matrix
+            )  # not always the one it was made with (fem.static.curved)
             self._ksp.getPC().setUp()
         return self._checked()
 

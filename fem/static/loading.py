@@ -10,13 +10,11 @@ import numpy as np
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.parallel import on_root
 from tireroad.fem.static.equilibrium import Equilibrium, Step
-from tireroad.fem.static.round import RoundEquilibrium
 from tireroad.fem.static.stepping import Attempt, Show, march
+from tireroad.fem.static.symmetry.half_turn import HalfTurnEquilibrium, looks_the_same
+from tireroad.fem.static.symmetry.round import RoundEquilibrium
 from tireroad.fem.static.tread_surface import TreadSurface
-
-LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
-_REACH = 1.9  # times the largest deflection so far: a load is sought no further away
-_NEAR = 0.1  # of a wanted load: what may be out of balance on the way to it (12 tangents in place of 21)
+from tireroad.fem.static.way import Way
 
 
 @dataclass(frozen=True)
@@ -32,12 +30,11 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class _Known:
-    """A converged state on the way to a load."""
+class _Half:
+    """Half of the ring of a loader's body."""
 
-    deflection: float
-    load: float
-    displacement: np.ndarray
+    loader: Loader
+    equilibrium: HalfTurnEquilibrium
 
 
 class Loader:
@@ -72,13 +69,13 @@ class Loader:
         step = self._solve_at(pressure)
         self.newton_steps += step.iterations
         if step.converged:
-            self._report("inflation", pressure, "Pa", step)
+            self.tell("inflation", pressure, "Pa", step)
         else:
             self.body.u.x.array[:] = before
         return step.converged
 
     def _inflate_in_steps(self, pressure: float) -> None:
-        self._march(
+        self.march(
             lambda part: self._solve_at(part * pressure),
             1.0,
             1.0,
@@ -106,21 +103,67 @@ class Loader:
         return self.equilibrium.road_height - self.touch
 
     def lowest(self) -> float:
-        """Height of the lowest point of the outer face between its nodes, m. Collective."""
+        """Height of the lowest point of the outer face over the road's shape, m. Collective."""
         lattice = self.body.lattice
         moved = self.body.surface(self.body.owned(self.body.u.x.array))
-        return TreadSurface(lattice, lattice.points(lattice.face) + moved).lowest()
+        places = lattice.points(lattice.face) + moved
+        places[:, 2] -= self.equilibrium.shape.height(*places[:, :2].T)
+        return TreadSurface(lattice, places).lowest()
 
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
-        self._raise_road(0.0, deflection, [])
+        if not self._by_half(lambda half: Way(half).climb(deflection)):
+            Way(self).climb(deflection)
 
     def visit(self, deflections: Sequence[float]) -> Iterator[float]:
         """Raise the road to ascending deflections (m) in turn, from a line through the last two states."""
-        known = [_Known(0.0, 0.0, self.body.u.x.array.copy())]
+        half, own = self._half(), Way(self)
+        way = None if half is None else Way(half.loader)
         for deflection in deflections:
-            self._try_deflection(deflection, known)
+            if half is None or way is None:
+                own.to(deflection)
+            else:
+                way.to(deflection)
+                if not self._taken_over(half):
+                    half = None
+                    own.to(deflection)
             yield deflection
+
+    def _half(self) -> _Half | None:
+        """Half of the ring in the present state, where half a turn leaves tire and loads as they are. Collective."""
+        rolling = self.equilibrium.rolling
+        if not (self.equilibrium.shape.flat and looks_the_same(self.body.ring, rolling)):
+            return None
+        equilibrium = HalfTurnEquilibrium(self.body, rolling)
+        equilibrium.start(self.equilibrium)
+        loader = Loader(equilibrium, self.report)
+        loader._touch = self._touch
+        return _Half(loader, equilibrium)
+
+    def _taken_over(self, half: _Half) -> bool:
+        """Put the state of half the ring on the whole; whether it is balance there too. Collective."""
+        other = half.equilibrium
+        self.newton_steps += half.loader.newton_steps
+        half.loader.newton_steps = 0
+        self.equilibrium.cost.take(other.cost)
+        return self.equilibrium.resume(*other.on(self.body.lattice), other.road_height).converged
+
+    def _by_half(self, press: Callable[[Loader], object]) -> bool:
+        """Press half of the ring, if that is of use; whether it was. An error leaves the whole in the last state of
+        the half. Collective.
+        """
+        half, start = self._half(), self.body.u.x.array.copy()
+        if half is None:
+            return False
+        try:
+            press(half.loader)
+        except ConvergenceError:
+            self._taken_over(half)
+            raise
+        found = self._taken_over(half)
+        if not found:
+            self.body.u.x.array[:] = start
+        return found
 
     def carry(self, load: float) -> float:
         """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket.
@@ -129,122 +172,26 @@ class Loader:
         """
         if load <= 0:
             raise InputError(f"static.load = {load:g} N: a road carries a positive load")
-        start = self.body.u.x.array.copy()
-        try:
-            return self._seek(load, _NEAR * load)
-        except ConvergenceError:
-            if self.equilibrium.solve(self.equilibrium.road_height).converged:
-                raise
-            self.body.u.x.array[:] = start
-            return self._seek(load, 0.0)
-
-    def _seek(self, load: float, allowed: float) -> float:
-        """That deflection, with states on the way `allowed` (N) out of balance."""
-        known = [_Known(0.0, 0.0, self.body.u.x.array.copy())]
-        trial = 0.1 * self.body.ring.thickness
-        for _ in range(60):
-            self._try_deflection(trial, known, allowed)
-            rounding = self.equilibrium.rounding
-            if not allowed and abs(known[-1].load - load) <= max(LOAD_TOLERANCE * load, rounding):
-                return trial
-            trial = self._next_deflection(known, load)
-            if trial < _REACH * max(k.deflection for k in known):
-                if self._meet(load, trial, known):
-                    return self.deflection
-                if allowed:  # from here on a bracket has to close
-                    known, allowed = known[:1], 0.0
-        nearest = min(known, key=lambda k: abs(k.load - load))
-        raise ConvergenceError(
-            f"static: the load of {load:g} N was not met in 60 trials; nearest is {nearest.load:g} N. "
-            "Give static.deflection instead, or refine the mesh."
-        )
-
-    def _meet(self, load: float, trial: float, known: list[_Known]) -> bool:
-        """Solve for the load and the road's height at once, from the state guessed at a deflection."""
-        self._guess(trial, known)
-        step = self.equilibrium.solve(self.touch + trial, load)
-        self.newton_steps += step.iterations
-        if step.converged:
-            self._report("deflection", self.deflection, "m", step)
-        return step.converged
-
-    def _guess(self, trial: float, known: list[_Known]) -> bool:
-        """Put the body on a line through the two states nearest to a deflection, if there are two."""
-        near = sorted(known, key=lambda k: abs(k.deflection - trial))[:2]
-        if len(near) < 2:
-            return False
-        reach = (trial - near[0].deflection) / (near[0].deflection - near[1].deflection)
-        change = near[0].displacement - near[1].displacement
-        self.body.u.x.array[:] = near[0].displacement + reach * change
-        return True
-
-    def _try_deflection(self, trial: float, known: list[_Known], allowed: float = 0.0) -> None:
-        """Solve at the trial deflection from a line through the two nearest states, else by steps.
-
-        What converges on the way is known from then on, `allowed` (N) out of balance.
-        """
-        if self._guess(trial, known):
-            step = self.equilibrium.solve(self.touch + trial, allowed=allowed)
-            self.newton_steps += step.iterations
-            if step.converged:
-                self._report("deflection", trial, "m", step)
-                known.append(_Known(trial, self.load(), self.body.u.x.array.copy()))
-                return
-        below = max((k for k in known if k.deflection <= trial), key=lambda k: k.deflection)
-        self.body.u.x.array[:] = below.displacement
-        self._raise_road(below.deflection, trial, known, allowed)
-
-    def _next_deflection(self, known: list[_Known], load: float) -> float:
-        """Secant through the two loads nearest to the wanted one, kept inside the bracket."""
-        below = max((k for k in known if k.load <= load), key=lambda k: k.deflection)
-        above = [k.deflection for k in known if k.load > load]
-        far, near = sorted(known, key=lambda k: -abs(k.load - load))[-2:]
-        rise, run = near.load - far.load, near.deflection - far.deflection
-        slope = rise / run if run else 0.0
-        secant = near.deflection + (load - near.load) / slope if slope > 0 else np.inf
-        if above:
-            low, high = below.deflection, min(above)
-            return secant if low < secant < high else (low + high) / 2
-        if below.deflection > self.body.ring.height:
-            raise ConvergenceError(
-                f"static: the tire carries {below.load:.4g} N at {below.deflection:.4g} m of "
-                f"deflection, beyond its section; {load:g} N is out of reach. Lower static.load or "
-                "raise static.inflation."
-            )
-        # Beyond what was tried the curve is not known: at most double the deflection.
-        return float(np.clip(secant, 1.01 * below.deflection, 2 * below.deflection))
+        if not self._by_half(lambda half: Way(half).carry(load)):
+            Way(self).carry(load)
+        return self.deflection
 
     def load(self) -> float:
         """Total vertical force of the road, N. Collective."""
-        return self.body.comm.allreduce(self.equilibrium.contact_force().sum())
+        return self.equilibrium.load()
 
-    def _raise_road(
-        self, start: float, end: float, known: list[_Known], allowed: float = 0.0
-    ) -> None:
-        """In steps, each of which is entered in `known`."""
-
-        def attempt(deflection: float) -> Step:
-            step = self.equilibrium.solve(self.touch + deflection, allowed=allowed)
-            if step.converged:
-                known.append(_Known(deflection, self.load(), self.body.u.x.array.copy()))
-            return step
-
-        largest = 0.25 * self.body.ring.thickness
-        self._march(attempt, end, largest, Show("deflection", 1.0, "m"), start)
-
-    def _march(
+    def march(
         self, attempt: Attempt, end: float, first: float, show: Show, start: float = 0.0
     ) -> None:
         def tried(target: float) -> Step:
             step = attempt(target)
             self.newton_steps += step.iterations
             if step.converged:
-                self._report(show.what, target * show.scale, show.unit, step)
+                self.tell(show.what, target * show.scale, show.unit, step)
             return step
 
         march(tried, start, end, first, show)
 
-    def _report(self, what: str, value: float, unit: str, step: Step) -> None:
-        force = self.equilibrium.contact_force()
-        total, active = self.load(), self.body.comm.allreduce(int((force > 0).sum()))
-        self.report(Progress(what, value, unit, total, active, step))
+    def tell(self, what: str, value: float, unit: str, step: Step) -> None:
+        loads = self.equilibrium.load(), self.equilibrium.points()
+        self.report(Progress(what, value, unit, *loads, step))

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.fem.sections.torus import Torus
 from tireroad.runs.bench.parts import converged_load
 from tireroad.runs.bench.series.harmonics import Rubber, lowest
 from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.measure.torus import thesis_torus
 from tireroad.runs.process import observe
 
 ABOUT = "element order, mesh, grading, near-incompressibility and mass on the clamped torus"
@@ -95,8 +95,7 @@ def _named(mesh) -> str:
 
 
 def _section(*mesh):
-    sizes = {"outer_radius": 0.32, "minor_radius": 0.1, "thickness": 0.012}
-    return Torus(half_angle=np.radians(120), **sizes, **dict(zip(NAMES, mesh, strict=True)))
+    return thesis_torus(**dict(zip(NAMES, mesh, strict=True)))
 
 
 def _body(section, ratio: float = 0.45):

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from tireroad.modal.standing import sites
 from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.measure.torus import thesis_torus
 
 ABOUT = "error of the modes over mesh and order; round tires by wave number against the general way"
 MESHES = ((12, 4), (16, 6), (24, 9), (32, 12), (48, 18))  # elements around, along
@@ -27,18 +28,8 @@ def _operators(around: int, along: int, order: int):
     from tireroad.fem.matrices.operators import Operators
     from tireroad.fem.tire.body import Body
     from tireroad.fem.tire.material import compound
-    from tireroad.fem.tire.mesh import Torus
 
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=around,
-        elements_arc=along,
-        elements_thickness=1,
-        order=order,
-    )
+    section = thesis_torus(segments=around, elements_arc=along, order=order)
     rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     return Operators(Body(MPI.COMM_WORLD, section, rubber), 0.0)
 

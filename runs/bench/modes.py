@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.measure.torus import thesis_torus
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import peak_memory
 
@@ -67,19 +68,8 @@ def _tire(comm: MPI.Comm):
     from tireroad.fem.static.loading import Loader
     from tireroad.fem.tire.body import Body
     from tireroad.fem.tire.material import compound
-    from tireroad.fem.tire.mesh import Torus
 
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=80,
-        elements_arc=16,
-        elements_thickness=1,
-        order=2,
-        footprint_size=0.25,
-    )
+    section = thesis_torus(segments=80, elements_arc=16, footprint_size=0.25)
     material = compound(
         model="neo-hookean", youngs_modulus=48e6, poisson_ratio=0.45, density=1200.0
     )

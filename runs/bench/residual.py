@@ -15,7 +15,6 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.turning import Turning
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.recursion import Recursion
@@ -26,6 +25,7 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes
 from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.measure.torus import thesis_torus
 
 ABOUT = "receptance of few modes with each residual against the full matrices; set-up times"
 
@@ -64,16 +64,7 @@ def run() -> list[Table]:
 
 def _tire(comm: MPI.Comm, segments: int, elements_arc: int) -> SmallMotions:
     """An inflated torus of 48 MPa. Collective."""
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.10,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=segments,
-        elements_arc=elements_arc,
-        elements_thickness=1,
-        order=2,
-    ).ring()
+    section = thesis_torus(segments=segments, elements_arc=elements_arc).ring()
     rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     tire = TireModel(section, lambda: Body(comm, section, rubber))
     loader = Loader(Equilibrium(tire.body), lambda progress: None)

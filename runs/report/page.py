@@ -26,8 +26,9 @@ from tireroad.runs.report.sections import (
 )
 from tireroad.runs.report.verdicts import verdicts
 from tireroad.runs.scene.plan import STAGES
-from tireroad.runs.scene.schema import every_field, key_of, table_of
+from tireroad.runs.scene.schema import key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.walk import every_field
 from tireroad.runs.version import PROGRAM
 
 SECTIONS: Mapping[str, Callable[[Results], Section]] = {

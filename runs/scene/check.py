@@ -8,8 +8,9 @@ from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.rules.road import check_road
-from tireroad.runs.scene.schema import applies, entries, key_of, table_of
+from tireroad.runs.scene.schema import key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.walk import applies, entries
 from tireroad.runs.search.settings import Ladders, applied, bounds
 
 Row = tuple[str, str, str, str, str]

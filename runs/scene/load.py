@@ -18,19 +18,11 @@ from tireroad.fem.keys import Key, described
 from tireroad.fem.parameters import ParameterError
 from tireroad.runs.scene.raw import override, read_text
 from tireroad.runs.scene.rules import scene as rules
-from tireroad.runs.scene.schema import (
-    Table,
-    applies,
-    every_field,
-    key_of,
-    names,
-    owners,
-    table_of,
-    variant_of,
-)
+from tireroad.runs.scene.schema import Table, fields_of, gathered, key_of, table_of, variant_of
 from tireroad.runs.scene.source import Source, shortened
 from tireroad.runs.scene.tables.cavity import filled
 from tireroad.runs.scene.tables.scene import Damping, Scene
+from tireroad.runs.scene.walk import applies, every_field, names, owners
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 
@@ -93,7 +85,7 @@ def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:
         return of()
     before = len(source.problems)
     values = {}
-    for item in fields(of):
+    for item in fields_of(of):
         if item.name in raw and variant_of(item) is None:
             values[item.name] = _field(item, raw[item.name], (*path, item.name), source)
     known = set(names(of))
@@ -105,7 +97,7 @@ def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:
     for name in raw:
         if name not in known:
             _unknown(of, path, name, values, source)
-    values = {name: value for name, value in values.items() if value is not _WRONG}
+    values = gathered(of, {name: one for name, one in values.items() if one is not _WRONG})
     if len(source.problems) > before:
         return _without_checks(of, values)
     try:
@@ -157,7 +149,7 @@ def _variant(kind: type, raw: dict, path: tuple[str, ...], source: Source) -> An
 
 def _check_kinds(result: Any, raw: dict, path: tuple[str, ...], source: Source) -> None:
     """Keys that belong to another kind of this very table."""
-    for item in fields(result):
+    for item in fields_of(result):
         key = key_of(item)
         if key and item.name in raw and not applies(key, result):
             selector, kinds = key.only_for

@@ -27,7 +27,7 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
         reasons["rotating"] = "no [rotation]: the wheel stands"
     elif scene.rotation.speed == 0:
         reasons["rotating"] = "rotation.speed is 0: the wheel stands"
-    if not scene.force:
+    if not scene.force and not any(kind.of == "contact" for _, kind in scene.output.kinds):
         reasons["response"] = "no [[force]]"
     if scene.contact is None:
         reasons["contact"] = "no [contact]"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tireroad.fem.keys import Key
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.schema import Variant, key_of, table_of, variant_of
+from tireroad.runs.scene.schema import Variant, fields_of, key_of, table_of, variant_of
 from tireroad.runs.scene.tables.scene import Scene
 
 HEAD = """\
@@ -34,7 +34,7 @@ def reference() -> str:
 def _tables(of: type, path: str, doc: str, many: bool, written: dict[type, str]) -> Iterator[str]:
     """A table of keys, its variants, then the tables in it; one that is `written` already is named."""
     name = f"`[[{path}]]`" if many else f"`[{path}]`" if path else "At the top"
-    own = [(item, key_of(item)) for item in fields(of) if key_of(item)]
+    own = [(item, key_of(item)) for item in fields_of(of) if key_of(item)]
     yield f"\n## {name}\n\n{doc[0].upper()}{doc[1:]}.\n"
     if of in written:
         yield f"\nThe keys are those of `[{written[of]}]`.\n"
@@ -46,7 +46,7 @@ def _tables(of: type, path: str, doc: str, many: bool, written: dict[type, str])
         part = variant_of(item)
         if part is not None:
             yield from _variants(part, path)
-    for item in fields(of):
+    for item in fields_of(of):
         table = table_of(item)
         if table is not None:
             inner = f"{path}.{item.name}" if path else item.name

@@ -5,12 +5,13 @@ A table's fields are made by the functions of `fem.parameters` and by `table`, `
 key reference and the error messages all come from them.
 
 A variant is a class found in a registry by a key of the same table, e.g. the road by `road.kind`: its
-parameters are keys of that table, and the scene holds an object of that class.
+parameters are keys of that table, and the scene holds an object of that class. A collection has a key for
+each class of a registry, e.g. `output.impulse`: a switch, or a table where the class has parameters.
 """
 
 from collections.abc import Iterator
 from dataclasses import Field, dataclass, field, fields
-from typing import Any
+from typing import Any, TypeVar
 
 from tireroad.fem.keys import Key, Limits, described, finite, key_of
 from tireroad.fem.parameters import (
@@ -24,6 +25,8 @@ from tireroad.fem.parameters import (
     vector,
 )
 from tireroad.fem.registry import Registry
+
+P = TypeVar("P", bound=Parameters)
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,28 @@ class Variant:
 
     selector: str
     registry: Registry
+
+
+@dataclass(frozen=True)
+class Collection:
+    """A key for each class that `registry` has, by its name."""
+
+    registry: Registry
+
+    def fields(self) -> Iterator[Field]:
+        """As of a dataclass: a switch of a class without parameters, else an optional table."""
+        for name in self.registry:
+            of, doc = self.registry[name], self.registry.doc(name)
+            made = table(of, doc, optional=True) if fields(of) else flag(False, doc)
+            made.name = name
+            yield made
+
+    def gathered(self, values: dict[str, Any]) -> tuple[tuple[str, Any], ...]:
+        """(name, object) of what the values by name switch on or describe."""
+        on = {name: value for name, value in values.items() if value not in (None, False)}
+        return tuple(
+            (name, self.registry[name]() if value is True else value) for name, value in on.items()
+        )
 
 
 @dataclass(frozen=True)
@@ -107,6 +132,47 @@ def variant(selector: str, registry: Registry) -> Any:
     return field(default=None, metadata={"variant": Variant(selector, registry)})
 
 
+def collection(registry: Registry) -> Any:
+    """A tuple of (name, object), one for each class of the registry that the scene has a key or table of."""
+    return field(default=(), metadata={"collection": Collection(registry)})
+
+
+class Collects(Parameters):
+    """Base of tables with a collection: its names are attributes too, as the scene has them."""
+
+    def __getattr__(self, name: str) -> Any:
+        for item in fields(self):
+            part = collection_of(item)
+            if part is None or name.startswith("_") or name not in part.registry:
+                continue
+            absent = None if fields(part.registry[name]) else False
+            found = dict(getattr(self, item.name)).get(name, absent)
+            return absent is False and found is not False or found
+        raise AttributeError(f"{type(self).__name__} has no {name}")
+
+
+def collection_of(item: Field) -> Collection | None:
+    """The collection of a field, None where it is none."""
+    return item.metadata.get("collection")
+
+
+def fields_of(of: Any) -> Iterator[Field]:
+    """The fields of a dataclass or of an object of it, those of its collections in their place."""
+    for item in fields(of):
+        part = collection_of(item)
+        yield from part.fields() if part else [item]
+
+
+def gathered(of: type, values: dict[str, Any]) -> dict[str, Any]:
+    """Arguments for the constructor from values by key: those of a collection together."""
+    rest = dict(values)
+    for item in fields(of):
+        if part := collection_of(item):
+            own = {name: rest.pop(name) for name in part.registry if name in rest}
+            rest[item.name] = part.gathered(own)
+    return rest
+
+
 class Variants(Parameters):
     """Base of tables with variants: puts the named class's defaults where none is given."""
 
@@ -133,77 +199,21 @@ def variant_of(item: Field) -> Variant | None:
     return item.metadata.get("variant")
 
 
-def names(of: type) -> list[str]:
-    """The keys and tables that dataclass `of` has in every variant, in their order."""
-    return [item.name for item in fields(of) if variant_of(item) is None]
-
-
-def every_field(of: type) -> dict[str, Field]:
-    """The keys and tables that dataclass `of` has in any variant, by name."""
-    found = {}
-    for item in fields(of):
-        part = variant_of(item)
-        if part is None:
-            found[item.name] = item
-            continue
-        for kind in part.registry:
-            found = every_field(part.registry[kind]) | found
-    return found
-
-
-def owners(of: type, name: str) -> tuple[str, list[str]] | None:
-    """(selecting key, its values) of the variants that have a key; None where none has."""
-    for item in fields(of):
-        part = variant_of(item)
-        kinds = part.registry.owners(name) if part else []
-        if kinds:
-            return part.selector, kinds
-    return None
-
-
-def entries(holder: Any) -> Iterator[tuple[Any, Field]]:
-    """(object, field) of all keys and tables of a table, those of its variants in their place."""
-    for item in fields(holder):
-        if variant_of(item) is None:
-            yield holder, item
-        else:
-            yield from entries(getattr(holder, item.name))
-
-
-def walk(of: type, path: str = "") -> Iterator[tuple[str, type, Field, Key]]:
-    """(dotted name, dataclass, field, description) of every key in every variant; [] marks arrays."""
-    for item in fields(of):
-        name = f"{path}.{item.name}" if path else item.name
-        part, kinds, key = table_of(item), variant_of(item), key_of(item)
-        if part is not None:
-            yield from walk(part.of, f"{name}[]" if part.many else name)
-        elif kinds is not None:
-            for kind in kinds.registry:
-                yield from walk(kinds.registry[kind], path)
-        elif key is not None:
-            yield name, of, item, key
-
-
-def applies(key: Key, holder: Any) -> bool:
-    """Whether a key belongs to the kind that its table is."""
-    return key.only_for is None or getattr(holder, key.only_for[0]) in key.only_for[1]
-
-
 __all__ = [
+    "Collection",
+    "Collects",
     "Pitch",
     "Table",
     "Variant",
     "Variants",
-    "applies",
     "choice",
-    "entries",
-    "every_field",
+    "collection",
+    "fields_of",
     "flag",
+    "gathered",
     "integer",
     "key_of",
-    "names",
     "number",
-    "owners",
     "points",
     "registered",
     "table",
@@ -213,5 +223,4 @@ __all__ = [
     "variant",
     "variant_of",
     "vector",
-    "walk",
 ]

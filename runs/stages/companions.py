@@ -64,7 +64,7 @@ class Given:
     @cached_property
     def settled(self) -> ContactSetup:
         """The patch in its static state."""
-        return settled(self.job, self.setup, self.response, self.static.product.force)
+        return settled(self.job, self.setup, self.response, self.static.product.normal_force)
 
     @cached_property
     def longer(self) -> Forces:
@@ -127,7 +127,7 @@ def fewer_points(given: Given) -> Forces:
         contact = replace(job.scene.contact, brush_stiffness=4 * brush)
         job = replace(job, scene=replace(job.scene, contact=contact))
     setup = replace(given.setup, patch=thinned(patch))
-    setup = settled(job, setup, given.response, given.static.product.force)
+    setup = settled(job, setup, given.response, given.static.product.normal_force)
     return given.of(job).repeated(setup, given.response)
 
 
@@ -175,7 +175,7 @@ def coarser_mesh(given: Given) -> Forces:
         if (found := _made(job, kind, part, done)) is not None:
             done[kind.name] = found
     response, state = done["greens"].product.contact, done["static"].product
-    setup = settled(job, done["setup"].product, response, state.force)
+    setup = settled(job, done["setup"].product, response, state.normal_force)
     return given.of(job).repeated(setup, response)
 
 

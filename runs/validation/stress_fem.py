@@ -15,7 +15,7 @@ from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
+from tireroad.runs.measure.torus import thesis_torus
 
 BALANCED = 1e-9  # residual of a state in equilibrium, of the force scale
 
@@ -74,17 +74,8 @@ class Ended:
 def result(asked: Attempt) -> Ended:
     """Load, and look at what is left."""
     segments, arc, order = asked.mesh
-    half = np.radians(120)
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=half,
-        segments=segments,
-        elements_arc=arc,
-        elements_thickness=1,
-        order=order,
-        footprint_size=asked.size,
+    section = thesis_torus(
+        segments=segments, elements_arc=arc, order=order, footprint_size=asked.size
     )
     rubber = compound(
         "neo-hookean",

@@ -11,13 +11,13 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.modal.basis import Projection, project
 from tireroad.modal.campbell import critical_speed, growth, onset
 from tireroad.modal.rotating import checks, matrices, rotating
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import sites
+from tireroad.runs.measure.torus import thesis_torus
 
 COUNT = 120
 DAMPING = (0.0, 500.0, 5e3, 1e5)  # gamma1, 1/s
@@ -26,16 +26,7 @@ SPEEDS = (0.0, 0.3, 0.999, 1.3)  # of the critical one
 
 def rows() -> list[list]:
     """(package, case, what happened, how it was caught)."""
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=8,
-        elements_arc=4,
-        elements_thickness=1,
-        order=2,
-    )
+    section = thesis_torus(segments=8, elements_arc=4)
     body = Body(
         MPI.COMM_SELF,
         section,

@@ -14,22 +14,12 @@ from tireroad.contact.thinned import thinned
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.tread_surface import TreadSurface
-from tireroad.fem.tire.mesh import Torus, field_lattice
+from tireroad.fem.tire.mesh import field_lattice
+from tireroad.runs.measure.torus import thesis_torus
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.contact import Contact
 
-SECTION = Torus(
-    outer_radius=0.32,
-    minor_radius=0.10,
-    thickness=0.012,
-    half_angle=np.radians(120),
-    segments=60,
-    elements_arc=16,
-    elements_thickness=1,
-    order=2,
-    grading="bead",
-    footprint_size=0.3,
-)
+SECTION = thesis_torus(segments=60, elements_arc=16, grading="bead", footprint_size=0.3)
 
 
 @pytest.fixture(scope="module")

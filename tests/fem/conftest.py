@@ -9,8 +9,8 @@ from scipy import sparse
 
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.tire.wall import compounds
+from tireroad.runs.measure.torus import thesis_torus
 
 RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
 
@@ -22,16 +22,8 @@ def make_body() -> Callable[..., Body]:
     def make(order=2, segments=12, arc=6, layers=1, comm=MPI.COMM_SELF, free=False, **more):
         material, regions = more.pop("material", RUBBER), more.pop("regions", ())
         cords, plies = more.pop("cords", ()), more.pop("plies", ())
-        section = Torus(
-            outer_radius=0.32,
-            minor_radius=0.1,
-            thickness=0.012,
-            half_angle=np.radians(120),
-            segments=segments,
-            elements_arc=arc,
-            elements_thickness=layers,
-            order=order,
-            **more,
+        section = thesis_torus(
+            segments=segments, elements_arc=arc, elements_thickness=layers, order=order, **more
         )
         ring = section.ring([region.patch(i) for i, region in enumerate(regions)], plies)
         body = Body(comm, ring, compounds(material, tuple(regions)), cords=cords)

@@ -12,9 +12,9 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.nonlinear import NonlinearTire
+from tireroad.runs.measure.torus import thesis_torus
 
 pytestmark = pytest.mark.slow
 
@@ -26,16 +26,7 @@ PUSH = 300.0  # N: some millimetres
 
 def inflated(comm):
     """A soft inflated torus of few elements, and a push at its lowest point."""
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.10,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=10,
-        elements_arc=4,
-        elements_thickness=1,
-        order=2,
-    )
+    section = thesis_torus(segments=10, elements_arc=4)
     body = Body(
         comm, section, compound("neo-hookean", 1200.0, youngs_modulus=4.8e6, poisson_ratio=0.45)
     )

@@ -9,22 +9,14 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.sections import reference
 from tireroad.fem.sections.grid import Patch, PlyLine, corners
 from tireroad.fem.sections.torus import Torus
+from tireroad.runs.measure.torus import thesis_torus
 
 HALF = np.radians(120)
 BELT = PlyLine("belt", (-0.8, 0.8), 0.75)
 
 
 def torus(order=2, arc=12, layers=1) -> Torus:
-    return Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=HALF,
-        segments=20,
-        elements_arc=arc,
-        elements_thickness=layers,
-        order=order,
-    )
+    return thesis_torus(segments=20, elements_arc=arc, elements_thickness=layers, order=order)
 
 
 def area(mesh, region=None) -> float:

@@ -6,7 +6,7 @@ import pytest
 from tireroad.fem.sections import reference
 from tireroad.fem.sections.radial import radial
 from tireroad.fem.sections.split import split_ring, split_section
-from tireroad.fem.sections.torus import Torus
+from tireroad.runs.measure.torus import thesis_torus
 
 
 def area(section) -> float:
@@ -24,16 +24,7 @@ def area(section) -> float:
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_strips_are_cut_across_the_wall_and_the_shape_stays(order):
-    ring = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=8,
-        elements_arc=6,
-        elements_thickness=2,
-        order=order,
-    ).ring()
+    ring = thesis_torus(segments=8, elements_arc=6, elements_thickness=2, order=order).ring()
     along, around = np.zeros(6, bool), np.zeros(8, bool)
     along[[2, 3]], around[0] = True, True
     finer = split_ring(ring, around, along)

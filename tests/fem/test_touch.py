@@ -6,7 +6,8 @@ import pytest
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.tread_surface import TreadSurface
-from tireroad.fem.tire.mesh import Lattice, Torus, position
+from tireroad.fem.tire.mesh import Lattice, position
+from tireroad.runs.measure.torus import thesis_torus
 
 
 def torus(ring, arc):
@@ -20,16 +21,7 @@ def test_the_lowest_point_of_a_turned_wheel(order, turn):
     """A circle about the axle, turned by a part of an element: the face between nodes closes in on it."""
     errors = []
     for segments in (16, 32):
-        section = Torus(
-            outer_radius=0.32,
-            minor_radius=0.1,
-            thickness=0.012,
-            half_angle=np.radians(120),
-            segments=segments,
-            elements_arc=segments // 2,
-            elements_thickness=1,
-            order=order,
-        )
+        section = thesis_torus(segments=segments, elements_arc=segments // 2, order=order)
         edge = {1: [0, 1], 2: [0, 0.5, 1], 3: [0, 0.27639320225, 0.72360679775, 1]}[order]
         lattice = Lattice(section, np.array(edge))
         ring, arc = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
@@ -41,16 +33,7 @@ def test_the_lowest_point_of_a_turned_wheel(order, turn):
 
 def test_no_place_on_the_face_is_lower():
     rng = np.random.default_rng(3)
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=12,
-        elements_arc=6,
-        elements_thickness=1,
-        order=3,
-    )
+    section = thesis_torus(segments=12, elements_arc=6, order=3)
     lattice = Lattice(section, np.array([0, 0.27639320225, 0.72360679775, 1]))
     ring, arc = np.meshgrid(lattice.ring, lattice.arc, indexing="ij")
     face = torus(ring.ravel(), arc.ravel())
@@ -64,6 +47,6 @@ def test_a_tire_whose_crown_is_no_node_touches_below_its_nodes(make_body):
     equilibrium = Equilibrium(make_body(order=3, segments=8, arc=5))
     loader = Loader(equilibrium, lambda progress: None)
     loader.inflate(2e5)
-    assert loader.touch < equilibrium.tread_height().min() - 1e-5
+    assert loader.touch < equilibrium.road.tread_height().min() - 1e-5
     loader.carry(50.0)
     assert loader.load() == pytest.approx(50.0, rel=1e-8)

@@ -12,24 +12,15 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.transient.linear import FullTire
+from tireroad.runs.measure.torus import thesis_torus
 
 DAMPING = (400.0, 0.0)
 
 
 def inflated(comm):
     """An inflated torus of few elements, its operators, rotation matrices, a load and its reading."""
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.10,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=12,
-        elements_arc=4,
-        elements_thickness=1,
-        order=2,
-    )
+    section = thesis_torus(segments=12, elements_arc=4)
     material = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
     body = Body(comm, section, material)
     Loader(Equilibrium(body), lambda progress: None).inflate(2e5)

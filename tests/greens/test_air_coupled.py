@@ -16,7 +16,6 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.transient.linear import FullTire
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.recursion import Recursion
@@ -24,6 +23,7 @@ from tireroad.greens.response import couple
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
 from tireroad.modal.standing import sites
+from tireroad.runs.measure.torus import thesis_torus
 
 pytestmark = pytest.mark.slow
 
@@ -37,16 +37,7 @@ EVERY = 10**6
 @lru_cache(maxsize=3)
 def body(speed: float, deflection: float = 0.01) -> Body:
     """An inflated soft torus on the road, turning or not."""
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.10,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=8,
-        elements_arc=2,
-        elements_thickness=1,
-        order=2,
-    )
+    section = thesis_torus(segments=8, elements_arc=2)
     made = Body(COMM, section, RUBBER)
     loader = Loader(Equilibrium(made, Rolling(speed=speed)), lambda progress: None)
     loader.inflate(2e5)

@@ -11,11 +11,11 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.greens import attachment
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
+from tireroad.runs.measure.torus import thesis_torus
 
 COMM = MPI.COMM_WORLD
 SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
@@ -24,17 +24,7 @@ SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "
 @pytest.fixture(scope="module")
 def tire():
     """7,200 unknowns, 40 modes, vertical probes at 15 x 9 points 8 mm apart (closer than the nodes)."""
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.10,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=24,
-        elements_arc=9,
-        elements_thickness=1,
-        order=2,
-        footprint_size=0.4,
-    )
+    section = thesis_torus(segments=24, elements_arc=9, footprint_size=0.4)
     body = Body(COMM, section, compound(**SOFT))
     Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)

@@ -20,7 +20,6 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Basis
 from tireroad.greens.blocked import disagreement
@@ -32,6 +31,7 @@ from tireroad.modal.rolling import decouple
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import everywhere
 from tireroad.modal.standing import sites
+from tireroad.runs.measure.torus import thesis_torus
 
 COMM = MPI.COMM_WORLD
 RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
@@ -111,16 +111,7 @@ def body(speed: float) -> Body:
     """An inflated soft torus on the road, turning or not."""
     made = Body(
         COMM,
-        Torus(
-            outer_radius=0.32,
-            minor_radius=0.10,
-            thickness=0.012,
-            half_angle=np.radians(120),
-            segments=8,
-            elements_arc=2,
-            elements_thickness=1,
-            order=2,
-        ),
+        thesis_torus(segments=8, elements_arc=2),
         RUBBER,
     )
     loader = Loader(Equilibrium(made, Rolling(speed=speed)), lambda progress: None)

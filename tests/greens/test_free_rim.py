@@ -16,12 +16,12 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.response import couple
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
 from tireroad.modal.standing import sites
+from tireroad.runs.measure.torus import thesis_torus
 
 COMM = MPI.COMM_WORLD
 RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=4.8e7, poisson_ratio=0.45)
@@ -32,16 +32,7 @@ DAMPING = (60.0, 1e-6)
 @lru_cache(maxsize=2)
 def body(speed: float) -> Body:
     """An inflated soft torus, turning or not."""
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.10,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=8,
-        elements_arc=2,
-        elements_thickness=1,
-        order=2,
-    )
+    section = thesis_torus(segments=8, elements_arc=2)
     made = Body(COMM, section, RUBBER)
     Loader(Equilibrium(made, Rolling(speed=speed)), lambda progress: None).inflate(2e5)
     return made

@@ -16,13 +16,13 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.truncation import Cutoff, estimate, estimate_axle
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.solver.modes import Modes
+from tireroad.runs.measure.torus import thesis_torus
 
 MATERIAL = {
     "model": "neo-hookean",
@@ -39,16 +39,7 @@ SPOTS = [(0.0, 0.0), (0.15, 0.1), (-0.2, -0.3), (1.0, 0.5)]
 def tire():
     """An inflated soft torus of 2,112 free unknowns, its lowest modes, loads and readings."""
     comm = MPI.COMM_WORLD
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.10,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=16,
-        elements_arc=6,
-        elements_thickness=1,
-        order=2,
-    )
+    section = thesis_torus(segments=16, elements_arc=6)
     body = Body(comm, section, compound(**MATERIAL))
     Loader(Equilibrium(body), lambda progress: None).inflate(2e5)
     operators = Operators(body, 2e5)

@@ -11,7 +11,6 @@ from scipy import linalg, sparse
 from tireroad.fem.matrices.compliance import on_own_rows
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.probe import nodes
-from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
@@ -22,6 +21,7 @@ from tireroad.greens.coupling import Basis, Wheel
 from tireroad.modal.basis import project
 from tireroad.modal.damping import StrainEnergy, beyond, rates
 from tireroad.modal.solver import undamped
+from tireroad.runs.measure.torus import thesis_torus
 
 INFLATION, KEPT = 1e5, 30
 
@@ -33,16 +33,7 @@ def tire() -> SimpleNamespace:
     tread = Region(
         material=compound("neo-hookean", **rubber, loss_factor=0.3), arc=(0.0, np.radians(60))
     )
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=8,
-        elements_arc=4,
-        elements_thickness=1,
-        order=2,
-    )
+    section = thesis_torus(segments=8, elements_arc=4)
     wall = compound("neo-hookean", **rubber, loss_factor=0.1)
     body = Body(MPI.COMM_SELF, section, wall, (tread,))
     equilibrium = Equilibrium(body)

@@ -7,8 +7,8 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import dumps
-from tireroad.runs.scene.schema import walk
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.walk import walk
 
 FULL = """
 [static]

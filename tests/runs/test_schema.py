@@ -16,10 +16,11 @@ from tireroad.fem.parameters import ParameterError
 from tireroad.fem.tire.law import MATERIALS
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.reference import reference
-from tireroad.runs.scene.schema import variant_of, walk
+from tireroad.runs.scene.schema import collection_of, variant_of
 from tireroad.runs.scene.tables import tire as tire_tables
 from tireroad.runs.scene.tables.pattern import PatternTable
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.walk import walk
 from tireroad.runs.stages.build.pattern import make_pattern
 from tireroad.runs.stages.pipeline import run_scene
 
@@ -164,6 +165,7 @@ class Recorder:
 
     def _watch(self, of: type) -> None:
         names = {item.name for item in fields(of)}
+        switches = {f.name for item in fields(of) if (c := collection_of(item)) for f in c.fields()}
         plain: Callable = of.__getattribute__
         label, seen = of.__name__, self.seen
 
@@ -172,6 +174,8 @@ class Recorder:
                 file = sys._getframe(1).f_code.co_filename
                 if not file.endswith(Recorder.WHOLE):
                     seen.update(f"{label}.{n}" for n in (names if name == "__dict__" else [name]))
+                    if switches and name == "kinds":  # whoever takes them all takes each
+                        seen.update(f"{label}.{n}" for n in switches)
             return plain(holder, name)
 
         self._patch.setattr(of, "__getattribute__", reading, raising=False)

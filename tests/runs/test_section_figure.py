@@ -6,22 +6,13 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.image import imread
 
 from tireroad.fem.sections.grid import PlyLine
-from tireroad.fem.sections.torus import Torus
+from tireroad.runs.measure.torus import thesis_torus
 from tireroad.runs.report.section_figure import draw_section, save_section
 
 
 @pytest.fixture
 def mesh():
-    torus = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=16,
-        elements_arc=12,
-        elements_thickness=2,
-        order=2,
-    )
+    torus = thesis_torus(segments=16, elements_arc=12, elements_thickness=2)
     return torus.section(plies=[PlyLine("belt", (-0.7, 0.7), 0.5)])
 
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from tireroad.fem.errors import InputError
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.build.transmissibility import apart
+from tireroad.runs.stages.outputs.transmissibility import apart
 from tireroad.runs.stages.pipeline import run_scene
 
 SCENE = """

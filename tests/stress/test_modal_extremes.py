@@ -11,13 +11,13 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.modal.basis import project
 from tireroad.modal.campbell import critical_speed, growth, onset
 from tireroad.modal.rotating import checks, matrices, rotating
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import sites
+from tireroad.runs.measure.torus import thesis_torus
 
 pytestmark = pytest.mark.slow
 
@@ -27,16 +27,7 @@ SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "
 
 @pytest.fixture(scope="module")
 def operators() -> Operators:
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=8,
-        elements_arc=2,
-        elements_thickness=1,
-        order=2,
-    )
+    section = thesis_torus(segments=8, elements_arc=2)
     body = Body(COMM, section, compound(**SOFT))
     loader = Loader(Equilibrium(body), lambda progress: None)
     loader.inflate(2e5)
@@ -84,16 +75,7 @@ def test_growth_begins_where_onset_says(operators, modes):
 
 def test_bulk_a_thousand_times_the_shear_modulus():
     """Rounding leaves more than 1e-8 of the lowest eigenvalue: as good as LAPACK's, and not refused."""
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=12,
-        elements_arc=4,
-        elements_thickness=1,
-        order=3,
-    )
+    section = thesis_torus(segments=12, elements_arc=4, order=3)
     rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.4995)
     operators = Operators(Body(MPI.COMM_SELF, section, rubber), 0.0)
     modes = undamped.solve(operators.stiffness, operators.mass, 10)

@@ -4,23 +4,14 @@ import numpy as np
 import pytest
 
 from tireroad.fem.sections.grid import PlyLine
-from tireroad.fem.sections.torus import Torus
 from tireroad.runs.bench.series.harmonics import Membrane, Rubber, frequencies
+from tireroad.runs.measure.torus import thesis_torus
 
 HALF = np.radians(120)
 
 
 def section(arc=24, layers=2, plies=()):
-    torus = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=HALF,
-        segments=8,
-        elements_arc=arc,
-        elements_thickness=layers,
-        order=3,
-    )
+    torus = thesis_torus(segments=8, elements_arc=arc, elements_thickness=layers, order=3)
     return torus.section([], plies)
 
 

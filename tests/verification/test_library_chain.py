@@ -17,7 +17,6 @@ from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.probe import nodes
 from tireroad.fem.model import SmallMotions, TireModel
-from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.press import press
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
@@ -29,6 +28,7 @@ from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.damping import StrainEnergy
 from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.standing import standing_modes
+from tireroad.runs.measure.torus import thesis_torus
 from tireroad.runs.stages.build.turning import rolling_shape
 
 SCENE = """
@@ -69,17 +69,7 @@ COMM, SPEED, STEP = MPI.COMM_SELF, 40.0, 5e-5
 
 @pytest.fixture(scope="module")
 def tire() -> TireModel:
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.10,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=16,
-        elements_arc=6,
-        elements_thickness=1,
-        order=2,
-        grading="uniform",
-    )
+    section = thesis_torus(segments=16, elements_arc=6, grading="uniform")
     rubber = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45)
     return TireModel(section, lambda: Body(COMM, section, rubber))
 

@@ -15,8 +15,8 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.tire.wall import Region
+from tireroad.runs.measure.torus import thesis_torus
 
 pytestmark = pytest.mark.slow
 
@@ -25,17 +25,7 @@ HEIGHT, CONVERGED = -0.3184244, 532.8  # m, N
 
 
 def ring(segments, arc, order=2):
-    return Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=segments,
-        elements_arc=arc,
-        elements_thickness=1,
-        order=order,
-        footprint_size=0.25,
-    )
+    return thesis_torus(segments=segments, elements_arc=arc, order=order, footprint_size=0.25)
 
 
 def pressed(section, rolling=AT_REST, comm=MPI.COMM_SELF, regions=(), height=HEIGHT) -> Loader:

@@ -10,7 +10,6 @@ from scipy.sparse import linalg
 from tireroad.fem import compat
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.sections.grid import PlyLine
-from tireroad.fem.sections.torus import Torus
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.cords import Cords
@@ -20,6 +19,7 @@ from tireroad.modal.basis import project
 from tireroad.modal.damping import Proportional, StrainEnergy, beyond, rates
 from tireroad.modal.rotating import matrices, standing
 from tireroad.modal.solver import undamped
+from tireroad.runs.measure.torus import thesis_torus
 
 INFLATION = 1.0e5
 
@@ -27,16 +27,7 @@ INFLATION = 1.0e5
 def tire(crown: dict, side: dict, segments=8, arc=6, plies=True, comm=MPI.COMM_SELF) -> Body:
     """A small inflated torus of two compounds with a radial ply."""
     rubber = {"density": 1200.0, "youngs_modulus": 48e6, "poisson_ratio": 0.45}
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=segments,
-        elements_arc=arc,
-        elements_thickness=1,
-        order=2,
-    )
+    section = thesis_torus(segments=segments, elements_arc=arc)
     regions = (
         Region(material=compound("neo-hookean", **rubber, **crown), arc=(0.0, np.radians(50))),
     )

@@ -11,12 +11,12 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.modal.basis import project
 from tireroad.modal.rotating import checks, matrices, rotating
 from tireroad.modal.solver import quadratic, undamped
 from tireroad.modal.solver.agreement import truncation
 from tireroad.modal.standing import sites
+from tireroad.runs.measure.torus import thesis_torus
 
 pytestmark = pytest.mark.slow
 
@@ -25,16 +25,7 @@ INFLATION = 2e5
 SOFT = {"model": "neo-hookean", "youngs_modulus": 48e6, "poisson_ratio": 0.45, "density": 1200.0}
 
 
-SMALL = Torus(
-    outer_radius=0.32,
-    minor_radius=0.1,
-    thickness=0.012,
-    half_angle=np.radians(120),
-    segments=16,
-    elements_arc=4,
-    elements_thickness=1,
-    order=2,
-)
+SMALL = thesis_torus(segments=16, elements_arc=4)
 
 
 def tire(deflection: float) -> Operators:
@@ -124,16 +115,7 @@ def test_a_light_load_keeps_both_mirror_planes():
     """Stiff rubber, order 3: entries of the matrix are symmetric to 1e-13 of the largest, which is 1e-8 of the
     lowest eigenvalue. That is rounding, no asymmetry, and shifts no frequency by as much.
     """
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=24,
-        elements_arc=6,
-        elements_thickness=1,
-        order=3,
-    )
+    section = thesis_torus(segments=24, elements_arc=6, order=3)
     body = Body(COMM, section, compound(**SOFT | {"youngs_modulus": 4.8e8}))
     loader = Loader(Equilibrium(body), lambda progress: None)
     loader.inflate(0.0)

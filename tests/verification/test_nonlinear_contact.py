@@ -17,9 +17,9 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.nonlinear import NonlinearTire
+from tireroad.runs.measure.torus import thesis_torus
 
 INFLATION, STEP = 2e5, 2e-4
 DAMPING = (400.0, 0.0)
@@ -28,17 +28,7 @@ RISE = 4e-3  # m
 
 def pressed(deflection: float):
     """A loader at a deflection of a standing tire of few elements."""
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.10,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=16,
-        elements_arc=6,
-        elements_thickness=1,
-        order=2,
-        footprint_size=0.3,
-    )
+    section = thesis_torus(segments=16, elements_arc=6, footprint_size=0.3)
     body = Body(
         MPI.COMM_SELF,
         section,

@@ -14,10 +14,10 @@ from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.fem.tire.mesh import Torus
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.standing import sites
+from tireroad.runs.measure.torus import thesis_torus
 
 pytestmark = pytest.mark.slow
 
@@ -27,16 +27,7 @@ RUBBER = compound("neo-hookean", 1200.0, youngs_modulus=48e6, poisson_ratio=0.45
 
 def tire(inflation: float, deflection: float = 0.0, speed: float = 0.0) -> tuple[Body, np.ndarray]:
     """The body at its static state and its own nodes that touch."""
-    section = Torus(
-        outer_radius=0.32,
-        minor_radius=0.1,
-        thickness=0.012,
-        half_angle=np.radians(120),
-        segments=16,
-        elements_arc=4,
-        elements_thickness=1,
-        order=2,
-    )
+    section = thesis_torus(segments=16, elements_arc=4)
     body = Body(COMM, section, RUBBER)
     equilibrium = Equilibrium(body, Rolling(speed=speed))
     loader = Loader(equilibrium, lambda progress: None)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tireroad.runs.files.read import Absent, Results, Section, attributes
 from tireroad.runs.report import figures, live, realism, surface_figures
 from tireroad.runs.report.quantities import quantity
-from tireroad.runs.report.sections import corner, pattern, transmissibility
+from tireroad.runs.report.sections import corner, pattern, road, transmissibility
 from tireroad.runs.report.sections.tire import pressure
 
 SAMPLED = 400  # instants read of a (time, point) dataset: the file may be larger than memory
@@ -42,6 +42,7 @@ def contact(results: Results) -> Section:
     section.notes += [note] if (note := realism.mean_load(results)) else []
     corner.wheel(results, section, time)
     pattern.tread(results, section)
+    road.texture(results, section)
     points, normal = results.array(name, "points"), results.dataset(name, "normal_force")
     stride = max(1, -(-len(time) // SAMPLED))
     picture = surface_figures.space_time(time[::stride], points, sampled(normal, stride))

@@ -97,8 +97,13 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
     if "response" not in left_out:
         k = max(size.driven, 1)
         parts["receptances"] = 16.0 * 5 * size.frequencies * k**2
-        parts["time series"] = 8.0 * size.steps * (4 * k + 3 * k * k * scene.output.impulse + 6) * 2
+        parts["time series"] = 8.0 * size.steps * (4 * k + 3 * _each_step(scene, k) + 6) * 2
     return parts
+
+
+def _each_step(scene: Scene, points: int) -> int:
+    """Numbers that the outputs at the driven points add to each time step."""
+    return sum(kind.numbers(points) for _, kind in scene.output.kinds)
 
 
 def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
@@ -132,7 +137,7 @@ def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, floa
     if "response" not in left_out:
         k = max(size.driven, 1)
         parts["response.h5"] = 8.0 * (
-            size.steps * (4 * k + 3 + k * k * scene.output.impulse) + 2 * size.frequencies * k * k
+            size.steps * (4 * k + 3 + _each_step(scene, k)) + 2 * size.frequencies * k * k
         )
     return parts
 

@@ -36,7 +36,7 @@ def sizes(scene: Scene) -> Sizes:
     free = scene.tire.free_unknowns()
     modes = _modes(scene, free)
     nodes, points = _points(scene, free)
-    receptance, rotation = scene.output.receptance, scene.rotation
+    rotation = scene.rotation
     campbell = rotation.campbell if rotation else None
     return Sizes(
         free=free,
@@ -44,7 +44,7 @@ def sizes(scene: Scene) -> Sizes:
         nodes=nodes,
         points=points,
         steps=_steps(scene, modes),
-        frequencies=round(receptance.to / receptance.step) if receptance else 0,
+        frequencies=sum(kind.frequencies() for _, kind in scene.output.kinds),
         speeds=round(campbell.to / campbell.step) + 1 if campbell else 0,
         driven=len(scene.force),
     )

@@ -16,6 +16,3 @@ def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     advice = "needs full matrices of damping, and loss factors make none: add [damping]"
     if scene.rotation is not None and scene.rotation.method == "full":
         raise error(("rotation", "method"), f'= "full" {advice}')
-    receptance = scene.output.receptance
-    if receptance is not None and receptance.direct:
-        raise error(("output", "receptance", "direct"), f"= {receptance.direct} {advice}")

@@ -1,16 +1,17 @@
 """What no single key can tell: contradictions between tables, and what this version leaves out."""
 
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.rules.full import full_matrices
 from tireroad.runs.scene.rules.output import (
     check_campbell,
-    check_receptance,
-    check_transmissibility,
+    check_outputs,
     check_vibration,
 )
+from tireroad.runs.scene.rules.road import check_shape
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.accuracy import check_accuracy
 from tireroad.runs.scene.tables.axle import check_axle
@@ -115,14 +116,8 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 
 def _force(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    sought = scene.output.receptance or scene.output.transmissibility
-    for key in ("velocity", "acceleration"):
-        if scene.contact is not None and getattr(scene.output, key):
-            raise error(
-                ("output", key),
-                "is not available in scenes with [contact]: leave it out, or take out [contact]",
-            )
-    if scene.force and scene.time is None and sought is None:
+    sought = any(fields(kind) for _, kind in scene.output.kinds)
+    if scene.force and scene.time is None and not sought:
         raise error(("force",), "has nothing to drive: add [time] or output.receptance")
     for number, force in enumerate(scene.force):
         if not any(force.direction):
@@ -157,6 +152,19 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     contact = scene.contact
     standing = scene.rotation is None or scene.rotation.speed == 0
     check_tread(contact, standing, error)
+    rotation = scene.rotation
+    for key in ("free_rolling", "slip_angle"):
+        if rotation is not None and getattr(rotation, key) and (not contact.rubs or standing):
+            raise error(
+                ("rotation", key),
+                "needs contact.brush_stiffness_per_area (N/m³), without which no road pulls on the tire, and a "
+                "wheel that turns",
+            )
+    if rotation is not None and rotation.free_rolling and contact.friction == 0:
+        raise error(
+            ("rotation", "free_rolling"),
+            "does not exist with contact.friction = 0: any slip is free",
+        )
 
 
 def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
@@ -182,8 +190,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("modal", "static", "rotation", "contact", "damping", "greens"), _modal),
     (("damping", "rotation", "output"), full_matrices),
     (("contact", "road", "time", "static", "rotation"), _contact),
-    (("output", "force"), check_receptance),
-    (("output", "force", "modal", "axle", "tire"), check_transmissibility),
+    (("output", "force", "modal", "axle", "tire", "damping", "contact"), check_outputs),
     (("rotation",), check_campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),
@@ -192,6 +199,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("pattern", "contact"), check_pattern),
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
     (("output", "time", "contact", "force", "rotation"), check_vibration),
+    (("static", "road", "modal", "tire"), check_shape),
     (("time",), _time),
     (("accuracy", "contact", "road", "time", "output", "force"), check_accuracy),
 )

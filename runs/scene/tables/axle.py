@@ -171,8 +171,6 @@ def _check_company(scene: Scene, axle: Axle, error: Where) -> None:
             ("greens", "residual"),
             '= "second-order" knows no [axle] that moves: take "static" or "attachment"',
         )
-    if scene.output.receptance is not None and scene.output.receptance.direct:
-        raise error(("output", "receptance", "direct"), "needs an [axle] that is fixed: take 0")
     tilts = any(k > 2 for k in axle.moving)
     if tilts and turns and not scene.static.steady_rolling:
         raise error(

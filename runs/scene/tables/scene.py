@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 from tireroad.fem.parameters import choice, flag, integer, number, text, vector
-from tireroad.runs.scene.schema import table, tables
+from tireroad.runs.scene.outputs import OUTPUTS
+from tireroad.runs.scene.outputs import Output as PointOutput
+from tireroad.runs.scene.schema import Collects, collection, table, tables
 from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.scene.tables.axle import AxleTable
 from tireroad.runs.scene.tables.contact import Contact, Time
@@ -65,6 +67,18 @@ class Rotation:
         "speed over the road, instead of speed: the wheel turns as fast as it rolls freely; 25 m/s are 90 km/h",
         least=1e-6,
         most=500,
+    )
+    free_rolling: bool = flag(
+        False,
+        "find the wheel's slip at which a smooth road does not drag on it, by the loop and its brush, which then feels "
+        "the static shape's own speeds; added to contact.slip",
+    )
+    slip_angle: float = number(
+        0.0,
+        "deg",
+        "angle from the wheel's plane to where it goes, > 0 towards +y; its tangent is added to the lateral contact.slip",
+        least=-30,
+        most=30,
     )
     inertia: str = choice(
         "full",
@@ -156,49 +170,16 @@ class PointForce:
 
 
 @dataclass(frozen=True)
-class Receptance:
-    to: float = number(500.0, "Hz", "highest frequency", least=1e-3, most=1e6)
-    step: float = number(2.0, "Hz", "step between two frequencies", least=1e-4, most=1e6)
-    direct: int = integer(
-        0, "number of frequencies also solved on the full matrices, as a check", least=0, most=1000
-    )
-
-
-@dataclass(frozen=True)
-class Transmissibility:
-    to: float = number(300.0, "Hz", "highest frequency", least=1e-3, most=1e6)
-    step: float = number(2.0, "Hz", "step between two frequencies", least=1e-4, most=1e6)
-    free_rim: int = integer(
-        0,
-        "number of modes of the tire with a free rim, by which it is found a second way; 0: by momentum alone",
-        least=0,
-        most=100000,
-    )
-
-
-@dataclass(frozen=True)
-class Output:
+class Output(Collects):
     spectra: bool = flag(True, "spectra of the contact force and the axle force")
     axle_force: bool = flag(True, "axle force, from the momentum of the tire")
-    impulse: bool = flag(
-        False, "impulse responses (Green's functions) between the driven points, over [time]"
-    )
-    velocity: bool = flag(False, "velocity of the driven points")
-    acceleration: bool = flag(False, "acceleration of the driven points")
     vibration: bool = flag(
         False, "vibration of the outer face in frequency, and its equivalent radiated power"
     )
     fields: bool = flag(
         False, "motion of the outer face at the end of the run, also as XDMF for ParaView"
     )
-    receptance: Receptance | None = table(
-        Receptance, "receptances between the driven points", optional=True
-    )
-    transmissibility: Transmissibility | None = table(
-        Transmissibility,
-        "force on the held axle per force at each driven point, over frequency",
-        optional=True,
-    )
+    kinds: tuple[tuple[str, PointOutput], ...] = collection(OUTPUTS)
 
 
 @dataclass(frozen=True)

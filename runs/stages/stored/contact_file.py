@@ -20,6 +20,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.build import corner, pattern
 from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.stored import road_file
 
 BLOCK = 512  # steps kept in memory between two writes
 CHECKPOINT = "checkpoint.h5"
@@ -143,6 +144,7 @@ class ContactFile:
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
         pattern.fill(self._file, self._setup)
+        road_file.fill(self._file, self._setup)
         forces = len(self._job.scene.force)
         driven: dict[str, tuple[tuple, str]] = {DRIVEN: ((forces, 3), "m")} if forces else {}
         driven |= _OF_WHEEL if self._job.axle else {}
@@ -171,6 +173,9 @@ class ContactFile:
         if not self._stack:
             return
         steps = _columns(self._stack)
+        if self._job.axle:
+            height = 3 * len(self._job.scene.force) + 2
+            steps["wheel_height"] = np.array([reading[height] for reading in self._readings])
         count(steps)
         on_root(self._job.comm, lambda: self._write(steps))
         self._done += len(self._stack)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tireroad.runs.stages.build.transmissibility import FREE_RIM, FREQUENCY, MOMENTUM, apart
+from tireroad.runs.stages.outputs.transmissibility import FREE_RIM, FREQUENCY, MOMENTUM, apart
 from tireroad.runs.thesis.claim import Claim
 from tireroad.runs.thesis.figure import Reproduced, figure
 from tireroad.runs.thesis.figures.simplified import Array

@@ -1,0 +1,162 @@
+"""A road along a line, as a laser measures it: cleaned openly, and widened to the tire."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.grid_file import UNITS
+from tireroad.contact.roads.kind import Levelled, road_kind
+from tireroad.contact.roads.rows import check_count
+from tireroad.contact.roads.texture.cleaning import cleaned
+from tireroad.contact.roads.texture.widened import widened
+from tireroad.fem.errors import InputError
+from tireroad.fem.parameters import ParameterError, choice, filename, integer, number
+
+Array = NDArray[np.float64]
+MOST_HEIGHTS = 20_000_000  # of a widened profile: 160 MB, and four times that on the way
+_EVEN = 0.02  # of a step: positions along must be that even
+
+
+@dataclass(frozen=True)
+class _Line:
+    """Heights (n,) m every `pitch` m."""
+
+    profile: Array
+    pitch: float
+
+
+@road_kind("laser", "heights measured along one line by a laser, cleaned and widened to the tire")
+class LaserFile(Levelled):
+    """The file, how it is read, cleaned, and extended across."""
+
+    file: str | None = filename(
+        "measured line (.csv): a height a line, or x and a height; nan where it is missing"
+    )
+    pitch: float = number(
+        4e-5, "m", "distance between heights, where the file has no x", least=1e-7, most=0.1
+    )
+    length_unit: str = choice("mm", tuple(UNITS), "unit of x in the file")
+    height_unit: str = choice("mm", tuple(UNITS), "unit of the heights in the file")
+    outlier: float = number(
+        8.0, "-", "a height is an outlier this many times the usual distance (1.48 times the median) from "
+        "the median of its 11 neighbours", least=3, most=1e6,
+    )  # fmt: skip
+    longest_gap: float = number(
+        0.005, "m", "gaps up to this length are bridged by straight lines; longer ones are an error",
+        least=0, most=10,
+    )  # fmt: skip
+    shortest_wave: float = number(
+        0.002, "m", "shorter waves are filtered out, and the profile kept at a quarter of it",
+        least=1e-5, most=1,
+    )  # fmt: skip
+    across: str = choice(
+        "isotropic", ("isotropic", "ruts"), "beside the line: a random surface as rough as it, which has "
+        "the line in its middle; or its heights all across",
+    )  # fmt: skip
+    width: float = number(0.4, "m", "width of the road made of the line", least=0.01, most=5)
+    seed: int = integer(0, "seed of what is beside the line", least=0, most=2**31 - 1)
+    end: str = choice(
+        "refuse", ("refuse", "mirror"), "a run longer than the road: an error, or the road mirrored"
+    )
+
+    def validate(self) -> None:
+        """A file is named."""
+        if self.file is None:
+            raise ParameterError("file", 'is missing: name a measured line by file = "…"')
+
+    def make(self) -> Grid:
+        """The road; what was done to the measurement is in its `notes`. InputError where it cannot be used."""
+        source = f"road.file {self.file}"
+        line = self._read(Path(self.file or ""), source)
+        sound = cleaned(line.profile, line.pitch, self.outlier, self.longest_gap, source)
+        profile, pitch = self._resampled(sound.profile, line.pitch, source)
+        if self.across == "ruts":
+            y = np.array([-0.5, 0.5]) * self.width
+            z, how = np.repeat(profile[:, None], 2, axis=1), "the same all across (ruts)"
+        else:
+            self._check_size(len(profile), pitch)
+            y, z = widened(profile, pitch, self.width, self.seed)
+            how = f"across an isotropic random surface as rough as the line, which is its middle (seed {self.seed})"
+        x: Array = np.float64(pitch) * np.arange(len(profile))
+        road = Grid(x, y, z, end=self.end, source=source)
+        road.notes = (sound.told, f"extended to {self.width:g} m: {how}")
+        return road
+
+    def _read(self, path: Path, source: str) -> _Line:
+        if not path.is_file():
+            raise InputError(f"{source}: no such file")
+        if path.suffix.lower() != ".csv":
+            raise InputError(f"{source}: the ending {path.suffix!r} is not .csv")
+        try:
+            text = path.read_text(encoding="utf-8-sig")
+            lines = [row for row in text.splitlines() if row.strip() and not row.startswith("#")]
+            begin = 1 if lines and _is_heading(lines[0]) else 0
+            if len(lines) - begin < 3:
+                raise InputError(f"{source}: {len(lines) - begin} heights are no road")
+            check_count(path, len(lines))
+            table = np.loadtxt(lines[begin:], delimiter=",", ndmin=2, dtype=float)
+        except UnicodeDecodeError as error:
+            raise InputError(f"{source}: is no text file (byte {error.start})") from error
+        except (OSError, ValueError) as error:
+            raise InputError(f"{source}: {error}") from error
+        return self._line(table, source)
+
+    def _line(self, table: Array, source: str) -> _Line:
+        if table.shape[1] not in (1, 2):
+            raise InputError(
+                f"{source}: {table.shape[0]} lines of {table.shape[1]} numbers; a measured line has one "
+                "height a line, or x and a height"
+            )
+        profile = table[:, -1] * UNITS[self.height_unit]
+        if np.isinf(profile).any():
+            raise InputError(f"{source}: {int(np.isinf(profile).sum())} heights are infinite")
+        if table.shape[1] == 1:
+            return _Line(profile, self.pitch)
+        x = table[:, 0] * UNITS[self.length_unit]
+        pitch = (x[-1] - x[0]) / (len(x) - 1)
+        if not (
+            np.isfinite(x).all() and pitch > 0 and np.abs(np.diff(x) / pitch - 1).max() < _EVEN
+        ):
+            raise InputError(f"{source}: x must ascend in even steps, within {100 * _EVEN:g} %")
+        return _Line(profile, float(pitch))
+
+    def _resampled(self, profile: Array, pitch: float, source: str) -> tuple[Array, float]:
+        """Without waves shorter than `shortest_wave` (ISO 16610-21), at a quarter of that."""
+        from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
+
+        from tireroad.contact.roads.levelling import DEVIATION
+
+        step = max(math.floor(self.shortest_wave / 4 / pitch), 1)
+        if step > 1:
+            profile = gaussian_filter1d(
+                profile, DEVIATION * self.shortest_wave / pitch, mode="nearest"
+            )
+            profile, pitch = profile[::step], pitch * step
+        if len(profile) < 16:
+            raise InputError(
+                f"{source}: {len(profile) * pitch:.3g} m are too short a road for waves of "
+                f"{self.shortest_wave:g} m"
+            )
+        return profile, pitch
+
+    def _check_size(self, count: int, pitch: float) -> None:
+        heights = count * self.width / pitch
+        if heights > MOST_HEIGHTS:
+            raise InputError(
+                f"road: {count * pitch:.4g} m of {self.width:g} m width every {1e3 * pitch:.3g} mm are "
+                f"{heights:.3g} heights, more than {MOST_HEIGHTS:g}: take a longer road.shortest_wave, a smaller "
+                'road.width or across = "ruts", or cut the file'
+            )
+
+
+def _is_heading(line: str) -> bool:
+    """Whether a line's first field is no number."""
+    try:
+        float(line.split(",")[0])
+    except ValueError:
+        return True
+    return False

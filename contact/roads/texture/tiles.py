@@ -1,0 +1,154 @@
+"""Random fields with a given spectrum: tiles blended so that nothing repeats along the road."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+PER_WAVE = 4  # places of a tile a shortest wave
+WAVES = (16, 6)  # longest waves in a tile, along and across
+WIDEST = 0.6  # m: a tile is at least as wide, since it does repeat across; no tire is wider
+MOST_PLACES = 16_000_000  # of a tile: 128 MB
+KEPT = 3  # blended halves of tiles in memory
+
+
+def tile_size(longest: float) -> tuple[float, float]:
+    """Length and width (m) of a tile whose longest wave is that."""
+    return WAVES[0] * longest, max(WAVES[1] * longest, WIDEST)
+
+
+def tile_places(shortest: float, longest: float) -> float:
+    """Number of places of a tile for waves from `shortest` to `longest` (m)."""
+    along, across = tile_size(longest)
+    return along * across / (shortest / PER_WAVE) ** 2
+
+
+class Tiles:
+    """Isotropic, Gaussian, of root mean square `rms` (m): the waves from `shortest` to `longest` (m) have the
+    `amplitude` (any unit) of their wave number (1/m), `seed` draws them.
+
+    Along the road independent tiles T_k, each 16 longest waves long and drawn when it is reached, overlap by half:
+
+        z = cos(pi s/2) T_k(x) + sin(pi s/2) T_{k+1}(x),   s in [0, 1] over the overlap,
+
+    which keeps the variance, smears the spectrum by 1/16 of its lowest wave number, and never
+    repeats. Across, a tile continues itself after its width (6 longest waves, 0.6 m at least).
+    Heights are bilinear between places a quarter of the shortest wave apart.
+    """
+
+    extent = ((-np.inf, np.inf), (-np.inf, np.inf))
+
+    def __init__(
+        self,
+        amplitude: Callable[[Array], Array],
+        *,
+        shortest: float,
+        longest: float,
+        rms: float,
+        seed: tuple[int, ...],
+    ) -> None:
+        self._amplitude, self._band, self._rms, self._seed = (
+            amplitude,
+            (shortest, longest),
+            rms,
+            seed,
+        )
+        self._pitch = shortest / PER_WAVE
+        self._shape = self._places()
+        self._filter: Array | None = None
+        self._tiles: dict[int, Array] = {}
+        self._halves: dict[int, Array] = {}
+        self.spacing = 0.5 * shortest
+
+    def _places(self) -> tuple[int, int]:
+        """Places of a tile along and across, the first even."""
+        from scipy import fft
+
+        half, across = (
+            fft.next_fast_len(int(np.ceil(length / self._pitch / part)), real=True)
+            for length, part in zip(tile_size(self._band[1]), (2, 1), strict=True)
+        )
+        return 2 * half, across
+
+    def _tile(self, number: int) -> Array:
+        """The independent tile `number`: filtered white noise of exactly the expected variance."""
+        from scipy import fft
+
+        if self._filter is None:
+            qx = fft.fftfreq(self._shape[0], self._pitch)[:, None]
+            qy = fft.rfftfreq(self._shape[1], self._pitch)[None, :]
+            q = np.hypot(qx, qy)
+            shortest, longest = self._band
+            kept = (q >= 1.0 / longest) & (q <= 1.0 / shortest)
+            self._filter = np.where(kept, self._amplitude(np.where(kept, q, 1.0)), 0.0)
+        # Python's remainder: tiles before the beginning have numbers of their own.
+        rng = np.random.default_rng([*self._seed, number % 2**64])
+        z = fft.irfft2(fft.rfft2(rng.standard_normal(self._shape)) * self._filter, self._shape)
+        return z * (self._rms / z.std())
+
+    def _drawn(self, number: int) -> Array:
+        """The tile `number`; the last two are kept, as each takes part in two halves."""
+        if number not in self._tiles:
+            if len(self._tiles) > 1:
+                del self._tiles[next(iter(self._tiles))]
+            self._tiles[number] = self._tile(number)
+        return self._tiles[number]
+
+    def _half(self, number: int) -> Array:
+        """Heights over the overlap of tiles number - 1 and number, with the row that follows."""
+        if number not in self._halves:
+            if len(self._halves) >= KEPT:
+                del self._halves[next(iter(self._halves))]
+            half = self._shape[0] // 2
+            share = 0.5 * np.pi * (np.arange(half + 1) / half)[:, None]
+            before, here = self._drawn(number - 1), self._drawn(number)
+            # The row that follows the earlier tile's end has no weight.
+            ending = np.concatenate([before[half:], before[:1]])
+            self._halves[number] = np.cos(share) * ending + np.sin(share) * here[: half + 1]
+        return self._halves[number]
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Bilinear heights (m) at x, y (m) of equal shape."""
+        half = self._shape[0] // 2
+        u = np.asarray(x, dtype=float) / self._pitch
+        number = np.floor(u / half).astype(np.int64)
+        v = np.asarray(y, dtype=float) / self._pitch
+        if number.size and number.min() == number.max():
+            return self._within(int(number.flat[0]), u, v)
+        out = np.empty(u.shape)
+        for one in np.unique(number):
+            out[number == one] = self._within(int(one), u[number == one], v[number == one])
+        return out
+
+    def _within(self, number: int, u: Array, v: Array) -> Array:
+        z, rows = self._half(number), self._shape[0] // 2
+        local = u - number * rows
+        i = np.minimum(local.astype(np.int64), rows - 1)
+        j = np.floor(v).astype(np.int64)
+        s, t = local - i, v - j
+        j = j % self._shape[1]
+        next_j = (j + 1) % self._shape[1]
+        near = z[i, j] + t * (z[i, next_j] - z[i, j])
+        far = z[i + 1, j] + t * (z[i + 1, next_j] - z[i + 1, j])
+        return near + s * (far - near)
+
+    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """The highest place from x0 to x1, m."""
+        return max(float(z.max()) for z in self._strip(x0, x1))
+
+    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """The lowest place from x0 to x1, m."""
+        return min(float(z.min()) for z in self._strip(x0, x1))
+
+    def _strip(self, x0: float, x1: float) -> Iterator[Array]:
+        length = self._shape[0] // 2 * self._pitch
+        for index in range(int(np.floor(x0 / length)), int(np.floor(x1 / length)) + 1):
+            yield self._half(index)
+
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> Tiles:
+        """Nothing to prepare."""
+        return self

@@ -1,0 +1,89 @@
+"""A surface around a measured profile: isotropic, and the profile itself along its middle.
+
+With the spectrum of the profile taken as that of an isotropic Gaussian surface of density C(q), the part of a wave
+number k along that stands in the middle decays across as
+
+    rho_k(y) = int C(sqrt(k^2 + l^2)) cos(2 pi l y) dl / int C dl,
+
+and what is added, u(k, y) - u(k, 0) rho_k(y) of an independent surface u, makes the whole as rough everywhere
+(simple kriging of the line: Chiles and Delfiner, Geostatistics, 7.3.1).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.roads.texture.isotropic import bands, filter_of, surface_density
+
+Array = NDArray[np.float64]
+_LONGEST = 4  # a profile holds that many of the longest waves that its surface is made of, and twice the width one
+
+
+def widened(profile: Array, pitch: float, width: float, seed: int) -> tuple[Array, Array]:
+    """y (m,) m, symmetric about 0, and z (n, m) m of a surface with the profile (n,) m at y = 0.
+
+    Waves too long for either length are those of the profile, the same across.
+    """
+    from scipy import fft  # not needed to read a scene
+
+    half = int(np.ceil(0.5 * width / pitch))
+    across = 2 * half + 1
+    longest = min(len(profile) * pitch / _LONGEST, 2.0 * width)
+    smooth, rough = _split(profile, pitch, longest)
+    edges = bands(2 * pitch, longest)
+    power = _band_power(rough, pitch, edges)
+    shape = _padded(len(profile), longest, pitch), fft.next_fast_len(2 * across)
+    amplitude = _amplitude(edges, power, shape, pitch)
+    middle = np.fft.rfft(np.pad(rough, (0, shape[0] - len(profile)), mode="reflect"))
+    rho = _decay(amplitude)
+    noise = np.random.default_rng(seed).standard_normal(shape)
+    other = fft.ifft(fft.fft(fft.rfft(noise, axis=0), axis=1) * amplitude, axis=1)
+    lag = np.abs(np.arange(across) - half)
+    field = other[:, :across] + rho[:, lag] * (middle - other[:, half])[:, None]
+    z = fft.irfft(field, shape[0], axis=0)[: len(profile)]
+    y: Array = np.float64(pitch) * np.arange(-half, half + 1)
+    return y, z + smooth[:, None]
+
+
+def _split(profile: Array, pitch: float, longest: float) -> tuple[Array, Array]:
+    """Waves longer than `longest` (m), straight line included, and the rest."""
+    from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
+
+    from tireroad.contact.roads.levelling import DEVIATION
+
+    smooth = gaussian_filter1d(profile, DEVIATION * longest / pitch, mode="nearest")
+    return smooth, profile - smooth
+
+
+def _band_power(profile: Array, pitch: float, edges: Array) -> Array:
+    """Variances (k,) m^2 of the profile in the bands between the `edges` (1/m)."""
+    power = np.abs(np.fft.rfft(profile - profile.mean())) ** 2 * 2 / len(profile) ** 2
+    wave = np.fft.rfftfreq(len(profile), pitch)
+    total = np.concatenate([[0.0], np.cumsum(power)])
+    ends = np.interp(edges, np.concatenate([[0.0], wave + 0.5 * wave[1]]), total)
+    return np.maximum(np.diff(ends), 1e-30)
+
+
+def _padded(count: int, longest: float, pitch: float) -> int:
+    """A length with few factors in which the profile does not meet its own beginning."""
+    from scipy.fft import next_fast_len
+
+    extra = min(int(longest / pitch), count - 1)
+    whole = next_fast_len(count + extra, real=True)
+    return whole if whole - count < count else count + extra
+
+
+def _amplitude(edges: Array, power: Array, shape: tuple[int, int], pitch: float) -> Array:
+    """(n // 2 + 1, m) amplitudes of white noise's transform, such that profiles have the `power`."""
+    density = surface_density(edges, power)
+    along, across = np.fft.rfftfreq(shape[0], pitch), np.fft.fftfreq(shape[1], pitch)
+    wave = np.hypot(along[:, None], across[None, :])
+    return filter_of(edges, density, wave) / pitch
+
+
+def _decay(amplitude: Array) -> Array:
+    """rho (n // 2 + 1, m) at the lags across of the transform."""
+    correlation = np.fft.ifft(amplitude**2, axis=1).real
+    own = correlation[:, :1]
+    return np.where(own > 0, correlation / np.where(own > 0, own, 1.0), 1.0)

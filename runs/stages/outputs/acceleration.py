@@ -1,0 +1,30 @@
+"""Accelerations of the driven points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from tireroad.runs.scene.outputs import OUTPUTS, Curves, Output
+
+if TYPE_CHECKING:
+    from tireroad.runs.stages.build.driven import Driven
+    from tireroad.runs.stages.record import Record
+
+
+@OUTPUTS.register("acceleration", "acceleration of the driven points")
+class Acceleration(Output):
+    in_contact: ClassVar[bool] = False
+
+    def numbers(self, points: int) -> int:
+        """Three components of each point."""
+        return 3 * points
+
+    def curves(self, seen: Driven, record: Record) -> Curves:
+        """a = C s^2 q + C s B f + R d2f/dt2, (nt, k, 3) m/s2: the middle term is the residual of the velocity."""
+        if seen.integration is None:
+            return {}
+        response = seen.response.resolved(seen.integration.step)
+        velocity = response.rate()
+        moved = seen.march(velocity.rate())
+        moved += seen.force(1) @ velocity.residual.T + seen.force(2) @ response.residual.T
+        return {"acceleration": (moved.reshape(len(moved), -1, 3), "m/s2")}

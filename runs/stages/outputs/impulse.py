@@ -1,0 +1,27 @@
+"""Impulse responses between the driven points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tireroad.runs.scene.outputs import OUTPUTS, Curves, Output
+
+if TYPE_CHECKING:
+    from tireroad.runs.stages.build.driven import Driven
+    from tireroad.runs.stages.record import Record
+
+
+@OUTPUTS.register(
+    "impulse", "impulse responses (Green's functions) between the driven points, over [time]"
+)
+class Impulse(Output):
+    def numbers(self, points: int) -> int:
+        """One from each to each."""
+        return points**2
+
+    def curves(self, seen: Driven, record: Record) -> Curves:
+        """g (nt, k, k) along the forces, without the residual's delta at t = 0."""
+        if seen.time is None:
+            return {}
+        with record.timing("impulse responses"):
+            return {"impulse": (seen.along(seen.response.impulse(seen.time)), "m/(N s)")}

@@ -1,0 +1,76 @@
+"""Receptances between the driven points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tireroad.fem.parameters import integer, number
+from tireroad.runs.scene.outputs import (
+    MOST_FREQUENCIES,
+    OUTPUTS,
+    Curves,
+    Output,
+    Where,
+    check_steps,
+)
+
+if TYPE_CHECKING:
+    from tireroad.runs.scene.tables.scene import Scene
+    from tireroad.runs.stages.build.driven import Driven
+    from tireroad.runs.stages.record import Record
+
+
+@OUTPUTS.register("receptance", "receptances between the driven points")
+class Receptance(Output):
+    to: float = number(500.0, "Hz", "highest frequency", least=1e-3, most=1e6)
+    step: float = number(2.0, "Hz", "step between two frequencies", least=1e-4, most=1e6)
+    direct: int = integer(
+        0, "number of frequencies also solved on the full matrices, as a check", least=0, most=1000
+    )
+
+    def check(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
+        """Points, steps, and full matrices where these are asked for."""
+        check_steps(
+            (*path, "step"), "frequencies", self.to, self.step, "Hz", error, most=MOST_FREQUENCIES
+        )
+        if self.direct and scene.damping is None:
+            raise error(
+                (*path, "direct"),
+                f"= {self.direct} needs full matrices of damping, and loss factors make none: add [damping]",
+            )
+        if self.direct and scene.axle.kind != "fixed":
+            raise error((*path, "direct"), "needs an [axle] that is fixed: take 0")
+
+    def frequencies(self) -> int:
+        """From 0 to the highest."""
+        return round(self.to / self.step)
+
+    def curves(self, seen: Driven, record: Record) -> Curves:
+        """H (f, k, k) m/N, each point along its own force. Collective."""
+        frequency = np.arange(0.0, self.to + self.step / 2, self.step)
+        if seen.drifts:
+            frequency = frequency[1:]
+        with record.timing("receptance"):
+            along = seen.along(seen.response.receptance(frequency))
+        peak = int(np.abs(along[:, 0, 0]).argmax())
+        record.headline["largest receptance"] = (float(np.abs(along[peak, 0, 0])), "m/N")
+        record.headline["at"] = (float(frequency[peak]), "Hz")
+        out = {"frequency": (frequency, "Hz"), "receptance": (along, "m/N")}
+        return out | (self._by_full_matrices(seen, record) if self.direct else {})
+
+    def _by_full_matrices(self, seen: Driven, record: Record) -> Curves:
+        """The same receptances without modes, at a few frequencies, and how far the modes are off."""
+        frequency = self.to * np.arange(1, self.direct + 1) / self.direct
+        loads, readings = seen.points()
+        with record.timing("receptance of the full matrices"):
+            full = seen.wheel.product.receptance(readings, loads, frequency)
+        off = seen.response.receptance(frequency) - full
+        share = np.linalg.norm(off, axis=(1, 2)) / np.linalg.norm(full, axis=(1, 2))
+        name = f"receptance off the full matrices' up to {self.to:.4g} Hz"
+        record.indicators[name] = (float(share.max()), "-")
+        return {
+            "direct/frequency": (frequency, "Hz"),
+            "direct/receptance": (seen.along(full), "m/N"),
+        }

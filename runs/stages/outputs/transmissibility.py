@@ -1,0 +1,94 @@
+"""Force on the held axle per force at the driven points, over frequency: by momentum, and by a free rim."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tireroad.fem.parameters import integer, number
+from tireroad.runs.scene.outputs import (
+    MOST_FREQUENCIES,
+    OUTPUTS,
+    Curves,
+    Output,
+    Where,
+    check_steps,
+)
+from tireroad.runs.scene.tables.cavity import has_air
+
+if TYPE_CHECKING:
+    from tireroad.runs.scene.tables.scene import Scene
+    from tireroad.runs.stages.build.driven import Driven
+    from tireroad.runs.stages.record import Record
+
+# Of the highest mode. Of a tire of 48 MPa with 60, 120, 250 modes (311, 448, 687 Hz) the two ways are 0.5, 0.25, 0.2 %
+# apart up to half of it, and 40, 3, 0.2 % up to 300 Hz.
+LIMIT = 0.5
+FREQUENCY, MOMENTUM, FREE_RIM = (
+    f"transmissibility/{name}" for name in ("frequency", "momentum", "free_rim")
+)
+
+
+@OUTPUTS.register(
+    "transmissibility", "force on the held axle per force at each driven point, over frequency"
+)
+class Transmissibility(Output):
+    to: float = number(300.0, "Hz", "highest frequency", least=1e-3, most=1e6)
+    step: float = number(2.0, "Hz", "step between two frequencies", least=1e-4, most=1e6)
+    free_rim: int = integer(
+        0,
+        "number of modes of the tire with a free rim, by which it is found a second way; 0: by momentum alone",
+        least=0,
+        most=100000,
+    )
+
+    def check(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
+        """Points, an axle that is held, steps."""
+        if scene.modal.rim == "free" or scene.axle.kind != "fixed":
+            raise error(
+                path, 'is the force on a held axle: take modal.rim = "fixed", axle.kind = "fixed"'
+            )
+        if self.free_rim and has_air(scene):
+            raise error(
+                (*path, "free_rim"), "has no air in the tire: take 0, or take out [tire.cavity]"
+            )
+        check_steps(
+            (*path, "step"), "frequencies", self.to, self.step, "Hz", error, most=MOST_FREQUENCIES
+        )
+
+    def curves(self, seen: Driven, record: Record) -> Curves:
+        """The curves (f, 3, k), -, of k driven points, from `step` to `to` Hz: force of the tire on the axle per
+        force. By the momentum of the response's states and, where the scene asks for it, by modes of the tire
+        with a free rim (greens.axle): each checks the other. Collective.
+        """
+        from tireroad.greens.axle import by_momentum
+
+        frequency = self.step * np.arange(1, round(self.to / self.step) + 1)
+        loads, _ = seen.points()
+        total = loads.toarray().reshape(loads.shape[0], -1, 3).sum(axis=1).T
+        with record.timing("transmissibility"):
+            found = by_momentum(seen.response, total, frequency)
+        peak = np.unravel_index(np.abs(found).argmax(), found.shape)
+        record.headline["largest force on the axle per force"] = (float(np.abs(found[peak])), "-")
+        record.headline["force on the axle is largest at"] = (float(frequency[peak[0]]), "Hz")
+        curves: Curves = {FREQUENCY: (frequency, "Hz"), MOMENTUM: (found, "-")}
+        highest = float(seen.modes.product.frequency[-1])
+        if self.free_rim:
+            with record.timing("free rim"):
+                other, top = seen.by_free_rim(self.free_rim, frequency)
+            highest = min(highest, top)
+            curves[FREE_RIM] = other, "-"
+            name = f"axle force by the free rim off that by momentum up to {self.to:.4g} Hz"
+            record.indicators[name] = (apart(other, found), "-")
+        if self.to > LIMIT * highest:
+            record.warnings.append(
+                f"output.transmissibility goes to {self.to:g} Hz; beyond {LIMIT * highest:.4g} Hz, half the highest mode, "
+                "it lacks the modes left out: take more of them (modal.count, output.transmissibility.free_rim)"
+            )
+        return curves
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Distance of two transmissibilities over the other's size, both as root mean squares over all entries."""
+    return float(np.linalg.norm(one - other) / np.linalg.norm(other))

@@ -1,0 +1,227 @@
+"""Textures: what a profile says, surfaces with a given spectrum, and lines that a laser measured."""
+
+import numpy as np
+import pytest
+
+from tireroad.contact.roads.kinds.laser import LaserFile
+from tireroad.contact.roads.kinds.two_slope import TwoSlope
+from tireroad.contact.roads.road import make_road
+from tireroad.contact.roads.texture.isotropic import bands, profile_power, surface_density
+from tireroad.contact.roads.texture.layered import Skewed, band_power
+from tireroad.contact.roads.texture.levels import mean_profile_depth, texture_of, third_octaves
+from tireroad.fem.errors import InputError
+
+PITCH = 5e-4
+
+
+def test_depth_and_level_of_a_sine() -> None:
+    """Peaks of a sine of 20 mm are its amplitude; its level is that of amplitude over sqrt 2."""
+    x = PITCH * np.arange(40_000)
+    z = 1e-3 * np.cos(2 * np.pi * x / 0.02) + 0.01 * x + 0.3
+    assert mean_profile_depth(z, PITCH) == pytest.approx(1e-3, rel=0.02)
+    wavelength, level = third_octaves(z, PITCH)
+    own = np.abs(wavelength / 0.02 - 1).argmin()
+    assert level[own] == pytest.approx(20 * np.log10(1e-3 / np.sqrt(2) / 1e-6), abs=0.05)
+    assert np.delete(level, own).max() < level[own] - 40
+
+
+def test_level_of_a_class_a_road_carried_on() -> None:
+    """G = 16e-6 (n / 0.1)^-2: 22.7 dB at 5 mm (a^2 = 0.23 n G)."""
+    power = band_power([5e-3], [22.7], np.array([200 * 10**-0.05, 200 * 10**0.05]))
+    assert power[0] == pytest.approx(0.2308 * 200 * 16e-6 * 2000.0**-2, rel=0.02)
+
+
+def test_flat_and_short_roads_have_no_depth() -> None:
+    assert make_road(kind="flat").prepare(0.0, 5.0, -0.1, 0.1).texture is None
+    assert make_road(kind="sine").prepare(0.0, 0.15, -0.1, 0.1).texture is None
+    sine = make_road(kind="sine", wavelength=0.02, amplitude=1e-3).prepare(0.0, 3.0, -0.1, 0.1)
+    assert sine.texture.depth == pytest.approx(1e-3, rel=0.06)
+
+
+def test_profile_of_an_isotropic_surface() -> None:
+    """The matrix against brute force: profiles of a discrete surface with C = 1 in one band."""
+    edges = np.array([20.0, 40.0, 80.0, 160.0])
+    wave = (np.arange(-2000, 2000) + 0.5) * 0.1
+    for band in range(3):
+        radius = np.hypot(wave[:, None], wave[None, :])
+        inside = (radius >= edges[band]) & (radius < edges[band + 1])
+        along = inside.sum(axis=1) * 0.1
+        found = [
+            along[(np.abs(wave) >= a) & (np.abs(wave) < b)].sum() * 0.1
+            for a, b in zip(edges[:-1], edges[1:], strict=True)
+        ]
+        assert found == pytest.approx(profile_power(edges)[:, band], rel=5e-3, abs=1.0)
+
+
+def test_a_spectrum_that_no_surface_has_is_met_as_near_as_can_be() -> None:
+    edges = bands(0.005, 0.1)
+    power = 1e-9 * np.geomspace(1e-6, 1.0, len(edges) - 1)  # falls by 60 dB towards long waves
+    density = surface_density(edges, power)
+    assert (density >= 0).all() and np.isfinite(density).all()
+    assert (profile_power(edges) @ density)[-1] == pytest.approx(power[-1], rel=0.5)
+
+
+@pytest.mark.slow
+def test_two_slopes_have_their_levels() -> None:
+    spec = TwoSlope(seed=3, road_class="B")
+    road, x = spec.make(), PITCH * np.arange(40_000)
+    found = [texture_of(road.height(x, 0 * x + y), PITCH) for y in (0.0, 0.11, 0.23)]
+    level = 10 * np.log10(np.mean([10 ** (t.level / 10) for t in found], axis=0))
+    wavelength = found[0].wavelength
+    order = np.argsort(spec.wavelengths)
+    asked = np.interp(
+        np.log(wavelength), np.log(np.array(spec.wavelengths))[order], np.array(spec.levels)[order]
+    )
+    kept = (wavelength > 0.0045) & (wavelength < 0.13)
+    assert np.abs(level - asked)[kept].max() < 1.0
+    assert np.abs((level - asked)[kept].mean()) < 0.4
+    assert level[wavelength < 0.0033].max() < 28  # cut at the stone; kinks between places are left
+    assert found[0].depth == pytest.approx(1.1e-3, abs=0.2e-3)
+    assert road.lowest(0, 20, 0, 0.3) <= road.height(x, 0 * x).min()
+    assert road.highest(0, 20, 0, 0.3) >= road.height(x, 0 * x).max()
+
+
+def test_a_skewed_texture_keeps_mean_and_variance() -> None:
+    h = np.random.default_rng(0).standard_normal(1_000_000)
+    for skewness in (-1.0, -0.5, 0.8):
+        z = Skewed(skewness)(h)
+        assert abs(z.mean()) < 0.005 and z.var() == pytest.approx(1.0, abs=0.02)
+        assert (z**3).mean() == pytest.approx(skewness, abs=0.05)
+        low, high = Skewed(skewness).bounds(-3.0, 3.0)
+        assert low <= Skewed(skewness)(np.linspace(-3, 3, 999)).min()
+        assert high >= Skewed(skewness)(np.linspace(-3, 3, 999)).max()
+    assert np.array_equal(Skewed(0.0)(h), h)
+
+
+@pytest.mark.parametrize(
+    ("keys", "named"),
+    [
+        ({"levels": (40.0,)}, "levels"),
+        ({"wavelengths": (0.1, 0.1), "levels": (40.0, 41.0)}, "wavelengths"),
+        ({"stone_size": 0.4}, "stone_size"),
+    ],
+)
+def test_two_slopes_that_do_not_fit(keys, named) -> None:
+    with pytest.raises(InputError, match=named):
+        TwoSlope(**keys)
+
+
+def measured(tmp_path, spoil=lambda mm, rng: None, length=1.0):
+    """A line of `length` m as a laser writes it, mm every 0.04 mm, with 3 um of noise; (file, heights in m)."""
+    x = 4e-5 * np.arange(round(length / 4e-5))
+    rng = np.random.default_rng(4)
+    wave = 2 * np.pi / np.geomspace(0.004, 0.2, 60)
+    z = (1e-4 * np.sin(x[:, None] * wave + rng.uniform(0, 6.28, 60))).sum(axis=1)
+    mm = 1e3 * z + rng.normal(0, 3e-3, len(z))
+    spoil(mm, rng)
+    np.savetxt(tmp_path / "line.csv", mm, fmt="%.5f")
+    return str(tmp_path / "line.csv"), x, z
+
+
+def spoiled(mm, rng) -> None:
+    mm[rng.integers(0, len(mm), 200)] += 5.0
+    for begin in (5000, 12_000):
+        mm[begin : begin + 80] = np.nan
+
+
+def test_a_laser_profile_is_cleaned_openly(tmp_path) -> None:
+    """Outliers and gaps are gone and counted; the line itself is the road's middle within its filter."""
+    file, x, z = measured(tmp_path, spoiled)
+    road = LaserFile(file=file, across="ruts", shortest_wave=5e-4).make()
+    inner = (x > 0.01) & (x < 0.99)
+    for begin in (5000, 12_000):  # nothing is known of the gaps
+        inner[begin - 50 : begin + 130] = False
+    assert np.abs(road.height(x, 0 * x) - z)[inner].max() < 1e-4
+    assert "160 missing" in road.notes[0] and "ruts" in road.notes[1]
+    outliers = int(road.notes[0].split("and ")[1].split()[0])
+    assert 180 <= outliers <= 230
+    under = make_road(kind="laser", file=file, across="ruts").prepare(0.0, 0.5, -0.1, 0.1)
+    assert under.notes[0].startswith("laser profile of 25000 points")
+
+
+def test_a_laser_profile_is_widened_by_isotropy(tmp_path) -> None:
+    """The line in its middle, as rough beside it and across it."""
+    file, x, z = measured(tmp_path, length=2.0)
+    road = LaserFile(file=file, shortest_wave=4e-3, width=0.3).make()
+    s = np.arange(0.02, 1.98, 1e-3)
+    middle, lines = (
+        road.height(s, 0 * s),
+        [road.height(s, 0 * s + y) for y in np.linspace(-0.15, 0.15, 13)],
+    )
+    alike = LaserFile(file=file, shortest_wave=4e-3, across="ruts").make()
+    assert np.abs(middle - alike.height(s, 0 * s)).max() < 1e-9
+    assert np.mean([line.std() for line in lines]) == pytest.approx(middle.std(), rel=0.15)
+    assert abs(np.corrcoef(lines[0], middle)[0, 1]) < 0.3
+    # Slopes along and across: an isotropic surface has the same.
+    y = np.arange(-0.14, 0.14, 1e-3)
+    grid = road.height(*np.broadcast_arrays(s[:, None], y[None, :]))
+    along, across = (np.diff(grid, axis=axis).std() for axis in (0, 1))
+    assert across == pytest.approx(along, rel=0.1)
+
+
+def all_lost(mm, rng) -> None:
+    mm[:] = np.nan
+
+
+def one_long_gap(mm, rng) -> None:
+    mm[5000:5400] = np.nan
+
+
+def much_lost(mm, rng) -> None:
+    mm[::5] = np.nan
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (all_lost, "none of the 25000 heights is a number"),
+        (one_long_gap, "longest_gap"),
+        (much_lost, "of no use"),
+    ],
+)
+def test_profiles_of_no_use_are_refused(tmp_path, spoil, message) -> None:
+    file, _, _ = measured(tmp_path, spoil)
+    with pytest.raises(InputError, match=message):
+        LaserFile(file=file).make()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("1,2,3\n" * 9, "3 numbers"),
+        ("a\nb\nc\nd\n", "line.csv"),
+        ("0,1\n1,1\n1,1\n4,1\n", "even steps"),
+        ("", "line.csv"),
+    ],
+)
+def test_files_that_are_no_line(tmp_path, content, message) -> None:
+    (tmp_path / "line.csv").write_text(content)
+    with pytest.raises(InputError, match=message):
+        LaserFile(file=str(tmp_path / "line.csv")).make()
+    with pytest.raises(InputError, match="file"):
+        LaserFile()
+
+
+def test_the_road_of_a_drum_comes_again() -> None:
+    """After the circumference, continuous at the seam, within its bounds; a wave that fits nowhere is blended."""
+    keys = {"kind": "sine", "wavelength": 0.17, "amplitude": 1e-3, "run_in": 0.0}
+    drum, plane = make_road(**keys, drum_radius=0.5), make_road(**keys)
+    length = np.pi
+    strip = drum.prepare(-5.0, 30.0, -0.1, 0.1)
+    x = np.arange(0.0, 20.0, 1e-3)
+    z = strip.height(x, 0 * x)
+    assert np.allclose(z, strip.height(x + length, 0 * x), atol=1e-12)
+    fine = 6 * length + np.linspace(-0.25, 0.05, 4001)
+    steepest = 1e-3 * 2 * np.pi / 0.17
+    assert np.abs(np.diff(strip.height(fine, 0 * fine)) / np.diff(fine)).max() < 1.5 * steepest
+    assert strip.lowest(-1, 20, 0, 0) <= z.min() and z.max() <= strip.highest(-1, 20, 0, 0)
+    inside = plane.prepare(-5.0, 30.0, -0.1, 0.1).height(x[:2500] + 0.2, 0 * x[:2500])
+    assert np.allclose(z[:2500], inside, atol=1e-12)
+    assert "repeats after 3.142 m" in strip.notes[-1]
+
+
+def test_a_measured_road_shorter_than_the_drum_is_refused(tmp_path) -> None:
+    file, _, _ = measured(tmp_path, length=1.0)
+    road = make_road(kind="laser", file=file, across="ruts", drum_radius=0.5)
+    with pytest.raises(InputError, match="the run needs the road from 0 to 3.142 m"):
+        road.prepare(0.0, 2.0, -0.1, 0.1)
