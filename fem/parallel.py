@@ -36,9 +36,11 @@ def on_root(
             error = raised
     if comm.size > 1:
         known = error is None or isinstance(error, clear)
-        told = comm.bcast(error if known else ToldByRoot())
-        value = comm.bcast(value if error is None else None)
-        error = error or told
+        from tireroad.fem.collective import told  # not needed before there are processes
+
+        known_error = comm.bcast(error if known else ToldByRoot())
+        value = told(comm, value if error is None else None)
+        error = error or known_error
     if error is not None:
         raise error
     return cast(T, value)  # every process has what the function returned
