@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tireroad.contact.rolling import Tire
+from tireroad.greens.sparse_columns import LoadedColumns
 
 
 class Driven:
@@ -21,9 +22,11 @@ class Driven:
 
     def __init__(self, tire: Tire, history: np.ndarray, directions: np.ndarray) -> None:
         self._tire, self._history, self._directions = tire, history, directions
+        self._forced = history.shape[1] > 0
         self._count = tire.same_step.shape[1] - history.shape[1]
         self._same = tire.same_step
         self.same_step = self._same[: self._count, : self._count]
+        self._beside = LoadedColumns(self._same[self._count :])
         self._step = 0
         self._along = np.zeros(history.shape[1])
         self.work = self.lead = 0.0
@@ -33,15 +36,21 @@ class Driven:
         """Displacement (c,) m at the end of the step with no new contact force. Collective."""
         self._step += 1
         self._free = self._tire.predict()
+        if not self._forced:
+            return self._free[: self._count]
         pushed = self._same[: self._count, self._count :] @ self._history[self._step]
         return self._free[: self._count] + pushed
 
     def advance(self, force: np.ndarray) -> None:
         """Take the contact's forces (c,) N at the end of the step."""
+        if not self._forced:
+            self._tire.advance(force)
+            self.reading = self._free[self._count :] + self._beside @ force
+            return
         before, now = self._history[self._step - 1], self._history[self._step]
         acting = np.concatenate([force, now])
         self._tire.advance(acting)
-        moved = self._free[self._count :] + self._same[self._count :] @ acting
+        moved = self._free[self._count :] + self._beside @ acting
         along, self.reading = np.split(moved, [len(now)])
         self.work += float(0.5 * (before + now) @ (along - self._along))
         self.lead += float(0.5 * (now - before) @ (along - self._along))
@@ -49,7 +58,8 @@ class Driven:
 
     def inertia_force(self) -> np.ndarray:
         """What axle and contact together have to balance (3,), N: momentum's rate less the forces."""
-        return self._tire.inertia_force() - self._history[self._step] @ self._directions
+        rate = self._tire.inertia_force()
+        return rate - self._history[self._step] @ self._directions if self._forced else rate
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """The tire's, and how far the prescribed forces are. Collective when the tire's is."""

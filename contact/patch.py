@@ -19,7 +19,8 @@ class Patch:
     rectangle of each, `force` (c,) N and `gap` (c,) m of the static state on a flat road, `edge`
     (c,) marks its outermost points, which should never touch. `weights` W (c, p) takes nodal values to
     the points; None: the points are the nodes. `places`: where they lie on a regular grid, or None.
-    Points of equal `line` (c,) int follow each other in the rolling direction.
+    Points of equal `line` (c,) int follow each other in the rolling direction. `frames` (c, 3, 3): unit vectors along,
+    across and normal to the road in the wheel's axes, along which forces and displacements are counted; None: x, y, z.
     """
 
     index: np.ndarray
@@ -31,6 +32,13 @@ class Patch:
     line: np.ndarray
     weights: sparse.csr_matrix | None = None
     places: GridPlaces | None = None
+    frames: np.ndarray | None = None
+
+    def resultant(self, force: np.ndarray, horizontal: np.ndarray) -> np.ndarray:
+        """(3,) N in the wheel's axes of forces normal to the road (c,) and along and across it (c, 2)."""
+        if self.frames is None:
+            return np.array([*horizontal.sum(axis=0), force.sum()])
+        return np.einsum("ci,cij->j", np.column_stack([horizontal, force]), self.frames)
 
     @property
     def area(self) -> np.ndarray:

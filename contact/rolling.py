@@ -160,7 +160,7 @@ def roll(
             memory.advance(change[:count])
         moved = free + answer @ change
         axle = -tire.inertia_force()
-        axle += [*horizontal.sum(axis=0), force.sum()]
+        axle += patch.resultant(force, horizontal)
         yield Instant(
             time,
             force,

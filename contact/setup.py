@@ -12,9 +12,11 @@ from tireroad.contact.grid_patch import make_grid_patch, settle
 from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
+from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
 from tireroad.contact.rolling import Drive
 from tireroad.contact.tread.pattern import Pattern
+from tireroad.fem.static.curved.shape import RoadShape
 from tireroad.greens.response import Response
 
 # What the tire may give way beyond the road's own height, m: the smallest reach of the patch.
@@ -37,6 +39,12 @@ class OuterFace(Protocol):
     def shape(self) -> tuple[int, int]: ...
     @property
     def road_height(self) -> float | None: ...
+    @property
+    def normal_force(self) -> np.ndarray: ...
+    @property
+    def seen(self) -> np.ndarray: ...
+    @property
+    def road(self) -> RoadShape: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,13 +65,15 @@ class Rolled:
 
 @dataclass(frozen=True, kw_only=True)
 class ContactSetup:
-    """The `patch` of points whose static gap is within `reach` (m), and the strip of `road` under it."""
+    """The `patch` of points whose static gap is within `reach` (m), the strip of `road` under it, and the `slip`
+    of the wheel, (s_x, s_y) or (c, 2), as contact.tread.brush has it."""
 
     patch: Patch
     reach: float
     road: PreparedRoad
     rolled: Rolled
     pattern: Pattern | None = None
+    slip: np.ndarray | tuple[float, float] = (0.0, 0.0)
 
     @property
     def drive(self) -> Drive:
@@ -107,6 +117,12 @@ class ContactSetup:
         strip = x0, x1 + self.rolled.travel, y0, y1
         return self.road.highest(*strip) - self.road.lowest(*strip)
 
+    def smooth(self, duration: float) -> ContactSetup:
+        """The same on a road without heights, at rest, for `duration` s; a slick."""
+        still = replace(self.rolled, duration=duration, motion=lambda time: 0.0, lift=0.0)
+        road = _under(RoadUnderTire(Flat()), self.patch, still)
+        return replace(self, road=road, rolled=still, pattern=None)
+
     def settled(self, response: Response, nodal_force: np.ndarray, spec: Spec) -> tuple:
         """(setup, rise in m): a grid of points takes up the static load that the finite elements gave to
         nodes, `nodal_force` (s,) N of the outer face; points at the nodes have it already."""
@@ -143,8 +159,9 @@ def contact_setup(
         from tireroad.fem.static.tread_surface import TreadSurface
 
         assert face.road_height is not None, "contact needs a tire that stands on a road"
-        surface = TreadSurface(lattice, face.positions)
+        surface = TreadSurface(lattice, face.seen)
         patch = make_grid_patch(surface, face.road_height, patch, spacing, reach)
+    patch = _on_shape(patch, face.road)
     if pattern is not None:
         pattern.land(patch.points[~patch.edge, 1])
     under = _under(road, patch, rolled)
@@ -152,7 +169,21 @@ def contact_setup(
 
 
 def _nodes(face: OuterFace, reach: float) -> Patch:
-    return make_patch(face.positions, face.half_sizes, face.force, face.gap, face.shape, reach)
+    given = face.half_sizes, face.normal_force, face.gap, face.shape, reach
+    return make_patch(face.seen, *given)
+
+
+def _on_shape(patch: Patch, road: RoadShape) -> Patch:
+    """The patch with its points where they are, and gaps, forces and motions counted along the road's normal."""
+    if road.flat:
+        return patch
+    x, y, height = patch.points.T
+    return replace(
+        patch,
+        points=np.stack([x, y, height + road.height(x, y)], axis=-1),
+        gap=patch.gap / road.stretch(x, y),
+        frames=road.frames(x, y),
+    )
 
 
 def _under(road: RoadUnderTire, patch: Patch, rolled: Rolled) -> PreparedRoad:

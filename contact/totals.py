@@ -15,7 +15,8 @@ RUNAWAY = 100.0  # times the patch's reach: half a metre at least
 
 @dataclass
 class Figures:
-    """What a checkpoint keeps as single numbers: N, the complementarity residual, m."""
+    """What a checkpoint keeps as single numbers: N, the complementarity residual, m; `excursion`, how far a point of
+    contact moved beyond the static state, as the wheel sees it."""
 
     steps: int = 0
     sum: float = 0.0
@@ -24,6 +25,7 @@ class Figures:
     least: float = np.inf
     most: float = -np.inf
     most_active: int = 0
+    excursion: float = 0.0
 
 
 @dataclass
@@ -58,7 +60,13 @@ class Totals:
             least=min(old.least, float(load.min())),
             most=max(old.most, float(load.max())),
             most_active=max(old.most_active, int(steps["active"].max())),
+            excursion=max(old.excursion, float(np.abs(self._beside_wheel(steps)).max())),
         )
+
+    def _beside_wheel(self, steps: dict[str, np.ndarray]) -> np.ndarray:
+        """Displacements (n, c) m of the points less the wheel's height, of those that touch at rest."""
+        touching = self.patch.force > 0
+        return steps["displacement"][:, touching] - steps.get("wheel_height", np.zeros(1))[:, None]
 
     def _check_bounded(self, steps: dict[str, np.ndarray]) -> None:
         """Chatter where a point moved by much more than the road could move it."""

@@ -5,23 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from tireroad.contact.chatter import choose, oscillation
-from tireroad.contact.grid_patch import OnPoints
 from tireroad.contact.limits import Limit, limits, lowest, pitch
-from tireroad.contact.model import step_solver, tread_memory
 from tireroad.contact.patch import Patch
 from tireroad.contact.roads.under_tire import RoadUnderTire
-from tireroad.contact.rolling import roll as instants_of
-from tireroad.contact.setup import Rolled, contact_setup
+from tireroad.contact.rolling import Instant, roll
+from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
 from tireroad.contact.spectra import amplitudes, third_octaves
-from tireroad.contact.steps import equal_steps
+from tireroad.contact.steps import Steps, equal_steps
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices import probe
 from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
 from tireroad.runs.library import RollingTire
+from tireroad.runs.stages.build.loop import make_loop
 
 Array = NDArray[np.float64]
 _TURN = 0.3  # rad that the fastest mode turns in a step by default: under a percent in its phase
@@ -62,6 +63,7 @@ class History:
 class _Spec:
     law: TreadLaw
     solver: str = "auto"
+    rubs: bool = False
 
 
 def drive(
@@ -96,42 +98,33 @@ def drive(
     setup, _ = setup.settled(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     chosen = equal_steps(duration, step or min(duration / _LEAST_STEPS, _TURN / fastest))
+    instants = _instants(spec, setup, response, chosen, motions.body.comm)
+    highest = tire.states.highest / (2 * np.pi)
+    bounds = limits(step=chosen.size, highest=highest, pitch=pitch(setup.patch), speed=rolled.speed)
+    return _history(setup.patch, instants, lowest(bounds))
+
+
+def _instants(
+    spec: _Spec, setup: ContactSetup, response: Response, chosen: Steps, comm: MPI.Comm
+) -> list[Instant]:
+    """The time loop by the scheme that the contact asks for. Collective."""
     kept = response.resolved(chosen.size)
     scheme = choose(oscillation(spec, setup.patch, kept, chosen.size)).scheme
-    recursion = Recursion(response=kept, step=chosen.size, scheme=scheme, comm=motions.body.comm)
-    p = len(setup.patch.index)
-    memory = tread_memory(spec, setup.patch, rolled.speed, chosen.size)
-    at_once = memory.at_once if memory else 1.0
-    solver = step_solver(spec, setup.patch, recursion.same_step[:p, :p], at_once)
-    seen = (
-        OnPoints(recursion, setup.patch.weights, 1)
-        if setup.patch.weights is not None
-        else recursion
-    )
-    instants = list(
-        instants_of(
-            seen, solver, setup.patch, setup.drive, chosen.size, chosen.count, memory=memory
-        )
-    )
-    history = History(
-        time=np.array([instant.time for instant in instants]),
-        force=np.stack([instant.force for instant in instants]),
-        axle_force=np.stack([instant.axle_force for instant in instants]),
-        displacement=np.stack([instant.displacement for instant in instants]),
-        gap=np.stack([instant.gap for instant in instants]),
-        patch=setup.patch,
-        limit=lowest(
-            limits(
-                step=chosen.size,
-                highest=tire.states.highest / (2 * np.pi),
-                pitch=pitch(setup.patch),
-                speed=rolled.speed,
-            )
-        ),
-    )
-    if (history.force[:, setup.patch.edge] > 0).any():
+    recursion = Recursion(response=kept, step=chosen.size, scheme=scheme, comm=comm)
+    loop = make_loop(spec, setup, recursion, chosen.size)
+    given = setup.patch, setup.drive, chosen.size, chosen.count
+    return list(roll(loop.tire, loop.solver, *given, memory=loop.memory))
+
+
+def _history(patch: Patch, instants: list[Instant], limit: Limit) -> History:
+    """The instants one after the other. ConvergenceError where the road touches beyond the patch."""
+    kept = {
+        name: np.stack([getattr(instant, name) for instant in instants])
+        for name in ("time", "force", "axle_force", "displacement", "gap")
+    }
+    if (kept["force"][:, patch.edge] > 0).any():
         raise ConvergenceError(
             "drive: the road touches at the edge of the patch of contact points: it is rougher than its "
             "own highest spot says; take a smoother road or smaller steps"
         )
-    return history
+    return History(**kept, patch=patch, limit=limit)

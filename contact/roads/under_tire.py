@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 
 from tireroad.contact.roads.levelling import Level, mean_level, wave_level
 from tireroad.contact.roads.texture.levels import Texture, texture_of
+from tireroad.contact.roads.texture.repeated import Repeated
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import Parameters, number
+from tireroad.fem.parameters import Parameters, choice, number
 
 Array = NDArray[np.float64]
 
 # Pieces a strip is cut into for its bounds, at least: the level changes slowly over one.
 PIECES = 64
 LONGEST = 0.25  # m
-# The texture that is told: of that many metres at most and at least, points at most, points this far apart at most.
+# The texture that is reported: of that many metres at most and at least, points at most, points this far apart at most.
 _SEEN, _LEAST_SEEN, _MOST_SEEN, _COARSEST = 20.0, 0.1, 100_000, 1e-3
 
 
@@ -67,12 +68,20 @@ class Placement(Parameters):
     offset: float = number(
         0.0, "m", "height added to the whole road, positive up", least=-10, most=10
     )
+    drum_radius: float | None = number(
+        None,
+        "m",
+        "the road lies on a drum of this radius, and repeats after its circumference; absent: a plane",
+        least=0.1,
+        most=1e4,
+    )
+    drum: str = choice("outside", ("outside", "inside"), "side of the drum that the tire runs on")
 
 
 class RoadUnderTire:
     """A road placed under the axle; `prepare` cuts out the strip a run drives over.
 
-    start, lateral, run_in, offset (m): see Placement; datum: "mean" subtracts the strip's mean
+    start, lateral, run_in, offset, drum_radius (m), drum: see Placement; datum: "mean" subtracts the strip's mean
     height, "zero" nothing; longest_wave (m): longer waves are filtered out too.
     """
 
@@ -86,12 +95,16 @@ class RoadUnderTire:
         offset: float = 0.0,
         datum: str = "zero",
         longest_wave: float | None = None,
+        drum_radius: float | None = None,
+        drum: str = "outside",
     ) -> None:
         if datum not in ("mean", "zero"):
             raise InputError(f'road: datum = "{datum}" is unknown: take "mean" or "zero"')
         if not run_in >= 0.0:
             raise InputError(f"road: run_in {run_in:g} m must not be negative")
-        self.road, self._datum = road, datum
+        if drum_radius is not None and np.isfinite(road.spacing):
+            road = Repeated(road, 2 * np.pi * drum_radius)
+        self.road, self._datum, self.drum = road, datum, drum
         self._start, self._lateral, self._run_in, self._offset = start, lateral, run_in, offset
         self._longest_wave = longest_wave
 

@@ -27,13 +27,13 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class BrushLaw:
-    """`stiffness` N/m a point, or (c,) of each; `friction` mu, None: never slips; `slip` (s_x, s_y); `kind`:
+    """`stiffness` N/m a point, or (c,) of each; `friction` mu, None: never slips; `slip` (s_x, s_y), or (c, 2); `kind`:
     "rolling", or "spring", the thesis's spring to the point's own displacement, e = u.
     """
 
     stiffness: float | Array
     friction: float | None = None
-    slip: tuple[float, float] = (0.0, 0.0)
+    slip: tuple[float, float] | Array = (0.0, 0.0)
     kind: str = "rolling"
 
 
@@ -47,7 +47,7 @@ class Brush:
         self.law = law
         self._way = speed * step
         self._upstream = upstream(x, line, self._way)
-        self._slip = self._way * np.array([-law.slip[0], law.slip[1]])
+        self._slip = self._way * np.array([-1.0, 1.0]) * np.asarray(law.slip)
         self.deflection = np.zeros((len(x), 2))
         self._moved = np.zeros((len(x), 2))
         self._touched: Mask = np.zeros(len(x), dtype=bool)

@@ -19,6 +19,14 @@ def nodes(index: np.ndarray, count: int, component: int = 2) -> sparse.csr_matri
     )
 
 
+def along(index: np.ndarray, count: int, vectors: np.ndarray) -> sparse.csr_matrix:
+    """The components along `vectors` (k, 3) at single nodes: (k, 3 count), for `index` (k,) into the outer face."""
+    k = len(index)
+    rows = np.repeat(np.arange(k), 3)
+    columns = (3 * index[:, None] + np.arange(3)).ravel()
+    return sparse.csr_matrix((vectors.ravel(), (rows, columns)), shape=(k, 3 * count))
+
+
 def spot(
     lattice: Lattice, ring: float, arc: float, spread: tuple[float, float] = (0.0, 0.0)
 ) -> np.ndarray:

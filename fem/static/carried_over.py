@@ -8,7 +8,7 @@ import numpy as np
 
 from tireroad.fem.matrices import probe
 from tireroad.fem.sections.locate import interpolation, locate
-from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.tire.mesh import Lattice
 
@@ -26,9 +26,10 @@ def carried_over(
     """
     body = other.body
     body.set_displacement(sampled(tire.lattice, state.displacement, body.lattice))
-    equilibrium = Equilibrium(body, state.rolling)
+    equilibrium = make_equilibrium(body, state.rolling, state.road)
     equilibrium.pressure.value = state.inflation
-    step = equilibrium.solve(state.road_height, load=load)
+    carried = None if load is None else load * state.road.upright
+    step = equilibrium.solve(state.road_height, load=carried)
     return static_state(equilibrium, state.touch_height) if step.converged else None
 
 

@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.road import Road
 from tireroad.fem.static.shape_damping import ShapeDamping
@@ -38,8 +39,10 @@ class Equilibrium:
 
     `inflation` (Pa) may be changed between solves; `solve` starts from the body's displacement and
     puts it back when it does not converge. `road_height` (m) is that of the last state that did;
-    `cost`: seconds by part.
+    `cost`: seconds by part; the road's `shape` is a level plane here (fem.static.curved has others).
     """
+
+    shape: RoadShape = FLAT
 
     def __init__(self, body: Body, rolling: Rolling = AT_REST) -> None:
         self.body, self.rolling = body, rolling
@@ -61,10 +64,13 @@ class Equilibrium:
         self._work = fem.petsc.create_vector(self._residual)
         rim = body.rim[body.rim < body.nodes]
         self._rim = (3 * rim[:, None] + np.arange(3)).ravel()
-        self.road = Road(body)
+        self.road = self._make_road()
         self._scale = self._yardsticks()
         damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
         self._system = self._make_system("lu" if damped else "cholesky")
+
+    def _make_road(self) -> Road:
+        return Road(self.body)
 
     def _make_system(self, kind: str) -> System:
         return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
@@ -208,7 +214,7 @@ class Equilibrium:
         return self.solve(height)
 
     def _yardsticks(self) -> float:
-        """Force scale, N, of the undeformed body, whose stiffness the road is told.
+        """Force scale, N, of the undeformed body, which scales the road's stiffness.
 
         The scale is the typical stiffness of a dof times the wall, so that 1e-12 of it is far below
         any load of interest.

@@ -71,6 +71,9 @@ class HeldSystem:
             self.raising = self._moved(matrix, np.ones(len(held)))
             matrix.zeroRowsColumns(rows, 1.0)
         with self._timing("factorisation"):
+            self._ksp.setOperators(
+                matrix
+            )  # not always the one it was made with (fem.static.curved)
             self._ksp.getPC().setUp()
         return self._checked()
 

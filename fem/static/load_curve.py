@@ -39,7 +39,9 @@ def load_curve(loader: Loader, deflections: Sequence[float]) -> list[CurvePoint]
     Each step starts from a line through the two states before it; ConvergenceError where one does not
     converge by halved steps either.
     """
-    return [_point(loader, deflection) for deflection in loader.visit(deflections)]
+    upright = loader.equilibrium.shape.upright
+    raised = loader.visit([deflection / upright for deflection in deflections])
+    return [_point(loader, deflection * upright) for deflection in raised]
 
 
 def slopes(deflection: np.ndarray, load: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -55,7 +57,7 @@ def _point(loader: Loader, deflection: float) -> CurvePoint:
     return CurvePoint(
         deflection,
         state.load,
-        loader.equilibrium.road_stiffness(),
+        loader.equilibrium.road_stiffness() / loader.equilibrium.shape.upright**2,
         state.footprint(),
         int((state.force > 0).sum()),
         state.rolling_radius(),

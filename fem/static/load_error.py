@@ -18,7 +18,7 @@ from tireroad.fem.matrices import probe
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.split import split_ring
 from tireroad.fem.static.carried_over import sampled
-from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
@@ -94,7 +94,8 @@ def _taken_over(loader: Loader, ring: Ring, rolling: Rolling) -> Loader:
     body = loader.body
     other = Body(body.comm, ring, body.materials, cords=body.plies.cords)
     other.set_displacement(sampled(body.lattice, body.displacement(), other.lattice))
-    companion = Loader(Equilibrium(other, rolling), lambda progress: None)
+    equilibrium = make_equilibrium(other, rolling, loader.equilibrium.shape)
+    companion = Loader(equilibrium, lambda progress: None)
     companion.equilibrium.pressure.value = loader.equilibrium.pressure.value
     return companion
 

@@ -103,10 +103,12 @@ class Loader:
         return self.equilibrium.road_height - self.touch
 
     def lowest(self) -> float:
-        """Height of the lowest point of the outer face between its nodes, m. Collective."""
+        """Height of the lowest point of the outer face over the road's shape, m. Collective."""
         lattice = self.body.lattice
         moved = self.body.surface(self.body.owned(self.body.u.x.array))
-        return TreadSurface(lattice, lattice.points(lattice.face) + moved).lowest()
+        places = lattice.points(lattice.face) + moved
+        places[:, 2] -= self.equilibrium.shape.height(*places[:, :2].T)
+        return TreadSurface(lattice, places).lowest()
 
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
@@ -130,7 +132,7 @@ class Loader:
     def _half(self) -> _Half | None:
         """Half of the ring in the present state, where half a turn leaves tire and loads as they are. Collective."""
         rolling = self.equilibrium.rolling
-        if not looks_the_same(self.body.ring, rolling):
+        if not (self.equilibrium.shape.flat and looks_the_same(self.body.ring, rolling)):
             return None
         equilibrium = HalfTurnEquilibrium(self.body, rolling)
         equilibrium.start(self.equilibrium)

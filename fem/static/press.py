@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.model import TireModel
-from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.curved.balance import make_equilibrium
+from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.loading import Loader, Progress
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
@@ -21,9 +22,10 @@ def press(
     deflection: float | None = None,
     road_height: float | None = None,
     rolling: Rolling = AT_REST,
+    road: RoadShape = FLAT,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> StaticState:
-    """The tire inflated to `inflation` (Pa) and, with one of the others, on a flat frictionless road.
+    """The tire inflated to `inflation` (Pa) and, with one of the others, on a frictionless `road`.
 
     `load` N on the road, or `deflection` m of the road from first touch, or `road_height` m, z of its
     plane; none of them: no road. `rolling`: inertia and damping of the steadily rolling shape. `report`
@@ -32,7 +34,7 @@ def press(
     """
     if not (math.isfinite(inflation) and inflation >= 0.0):
         raise InputError(f"inflation = {inflation:g} Pa must be 0 or more, and finite")
-    loader = Loader(Equilibrium(tire.body, rolling), report)
+    loader = Loader(make_equilibrium(tire.body, rolling, road), report)
     loader.inflate(inflation)
     place(loader, load, deflection, road_height)
     return static_state(loader.equilibrium, loader.touch)
@@ -41,7 +43,7 @@ def press(
 def place(
     loader: Loader, load: float | None, deflection: float | None, road_height: float | None
 ) -> None:
-    """Press the inflated tire on the road, as `press` says. Collective."""
+    """Press the inflated tire on the road, as `press` says: load and deflection along its normal. Collective."""
     given = {"load": load, "deflection": deflection, "road_height": road_height}
     named = [name for name, value in given.items() if value is not None]
     if len(named) > 1:
@@ -50,8 +52,8 @@ def place(
         if value is not None and not math.isfinite(value):
             raise InputError(f"{name} = {value:g} must be finite")
     if load is not None:
-        loader.carry(load)
+        loader.carry(load * loader.equilibrium.shape.upright)
     elif deflection is not None:
-        loader.deflect(deflection)
+        loader.deflect(deflection / loader.equilibrium.shape.upright)
     elif road_height is not None:
         loader.deflect(road_height - loader.touch)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
@@ -16,11 +17,11 @@ from tireroad.fem.tire.mesh import Lattice
 
 @dataclass(frozen=True, kw_only=True)
 class StaticState:
-    """The tire at rest on the road.
+    """The tire at rest on the `road`, a level plane unless its shape says otherwise.
 
     `displacement` (n, 3) m of all lattice nodes; of the outer face, in the order of its ids:
     `points` (s, 3) m undeformed, `moved` (s, 3) m displacement, `force` (s,) N of the road on the
-    tire, `area` (s,) m2 that a uniform pressure is shared out by, `half_sizes` (s, 2) m of the deformed rectangle each node stands for (x and y),
+    tire along the wheel's z, `area` (s,) m2 that a uniform pressure is shared out by, `half_sizes` (s, 2) m of the deformed rectangle each node stands for (x and y),
     `ring_rate` (s,) m/rad the derivative of the deformed x by the angle around the axle.
     `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are what it was
     computed for, and travel with it. `cords` by name of the ply; `mass` (kg) of wall and cords.
@@ -40,11 +41,35 @@ class StaticState:
     rolling: Rolling = AT_REST
     cords: Mapping[str, CordForce] = field(default_factory=dict)
     mass: float = 0.0
+    road: RoadShape = FLAT
 
     @property
     def load(self) -> float:
-        """Total vertical force, N."""
-        return float(self.force.sum())
+        """Total force along the road's normal under the axle, N."""
+        return float(self.force.sum()) / self.road.upright
+
+    @property
+    def deflection(self) -> float | None:
+        """Way along that normal from first touch, m; None without a road."""
+        if self.road_height is None:
+            return None
+        return (self.road_height - self.touch_height) * self.road.upright
+
+    @property
+    def frames(self) -> np.ndarray | None:
+        """Unit vectors (s, 3, 3) along, across and normal to the road at each point; None on a level plane."""
+        return None if self.road.flat else self.road.frames(*self.positions[:, :2].T)
+
+    @property
+    def push(self) -> np.ndarray:
+        """Force (s, 3) N of the frictionless road, in the wheel's axes."""
+        slopes = self.road.slopes(*self.positions[:, :2].T)
+        return np.stack([*(-self.force * slope for slope in slopes), self.force], axis=-1)
+
+    @property
+    def normal_force(self) -> np.ndarray:
+        """Force (s,) N normal to the road."""
+        return self.force * self.road.stretch(*self.positions[:, :2].T)
 
     @property
     def positions(self) -> np.ndarray:
@@ -52,9 +77,16 @@ class StaticState:
         return self.points + self.moved
 
     @property
+    def seen(self) -> np.ndarray:
+        """Positions (s, 3) m with their heights over the road's shape: as from a level plane."""
+        places = self.positions
+        places[:, 2] -= self.road.height(*places[:, :2].T)
+        return places
+
+    @property
     def gap(self) -> np.ndarray:
-        """Height of the outer face above the road plane, (s,) m; 0 where it touches."""
-        gap = self.positions[:, 2] - self.road_height
+        """Height of the outer face above the road, (s,) m; 0 where it touches."""
+        gap = self.seen[:, 2] - self.road_height
         return np.where(self.force > 0, 0.0, gap)
 
     @property
@@ -62,7 +94,7 @@ class StaticState:
         """How far the deepest point of the outer face is inside the road as solved, m; 0 without one."""
         if self.road_height is None:
             return 0.0
-        return max(float((self.road_height - self.positions[:, 2]).max()), 0.0)
+        return max(float((self.road_height - self.seen[:, 2]).max()), 0.0)
 
     def rolling_radius(self) -> float:
         """Effective rolling radius, m: material speed over the road per unit speed of rotation.
@@ -71,7 +103,7 @@ class StaticState:
         or at the lowest crown point without a road: the speed at which that material would stick.
         """
         if self.force.any():
-            return float(self.ring_rate @ self.force / self.load)
+            return float(self.ring_rate @ self.force / self.force.sum())
         crown = np.argmin(self.positions[:, 2])
         return float(self.ring_rate[crown])
 
@@ -85,7 +117,7 @@ class StaticState:
         """Extent of the contact; zeros without a road."""
         if self.road_height is None:
             return Footprint(0.0, 0.0, 0.0)
-        return footprint(self.shape, self.positions, self.pressure, self.gap, self.area)
+        return footprint(self.shape, self.positions, self.pressure, self.gap)
 
 
 def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
@@ -114,6 +146,7 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         road_height=road_height,
         inflation=float(equilibrium.pressure.value),
         rolling=equilibrium.rolling,
+        road=equilibrium.shape,
         cords=cord_forces(body),
         mass=body.comm.allreduce(float(body.nodal_mass()[::3].sum())),
     )

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.chatter import LIMIT, Chatter, Chosen, warning
+from tireroad.contact.chatter import Chatter, Chosen
 from tireroad.contact.model import solver_name
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
@@ -21,11 +21,10 @@ from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
 from tireroad.runs.stages.build import pattern
 from tireroad.runs.stages.build.energy import Losses, describe_energy, works
-from tireroad.runs.stages.build.loop import driven_tire, make_loop
+from tireroad.runs.stages.build.loop import driven_tire, freely_rolling, make_loop
 from tireroad.runs.stages.build.point_forces import shortest_period
-from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, told
+from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, reported
 from tireroad.runs.stages.build.stepping import (
-    Integration,
     Planned,
     integration,
     passing_period,
@@ -35,13 +34,17 @@ from tireroad.runs.stages.build.watch import Watch
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.stage import Done, Stage
-from tireroad.runs.stages.stored import road_file
+from tireroad.runs.stages.stored import contact_figures, road_file
 from tireroad.runs.stages.stored.contact_file import (
     ContactFile,
     ContactHistory,
     begun_with,
     forget_checkpoint,
 )
+
+LINEAR = (
+    1 / 3
+)  # of the static deflection: motion of the contact up to which a linear tire is trusted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +66,9 @@ class ContactStage(Stage[ContactHistory]):
             "road": [asdict(scene.road), pattern.inputs(self.job)],
             "file": store.file_hash(scene.road.file) if scene.road.file else None,
             "speed": self.setup.product.rolled.speed,
+            "slip": [scene.rotation.free_rolling, scene.rotation.slip_angle]
+            if scene.rotation
+            else None,
             "axle_force": scene.output.axle_force,
             "forces": [asdict(force) for force in scene.force],
             "time": {k: v for k, v in asdict(scene.time).items() if k != "checkpoint"},
@@ -80,11 +86,14 @@ class ContactStage(Stage[ContactHistory]):
         response, setup = self.greens.product.contact, self.setup.product
         plan = planned(self.job, record, response, self._shortest_period())
         with record.timing("tread and solver"):
-            setup, rise = setup.settled(response, self.static.product.force, self.job.scene.contact)
+            setup, rise = setup.settled(
+                response, self.static.product.normal_force, self.job.scene.contact
+            )
             if rise:
                 record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
             begun = begun_with(self.job, key)
             chosen = chosen_scheme(self.job, record, setup, plan, begun)
+            setup = self._rolling_freely(record, setup, plan, chosen.scheme)
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
         observe.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
@@ -95,8 +104,19 @@ class ContactStage(Stage[ContactHistory]):
             if not doubtful:
                 raise
             forget_checkpoint(self.job)
-            chosen = told(record, Chosen(*WATCHED))
+            chosen = reported(record, Chosen(*WATCHED))
             self._attempt(key, record, setup, plan, chosen.scheme, False)
+
+    def _rolling_freely(self, record: Record, setup: ContactSetup, plan: Planned, scheme: str):
+        """With the slip of free rolling, where the scene wants that. Collective."""
+        rotation, response = self.job.scene.rotation, self.greens.product.contact
+        if rotation is None or not rotation.free_rolling:
+            return setup
+        # Found about the present setup, whose slip has nothing found yet.
+        setup, slip = freely_rolling(self.job, setup, response, plan.step, scheme)
+        self.job.found["free slip"] = slip
+        record.headline["slip of free rolling"] = (100 * slip, "%")
+        return setup
 
     def _attempt(
         self,
@@ -130,7 +150,8 @@ class ContactStage(Stage[ContactHistory]):
             busy = (time.thread_time() - began) / max(chosen.steps - done, 1)
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
-        _describe(record, totals, loop.solver, chosen, chosen.steps - done)
+        contact_figures.describe(record, totals, loop.solver, chosen, chosen.steps - done)
+        contact_figures.excursion(record, totals.figures.excursion, self.static.product.deflection)
         pattern.describe(record, setup)
         road_file.describe(record, setup)
         if chosen.scheme != "convolution":
@@ -197,27 +218,3 @@ def beyond_unique(friction: float | None, limit: float) -> list[str]:
         f"contact.friction = {friction:g} is more than {limit:.3g}, up to which a step is sure to have "
         "one answer: where points slip there may be another; lower it, or take a softer tread"
     ]
-
-
-def _describe(record: Record, counted: Totals, solver, chosen: Integration, taken: int) -> None:
-    """`taken`: the steps of this run, without those before its checkpoint."""
-    totals, chattering = counted.figures, counted.alternation.worst
-    record.headline |= {
-        "mean load": (float(totals.sum / totals.steps), "N"),
-        "least load": (float(totals.least), "N"),
-        "largest load": (float(totals.most), "N"),
-        "points touching at most": (totals.most_active, "-"),
-        "step": (chosen.step, "s"),
-        "scheme": (chosen.scheme, "-"),
-        "time a step": (record.cost["time loop"] / max(taken, 1) * 1e6, "us"),
-    }
-    record.indicators |= {
-        "worst complementarity residual": (float(totals.residual), "-"),
-        "largest penetration": (float(totals.penetration), "m"),
-        "factorisations": (solver.factorisations, "-"),
-        "points that change back from step to step, at worst": (chattering, "-"),
-    }
-    if chattering > LIMIT:
-        record.warnings.append(warning(chattering))
-    if totals.least == 0:
-        record.warnings.append("the tire lost contact with the road for a while")

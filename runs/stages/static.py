@@ -9,8 +9,8 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.model import TireModel
+from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.diagnosis import with_cause
-from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_error import load_error
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.press import place
@@ -20,6 +20,7 @@ from tireroad.fem.timing import Timing
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.build.tire import road_shape
 from tireroad.runs.stages.build.turning import rolling_shape, turning_of
 from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.record import Record
@@ -48,17 +49,14 @@ class StaticStage(Computed[StaticState]):
 
     def inputs(self) -> dict:
         """The tire without its air, the static loads, and the rolling terms where they take part."""
-        scene = self.job.scene
+        scene, rotation = self.job.scene, self.job.scene.rotation
         return {
             "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
             "file": scene.tire.shape.fingerprint(scene.tire),
             "static": asdict(scene.static),
-            "rolling": asdict(
-                steady_rolling(self.job, scene.rotation.speed if scene.rotation else None)
-            ),
-            "travel": [scene.rotation.travel_speed, scene.rotation.rolling_radius]
-            if scene.rotation
-            else None,
+            "road": asdict(road_shape(scene)),
+            "rolling": asdict(steady_rolling(self.job, rotation.speed if rotation else None)),
+            "travel": [rotation.travel_speed, rotation.rolling_radius] if rotation else None,
         }
 
     def compute(self, record: Record) -> StaticState:
@@ -76,7 +74,7 @@ class StaticStage(Computed[StaticState]):
         return state
 
     def _conclude(self, record: Record, state: StaticState, loader: Loader) -> None:
-        """What is told of the state, and the error of its load. Collective."""
+        """Figures of the state, and the error of its load. Collective."""
         wanted = self.job.scene.static
         _describe(record, state, loader)
         self._warn_at_rest(record)
@@ -89,7 +87,7 @@ class StaticStage(Computed[StaticState]):
         """Load steps up to the state at `speed` rad/s. Collective."""
         wanted, rolling = self.job.scene.static, steady_rolling(self.job, speed)
         with record.timing("mesh and forms"):
-            equilibrium = Equilibrium(self.job.tire.body, rolling)
+            equilibrium = make_equilibrium(self.job.tire.body, rolling, road_shape(self.job.scene))
         loader = Loader(equilibrium, _show)
         began = Timing.clock()
         try:
@@ -145,6 +143,7 @@ class StaticStage(Computed[StaticState]):
             shape=self.job.tire.lattice.face_shape,
             touch_height=float(attributes["touch_height"]),
             road_height=None if road is None else float(road),
+            road=road_shape(self.job.scene),
             inflation=float(attributes["inflation"]),
             rolling=steady_rolling(self.job, float(attributes["rolling_speed"])),
             **cords_file.read(file),
@@ -199,7 +198,7 @@ def _describe(record: Record, state: StaticState, loader: Loader) -> None:
         extent = state.footprint()
         record.headline |= {
             "load": (state.load, "N"),
-            "deflection": (state.road_height - state.touch_height, "m"),
+            "deflection": (state.deflection, "m"),
             "footprint length": (extent.length, "m"),
             "footprint width": (extent.width, "m"),
             "footprint area": (extent.area, "m2"),
@@ -232,16 +231,17 @@ def _fill(file, state: StaticState, tire: TireModel) -> None:
     file.attrs["rolling_radius"] = state.rolling_radius()
     if state.road_height is None:
         return
+    file.attrs["camber"] = float(np.degrees(state.road.camber))
+    if state.road.drum_radius is not None:
+        file.attrs["drum_radius"] = state.road.drum_radius
     near = np.flatnonzero(state.gap < tire.section.thickness)
-    force = np.zeros((len(near), 3))
-    force[:, 2] = state.force[near]
     put(file, "contact/index", near, "-")
     put(file, "contact/points", state.positions[near], "m")
-    put(file, "contact/force", force, "N")
+    put(file, "contact/force", state.push[near], "N")
     put(file, "contact/gap", state.gap[near], "m")
     put(file, "contact/area", state.area[near], "m2")
     put(file, "contact/pressure", state.pressure[near], "Pa")
     file.attrs["road_height"] = state.road_height
-    file.attrs["deflection"] = state.road_height - state.touch_height
+    file.attrs["deflection"] = state.deflection
     for name, value in asdict(state.footprint()).items():
         file.attrs[f"footprint_{name}"] = value

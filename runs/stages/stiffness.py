@@ -9,7 +9,7 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.road_stiffness import RoadStiffness, road_stiffness
-from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.load_curve import CurvePoint, load_curve, slopes
 from tireroad.fem.static.loading import Loader
 from tireroad.fem.static.state import StaticState
@@ -74,7 +74,7 @@ class StiffnessStage(Computed[Stiffness]):
         stuck = None
         if wanted.which == "all" and on_road:
             force = state.force[body.surface.place]
-            centre = state.force @ state.positions / state.load
+            centre = state.force @ state.positions / state.force.sum()
             stuck = self._stuck(record, body.surface.local[force > 0], centre)
         try:
             points, force = self._curve(record)
@@ -100,7 +100,7 @@ class StiffnessStage(Computed[Stiffness]):
         body, state = self.job.tire.body, self.static.product
         body.u.x.array[:] = 0.0
         with record.timing("mesh and forms"):
-            equilibrium = Equilibrium(body, steady_rolling(self.job))
+            equilibrium = make_equilibrium(body, steady_rolling(self.job), state.road)
         loader = Loader(equilibrium, lambda progress: None)
         try:
             loader.inflate(self.job.scene.static.inflation)
@@ -139,7 +139,7 @@ class StiffnessStage(Computed[Stiffness]):
 
 def _own(state: StaticState) -> float | None:
     """Deflection of the scene's own state, m."""
-    return None if state.road_height is None else state.road_height - state.touch_height
+    return state.deflection
 
 
 def _result(points: list[CurvePoint], state: StaticState, stuck: RoadStiffness | None) -> Stiffness:

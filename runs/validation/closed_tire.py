@@ -94,15 +94,38 @@ def _ring(speed: float) -> Iterator[tuple]:
     rotation = operators.rotation() if speed else None
     projection = project(modes, rotation, operators.carried, COMM)
     states = rotating(*matrices(projection, speed, (0.0, 0.0), "full"))
-    found = np.abs(states.eigenvalue.imag) / (2 * np.pi)
+    found = _bending_waves(
+        body.lattice.points(body.ids), modes.vectors @ states.right, states.eigenvalue
+    )
     bending = E * h**2 / (12 * density * R**4)
     for n in (2, 3, 4):
         root = np.sqrt(n**2 * (n**2 - 1) ** 2 / (n**2 + 1) * (bending + speed**2 / (n**2 + 1)))
         turn = 2 * n * speed / (n**2 + 1) - n * speed
         for sign in (1, -1) if speed else (1,):
-            closed = abs(turn + sign * root) / (2 * np.pi)
+            closed = (turn + sign * root) / (2 * np.pi)
             name = f"thin free ring at {speed:g} rad/s, n = {n} (Endo)"
-            yield name, "Hz", float(found[np.abs(found - closed).argmin()]), float(closed)
+            yield name, "Hz", abs(found[n][sign]), abs(closed)
+
+
+def _bending_waves(points: np.ndarray, shape: np.ndarray, eigenvalue: np.ndarray) -> dict:
+    """Signed frequency (Hz) by wave number n and branch of a ring's waves exp(i (w t - n a)) in its plane, a the angle
+    from the lowest point against the sense of rotation: 1 the higher of the two, -1 the lower.
+
+    Told from all other states by their shapes (3 s, m), not by their frequencies.
+    """
+    angle = np.arctan2(points[:, 0], -points[:, 2])
+    field = shape.reshape(len(points), 3, -1)
+    radial = np.sin(angle)[:, None] * field[:, 0] - np.cos(angle)[:, None] * field[:, 2]
+    in_plane = np.linalg.norm(field[:, 1], axis=0) < 0.1 * np.linalg.norm(radial, axis=0)
+    found = {}
+    for n in (2, 3, 4):
+        parts = np.array([np.exp(-1j * k * angle) @ radial for k in (n, -n)]) / len(points)
+        whole = np.sqrt((np.abs(radial) ** 2).mean(axis=0))
+        ours = in_plane & (eigenvalue.imag > 0) & (np.linalg.norm(parts, axis=0) > 0.9 * whole)
+        ways = np.where(np.abs(parts[0]) < np.abs(parts[1]), 1, -1)
+        signed = np.sort((ways * eigenvalue.imag)[ours]) / (2 * np.pi)
+        found[n] = {-1: float(signed[0]), 1: float(signed[-1])}
+    return found
 
 
 def _soft_modes(operators: Operators) -> Modes:

@@ -200,3 +200,28 @@ def test_files_that_are_no_line(tmp_path, content, message) -> None:
         LaserFile(file=str(tmp_path / "line.csv")).make()
     with pytest.raises(InputError, match="file"):
         LaserFile()
+
+
+def test_the_road_of_a_drum_comes_again() -> None:
+    """After the circumference, continuous at the seam, within its bounds; a wave that fits nowhere is blended."""
+    keys = {"kind": "sine", "wavelength": 0.17, "amplitude": 1e-3, "run_in": 0.0}
+    drum, plane = make_road(**keys, drum_radius=0.5), make_road(**keys)
+    length = np.pi
+    strip = drum.prepare(-5.0, 30.0, -0.1, 0.1)
+    x = np.arange(0.0, 20.0, 1e-3)
+    z = strip.height(x, 0 * x)
+    assert np.allclose(z, strip.height(x + length, 0 * x), atol=1e-12)
+    fine = 6 * length + np.linspace(-0.25, 0.05, 4001)
+    steepest = 1e-3 * 2 * np.pi / 0.17
+    assert np.abs(np.diff(strip.height(fine, 0 * fine)) / np.diff(fine)).max() < 1.5 * steepest
+    assert strip.lowest(-1, 20, 0, 0) <= z.min() and z.max() <= strip.highest(-1, 20, 0, 0)
+    inside = plane.prepare(-5.0, 30.0, -0.1, 0.1).height(x[:2500] + 0.2, 0 * x[:2500])
+    assert np.allclose(z[:2500], inside, atol=1e-12)
+    assert "repeats after 3.142 m" in strip.notes[-1]
+
+
+def test_a_measured_road_shorter_than_the_drum_is_refused(tmp_path) -> None:
+    file, _, _ = measured(tmp_path, length=1.0)
+    road = make_road(kind="laser", file=file, across="ruts", drum_radius=0.5)
+    with pytest.raises(InputError, match="the run needs the road from 0 to 3.142 m"):
+        road.prepare(0.0, 2.0, -0.1, 0.1)

@@ -7,7 +7,7 @@ from tireroad.contact.model import step_solver
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.spectra import distance
 from tireroad.runs.measure.tabulate import modules
-from tireroad.runs.validation import rolling, schemes
+from tireroad.runs.validation import closed_tire, rolling, schemes
 from tireroad.runs.validation.comparison import Comparison
 from tireroad.runs.validation.histories import History, follow
 from tireroad.runs.validation.moved_road import SCENE
@@ -118,3 +118,16 @@ def test_the_scheme_that_is_chosen_is_held_against_a_finer_step(tires) -> None:
     (*_, coarse, constant), (*_, fine, _) = rows
     assert float(fine) < float(coarse) / 4
     assert rows[1][4] == "linear" and float(constant) > float(coarse)
+
+
+@pytest.mark.slow
+def test_waves_of_the_turning_ring_are_told_by_their_shapes(monkeypatch) -> None:
+    """Endo's: 1 % as the ring is, and plainly off without Coriolis and centrifugal forces. Taken for the nearest of all
+    60 frequencies, only the lower branch would show that."""
+    assert all(
+        found == pytest.approx(exact, rel=0.01) for *_, found, exact in closed_tire._ring(50.0)
+    )
+    plain = closed_tire.matrices
+    monkeypatch.setattr(closed_tire, "matrices", lambda *given: plain(*given[:-1], "doppler"))
+    off = [abs(found / exact - 1) for *_, found, exact in closed_tire._ring(50.0)]
+    assert min(off) > 0.05

@@ -99,13 +99,13 @@ def fuzz_run(folder: Path, seed: int, number: int, limit: float) -> tuple[str, s
         with suppress(InputError):
             explain(load(path, changed))
             break
-    status, said, memory = _run(folder, changed, limit)
+    status, said, memory = run_scene_file(folder, changed, limit)
     tried = f"{name} {changed} {said.strip()[-300:]}"
     wrong = ended(status, said, memory, folder / "out")
     return wrong or ("stopped" if status is None else f"exit {status}"), tried
 
 
-def _run(folder: Path, changed: list[str], limit: float) -> tuple[int | None, str, int]:
+def run_scene_file(folder: Path, changed: list[str], limit: float) -> tuple[int | None, str, int]:
     """Status, output and memory of the scene run.toml in a folder."""
     out = folder / "out"
     command = ["run", str(folder / "run.toml"), "--out", str(out), "--until", "spectra"]
@@ -125,7 +125,7 @@ def run_bases(folder: Path) -> None:
     write_deck(folder)
     for name, (text, _) in BASES.items():
         (folder / "run.toml").write_text(text)
-        status, said, memory = _run(folder, [], 20 * LIMIT)
+        status, said, memory = run_scene_file(folder, [], 20 * LIMIT)
         wrong = ended(status, said, memory, folder / "out")
         assert status == 0 and not wrong, f"{name}: {status} {wrong} {said}"
 

@@ -28,6 +28,8 @@ def static(results: Results) -> Section:
             ("touch_height", "m"),
             ("footprint_length", "m"),
             ("footprint_width", "m"),
+            ("camber", "deg"),
+            ("drum_radius", "m"),
         ),
     )
     speed = results.scene.get("rotation", {}).get("speed")

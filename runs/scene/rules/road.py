@@ -1,7 +1,9 @@
 """Whether the road of a scene can be driven on, before anything is solved: its file, its length."""
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 from tireroad.contact.roads.kind import RoadKind
 from tireroad.contact.roads.under_tire import Road
@@ -12,6 +14,29 @@ from tireroad.runs.scene.tables.scene import Scene
 # patch may reach ahead of the axle, m: what is refused here the run would refuse for certain.
 LEAST_RADIUS = 0.85
 AHEAD = 0.5
+Where = Callable[[tuple[str, ...], str], InputError]
+
+
+# A wall inside a drum that is this many times as large has room to be pressed on it.
+_ROOM = 1.15
+
+
+def check_shape(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    """InputError for a drum without room for the tire, and for modes on a road that is no level plane."""
+    road, camber = scene.road, scene.static.camber
+    drum = road.drum_radius if road else None
+    outer = scene.tire.proportions().outer_radius
+    if drum is not None and road.drum == "inside" and drum < _ROOM * outer:
+        raise error(
+            ("road", "drum_radius"),
+            f"= {drum:g} m leaves no room inside for a tire of {outer:g} m: at least {_ROOM * outer:.3g} m",
+        )
+    if scene.modal.road == "held" and (drum is not None or camber):
+        raise error(
+            ("modal", "road"),
+            '= "held" holds the nodes in height, on a level road: take "forces", or static.camber = 0 deg '
+            "and no road.drum_radius",
+        )
 
 
 def check_road(scene: Scene) -> None:

@@ -11,6 +11,7 @@ from tireroad.runs.scene.rules.output import (
     check_outputs,
     check_vibration,
 )
+from tireroad.runs.scene.rules.road import check_shape
 from tireroad.runs.scene.source import Source
 from tireroad.runs.scene.tables.accuracy import check_accuracy
 from tireroad.runs.scene.tables.axle import check_axle
@@ -151,6 +152,19 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     contact = scene.contact
     standing = scene.rotation is None or scene.rotation.speed == 0
     check_tread(contact, standing, error)
+    rotation = scene.rotation
+    for key in ("free_rolling", "slip_angle"):
+        if rotation is not None and getattr(rotation, key) and (not contact.rubs or standing):
+            raise error(
+                ("rotation", key),
+                "needs contact.brush_stiffness_per_area (N/m³), without which no road pulls on the tire, and a "
+                "wheel that turns",
+            )
+    if rotation is not None and rotation.free_rolling and contact.friction == 0:
+        raise error(
+            ("rotation", "free_rolling"),
+            "does not exist with contact.friction = 0: any slip is free",
+        )
 
 
 def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
@@ -185,6 +199,7 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("pattern", "contact"), check_pattern),
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
     (("output", "time", "contact", "force", "rotation"), check_vibration),
+    (("static", "road", "modal", "tire"), check_shape),
     (("time",), _time),
     (("accuracy", "contact", "road", "time", "output", "force"), check_accuracy),
 )

@@ -68,6 +68,18 @@ class Rotation:
         least=1e-6,
         most=500,
     )
+    free_rolling: bool = flag(
+        False,
+        "find the wheel's slip at which a smooth road does not drag on it, by the loop and its brush, which then feels "
+        "the static shape's own speeds; added to contact.slip",
+    )
+    slip_angle: float = number(
+        0.0,
+        "deg",
+        "angle from the wheel's plane to where it goes, > 0 towards +y; its tangent is added to the lateral contact.slip",
+        least=-30,
+        most=30,
+    )
     inertia: str = choice(
         "full",
         ("full", "doppler"),

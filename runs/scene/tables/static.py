@@ -21,7 +21,19 @@ class Static:
         most=10,
     )
     road_height: float | None = number(
-        None, "m", "z of the road plane, the axle at 0, instead of load", least=-10, most=-1e-3
+        None,
+        "m",
+        "z of the road under the axle, the axle at 0, instead of load",
+        least=-10,
+        most=-1e-3,
+    )
+    camber: float = number(
+        0.0,
+        "deg",
+        "inclination of the wheel on its road, load and deflection along the road's normal; > 0: its top leans to the "
+        "right (-y)",
+        least=-20,
+        most=20,
     )
     steady_rolling: bool = flag(
         True,

@@ -59,8 +59,8 @@ def widened(probes: sparse.csr_matrix) -> sparse.csr_matrix:
 
 def standing_moment(patch: Patch) -> np.ndarray:
     """Moment (3,) N m of the static contact forces about the axle's centre."""
-    up = np.zeros((len(patch.force), 3))
-    up[:, 2] = patch.force
+    up = np.array([0.0, 0.0, 1.0]) if patch.frames is None else patch.frames[:, 2]
+    up = patch.force[:, None] * up
     return np.cross(patch.points, up).sum(axis=0)
 
 

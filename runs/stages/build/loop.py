@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,8 @@ from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.friction import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
-from tireroad.greens.recursion import Recursion
+from tireroad.contact.tread.free_rolling import free_slip
+from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response
 from tireroad.runs.stages.build.point_forces import directions, histories
 from tireroad.runs.stages.job import Job
@@ -47,10 +49,30 @@ def _friction(spec, setup: ContactSetup, tire, step: float) -> Friction:
     """The brush of the scene, at rest."""
     patch = setup.patch
     stiffness = spec.brush_stiffness or spec.brush_stiffness_per_area * patch.area
-    law = BrushLaw(stiffness, spec.friction, spec.slip, spec.brush)
+    law = BrushLaw(stiffness, spec.friction, setup.slip, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0)
     return Friction(brush, tire.same_step, patch.weights)
+
+
+def freely_rolling(
+    job: Job, setup: ContactSetup, response: Response, step: float, scheme: str
+) -> tuple[ContactSetup, float]:
+    """The setup (settled) with the slip at which the tire rolls freely over a smooth road, and that slip: by the loop
+    itself, until the patch has passed six times. ConvergenceError where there is none. Collective."""
+    x0, x1, _, _ = setup.patch.extent
+    steps = max(int(np.ceil(6 * (x1 - x0) / setup.rolled.speed / step)), 20)
+    smooth, load = setup.smooth(steps * step), float(setup.patch.force.sum())
+
+    def with_slip(of: ContactSetup, slip: float) -> ContactSetup:
+        return replace(of, slip=np.asarray(of.slip) + [slip, 0.0])
+
+    def drag(slip: float) -> float:
+        found = forces(job, with_slip(smooth, slip), response, step, steps, scheme).contact
+        return float(found[-max(steps // 6, 1) :, 0].mean())
+
+    slip = free_slip(drag, load)
+    return with_slip(setup, slip), slip
 
 
 class Forces(NamedTuple):
@@ -68,7 +90,9 @@ def forces(
 
     `scheme` "linear" or "constant". ConvergenceError where the road touches beyond the patch.
     """
-    tire = Recursion(response=response.resolved(step), step=step, scheme=scheme, comm=job.comm)
+    kept = response.resolved(step)
+    comm = sharers(kept, job.comm)
+    tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm)
     loop = make_loop(job.scene.contact, setup, driven_tire(job, tire, step, steps) or tire, step)
     contact, axle = np.zeros((2, steps, 3))
     given = setup.patch, setup.drive, step, steps

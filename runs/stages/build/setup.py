@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +11,7 @@ from scipy import sparse
 from tireroad.contact.roads.motion import make_motion
 from tireroad.contact.roads.road import make_road
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
+from tireroad.contact.tread.free_rolling import shape_slip
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.scene.schema import Pitch
@@ -38,7 +39,7 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
     """The patch and the road of the job's scene."""
     scene, motion = job.scene, job.scene.road.motion
     points = scene.contact.points
-    return contact_setup(
+    setup = contact_setup(
         state,
         job.tire.lattice,
         make_road(scene.road),
@@ -52,6 +53,25 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
         reach=scene.contact.reach,
         pattern=make_pattern(scene.pattern, rolling_radius(job, state)),
     )
+    return replace(setup, slip=_slip(job, state, setup)) if scene.contact.rubs else setup
+
+
+def _slip(job: Job, state: StaticState, setup: ContactSetup) -> np.ndarray:
+    """The scene's slip, and slip angle, (2,); of a wheel that is to roll freely with that of its static shape, (c, 2),
+    and what has been found for it."""
+    rotation = job.scene.rotation
+    slip = np.array(job.scene.contact.slip)
+    if rotation is None:
+        return slip
+    slip[1] += np.tan(np.radians(rotation.slip_angle))
+    if not rotation.free_rolling:
+        return slip
+    nodes = shape_slip(
+        state.positions, job.tire.lattice.ring, state.shape, rolling_radius(job, state)
+    )[setup.patch.index]
+    weights = setup.patch.weights
+    own = nodes if weights is None else weights @ nodes
+    return slip + own + [job.found.get("free slip", 0.0), 0.0]
 
 
 def rolling_speed(job: Job, state: StaticState) -> float:
@@ -66,7 +86,7 @@ def rolling_radius(job: Job, state: StaticState) -> float:
 
 
 def components(job: Job) -> tuple[int, ...]:
-    """Directions of the contact forces: z, and with a brush x and y after it."""
+    """Directions of the contact forces: normal to the road, and with a brush along and across it after that."""
     return (2, 0, 1) if job.scene.contact.rubs else (2,)
 
 
@@ -87,7 +107,13 @@ def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
     if setup is None:
         return Probes("force", readings, loads)
     count, index = len(state.points), setup.patch.index
-    parts = [probe.nodes(index, count, part) for part in components(job)]
+    frames = state.frames
+    parts = [
+        probe.nodes(index, count, part)
+        if frames is None
+        else probe.along(index, count, frames[index, part])
+        for part in components(job)
+    ]
     if job.scene.force:
         parts += [loads, readings]
     points = sparse.vstack(parts, format="csr")

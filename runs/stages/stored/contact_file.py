@@ -173,6 +173,9 @@ class ContactFile:
         if not self._stack:
             return
         steps = _columns(self._stack)
+        if self._job.axle:
+            height = 3 * len(self._job.scene.force) + 2
+            steps["wheel_height"] = np.array([reading[height] for reading in self._readings])
         count(steps)
         on_root(self._job.comm, lambda: self._write(steps))
         self._done += len(self._stack)

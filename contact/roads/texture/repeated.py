@@ -1,0 +1,65 @@
+"""A road that comes again, as on a drum: blended over a seam, so that its heights are continuous."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from tireroad.contact.roads.under_tire import Road
+
+Array = NDArray[np.float64]
+_SEAM = 0.1  # of the length, blended, and this many metres at most
+_LONGEST = 0.2
+
+
+class Repeated:
+    """h(x mod L) of a road h; in the last part b of the length, h runs out while what lies before its beginning comes in:
+
+        z = (1 - w) h(L) + w h(b + x - L),   w from 0 to 1 over L - b < x < L,  else h(b + x).
+
+    The road is needed from 0 to its `length` L (m): its last height is held while the seam lasts.
+    """
+
+    def __init__(self, road: Road, length: float) -> None:
+        self._road, self._length = road, length
+        self._seam = min(_SEAM * length, _LONGEST)
+        self.spacing = road.spacing
+        self.filled: int = getattr(road, "filled", 0)
+        self.notes: tuple[str, ...] = (
+            *getattr(road, "notes", ()),
+            f"repeats after {length:.4g} m, blended over {self._seam:.2g} m",
+        )
+
+    @property
+    def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Endless along, as wide as the road, m."""
+        return (-np.inf, np.inf), self._road.extent[1]
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Heights (m) at x, y (m) of equal shape."""
+        place = np.mod(x, self._length)
+        z = self._road.height(np.minimum(place + self._seam, self._length), y)
+        share = (place - (self._length - self._seam)) / self._seam
+        late = share > 0
+        if late.any():
+            w = share[late] ** 2 * (3.0 - 2.0 * share[late])
+            # Beyond the end there is no road: its last height runs out, as z there has less and less weight.
+            again = self._road.height(place[late] + self._seam - self._length, np.asarray(y)[late])
+            z = np.array(z)
+            z[late] = (1.0 - w) * z[late] + w * again
+        return z
+
+    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Upper bound of the heights anywhere along, m."""
+        return self._road.highest(0.0, self._length, y0, y1)
+
+    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
+        """Lower bound of the heights anywhere along, m."""
+        return self._road.lowest(0.0, self._length, y0, y1)
+
+    def prepare(self, x0: float, x1: float, y0: float, y1: float) -> Repeated:
+        """The road of one turn alone. InputError where it is shorter."""
+        return Repeated(self._road.prepare(0.0, self._length, y0, y1), self._length)

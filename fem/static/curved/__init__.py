@@ -1,0 +1,1 @@
+"""Roads that are no level plane: camber and drums."""

@@ -1,0 +1,94 @@
+"""The road's own shape under the tire: a plane, tilted by the wheel's camber, or a drum.
+
+In the wheel's axes the surface is z = h + s(x, y), h its height under the axle. The wheel leans by the angle gamma about x
+(its top to the right, -y, for gamma > 0), so the road's normal is (0, sin gamma, cos gamma) there, and
+
+    s = -y tan gamma + d(x) / cos gamma,   d = sqrt(R^2 - x^2) - R on a drum, R - sqrt(R^2 - x^2) inside one,
+
+on a drum whose axis is level. Beyond 0.9 R a drum is continued by its tangent: nothing touches there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+_REACH = 0.9  # of the drum's radius
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadShape:
+    """`camber` rad; `drum_radius` m, None of a flat road; `inside`: the tire runs inside the drum."""
+
+    camber: float = 0.0
+    drum_radius: float | None = None
+    inside: bool = False
+
+    @property
+    def flat(self) -> bool:
+        """Whether it is a level plane."""
+        return self.camber == 0.0 and self.drum_radius is None
+
+    @property
+    def upright(self) -> float:
+        """cos gamma: the road's normal along the wheel's z."""
+        return math.cos(self.camber)
+
+    def height(self, x: Array, y: Array) -> Array:
+        """s (m) at x, y (m)."""
+        lean = -math.tan(self.camber) * y
+        if self.drum_radius is None:
+            return lean
+        near, radius, sign = self._near(x), self.drum_radius, self._sign
+        drop = np.sqrt(radius**2 - near**2) - radius
+        beyond = -near / np.sqrt(radius**2 - near**2) * (x - near)
+        return lean + sign * (drop + beyond) / self.upright
+
+    def slopes(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """ds/dx, ds/dy."""
+        across = np.full(np.shape(x), -math.tan(self.camber))
+        if self.drum_radius is None:
+            return np.zeros(np.shape(x)), across
+        near = self._near(x)
+        return -self._sign * near / np.sqrt(self.drum_radius**2 - near**2) / self.upright, across
+
+    def curvature(self, x: Array) -> Array:
+        """d2s/dx2, 1/m."""
+        if self.drum_radius is None:
+            return np.zeros(np.shape(x))
+        near, radius = self._near(x), self.drum_radius
+        bend = -(radius**2) / (radius**2 - near**2) ** 1.5
+        return np.where(near == x, self._sign * bend / self.upright, 0.0)
+
+    def frames(self, x: Array, y: Array) -> Array:
+        """Unit vectors (n, 3, 3) in the wheel's axes: along the road, across it to the left, its normal."""
+        along, across = self.slopes(x, y)
+        one, nothing = np.ones(len(along)), np.zeros(len(along))
+        forward = _unit(np.stack([one, nothing, along], axis=-1))
+        normal = _unit(np.stack([-along, -across, one], axis=-1))
+        return np.stack([forward, np.cross(normal, forward), normal], axis=1)
+
+    def stretch(self, x: Array, y: Array) -> Array:
+        """Normal force over its part along the wheel's z, and height over distance, at x, y (m)."""
+        along, across = self.slopes(x, y)
+        return np.sqrt(1.0 + along**2 + across**2)
+
+    @property
+    def _sign(self) -> float:
+        return -1.0 if self.inside else 1.0
+
+    def _near(self, x: Array) -> Array:
+        assert self.drum_radius is not None, "the road is no drum"
+        reach = _REACH * self.drum_radius
+        return np.clip(x, -reach, reach)
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+FLAT = RoadShape()

@@ -1,0 +1,52 @@
+"""What a contact loop tells in figures and warnings."""
+
+from __future__ import annotations
+
+from tireroad.contact.chatter import LIMIT, warning
+from tireroad.contact.totals import Totals
+from tireroad.runs.stages.build.stepping import Integration
+from tireroad.runs.stages.record import Record
+
+LINEAR = (
+    1 / 3
+)  # of the static deflection: motion of the contact up to which a linear tire is trusted
+
+
+def describe(record: Record, counted: Totals, solver, chosen: Integration, taken: int) -> None:
+    """Loads, the step and its cost, how exactly it was solved; `taken`: the steps of this run, without those before its checkpoint."""
+    totals, chattering = counted.figures, counted.alternation.worst
+    record.headline |= {
+        "mean load": (float(totals.sum / totals.steps), "N"),
+        "least load": (float(totals.least), "N"),
+        "largest load": (float(totals.most), "N"),
+        "points touching at most": (totals.most_active, "-"),
+        "step": (chosen.step, "s"),
+        "scheme": (chosen.scheme, "-"),
+        "time a step": (record.cost["time loop"] / max(taken, 1) * 1e6, "us"),
+    }
+    record.indicators |= {
+        "worst complementarity residual": (float(totals.residual), "-"),
+        "largest penetration": (float(totals.penetration), "m"),
+        "factorisations": (solver.factorisations, "-"),
+        "points that change back from step to step, at worst": (chattering, "-"),
+    }
+    if chattering > LIMIT:
+        record.warnings.append(warning(chattering))
+    if totals.least == 0:
+        record.warnings.append("the tire lost contact with the road for a while")
+
+
+def excursion(record: Record, most: float, deflection: float | None) -> None:
+    """How far the contact moved beyond the state about which the tire is linear."""
+    record.indicators["largest motion of the contact beyond the static state"] = (most, "m")
+    if not deflection:
+        return
+    share = most / deflection
+    record.indicators["that, of the static deflection"] = (share, "-")
+    if share > LINEAR:
+        record.warnings.append(
+            f"the contact moved by up to {1e3 * most:.3g} mm beyond the static state, {share:.2g} of the static "
+            f"deflection of {1e3 * deflection:.3g} mm: the tire is linear about that state, so forces are doubtful "
+            "beyond a third of it; take a lower road, a longer road.run_in or road.longest_wave, or a wheel that moves "
+            '(axle.kind = "corner")'
+        )

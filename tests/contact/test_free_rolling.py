@@ -1,0 +1,59 @@
+"""Free rolling: the root of the drag, the slip of the static shape, and that there may be none."""
+
+import numpy as np
+import pytest
+
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.contact.tread.free_rolling import free_slip, shape_slip
+from tireroad.fem.errors import ConvergenceError
+
+LOAD = 1000.0
+
+
+@pytest.mark.parametrize("root", [0.0, 2e-4, -3e-3, 0.05])
+def test_the_root_of_a_saturating_force(root) -> None:
+    asked = []
+
+    def drag(slip: float) -> float:
+        asked.append(slip)
+        return 800.0 * np.tanh(40 * (slip - root))
+
+    assert abs(drag(free_slip(drag, LOAD))) <= 1e-4 * LOAD
+    assert len(asked) < 20
+
+
+def test_no_free_rolling() -> None:
+    with pytest.raises(ConvergenceError, match="no free rolling"):
+        free_slip(lambda slip: -50.0 + np.tanh(slip), LOAD)
+
+
+def test_slip_of_a_rigid_wheel_and_of_a_cone() -> None:
+    """A surface of radius R at its own rolling radius does not slip; one of R - y slips by -y / R."""
+    ring = 2 * np.pi * np.arange(400) / 400
+    y = np.linspace(-0.05, 0.05, 5)
+    radius = 0.3 - 0.1 * y
+    places = np.stack(
+        [
+            np.outer(np.sin(ring), radius),
+            np.broadcast_to(y, (400, 5)),
+            -np.outer(np.cos(ring), radius),
+        ],
+        axis=-1,
+    ).reshape(-1, 3)
+    slip = shape_slip(places, ring, (400, 5), 0.3).reshape(400, 5, 2)
+    assert slip[0, :, 0] == pytest.approx(radius / 0.3 - 1, abs=1e-4)
+    assert np.abs(slip[0, :, 1]).max() < 1e-12
+
+
+def test_bristles_sum_up_the_slip_of_their_way() -> None:
+    """e(x) = integral of the slip from where they enter: here s_x = c x, from x = a: e = -c (x^2 - a^2) / 2 upstream."""
+    a, c, way = 0.05, 0.3, 5e-4
+    x = np.linspace(-a, a, 201)
+    slip = np.stack([c * x, 0 * x], axis=-1)
+    brush = Brush(BrushLaw(1.0, None, slip), x, np.zeros(201, int), way, 1.0)
+    brush.begin(np.ones(201, bool))
+    for _ in range(450):
+        share, past = brush.offer()
+        brush.take(-past, np.zeros((201, 2)), share >= 0)
+    expected = -c * (a**2 - x**2) / 2
+    assert brush.deflection[:, 0] == pytest.approx(expected, abs=0.03 * np.abs(expected).max())

@@ -1,0 +1,109 @@
+"""Camber and drums through all stages: at rest nothing moves, forces are the road's, wrong ones are refused."""
+
+import h5py
+import numpy as np
+import pytest
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.scene.load import load
+
+SCENE = """
+[tire]
+segments = 20
+elements_arc = 6
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 800.0
+camber = 4.0
+error_estimate = false
+[modal]
+count = 40
+[rotation]
+speed = 40.0
+[contact]
+points = { dx = 0.008, dy = 0.008 }
+tread = "layer"
+youngs_modulus = 1e7
+brush_stiffness_per_area = 1e8
+friction = 0.8
+reach = 0.01
+[road]
+kind = "flat"
+drum_radius = 0.85
+[time]
+duration = 0.01
+[accuracy]
+estimate = false
+"""
+CAR = """
+[axle]
+kind = "corner"
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axle", ["", CAR])
+def test_on_a_smooth_drum_nothing_moves(tmp_path, launch, axle) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE + axle)
+    done = launch("-m", "runs", "run", scene, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr + done.stdout
+    with h5py.File(tmp_path / "out" / "contact.h5") as contact:
+        total, axle_force = contact["total_force"][:], contact["axle_force"][:]
+        moved = np.abs(contact["displacement"][:]).max()
+    assert moved < 1e-12
+    assert np.ptp(total[:, 2]) < 1e-6
+    # Normal to a drum, forces fore and aft of the axle lean away from each other.
+    assert 800.0 <= total[0, 2] < 802.0
+    # In the wheel's axes: the load leans to the left by the camber's angle.
+    with h5py.File(tmp_path / "out" / "static.h5") as static:
+        push = static["contact/force"][:].sum(axis=0)
+        assert static.attrs["camber"] == pytest.approx(4.0)
+    assert axle_force[-1] == pytest.approx(push, abs=1.0)
+    assert push[1] / push[2] == pytest.approx(np.tan(np.radians(4.0)), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("drum_radius = 0.85", 'drum_radius = 0.33\ndrum = "inside"', "no room inside"),
+        ("drum_radius = 0.85", "drum_radius = 0.0", "drum_radius"),
+        ("camber = 4.0", "camber = 45.0", "camber"),
+        ("drum_radius = 0.85", 'drum = "under"', "drum"),
+    ],
+)
+def test_roads_that_cannot_be(tmp_path, old, new, named) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE.replace(old, new))
+    with pytest.raises(InputError, match=named):
+        load(tmp_path / "scene.toml")
+
+
+@pytest.mark.slow
+def test_a_freely_rolling_wheel_is_not_dragged(tmp_path, launch) -> None:
+    """On a smooth road, cambered: none of the force along the road is left, some of it across (camber thrust)."""
+    scene = tmp_path / "scene.toml"
+    text = SCENE.replace("speed = 40.0", "speed = 40.0\nfree_rolling = true")
+    scene.write_text(text.replace("duration = 0.01", "duration = 0.05"))
+    done = launch("-m", "runs", "run", scene, "--out", tmp_path / "out", "--until", "contact")
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert "slip of free rolling" in done.stdout
+    with h5py.File(tmp_path / "out" / "contact.h5") as contact:
+        total = contact["total_force"][:]
+    assert abs(total[-20:, 0].mean()) < 2e-3 * 800.0
+    assert abs(total[-1, 1]) > 5.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("brush_stiffness_per_area = 1e8\nfriction = 0.8", "", "brush_stiffness_per_area"),
+        ("friction = 0.8", "friction = 0.0", "any slip is free"),
+        ("speed = 40.0", "speed = 0.0", "a wheel that turns"),
+    ],
+)
+def test_free_rolling_that_cannot_be(tmp_path, old, new, named) -> None:
+    text = SCENE.replace("[rotation]\n", "[rotation]\nfree_rolling = true\n")
+    (tmp_path / "scene.toml").write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=named):
+        load(tmp_path / "scene.toml")
