@@ -42,6 +42,6 @@ def joined(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
     return every
 
 
-def told(comm: MPI.Comm, value: T, root: int = 0) -> T:
+def broadcast(comm: MPI.Comm, value: T, root: int = 0) -> T:
     """The object that `root` has, on every process; its arrays are sent as they are. Collective."""
     return value if comm.size == 1 else pkl5.Intracomm(comm).bcast(value, root)

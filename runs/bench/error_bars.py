@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
@@ -20,20 +19,21 @@ from tireroad.runs.bench.parts.effectivity import (
     every,
     shares,
 )
+from tireroad.runs.bench.parts.kept import read_kept, write_kept
 from tireroad.runs.bench.parts.rolling_cases import (
     CASES,
     DURATION,
     FINE,
-    TIRES,
     Case,
     Driven,
     Recorded,
+    by_wheel,
     driven,
     recorded,
     sets,
+    told_settings,
 )
 from tireroad.runs.files.cache import Cache
-from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.identity import identity
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
@@ -54,35 +54,21 @@ def tables(
 ) -> list[Table]:
     """Of the `cases`; settings of the run and of the far finer one. On one process."""
     found: list[Effectivity] = []
-    for case in sorted(cases, key=lambda case: (list(TIRES).index(case.tire), case.speed)):
+    for case in by_wheel(cases):
         where = _Where(folder / case.wheel, kept, case, duration, coarse, fine)
         file = kept / "error_bars" / f"{case.wheel}-{case.road}.json"
-        some = _known(file, [coarse, fine, duration])
-        if some is None:
+        of = [identity("accuracy").code, coarse, fine, duration]
+        known = read_kept(file, of)
+        if known is None:
             observe.say(f"  {case} ...")
-            some = list(_judged(where))
-            _keep(file, [coarse, fine, duration], some)
+            known = [asdict(one) for one in _judged(where)]
+            write_kept(file, of, known)
+        some = [Effectivity(**one) for one in known]
         found += some
         good = np.mean([one.good for one in some if one.cause == ALL])
         observe.say(f"  {case}: {100 * good:.3g} % good")
-    note = f"{_told(coarse)}; true: against {_told(fine)}."
+    note = f"{told_settings(coarse)}; true: against {told_settings(fine)}."
     return [shares(found, note), by_cause(found), every(found)]
-
-
-def _known(file: Path, of: list) -> list[Effectivity] | None:
-    """Figures of a case that an earlier bench of the same program kept."""
-    if not file.exists():
-        return None
-    data = json.loads(file.read_text(encoding="utf-8"))
-    if data["of"] != [identity("accuracy").code, *of]:
-        return None
-    return [Effectivity(**one) for one in data["figures"]]
-
-
-def _keep(file: Path, of: list, found: list[Effectivity]) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    data = {"of": [identity("accuracy").code, *of], "figures": [asdict(one) for one in found]}
-    write_text(file, json.dumps(data, indent=1) + "\n")
 
 
 @dataclass(frozen=True)
@@ -165,10 +151,3 @@ def _compared(
     for figure, far, estimated, small in figures:
         numbers = float(far), float(estimated), float(small)
         yield Effectivity(case, force, cause, figure, *numbers)
-
-
-def _told(keys: dict) -> str:
-    return (
-        f"{keys['segments']} x {keys['arc']} elements of order {keys['order']}, {keys['modes']} modes, points "
-        f"{1e3 * keys['pitch']:g} mm apart, steps of {1e3 * keys['step']:g} ms"
-    )

@@ -81,7 +81,7 @@ class AccuracyStage(Computed[Accuracy]):
         return {"contact": self.contact.key, "up_to": self.job.scene.accuracy.up_to}
 
     def compute(self, record: Record) -> Accuracy:
-        """Companions one by one; a cause whose companion fails is told, and the run goes on. Collective."""
+        """Companions one by one; a cause whose companion fails is reported, and the run goes on. Collective."""
         history, setup = self.contact.product, self.setup.product
         if self._at_rest:
             return self._none("nothing drives the tire: what varies is rounding")
@@ -200,7 +200,7 @@ class AccuracyStage(Computed[Accuracy]):
 
 
 def _told(forces: Forces, start: float, limit: float, up_to: float) -> dict[str, Told]:
-    """What is told of the forces of a companion after `start` s."""
+    """The figures of the forces of a companion after `start` s."""
     first = round(start / forces.step)
     both = {"contact_force": forces.contact, "axle_force": forces.axle}
     return {name: told(values[first:], forces.step, limit, up_to) for name, values in both.items()}

@@ -96,7 +96,7 @@ def run_scene(
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
     if scene.road is not None:
-        # A road file that cannot be used should be told before hours of solving, not after.
+        # A road file that cannot be used should be reported before hours of solving, not after.
         on_root(comm, lambda: check_road(scene))
     wanted = _say_demand(scene, directory, comm, until)
     reasons = skipped(scene, until)

@@ -217,9 +217,9 @@ def test_searches_are_judged_by_the_least_cost() -> None:
     assert accuracy_on_demand._spent(trials) == 11.0 + 3.0 + 11.0
     target = accuracy_on_demand.TARGET
     found = [
-        accuracy_on_demand.Outcome("a", True, 0.9 * target, 0.8 * target, 12.0, 8.0, 20.0, 0.01),
-        accuracy_on_demand.Outcome("b", False, 2.0 * target, 3.0 * target, 10.0, None, 30.0, 0.01),
+        accuracy_on_demand.Outcome("a", True, 0.9 * target, 0.8 * target, 12.0, 8.0, 20.0),
+        accuracy_on_demand.Outcome("b", False, 2.0 * target, 3.0 * target, 10.0, None, 30.0),
     ]
-    tables = [accuracy_on_demand._summary(found, rungs), accuracy_on_demand._every(found)]
+    tables = [accuracy_on_demand._summary(found), accuracy_on_demand._every(found)]
     assert [row[1] for row in tables[0].rows] == [50.0, 1.5, 1.5, 2.5, 2.5]
     check_page(tables, 0)

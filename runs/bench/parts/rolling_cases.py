@@ -4,9 +4,11 @@ whose forces are kept, so that a bench goes on where it was stopped and another 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -41,14 +43,15 @@ ROADS = {
 }
 SPEEDS = (30.0, 60.0)  # rad/s
 DURATION = 0.16  # s
-# Finer than any setting that is judged: elements at the footprint half as long as those of 18 x 8, of order 3.
-FINE = {
+# Finer than any setting that is judged, and than its companions: elements at the footprint half as long as those of
+# 18 x 8, of order 3, and points nearer to each other than half of 8 mm.
+FINE: dict[str, Any] = {
     "segments": 30,
     "arc": 12,
     "order": 3,
     "footprint": 0.2,
     "modes": 200,
-    "pitch": 0.004,
+    "pitch": 0.003,
     "step": 1e-4,
 }
 # m, of the patch: the same on every road, so that what comes before the loop is shared
@@ -117,6 +120,11 @@ class Case:
 CASES = tuple(Case(*one) for one in product(TIRES, ROADS, SPEEDS))
 
 
+def by_wheel(cases: Iterable[Case]) -> list[Case]:
+    """Cases of one wheel, which share their stages, after each other."""
+    return sorted(cases, key=lambda case: (list(TIRES).index(case.tire), case.speed))
+
+
 def sets(
     *,
     segments: int,
@@ -136,6 +144,14 @@ def sets(
         f"modal.count={modes}",
         f"contact.points={{ dx = {pitch}, dy = {pitch} }}",
         f"time.step={step}",
+    )
+
+
+def told_settings(keys: dict) -> str:
+    """Settings as of `sets` in words."""
+    return (
+        f"{keys['segments']} x {keys['arc']} elements of order {keys['order']}, {keys['modes']} modes, points "
+        f"{1e3 * keys['pitch']:g} mm apart, steps of {1e3 * keys['step']:g} ms"
     )
 
 
