@@ -76,7 +76,7 @@ def make_grid_patch(
     place = np.flatnonzero(taken)
     if len(place) == 0:
         raise InputError("contact.points: no grid point near the road; take a finer grid")
-    weights = _over_cells(
+    weights = over_cells(
         surface, np.stack([x, y], axis=-1)[place], spacing, ring[place], arc[place]
     )
     used = np.union1d(weights.indices, nodes.index[nodes.force > 0])
@@ -93,7 +93,7 @@ def make_grid_patch(
     )
 
 
-def _over_cells(
+def over_cells(
     surface: Surface,
     points: np.ndarray,
     spacing: tuple[float, float],

@@ -35,7 +35,7 @@ _PATIENCE = 2.0  # s of compilation before it is announced
 _LIBRARY = tuple(EXTENSION_SUFFIXES)
 
 announce: Callable[[str], None] = logging.getLogger(__name__).warning
-"""How a user is told that forms are being compiled; the command line puts its own here."""
+"""Shows the user that forms are being compiled; the command line puts its own here."""
 
 
 def kept_in() -> Path:

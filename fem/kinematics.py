@@ -31,11 +31,11 @@ def convective(u: Expr, w: Expr) -> Expr:
     return ufl.dot(ufl.grad(u), w)
 
 
-def turn(u: Expr) -> Expr:
+def cross_axle(u: Expr) -> Expr:
     """e_y x u."""
     return ufl.as_vector((u[2], 0.0, -u[0]))
 
 
 def body_rate(u: Expr, w: Expr) -> Expr:
     """grad(u) w - e_y x u: the rate the rotating material sees of itself."""
-    return convective(u, w) - turn(u)
+    return convective(u, w) - cross_axle(u)

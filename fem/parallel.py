@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # the command line needs this module, and starts without MPI
 T = TypeVar("T")
 
 
-class ToldByRoot(RuntimeError):
+class FailedOnRoot(RuntimeError):
     """The root process failed unexpectedly and says so; the others end without a word."""
 
 
@@ -25,7 +25,7 @@ def on_root(
     """Run `function` on the root process; its value on every process.
 
     Where it fails, every process raises: the same error where it is one of `clear`, or on the others
-    ToldByRoot for an error that is a bug. Collective.
+    FailedOnRoot for an error that is a bug. Collective.
     """
     value: T | None = None
     error: Exception | None = None
@@ -36,9 +36,11 @@ def on_root(
             error = raised
     if comm.size > 1:
         known = error is None or isinstance(error, clear)
-        told = comm.bcast(error if known else ToldByRoot())
-        value = comm.bcast(value if error is None else None)
-        error = error or told
+        from tireroad.fem.collective import broadcast  # not needed before there are processes
+
+        known_error = comm.bcast(error if known else FailedOnRoot())
+        value = broadcast(comm, value if error is None else None)
+        error = error or known_error
     if error is not None:
         raise error
     return cast(T, value)  # every process has what the function returned

@@ -22,6 +22,7 @@ from mpi4py import MPI
 from scipy import linalg, sparse
 
 from tireroad.fem.axle import DIRECTIONS, Axle
+from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.rim_motion import RimMotion
 
@@ -185,7 +186,7 @@ def meeting(
     """The corner on fields `vectors` (own rows (n, m)) of unit mass. Collective."""
     nothing = np.zeros((vectors.shape[1], 6))
     per_mode = {
-        name: comm.allreduce(vectors.T @ rim.rows[name]) if name in rim.rows else nothing
+        name: summed(comm, vectors.T @ rim.rows[name]) if name in rim.rows else nothing
         for name in _PER_MODE
     }
     own = {f"own_{name}": rim.whole.get(name, np.zeros((6, 6))) for name in _PER_MODE}

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
+from tireroad.fem.collective import summed
 from tireroad.fem.matrices.operators import Operators
 from tireroad.modal.damping import beyond
 from tireroad.modal.rolling import RollingModes
@@ -39,7 +40,7 @@ def full_states(
     found, figures, lacking = _solve(operators, pencil, projected, count, window)
     fields, coordinates = _orthonormal(operators, found)
     comm, old = operators.body.comm, projected.basis
-    momenta = comm.allreduce(operators.carried @ fields)
+    momenta = summed(comm, operators.carried @ fields)
     basis = replace(
         old,
         shape=operators.trace(fields),

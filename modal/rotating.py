@@ -226,7 +226,7 @@ def _inverse(values: Array, vectors: Array, block_vectors: Array) -> tuple[Array
 
 def _invariant(companion: Array, values: Array, good: Array) -> tuple[Array, Array, Array]:
     """Schur block and orthonormal real basis of the invariant subspace of the eigenvalues that are not `good`,
-    and which are good in the end: what cannot be told from the others goes with them.
+    and which are good in the end: what cannot be distinguished from the others goes with them.
 
     Another algorithm finds them again within what a defective one is uncertain by: a small part of
     itself, or, where it is zero, of the matrix.
@@ -244,6 +244,6 @@ def _invariant(companion: Array, values: Array, good: Array) -> tuple[Array, Arr
             return schur[:count, :count], basis[:, :count], ~within
     raise ConvergenceError(
         f"rotating: {len(chosen)} eigenvalues next to defective ones ({np.abs(chosen).min():.4g} to "
-        f"{np.abs(chosen).max():.4g} 1/s) cannot be told from others. Change the damping or the speed a "
+        f"{np.abs(chosen).max():.4g} 1/s) cannot be distinguished from others. Change the damping or the speed a "
         "little."
     )

@@ -36,8 +36,14 @@ def standing_modes(
     return projected(motions, modes, rotation, air, axle)
 
 
-def solved(operators: Operators, *, count: int | None = None, up_to: float | None = None) -> Modes:
-    """The modes alone. Collective."""
+def solved(
+    operators: Operators,
+    *,
+    count: int | None = None,
+    up_to: float | None = None,
+    teams: int | None = None,
+) -> Modes:
+    """The modes alone, found by `teams` of processes (modal.solver.team). Collective."""
     if count is None and up_to is None:
         raise InputError("modes: give count, how many of the lowest, or up_to, a frequency in Hz")
     return undamped.solve(
@@ -46,6 +52,7 @@ def solved(operators: Operators, *, count: int | None = None, up_to: float | Non
         None if up_to else count,
         up_to=up_to or np.inf,
         sites=sites(operators),
+        teams=teams,
     )
 
 

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
+from tireroad.fem.collective import summed
+
 PURE = 0.99  # least share of one wave number; a footprint or a coarse ring mixes several
 
 
@@ -51,7 +53,7 @@ def label(
             * root[:, None, None]
         )
         waves = root * np.exp(-1j * number[:, None] * angle[on])
-        amplitude = comm.allreduce(waves @ field.reshape(len(on), 3 * vectors.shape[1]))
+        amplitude = summed(comm, waves @ field.reshape(len(on), 3 * vectors.shape[1]))
         square = (np.abs(amplitude) ** 2).reshape(len(number), 3, -1).sum(axis=1)
         shares += square / comm.allreduce(float((root**2).sum()))
     shares[1:] *= 2

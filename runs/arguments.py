@@ -178,7 +178,10 @@ COMMANDS = {
         REPRODUCE,
     ),
     "validate": Command("against full finite elements, closed forms and stress", _validate),
-    "test": Command("the test suite, serial and on 2 and 3 processes", _test),
+    "test": Command(
+        "the test suite, serial and on 2 and 3 processes (--all: the long ones too, --fast: the quick ones)",
+        _test,
+    ),
 }
 
 

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 # Pieces a strip is cut into for its bounds, at least: the level changes slowly over one.
 PIECES = 64
 LONGEST = 0.25  # m
-# The texture that is told: of that many metres at most and at least, points at most, points this far apart at most.
+# The texture that is reported: of that many metres at most and at least, points at most, points this far apart at most.
 _SEEN, _LEAST_SEEN, _MOST_SEEN, _COARSEST = 20.0, 0.1, 100_000, 1e-3
 
 

@@ -18,6 +18,7 @@ from scipy import sparse
 from tireroad.fem.cavity.duct import Duct, modes
 from tireroad.fem.cavity.gas import inflated
 from tireroad.fem.cavity.trace import CavityTrace
+from tireroad.fem.collective import summed
 from tireroad.fem.matrices.support import Unknowns
 from tireroad.fem.tire.body import Body
 
@@ -33,7 +34,7 @@ class Column:
 
     def coupling(self, vectors: np.ndarray) -> np.ndarray:
         """e (1 + a, m) of motions given by own rows (n, m). Collective."""
-        return self.comm.allreduce(self.pushed.T @ vectors)
+        return summed(self.comm, self.pushed.T @ vectors)
 
     def mended(self, answers: np.ndarray, s: complex = 0.0) -> np.ndarray:
         """Answers (r, k) with the air, from those without (r + 1 + a, k + 1 + a): e's rows and columns last."""

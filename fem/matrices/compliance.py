@@ -9,6 +9,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.cavity.column import Column
+from tireroad.fem.collective import summed
 from tireroad.fem.matrices.direct import multiply, solve_all, symmetric
 from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
@@ -96,7 +97,7 @@ def loaded_shapes(
     pushed = loads if air is None else sparse.hstack([loads, air.pushed], format="csc")
     x = statics(operators, stiffness, pushed)
     x = x if air is None else air.with_air(x)
-    return x, operators.body.comm.allreduce(loads.T @ x)
+    return x, summed(operators.body.comm, loads.T @ x)
 
 
 def static_shapes(
@@ -123,10 +124,10 @@ def static_shapes(
         x, y = air.with_air(x), air.with_air(y, transposed=True)
     shapes = StaticShapes(
         x,
-        comm.allreduce(loads.T @ x),
-        comm.allreduce(y.T @ multiply(damping, x)),
-        comm.allreduce(y.T @ (operators.mass[:, None] * x)),
-        comm.allreduce(operators.carried @ x),
+        summed(comm, loads.T @ x),
+        summed(comm, y.T @ multiply(damping, x)),
+        summed(comm, y.T @ (operators.mass[:, None] * x)),
+        summed(comm, operators.carried @ x),
     )
     return shapes if air is None else _with_following(shapes, air, x, y)
 
@@ -165,7 +166,7 @@ def compliance(
     if air is not None:
         rows = sparse.vstack([rows, air.pushed.T], format="csr")
         columns = sparse.hstack([columns, air.pushed], format="csc")
-    answers = operators.body.comm.allreduce(rows @ statics(operators, stiffness, columns))
+    answers = summed(operators.body.comm, rows @ statics(operators, stiffness, columns))
     return answers if air is None else air.mended(answers)
 
 

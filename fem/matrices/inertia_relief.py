@@ -15,6 +15,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import linalg, sparse
 
+from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.direct import RESIDUAL_TOLERANCE, multiply, solve_all
 from tireroad.fem.matrices.operators import Operators
@@ -40,7 +41,7 @@ def rigid_space(operators: Operators) -> np.ndarray:
     inertia = comm.allreduce(motions.T @ (mass * motions))
     motions = motions @ np.linalg.inv(np.linalg.cholesky(inertia)).T
     forces = multiply(operators.stiffness, motions)
-    sizes, turn = np.linalg.eigh(comm.allreduce(forces.T @ (forces / mass)))
+    sizes, turn = np.linalg.eigh(summed(comm, forces.T @ (forces / mass)))
     stiffest = comm.allreduce((operators.stiffness.getDiagonal().array / mass[:, 0]).max())
     return motions @ turn[:, sizes <= (_ZERO * stiffest) ** 2]
 
@@ -65,7 +66,7 @@ def relieved(operators: Operators, loads: sparse.csr_matrix) -> np.ndarray:
         return solve_all(stiffness, loads)
     weighted = operators.mass[:, None] * rigid
     balanced = loads.toarray()
-    balanced -= weighted @ comm.allreduce(rigid.T @ balanced)
+    balanced -= weighted @ summed(comm, rigid.T @ balanced)
     held = _determinate(operators, rigid)
     supported = stiffness.copy()
     typical = stiffness.getDiagonal().norm() / np.sqrt(stiffness.getSize()[0])
@@ -82,7 +83,7 @@ def relieved(operators: Operators, loads: sparse.csr_matrix) -> np.ndarray:
             f"greens: the balanced loads leave a relative force of {np.sqrt(worst / size):.1e} on what "
             "holds the free tire: its rigid motions are not clearly apart from soft ones. Refine the mesh."
         )
-    return answer - rigid @ comm.allreduce(weighted.T @ answer)
+    return answer - rigid @ summed(comm, weighted.T @ answer)
 
 
 def _determinate(operators: Operators, rigid: np.ndarray) -> np.ndarray:

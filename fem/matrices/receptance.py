@@ -10,6 +10,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.cavity.column import Column
+from tireroad.fem.collective import summed
 from tireroad.fem.matrices.compliance import add_diagonal, on_own_rows
 from tireroad.fem.matrices.direct import solve_all
 from tireroad.fem.matrices.operators import Operators
@@ -47,7 +48,7 @@ def receptance(
         dynamic = _dynamic_stiffness(stiffness, damping, operators.mass, omega)
         solution = solve_all(dynamic, both)
         dynamic.destroy()
-        answers = comm.allreduce(rows @ (solution[:n] + 1j * solution[n:]))
+        answers = summed(comm, rows @ (solution[:n] + 1j * solution[n:]))
         H[k] = answers if air is None else air.mended(answers, 1j * omega)
     return H
 

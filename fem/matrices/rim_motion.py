@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from tireroad.fem.collective import summed
 from tireroad.fem.matrices.direct import multiply
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.support import Support, rigid_motions
@@ -51,7 +52,7 @@ def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> R
         _destroy(*vars(rotation).values())
     rows = {name: product[: len(unknowns.free)] for name, product in products.items()}
     comm = body.comm
-    whole = {name: comm.allreduce(motions.T @ product) for name, product in products.items()}
+    whole = {name: summed(comm, motions.T @ product) for name, product in products.items()}
     for name in set(NAMES[1:]) & set(whole):
         sign = -1 if name == "gyroscopic" else 1
         whole[name] = (whole[name] + sign * whole[name].T) / 2

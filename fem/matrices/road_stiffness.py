@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem import compat
+from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.direct import multiply, solve_all
 from tireroad.fem.matrices.support import FIXED, Unknowns, rigid_motions
@@ -122,4 +123,4 @@ def _condensed(stiffness: PETSc.Mat, motions: np.ndarray, held: np.ndarray) -> n
     supported.destroy()
     force = multiply(stiffness, answer)
     comm = stiffness.comm.tompi4py()
-    return comm.allreduce(moved.T @ force)
+    return summed(comm, moved.T @ force)

@@ -20,6 +20,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.collective import summed
 from tireroad.fem.tire.body import Body
 
 TURN = 3  # components 3, 4, 5 of an unknown: rotations about x, y, z
@@ -122,7 +123,7 @@ class Unknowns:
         own = nodal[self.free]
         if self.rim is None:
             return own
-        taken = self._body.comm.allreduce(self.rim.shape.T @ nodal[self.rim.dofs].toarray())
+        taken = summed(self._body.comm, self.rim.shape.T @ nodal[self.rim.dofs].toarray())
         if on_rim is not None:
             taken = taken + self.rim.coordinates.T @ on_rim
         return (
@@ -154,17 +155,17 @@ class Rim:
     def unknowns(self, motion: np.ndarray) -> np.ndarray:
         """The six (6, ...) of a rigid motion of the rim's own dofs (d, ...). Collective."""
         weighted = self._mass.reshape(-1, *[1] * (motion.ndim - 1)) * motion
-        return self._comm.allreduce(self.shape.T @ weighted)
+        return summed(self._comm, self.shape.T @ weighted)
 
     def momentum(self) -> np.ndarray:
         """Momentum (3, 6) kg per rate of the six unknowns. Collective."""
         weighted = self._mass[:, None] * self.shape
-        return self._comm.allreduce(np.stack([weighted[d::3].sum(axis=0) for d in range(3)]))
+        return summed(self._comm, np.stack([weighted[d::3].sum(axis=0) for d in range(3)]))
 
     def turning_stiffness(self, force: np.ndarray) -> np.ndarray:
         """W (6, 6) of static forces (d,) N on the rim's dofs that turn with it. Collective."""
         force = force.reshape(-1, 3)
-        product = self._comm.allreduce(force.T @ self._points)
+        product = summed(self._comm, force.T @ self._points)
         whole = np.zeros((6, 6))
         whole[TURN:, TURN:] = (product + product.T) / 2 - np.trace(product) * np.eye(3)
         return self.coordinates.T @ whole @ self.coordinates

@@ -1,4 +1,4 @@
-"""What makes a section mesh one that can be revolved into a tire, told by what and where."""
+"""What makes a section mesh one that can be revolved into a tire, each fault by what and where."""
 
 from __future__ import annotations
 

@@ -214,7 +214,7 @@ class Equilibrium:
         return self.solve(height)
 
     def _yardsticks(self) -> float:
-        """Force scale, N, of the undeformed body, whose stiffness the road is told.
+        """Force scale, N, of the undeformed body, which scales the road's stiffness.
 
         The scale is the typical stiffness of a dof times the wall, so that 1e-12 of it is far below
         any load of interest.

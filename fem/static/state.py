@@ -117,7 +117,7 @@ class StaticState:
         """Extent of the contact; zeros without a road."""
         if self.road_height is None:
             return Footprint(0.0, 0.0, 0.0)
-        return footprint(self.shape, self.positions, self.pressure, self.gap, self.area)
+        return footprint(self.shape, self.positions, self.pressure, self.gap)
 
 
 def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:

@@ -116,7 +116,7 @@ def convection_form(body: Body) -> ufl.Form:
 def body_rate_form(body: Body) -> ufl.Form:
     """B = G - Q, Q = int rho v . (e_y x u)."""
     u, v = body.trial, body.test
-    return convection_form(body) - body.inertia(ufl.inner(v, kinematics.turn(u)))
+    return convection_form(body) - body.inertia(ufl.inner(v, kinematics.cross_axle(u)))
 
 
 def tangent(body: Body, residual: ufl.Form) -> ufl.Form:

@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from tireroad.fem import compat
+from tireroad.fem.garbage import collect, watch
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
 from tireroad.fem.tire.cords import Cords
@@ -38,6 +39,7 @@ class Body:
         regions: Sequence[Region] = (),
         cords: Sequence[Cords] = (),
     ) -> None:
+        collect(comm)
         self.comm = comm
         if isinstance(tire, Torus):
             tire = tire.ring([region.patch(i) for i, region in enumerate(regions)])
@@ -47,6 +49,7 @@ class Body:
         self.tire = build(comm, tire)
         self.ring, order = tire, tire.order
         self.mesh, self.lattice = self.tire.mesh, self.tire.lattice
+        watch(comm, self, self.mesh)
         self.space = compat.vector_space(self.mesh, order)
         self.wall = Wall(self.tire, material)
         self.plies = Plies(self.mesh, order, cords, laid_on(self.tire, cords))

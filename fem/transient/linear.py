@@ -16,6 +16,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.cavity.column import Column
+from tireroad.fem.collective import summed
 from tireroad.fem.matrices.compliance import on_own_rows, rotating_damping, rotating_stiffness
 from tireroad.fem.matrices.direct import factorise, solve_columns
 from tireroad.fem.matrices.operators import Operators, Rotation
@@ -73,7 +74,7 @@ class FullTire:
         self._answer = self._solved_columns(self._columns)
         self._tire = len(self._mass)
         self._air = self._with_air(air) if air else None
-        self.same_step = self._comm.allreduce(self._outputs @ self._answer[: self._tire])
+        self.same_step = summed(self._comm, self._outputs @ self._answer[: self._tire])
         n = len(self._mass)
         self.displacement, self.velocity, self.acceleration, self.balanced = np.zeros((4, n))
         self._vectors = system.createVecs()
@@ -106,7 +107,7 @@ class FullTire:
         rate = gamma / (beta * h) * moved - self.velocity
         rate += h * (gamma * kept - (1 - gamma) * self.acceleration)
         self._free = self._solved(self._mass * right + self._product(rate))
-        return self._comm.allreduce(self._outputs @ self._free[: self._tire])
+        return summed(self._comm, self._outputs @ self._free[: self._tire])
 
     def _by_factors(self, right: np.ndarray) -> np.ndarray:
         """Own rows (n, k) of the sparse system^-1 right, checked."""
@@ -174,4 +175,4 @@ class FullTire:
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the momentum (3,) of tire and air, N: the convective parts cancel around the ring."""
-        return self._comm.allreduce(self._carried @ self.balanced)
+        return summed(self._comm, self._carried @ self.balanced)

@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from petsc4py import PETSc
 
+from tireroad.fem.collective import summed
 from tireroad.fem.matrices.direct import multiply
 from tireroad.fem.matrices.operators import Operators
 
@@ -39,7 +40,7 @@ class ModalDamping:
 
     def force(self, rate: np.ndarray) -> np.ndarray:
         """D_x rate, own rows, N, of velocities (n,) m/s. Collective."""
-        return self._push @ self._comm.allreduce(self._weighted.T @ rate)
+        return self._push @ summed(self._comm, self._weighted.T @ rate)
 
     def joined(
         self, solve: Callable[[np.ndarray], np.ndarray], share: float
@@ -47,10 +48,10 @@ class ModalDamping:
         """The solver of A + share D_x + K_x from that of A, `solve`: own rows (n, k) to own rows. Collective."""
         reading = share * self._weighted + self._turned
         through = solve(self._push)
-        small = np.eye(through.shape[1]) + self._comm.allreduce(reading.T @ through)
+        small = np.eye(through.shape[1]) + summed(self._comm, reading.T @ through)
 
         def whole(right: np.ndarray) -> np.ndarray:
             first = solve(right)
-            return first - through @ np.linalg.solve(small, self._comm.allreduce(reading.T @ first))
+            return first - through @ np.linalg.solve(small, summed(self._comm, reading.T @ first))
 
         return whole

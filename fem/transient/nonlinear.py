@@ -19,6 +19,7 @@ from scipy import sparse
 from ufl.core.expr import Expr
 
 from tireroad.fem import compat, kinematics
+from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.virtual_work import AT_REST, added_energy, added_stress, static_residual
@@ -115,7 +116,7 @@ class NonlinearTire(FullTire):
 
     def _freed(self, free: np.ndarray) -> np.ndarray:
         self._free = free
-        return self._comm.allreduce(self._outputs @ free)
+        return summed(self._comm, self._outputs @ free)
 
     def _dynamic(self, new: np.ndarray) -> np.ndarray:
         """Forces of inertia and damping, N, when the step ends at a displacement (own rows)."""

@@ -17,10 +17,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from petsc4py import PETSc
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from tireroad.modal.solver.distributed import congruent, largest_entry, less, row_sum, rows_of
 from tireroad.modal.solver.symmetry import TOLERANCE, Sites
+from tireroad.modal.solver.team import ALONE, Team
 
 _NEAR = 1e-6  # of the body's size: nodes are each other's images
 _LONGEST = 4  # nodes a segment along the ring, at most
@@ -50,18 +53,23 @@ class Ring:
         """Whether the modes of a wave number do not come in pairs."""
         return n == 0 or 2 * n == self.segments
 
-    def wave(self, n: int) -> Wave:
-        """The problem of one wave number."""
+    def wave(self, n: int, team: Team = ALONE) -> Wave:
+        """The problem of one wave number, own rows of it in the team."""
+        matrix, basis, copies = self._problem(n)
+        return Wave(self, n, matrix[team.own(matrix.shape[0])], basis, copies)
+
+    def _problem(self, n: int) -> tuple[sparse.csr_matrix, sparse.csr_matrix, int]:
+        """The whole of it, its basis, and the copies of each of its eigenvalues."""
         size = len(self.angle)
         H = self._hermitian(n)
         if self.single(n):
-            return Wave(self, n, H.real.tocsr(), sparse.identity(size, format="csr"), 1)
+            return H.real.tocsr(), sparse.identity(size, format="csr"), 1
         if self.kept is None:
             doubled = sparse.bmat([[H.real, -H.imag], [H.imag, H.real]], format="csr")
             unit = sparse.identity(size, format="csr")
-            return Wave(self, n, doubled, sparse.hstack([unit, 1j * unit], format="csr"), 1)
+            return doubled, sparse.hstack([unit, 1j * unit], format="csr"), 1
         basis = self._basis(n)
-        return Wave(self, n, (basis.getH() @ H @ basis).real.tocsr(), basis, 2)
+        return (basis.getH() @ H @ basis).real.tocsr(), basis, 2
 
     def _hermitian(self, n: int) -> sparse.csr_matrix:
         phase = 2j * np.pi * n / self.segments
@@ -80,7 +88,7 @@ class Ring:
 
 @dataclass(frozen=True)
 class Wave:
-    """The fields of one wave number: `matrix` (d, d) real symmetric, `basis` (., d) from its vectors to v."""
+    """The fields of one wave number: own rows of a `matrix` (d, d) real symmetric, `basis` (., d) from its vectors to v."""
 
     ring: Ring
     number: int
@@ -101,8 +109,9 @@ class Wave:
         return self.ring.turn @ (scale * fields)
 
 
-def repeated(matrix: sparse.csr_matrix, sites: Sites) -> Ring | None:
-    """The matrix (n, n) as that of equal segments, as many as there are; None where it is none. Not collective."""
+def repeated(matrix: PETSc.Mat, sites: Sites) -> Ring | None:
+    """The matrix (n, n) as that of equal segments, as many as there are; None where it is none. With the `sites` of
+    all unknowns on every process. Collective."""
     if len(sites.component) % 3 or (sites.component.reshape(-1, 3) != np.arange(3)).any():
         return None
     points = sites.place[::3]
@@ -141,25 +150,29 @@ def _segments(points: np.ndarray, angle: np.ndarray, count: int, near: float) ->
 
 
 def _verified(
-    matrix: sparse.csr_matrix, points: np.ndarray, angle: np.ndarray, nodes: np.ndarray
+    matrix: PETSc.Mat, points: np.ndarray, angle: np.ndarray, nodes: np.ndarray
 ) -> Ring | None:
     """The ring, if turning by one segment leaves the matrix as it is."""
     count, each = nodes.shape[0], 3 * nodes.shape[1]
     turn = _turned(angle, nodes.ravel())
     size = turn.shape[0]
-    allowed = TOLERANCE * abs(matrix).max()
-    first = (turn[:, : 2 * each].T @ matrix @ turn).tocsr()
+    allowed = TOLERANCE * largest_entry(matrix)
     along = np.roll(np.arange(size), each)
+    two = np.unique(turn[:, : 2 * each].tocoo().row)
+    first = (turn[two][:, : 2 * each].T @ rows_of(matrix, two) @ turn).tocsr()
     if abs(first[each:] - first[:each][:, along]).max() > allowed:
         return (
             None  # a load on the second segment already: the product with all of them is not needed
         )
-    local = (turn.T @ matrix @ turn).tocsr()
-    difference = abs(local[along][:, along] - local)
-    if difference.max() > allowed:
+    local = congruent(matrix, turn)
+    by_one = congruent(local, sparse.identity(size, format="csr")[:, along])
+    difference = less(by_one, local)
+    far, defect = largest_entry(difference), row_sum(difference)
+    top = rows_of(local, np.arange(each)).tocoo()
+    for one in (local, by_one, difference):
+        one.destroy()
+    if far > allowed:
         return None
-    defect = float(difference.sum(axis=1).max())
-    top = local[:each].tocoo()
     blocks = {}
     for j in np.unique(top.col // each):
         inside = top.col // each == j

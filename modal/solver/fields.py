@@ -9,8 +9,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.collective import summed
 from tireroad.modal.solver.spectrum import Part, Slice
+from tireroad.modal.solver.team import Team
 
+_AT_ONCE = 16  # vectors that one process holds whole
 CHUNK = 64  # columns a matrix product: no second copy of all vectors
 # Vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product.
 _REPAIR = 1e-12
@@ -39,9 +42,10 @@ def everywhere(matrix: PETSc.Mat) -> sparse.csr_matrix:
 
 
 def collect(
-    matrix: PETSc.Mat, parts: Sequence[Part], found: list[Slice], order: np.ndarray
+    matrix: PETSc.Mat, parts: Sequence[Part], found: list[Slice], order: np.ndarray, team: Team
 ) -> np.ndarray:
-    """This process's rows of the vectors in the given order, each slice sent by its owner. Collective."""
+    """This process's rows of the vectors in the given order, sent by the first process of the team that has them,
+    a few at a time: that process holds no more than those whole. Collective."""
     comm = matrix.comm.tompi4py()
     ranges = np.asarray(matrix.getOwnershipRanges())
     own = int(ranges[comm.rank + 1] - ranges[comm.rank])
@@ -50,23 +54,24 @@ def collect(
     vectors = np.empty((own, len(order)), order="F")
     start = 0
     for one in found:
-        place = column[start : start + len(one.values)]
+        copies = parts[one.part].copies
+        for first in range(0, len(one.values) // copies, _AT_ONCE):
+            last = min(first + _AT_ONCE, len(one.values) // copies)
+            place = column[start + first * copies : start + last * copies]
+            wanted = place >= 0
+            width = int(wanted.sum())
+            if not width:
+                continue
+            sent, rows = None, np.empty((own, width))
+            if one.vectors is not None:  # in its team only
+                shapes = team.at_root(one.vectors[:, first:last])
+                if shapes is not None:
+                    fields = parts[one.part].fields(shapes)[:, wanted]
+                    counts = np.diff(ranges) * width, ranges[:-1] * width
+                    sent = [np.ascontiguousarray(fields), *counts, MPI.DOUBLE]
+            comm.Scatterv(sent, rows, root=one.owner)
+            vectors[:, place[wanted]] = rows
         start += len(one.values)
-        wanted = place >= 0
-        width = int(wanted.sum())
-        if not width:
-            continue
-        sent, rows = None, np.empty((own, width))
-        if one.vectors is not None:  # on the owner only
-            fields = parts[one.part].fields(one.vectors)[:, wanted]
-            sent = [
-                np.ascontiguousarray(fields),
-                np.diff(ranges) * width,
-                ranges[:-1] * width,
-                MPI.DOUBLE,
-            ]
-        comm.Scatterv(sent, rows, root=one.owner)
-        vectors[:, place[wanted]] = rows
     return vectors
 
 
@@ -87,7 +92,7 @@ def multiply(matrix: PETSc.Mat, vectors: np.ndarray) -> np.ndarray:
 
 def gram(comm: MPI.Comm, left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """left^T right over all processes, rows distributed alike. Collective."""
-    return comm.allreduce(left.T @ right)
+    return summed(comm, left.T @ right)
 
 
 def orthonormalise(comm: MPI.Comm, vectors: np.ndarray, part: np.ndarray) -> float:

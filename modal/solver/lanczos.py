@@ -25,18 +25,18 @@ _LOST = 1e-8  # of the largest: a direction of a new block so short is rounding
 
 
 class Basis:
-    """Orthonormal vectors (n, m) that grow by blocks, orthogonal to the `known` (n, k) ones."""
+    """Orthonormal vectors (n, m) that grow by blocks, orthogonal to the `known` (n, k) ones; own rows of them all."""
 
     def __init__(self, shifted: Shifted, known: np.ndarray, most: int, seed: int) -> None:
-        self._shifted, self._known = shifted, known
-        self._random = np.random.default_rng(seed)
+        self._shifted, self._known, self._team = shifted, known, shifted.team
+        self._random = shifted.team.random(seed)
         room = shifted.size - known.shape[1]
         self._most = min(most, room)
-        self._vectors = np.empty((shifted.size, self._most), order="F")
+        self._vectors = np.empty((shifted.rows, self._most), order="F")
         self._projected = np.zeros((self._most, self._most))
         self.size = self._done = 0
         self._rest = np.zeros((0, 0))
-        self._append(self._random.standard_normal((shifted.size, min(BLOCK, self._most))))
+        self._append(self._random.standard_normal((shifted.rows, min(BLOCK, self._most))))
 
     @property
     def full(self) -> bool:
@@ -47,11 +47,11 @@ class Basis:
         """One block of solves, and the next block of the basis."""
         start, m = self._done, self.size
         ahead = self._shifted.solve(self._vectors[:, start:m])
-        largest = np.linalg.norm(ahead, axis=0).max()
+        largest = self._team.lengths(ahead).max()
         part = np.zeros((m, m - start))
         for _ in range(2):
-            ahead -= self._known @ (self._known.T @ ahead)
-            share = self._vectors[:, :m].T @ ahead
+            ahead -= self._known @ self._team.inner(self._known, ahead)
+            share = self._team.inner(self._vectors[:, :m], ahead)
             ahead -= self._vectors[:, :m] @ share
             part += share
         self._projected[:m, start:m] = part
@@ -73,16 +73,16 @@ class Basis:
     def _append(self, ahead: np.ndarray, largest: float = 1.0) -> np.ndarray:
         """Take the directions (n, b) in, as far as there is room; R (b', b) of what is left of them."""
         m = self.size
-        block, rest = np.linalg.qr(ahead)
+        block, rest = self._team.orthonormal(ahead)
         short = np.abs(rest.diagonal()) < _LOST * largest
         # In place of directions that are rounding, any others: the space was invariant there.
         block[:, short] = self._random.standard_normal((len(block), int(short.sum())))
         rest[short] = 0.0
         if short.any() or not m:
             for _ in range(2):
-                block -= self._known @ (self._known.T @ block)
-                block -= self._vectors[:, :m] @ (self._vectors[:, :m].T @ block)
-                block = np.linalg.qr(block)[0]
+                block -= self._known @ self._team.inner(self._known, block)
+                block -= self._vectors[:, :m] @ self._team.inner(self._vectors[:, :m], block)
+                block = self._team.orthonormal(block)[0]
         end = min(m + block.shape[1], self._most)
         self._vectors[:, m:end] = block[:, : end - m]
         self.size = end
@@ -94,7 +94,8 @@ def nearest(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues (k,) between `low` and `high` and their orthonormal vectors (n, k), orthogonal to the `known`.
 
-    As many as converge, `wanted` where they do: residual below the tolerance relative to theta.
+    As many as converge, `wanted` where they do: residual below the tolerance relative to theta. Collective in the
+    team, each process with its rows.
     """
     basis = Basis(shifted, known, _LENGTH * wanted + _MORE * BLOCK, 7 + known.shape[1])
     blocks = 0

@@ -18,7 +18,7 @@ from scipy import optimize
 from slepc4py import SLEPc
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.modal.solver.fields import multiply
+from tireroad.modal.solver.fields import gram, multiply
 
 Array = np.ndarray
 RESIDUAL_TOLERANCE = 1e-8
@@ -141,8 +141,8 @@ def _condition(comm: MPI.Comm, mass: Array, s: Array, u: Array, w: Array, turn: 
 def _pairing(comm: MPI.Comm, mass: Array, drag: PETSc.Mat, s: Array, u: Array, w: Array) -> Array:
     """w_i^T [(s_i + s_j) M + D] u_j: diagonal but for clusters, where its inverse makes w biorthogonal."""
     moved = _times(drag, u)
-    near = comm.allreduce(w.T @ (mass[:, None] * u))
-    return s[:, None] * near + near * s + comm.allreduce(w.T @ moved)
+    near = gram(comm, w, mass[:, None] * u)
+    return s[:, None] * near + near * s + gram(comm, w, moved)
 
 
 def _states(

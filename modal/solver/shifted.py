@@ -1,4 +1,4 @@
-"""A symmetric matrix minus a shift, factorised: its inertia and its inverse, on one process."""
+"""A symmetric matrix minus a shift, factorised by a team of processes: its inertia and its inverse."""
 
 from __future__ import annotations
 
@@ -7,22 +7,26 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
+from tireroad.modal.solver.team import ALONE, Team
 
 
 class Shifted:
-    """A - sigma I = L D L^T by MUMPS, for a symmetric sparse A (n, n). Not collective.
+    """A - sigma I = L D L^T by MUMPS, for a symmetric sparse A (n, n), of which each process of the `team` has its
+    own rows. Collective in the team.
 
     `negative` is the number of eigenvalues of A below sigma (Sylvester's law of inertia); `singular`
     tells that sigma is an eigenvalue to rounding, so that the inverse must not be used.
     """
 
-    def __init__(self, matrix: sparse.csr_matrix, shift: float) -> None:
-        self.size, self.shift = matrix.shape[0], shift
+    def __init__(self, matrix: sparse.csr_matrix, shift: float, team: Team = ALONE) -> None:
+        self.rows, self.size = matrix.shape
+        self.shift, self.team = shift, team
         csr = (_index(matrix.indptr), _index(matrix.indices), matrix.data)
-        shifted = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
+        sizes = ((self.rows, self.size), (self.rows, self.size))
+        shifted = PETSc.Mat().createAIJ(sizes, csr=csr, comm=team.comm)
         shifted.shift(-shift)
         shifted.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
+        self._pc = PETSc.PC().create(team.comm)
         self._pc.setOperators(shifted)
         self._pc.setType(PETSc.PC.Type.CHOLESKY)
         self._pc.setFactorSolverType("mumps")
@@ -30,6 +34,8 @@ class Shifted:
         self._factor = self._pc.getFactorMatrix()
         # Null pivots are found, or MUMPS counts a zero pivot by the sign of its rounding.
         self._factor.setMumpsIcntl(24, 1)
+        if not team.alone:  # the last block on one process: MUMPS counts its inertia there only
+            self._factor.setMumpsIcntl(13, 1)
         self._pc.setUp()
         self.negative, null, positive = self._factor.getInertia()
         self.singular = null > 0
@@ -42,13 +48,11 @@ class Shifted:
         shifted.destroy()
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """(A - sigma I)^-1 right for a block (n, p): many columns at once cost a fifth of one by one."""
-        block = PETSc.Mat().createDense(
-            right.shape, array=np.asfortranarray(right), comm=PETSc.COMM_SELF
-        )
-        answer = PETSc.Mat().createDense(
-            right.shape, array=np.empty(right.shape, order="F"), comm=PETSc.COMM_SELF
-        )
+        """(A - sigma I)^-1 right for own rows (rows, p) of a block: many columns at once cost a fifth of one by one."""
+        sizes, comm = ((self.rows, self.size), (PETSc.DECIDE, right.shape[1])), self.team.comm
+        block = PETSc.Mat().createDense(sizes, array=np.asfortranarray(right), comm=comm)
+        empty = np.empty(right.shape, order="F")
+        answer = PETSc.Mat().createDense(sizes, array=empty, comm=comm)
         self._factor.setMumpsIcntl(27, right.shape[1])
         self._factor.matSolve(block, answer)
         out = answer.getDenseArray().copy()

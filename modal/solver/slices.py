@@ -13,11 +13,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 from scipy import linalg, sparse
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver.lanczos import nearest
 from tireroad.modal.solver.shifted import Shifted
+from tireroad.modal.solver.team import ALONE, Team
 
 # Residual of a Ritz pair relative to theta: as small as vectors of neighbouring slices must be
 # orthogonal to each other, a few digits above rounding.
@@ -40,20 +42,24 @@ class Interval:
     count: int
 
 
-def eigenpairs(matrix: sparse.csr_matrix, interval: Interval) -> tuple[np.ndarray, np.ndarray]:
-    """The `count` eigenvalues inside, ascending, and their orthonormal vectors (n, count). Not collective.
+def eigenpairs(
+    matrix: sparse.csr_matrix, interval: Interval, team: Team = ALONE
+) -> tuple[np.ndarray, np.ndarray]:
+    """The `count` eigenvalues inside, ascending, and their orthonormal vectors (n, count), of the matrix and of them
+    the rows of this process in the `team`. Collective there.
 
     Small matrices and those of which most is wanted are solved densely. Raises ConvergenceError when
     fewer are found than inertia counts.
     """
-    size = matrix.shape[0]
+    rows, size = matrix.shape
     if interval.count == 0:
-        return np.zeros(0), np.zeros((size, 0))
+        return np.zeros(0), np.zeros((rows, 0))
     if size <= _DENSE or _MANY * size <= interval.count and size <= _LARGEST_DENSE:
-        found = linalg.eigh(matrix.toarray(), subset_by_value=(interval.low, interval.high))
-        _check_count(len(found[0]), interval)
-        return found
-    shifted = _regular_shift(matrix, interval)
+        whole = team.whole(matrix).toarray()
+        values, vectors = linalg.eigh(whole, subset_by_value=(interval.low, interval.high))
+        _check_count(len(values), interval)
+        return values, vectors[team.own(size)]
+    shifted = _regular_shift(matrix, interval, team)
     try:
         values, vectors = _search(shifted, interval)
         _check_count(len(values), interval)
@@ -76,7 +82,7 @@ def _check_count(found: int, interval: Interval) -> None:
 
 def _search(shifted: Shifted, interval: Interval) -> tuple[np.ndarray, np.ndarray]:
     """Eigenpairs inside the interval, in no order, as many as there are or as are found."""
-    values, vectors = np.zeros(0), np.zeros((shifted.size, 0))
+    values, vectors = np.zeros(0), np.zeros((shifted.rows, 0))
     for _ in range(_SEARCHES):
         missing = interval.count - len(values)
         more = nearest(shifted, interval.low, interval.high, missing, vectors, _TOLERANCE)
@@ -94,11 +100,12 @@ def _polish(
     A Krylov basis carries noise in the stiffest directions, which the matrix multiplies by up to 1e7
     times the lowest eigenvalue: low modes are good in the inverse norm and not in the residual's.
     """
-    soft = np.flatnonzero(values < _SOFT * float(abs(matrix).sum(axis=1).max()))
+    norm = shifted.team.comm.allreduce(float(abs(matrix).sum(axis=1).max()), MPI.MAX)
+    soft = np.flatnonzero(values < _SOFT * norm)
     if len(soft):
         better = shifted.solve(vectors[:, soft])
         vectors[:, soft] = (
-            better / np.linalg.norm(better, axis=0) * np.sign(values[soft] - shifted.shift)
+            better / shifted.team.lengths(better) * np.sign(values[soft] - shifted.shift)
         )
 
 
@@ -106,12 +113,12 @@ def _hertz(square: float) -> float:
     return float(np.sign(square) * np.sqrt(abs(square)) / (2 * np.pi))
 
 
-def _regular_shift(matrix: sparse.csr_matrix, interval: Interval) -> Shifted:
+def _regular_shift(matrix: sparse.csr_matrix, interval: Interval, team: Team) -> Shifted:
     """Factorised at a shift at the middle, moved a little while it is an eigenvalue itself."""
     width = interval.high - interval.low
     for part in (0.5, 0.507, 0.489, 0.523):
         shift = interval.low + part * width
-        shifted = Shifted(matrix, shift)
+        shifted = Shifted(matrix, shift, team)
         if not shifted.singular:
             return shifted
         shifted.destroy()

@@ -1,8 +1,8 @@
-"""The lowest eigenvalues of independent symmetric matrices, sliced by inertia over the processes.
+"""The lowest eigenvalues of independent symmetric matrices, sliced by inertia over teams of processes.
 
-Every process holds all the matrices and solves slices by itself: no communication inside a solve,
-results that do not depend on the number of processes, and cost proportional to the slices' number.
-Memory of one process: the matrices (together as many entries as the whole one), one factor and the
+Every team holds all the matrices and solves slices by itself: no communication between teams inside a solve,
+results that do not depend on their number, and cost proportional to the slices' number. Memory of a team, spread
+over its processes by rows: the matrices (together as many entries as the whole one), one factor and the
 Krylov basis of one slice at a time, and the vectors of the slices it solved.
 """
 
@@ -19,6 +19,7 @@ from scipy import sparse
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver.shifted import Shifted
 from tireroad.modal.solver.slices import Interval, eigenpairs
+from tireroad.modal.solver.team import Team
 
 T = TypeVar("T")
 
@@ -30,8 +31,8 @@ _CROWDED = 1.6  # times the wanted number in a step: then a boundary below costs
 
 
 class Part(Protocol):
-    """An independent part of a symmetric problem: its own sparse `matrix` (d, d), each of whose eigenvalues
-    stands for `copies` equal ones of the whole.
+    """An independent part of a symmetric problem: own rows in the team of its sparse `matrix` (d, d), each of whose
+    eigenvalues stands for `copies` equal ones of the whole.
     """
 
     @property
@@ -47,7 +48,7 @@ class Part(Protocol):
 @dataclass(frozen=True)
 class Slice:
     """One interval of one part, and its answer: `values` (k,), each as often as the part has copies,
-    and the part's `vectors` (d, k / copies), on `owner` only.
+    and own rows of the part's `vectors` (d, k / copies), in the team whose first process is `owner`.
     """
 
     part: int
@@ -78,26 +79,28 @@ class Bottom:
 
 
 class Spectrum:
-    """Independent parts of a symmetric problem, the same on all processes of `comm`."""
+    """Independent parts of a symmetric problem, the same in all teams of the processes of `comm`; no eigenvalue is
+    larger than `norm`."""
 
-    def __init__(self, comm: MPI.Comm, parts: list[Part]) -> None:
-        self.comm, self.parts = comm, parts
-        norms = [float(abs(part.matrix).sum(axis=1).max()) for part in parts]
-        self.bound = 1.001 * max(norms)
+    def __init__(self, comm: MPI.Comm, parts: list[Part], team: Team, norm: float) -> None:
+        self.comm, self.parts, self.team = comm, parts, team
+        self.bound = 1.001 * norm
 
     def _shared(self, work: Callable[[Part], T]) -> list[T]:
-        """What is computed of each part, on every process, each by one of them. Collective."""
-        size = self.comm.size
-        mine = {k: work(self.parts[k]) for k in range(self.comm.rank, len(self.parts), size)}
+        """What is computed of each part, on every process, each by one team. Collective."""
+        roots = self.team.roots
+        mine = {
+            k: work(self.parts[k]) for k in range(self.team.number, len(self.parts), len(roots))
+        }
         everyone = self.comm.allgather(mine)
-        return [everyone[k % size][k] for k in range(len(self.parts))]
+        return [everyone[roots[k % len(roots)]][k] for k in range(len(self.parts))]
 
     def bottom(self) -> Bottom:
         """Negative eigenvalues by inertia, and rough values of the lowest. Collective."""
         zero = ZERO * self.bound
 
         def work(part: Part) -> np.ndarray:
-            shifted = Shifted(part.matrix, -zero)
+            shifted = Shifted(part.matrix, -zero, self.team)
             estimates = np.repeat(_near(shifted) - zero, part.copies)
             negative = part.copies * shifted.negative
             shifted.destroy()
@@ -111,7 +114,7 @@ class Spectrum:
         """Eigenvalues below the shift, (parts,), copies counted, by inertia. Collective."""
 
         def work(part: Part) -> int:
-            shifted = Shifted(part.matrix, shift)
+            shifted = Shifted(part.matrix, shift, self.team)
             negative = shifted.negative
             shifted.destroy()
             return part.copies * negative
@@ -165,12 +168,13 @@ class Spectrum:
             for k, part in enumerate(self.parts)
         ]
         tasks = [task for task in tasks if task[1].count]
-        owners = _owners([interval.count for _, interval in tasks], self.comm.size)
+        team = self.team
+        owners = _owners([interval.count for _, interval in tasks], len(team.roots))
         answers, error = {}, None
         for task, (k, interval) in enumerate(tasks):
-            if owners[task] == self.comm.rank and error is None:
+            if owners[task] == team.number and error is None:
                 try:
-                    answers[task] = eigenpairs(self.parts[k].matrix, interval)
+                    answers[task] = eigenpairs(self.parts[k].matrix, interval, team)
                 except Exception as raised:
                     error = raised
         first = next((e for e in self.comm.allgather(error) if e is not None), None)
@@ -183,7 +187,7 @@ class Spectrum:
             Slice(
                 k,
                 interval,
-                owners[task],
+                team.roots[owners[task]],
                 np.repeat(values[task], self.parts[k].copies),
                 answers.get(task, (None, None))[1],
             )
@@ -193,12 +197,13 @@ class Spectrum:
 
 def _near(shifted: Shifted) -> np.ndarray:
     """Rough eigenvalues nearest to the shift, relative to it, by three steps of inverse iteration."""
-    width = min(_PROBES, shifted.size)
-    basis = np.linalg.qr(np.random.default_rng(3).standard_normal((shifted.size, width)))[0]
+    width, team = min(_PROBES, shifted.size), shifted.team
+    basis = team.orthonormal(team.random(3).standard_normal((shifted.rows, width)))[0]
     for _ in range(3):
         moved = shifted.solve(basis)
-        theta = np.linalg.eigvalsh((basis.T @ moved + moved.T @ basis) / 2)
-        basis = np.linalg.qr(moved)[0]
+        product = team.inner(basis, moved)
+        theta = np.linalg.eigvalsh((product + product.T) / 2)
+        basis = team.orthonormal(moved)[0]
     return 1 / theta
 
 
@@ -215,9 +220,9 @@ def _between(low: float, known: int, high: float, crowd: int, goal: float) -> fl
     return (root + share * (np.sqrt(high) - root)) ** 2
 
 
-def _owners(counts: list[int], processes: int) -> list[int]:
-    """The process of each task: the largest first, each to the one with least to do."""
-    load, owners = np.zeros(processes), [0] * len(counts)
+def _owners(counts: list[int], teams: int) -> list[int]:
+    """The team of each task: the largest first, each to the one with least to do."""
+    load, owners = np.zeros(teams), [0] * len(counts)
     for task in sorted(range(len(counts)), key=lambda k: -counts[k]):
         owners[task] = int(np.argmin(load))
         load[owners[task]] += counts[task] + _SLICE / 4  # the factorisation counts too

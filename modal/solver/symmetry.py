@@ -16,8 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 from scipy import sparse
 from scipy.spatial import cKDTree
+
+from tireroad.fem.collective import joined
+from tireroad.modal.solver.distributed import congruent, largest_entry, less, row_sum, rows_of
+from tireroad.modal.solver.team import Team
 
 # Largest entry of R A R - A relative to that of A: a symmetric state converges to about 1e-13; a road
 # load, a slope of the footprint or another mesh on one side gives 1e-6 and more.
@@ -60,7 +65,7 @@ class Sites:
 
     def everywhere(self, comm: MPI.Comm) -> Sites:
         """Those of all processes, one after the other. Collective."""
-        return Sites(*(np.concatenate(comm.allgather(part)) for part in vars(self).values()))
+        return Sites(*(joined(comm, part) for part in vars(self).values()))
 
     def rank(self) -> np.ndarray:
         """(n,) the place of each unknown in an order by position, lowest points first, then component:
@@ -75,7 +80,8 @@ class Sites:
 
 @dataclass(frozen=True)
 class Sector:
-    """The fields `basis` (n, d), an isometry, that a group of symmetries leaves to themselves, and A on them."""
+    """The fields `basis` (n, d), an isometry, that a group of symmetries leaves to themselves, and own rows in the
+    team of A on them."""
 
     basis: sparse.csr_matrix
     matrix: sparse.csr_matrix
@@ -86,9 +92,15 @@ class Sector:
         return self.basis @ vectors
 
 
-def whole(matrix: sparse.csr_matrix) -> Sector:
-    """The problem as one part."""
-    return Sector(sparse.identity(matrix.shape[0], format="csr"), matrix)
+def whole(matrix: PETSc.Mat, team: Team) -> Sector:
+    """The problem as one part. Collective."""
+    size = matrix.getSize()[0]
+    return Sector(sparse.identity(size, format="csr"), _own_rows(matrix, team))
+
+
+def _own_rows(matrix: PETSc.Mat, team: Team) -> sparse.csr_matrix:
+    own = team.own(matrix.getSize()[0])
+    return rows_of(matrix, np.arange(own.start, own.stop))
 
 
 @dataclass(frozen=True)
@@ -102,8 +114,8 @@ class Symmetry:
     defect: float
 
 
-def symmetries(matrix: sparse.csr_matrix, sites: Sites) -> list[Symmetry]:
-    """Independent symmetries of the matrix (n, n). Not collective.
+def symmetries(matrix: PETSc.Mat, sites: Sites) -> list[Symmetry]:
+    """Independent symmetries of the matrix (n, n), with the `sites` of all its unknowns. Collective.
 
     The two mirrors first; the half turn is their product, so it is tried where there is neither.
     """
@@ -113,22 +125,32 @@ def symmetries(matrix: sparse.csr_matrix, sites: Sites) -> list[Symmetry]:
     return [symmetry for symmetry in found if symmetry]
 
 
-def _found(matrix: sparse.csr_matrix, sites: Sites, isometry: Isometry) -> Symmetry | None:
+def _found(matrix: PETSc.Mat, sites: Sites, isometry: Isometry) -> Symmetry | None:
     image = _permutation(sites, isometry)
     if image is None:
         return None
-    difference = abs(image @ matrix @ image.T - matrix)
-    if difference.max() > TOLERANCE * abs(matrix).max():
-        return None
-    return Symmetry(isometry, image, float(difference.sum(axis=1).max()))
+    turned = congruent(matrix, image)  # an involution is its own transpose
+    difference = less(turned, matrix)
+    far, defect = largest_entry(difference), row_sum(difference)
+    turned.destroy()
+    difference.destroy()
+    return Symmetry(isometry, image, defect) if far <= TOLERANCE * largest_entry(matrix) else None
 
 
-def sectors(matrix: sparse.csr_matrix, images: list[sparse.csr_matrix]) -> list[Sector]:
-    """The parts of a symmetric matrix that commuting signed permutations of order two leave; itself without any."""
-    bases = [sparse.identity(matrix.shape[0], format="csr")]
+def sectors(matrix: PETSc.Mat, images: list[sparse.csr_matrix], team: Team) -> list[Sector]:
+    """The parts of a symmetric matrix that commuting signed permutations of order two leave; itself without any.
+    Collective."""
+    bases = [sparse.identity(matrix.getSize()[0], format="csr")]
     for image in images:
         bases = [half for basis in bases for half in _halves(basis, image)]
-    return [Sector(basis, (basis.T @ matrix @ basis).tocsr()) for basis in bases]
+    return [_sector(matrix, basis, team) for basis in bases]
+
+
+def _sector(matrix: PETSc.Mat, basis: sparse.csr_matrix, team: Team) -> Sector:
+    part = congruent(matrix, basis)
+    rows = _own_rows(part, team)
+    part.destroy()
+    return Sector(basis, rows)
 
 
 def _permutation(sites: Sites, isometry: Isometry) -> sparse.csr_matrix | None:

@@ -15,15 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy import sparse
 
+from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver.canonical import ordered, turn_to_rule
 from tireroad.modal.solver.circulant import repeated
+from tireroad.modal.solver.distributed import row_sum
 from tireroad.modal.solver.fields import (
     CHUNK,
     collect,
-    everywhere,
     multiply,
     orthonormalise,
     scaled_by,
@@ -31,6 +31,7 @@ from tireroad.modal.solver.fields import (
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.spectrum import Bottom, Part, Slice, Spectrum
 from tireroad.modal.solver.symmetry import Sites, sectors, symmetries, whole
+from tireroad.modal.solver.team import Team
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
 MOST = 1e-6  # where rounding alone is more than the tolerance
@@ -65,12 +66,14 @@ def solve(
     up_to: float = np.inf,
     sites: Sites | None = None,
     waves: bool = True,
+    teams: int | None = None,
 ) -> Modes:
     """The `count` lowest modes, or all below `up_to` (Hz), of a stiffness (n, n) in N/m and a diagonal
     mass (own rows) in kg; at least one of the two is given.
 
     Symmetries are looked for with the `sites` of own unknowns, equal segments unless `waves` is False. A
-    split whose modes are no modes of A is given up for the next. Every process holds a copy of A.
+    split whose modes are no modes of A is given up for the next. The processes work in `teams`, each of which holds
+    A spread over its own, by default each process in its own (modal.solver.team).
     Raises ConvergenceError when a mode is missing, inaccurate or unstable. Collective.
     """
     comm = stiffness.comm.tompi4py()
@@ -78,36 +81,40 @@ def solve(
     scaled = scaled_by(stiffness, mass)
     all_sites = None if sites is None else sites.everywhere(comm)
     rank = np.arange(size) if all_sites is None else all_sites.rank()
-    problem = _Problem(scaled, everywhere(scaled), mass, rank[slice(*scaled.getOwnershipRange())])
+    own = slice(*scaled.getOwnershipRange())
+    team = Team.of(comm, teams or comm.size)
+    problem = _Problem(scaled, team, row_sum(scaled), mass, rank[own])
     count, limit = min(count or size, size), (2 * np.pi * up_to) ** 2
-    for split in _splits(problem.whole, all_sites, waves):
+    for split in _splits(scaled, all_sites, waves, team):
         modes = problem.solve(split, count, limit)
         if problem.accurate(modes, split.defect):
             break
     scaled.destroy()
+    team.disband()
     return problem.checked(modes, split.defect)
 
 
-def _splits(matrix: sparse.csr_matrix, sites: Sites | None, waves: bool) -> Iterator[_Split]:
-    """Ways to split the problem, the finest first, the last one not at all."""
+def _splits(matrix: PETSc.Mat, sites: Sites | None, waves: bool, team: Team) -> Iterator[_Split]:
+    """Ways to split the problem, the finest first, the last one not at all. Collective."""
     if sites is not None:
         ring = repeated(matrix, sites) if waves else None
         if ring is not None:
-            yield _Split([ring.wave(n) for n in ring.waves], ring.defect, ring.segments)
+            yield _Split([ring.wave(n, team) for n in ring.waves], ring.defect, ring.segments)
         found = symmetries(matrix, sites)
         if found:
-            parts: list[Part] = [*sectors(matrix, [one.image for one in found])]
+            parts: list[Part] = [*sectors(matrix, [one.image for one in found], team)]
             names = tuple(one.isometry.name for one in found)
             yield _Split(parts, sum(one.defect for one in found), symmetries=names)
-    yield _Split([whole(matrix)])
+    yield _Split([whole(matrix, team)])
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """A distributed and `whole` on each process; own rows' `mass` kg and `rank` by position."""
+    """A distributed, the `team` of this process, the `norm` of A; own rows' `mass` kg and `rank` by position."""
 
     scaled: PETSc.Mat
-    whole: sparse.csr_matrix
+    team: Team
+    norm: float
     mass: np.ndarray
     rank: np.ndarray
 
@@ -117,7 +124,7 @@ class _Problem:
 
     def solve(self, split: _Split, count: int, limit: float) -> Modes:
         """By slices of the parts. Collective."""
-        spectrum = Spectrum(self.comm, split.parts)
+        spectrum = Spectrum(self.comm, split.parts, self.team, self.norm)
         bottom = spectrum.bottom()
         bottom.check_stable()
         boundaries = spectrum.boundaries(bottom, count, limit)
@@ -138,7 +145,7 @@ class _Problem:
         # A group is turned as a whole, also where the last mode cuts it.
         end = int(np.searchsorted(group, group[count - 1], side="right"))
         order, group = order[:end], group[:end]
-        vectors = collect(self.scaled, parts, found, order)
+        vectors = collect(self.scaled, parts, found, order, self.team)
         part = np.concatenate([np.full(len(one.values), one.part) for one in found])[order]
         defect = orthonormalise(self.comm, vectors, part)
         vectors /= np.sqrt(self.mass)[:, None]
@@ -152,7 +159,7 @@ class _Problem:
             inertia_count=proof.inertia,
             counted_below=proof.top,
             rigid=int((squares == 0).sum()),
-            sectors=tuple(part.matrix.shape[0] * part.copies for part in parts),
+            sectors=tuple(part.matrix.shape[1] * part.copies for part in parts),
             slices=len(found),
             segments=split.segments,
             symmetries=split.symmetries,
@@ -166,7 +173,7 @@ class _Problem:
         a symmetry shows it; at most `MOST`.
         """
         flexible = values[values > 0]
-        stiff = np.finfo(float).eps * float(abs(self.whole).sum(axis=1).max())
+        stiff = np.finfo(float).eps * self.norm
         return min(max(stiff, defect) / flexible.min(), MOST) if len(flexible) else 0.0
 
     def _allowed(self, modes: Modes, defect: float) -> float:
@@ -202,7 +209,7 @@ class _Problem:
             defects[some] = ((multiply(self.scaled, shapes) - shapes * squares[some]) ** 2).sum(
                 axis=0
             )
-        return np.sqrt(self.comm.allreduce(defects)) / np.maximum(squares, least)
+        return np.sqrt(summed(self.comm, defects)) / np.maximum(squares, least)
 
 
 def _families(parts: list[Part], found: list[Slice]) -> np.ndarray:

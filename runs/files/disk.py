@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -46,8 +47,17 @@ def part_of(path: Path) -> Path:
     return path.with_name(f".{path.name}.{socket.gethostname()}.{os.getpid()}.part")
 
 
+FACTORS = ".factors"  # the folder in a run's own of factors that memory does not hold
+
+
+def remove_factors(directory: Path) -> None:
+    """Those of a run that has ended, or was killed."""
+    shutil.rmtree(directory / FACTORS, ignore_errors=True)
+
+
 def remove_leftovers(directory: Path) -> None:
-    """Remove the temporary files of processes of this machine that were killed while they wrote."""
+    """Remove the temporary files of processes of this machine that were killed while they wrote, and factors."""
+    remove_factors(directory)
     for part in directory.glob(".*.part"):
         rest, _, process = part.name.removesuffix(".part").rpartition(".")
         here = rest.endswith(f".{socket.gethostname()}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import io
 import json
 import pkgutil
@@ -58,13 +59,20 @@ def run_all(package: str, names: list[str], out: Path | None, large: bool = Fals
     for name in names or known:
         observe.say(f"{name}: {known[name].ABOUT}")
         began = time.perf_counter()
-        tables = known[name].run_large() if large else known[name].run()
+        tables = known[name].run_large() if large else _run(known[name], out)
         for table in tables:
             show(table)
         observe.say(f"{name}: {time.perf_counter() - began:.1f} s\n")
         results[name] = tables
     if out is not None:
         _keep(results, {name: known[name].ABOUT for name in results}, out)
+
+
+def _run(module: ModuleType, out: Path | None) -> list[Table]:
+    """Of a module that goes on where it was stopped, with a folder beside `out` for what it has."""
+    if out is not None and "kept" in inspect.signature(module.run).parameters:
+        return module.run(kept=out.with_suffix(".kept"))
+    return module.run()
 
 
 def show(table: Table) -> None:

@@ -1,6 +1,7 @@
 """How much memory this process has taken, and how much there is."""
 
 import math
+import os
 import resource
 from contextlib import suppress
 from pathlib import Path
@@ -18,6 +19,22 @@ def peak_memory() -> float:
         return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     (own,) = (line.split()[1] for line in lines if line.startswith("VmHWM:"))
     return 1024.0 * float(own)
+
+
+# Of the options of PETSc's objects that factorise: modes and responses, static state, full states of a turning tire.
+_PREFIXES = "", "static_", "rotating_st_"
+
+
+def keep_factors_on_disk(folder: Path) -> None:
+    """From now on MUMPS keeps factors in files of the folder, and removes each with its factor. What the user's
+    PETSc options say stays."""
+    from petsc4py import PETSc
+
+    os.environ["MUMPS_OOC_TMPDIR"] = str(folder.resolve())
+    options = PETSc.Options()
+    for prefix in _PREFIXES:
+        if not options.hasName(f"{prefix}mat_mumps_icntl_22"):
+            options[f"{prefix}mat_mumps_icntl_22"] = 1
 
 
 def available_memory() -> float:

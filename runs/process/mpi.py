@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from tireroad.fem import parallel
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.parallel import ToldByRoot
+from tireroad.fem.parallel import FailedOnRoot
 from tireroad.runs.files.disk import Removed, explained
 from tireroad.runs.process.packages import missing
 from tireroad.runs.process.signals import STOP_SIGNALS, Stopped, raised
@@ -33,7 +33,7 @@ def start_petsc(options: list[str]) -> None:
 
 
 def on_root(comm: Any, function: Callable[[], T]) -> T:
-    """As fem.parallel.on_root; a result folder that was removed is told on every process too. Collective."""
+    """As fem.parallel.on_root; a result folder that was removed is an error on every process too. Collective."""
     return parallel.on_root(comm, function, (InputError, ConvergenceError, Removed))
 
 
@@ -59,7 +59,7 @@ def _judged(function: Callable[[], None]) -> tuple[int, str]:
         )
     except MemoryError as error:
         return GAVE_UP, f"error: out of memory ({error}): use a coarser mesh, fewer modes or points"
-    except ToldByRoot:
+    except FailedOnRoot:
         return BUG, ""
     except ModuleNotFoundError as error:
         message = missing(error)

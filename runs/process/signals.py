@@ -56,7 +56,7 @@ class _Heard:
 
 
 DEFERRED = b"d"
-"""What the supervisor is told of a request that the loop has noted, and ends of by itself."""
+"""What the supervisor hears of a request that the loop has noted, and ends of by itself."""
 
 
 def tell_when_deferred(descriptor: int) -> None:

@@ -83,7 +83,7 @@ def _watch(worker: int, hears: int) -> int:
 
 
 def _deferred(descriptor: int) -> bool:
-    """Whether the last that the worker has told since this was last asked is that its loop will stop."""
+    """Whether the worker's last message since this was last asked says that its loop will stop."""
     os.set_blocking(descriptor, False)
     try:
         return os.read(descriptor, 4096).endswith(signals.DEFERRED)

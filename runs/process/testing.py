@@ -1,6 +1,7 @@
 """`tireroad test`: the suite on one process, then its tests marked `mpi` on 2 and on 3.
 
-With `--fast` only those on one process that are not marked `slow`, of a few seconds at most each.
+Tests marked `long` run with `--all` and where they are named; with `--fast` only those on one process that are
+not marked `slow`, of a few seconds at most each.
 A test under mpirun fails when it fails on any process. When it fails on one and the others wait
 for ever in a collective call, they are ended together. Run as a module, this file is the worker:
 `python3 -m tireroad.runs.process.testing FOLDER PROCESSES [pytest arguments]`.
@@ -156,15 +157,21 @@ def _from_root(argument: str) -> str:
     return f"{Path(path).resolve()}{colons}{test}"
 
 
+def _chosen(arguments: list[str]) -> tuple[list[str], tuple[int, ...]]:
+    """pytest's arguments with the marks that --fast, --all or neither leave, and the numbers of processes."""
+    rest = [one for one in arguments if one not in ("--fast", "--all")]
+    if "--fast" in arguments:
+        return ["-m", "not slow and not long and not mpi", *rest], (1,)
+    named = any(not one.startswith("-") for one in rest) or "-m" in rest
+    return rest if named or "--all" in arguments else ["-m", "not long", *rest], (1, *PARALLEL)
+
+
 def run_tests(arguments: list[str]) -> int:
     """The whole suite; prints `N passed, N failed, N skipped` over all runs. Exit status 0 or 1."""
     if not (ROOT / "tests").is_dir():
         print("error: the tests are not installed: run them in a checkout", file=sys.stderr)
         return 2
-    counts: tuple[int, ...] = (1, *PARALLEL)
-    if "--fast" in arguments:
-        arguments.remove("--fast")
-        arguments[:0], counts = ["-m", "not slow and not mpi"], (1,)
+    arguments, counts = _chosen(arguments)
     arguments = [_from_root(argument) for argument in arguments]
     if not sys.stdout.isatty():  # mpirun gives its processes a terminal of their own
         arguments.insert(0, "--color=no")
@@ -187,6 +194,8 @@ def run_tests(arguments: list[str]) -> int:
     if "--collect-only" in arguments or "--co" in arguments:
         print(f"{collected} collected")
         return 0 if collected and not totals["failed"] else 1
+    if "not long" in arguments:
+        print("without the long ones, which --all runs too")
     print(", ".join(f"{number} {outcome}" for outcome, number in totals.items()))
     ran = sum(int(number) for number in totals.values())
     return 0 if totals["failed"] == 0 and ran else 1

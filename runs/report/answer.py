@@ -16,12 +16,12 @@ Fact = tuple[str, str]
 _MODES = 4
 
 
-def answer(results: Results, told: Mapping[str, Any]) -> list[Fact]:
-    """Facts (what, value) from the files there are and the summary's stages `told`; what is missing is left out."""
+def answer(results: Results, stages: Mapping[str, Any]) -> list[Fact]:
+    """Facts (what, value) from the files there are and the summary's stages `stages`; what is missing is left out."""
     found: list[Fact] = []
     for part in (_standing, _rolling, _levels, _power, _modes):
         try:
-            found += part(results, _Headlines(told))
+            found += part(results, _Headlines(stages))
         except (Absent, InputError, LookupError, ValueError):
             continue  # the file's own section says what is wrong
     return found
@@ -30,11 +30,13 @@ def answer(results: Results, told: Mapping[str, Any]) -> list[Fact]:
 class _Headlines:
     """Headline figures and indicators of the summary by stage and name."""
 
-    def __init__(self, told: Mapping[str, Any]) -> None:
-        self._told = told
+    def __init__(self, stages: Mapping[str, Any]) -> None:
+        self._stages = stages
 
     def __call__(self, stage: str, name: str) -> float | None:
-        groups = [self._told.get(stage, {}).get(kind) or {} for kind in ("headline", "indicators")]
+        groups = [
+            self._stages.get(stage, {}).get(kind) or {} for kind in ("headline", "indicators")
+        ]
         value = (groups[0].get(name) or groups[1].get(name) or {}).get("value")
         return float(value) if isinstance(value, int | float) else None
 

@@ -54,8 +54,8 @@ def figure_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
     """Headline figures of all stages, in the order of the first run that has them."""
     rows: dict[tuple[str, str], Row] = {}
     for summary in summaries:
-        for stage, told in summary.items():
-            for name, entry in (told.get("headline") or {}).items():
+        for stage, record in summary.items():
+            for name, entry in (record.get("headline") or {}).items():
                 values = tuple(
                     ((other.get(stage, {}).get("headline") or {}).get(name) or {}).get("value")
                     for other in summaries
@@ -68,7 +68,7 @@ def cost_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
     """Seconds of each stage; None where it was reused or skipped."""
     stages = list(dict.fromkeys(stage for summary in summaries for stage in summary))
     computed = [
-        {stage: told.get("seconds") for stage, told in summary.items()} for summary in summaries
+        {stage: record.get("seconds") for stage, record in summary.items()} for summary in summaries
     ]
     return [
         Row("cost", stage, "s", tuple(one.get(stage) or None for one in computed))

@@ -68,13 +68,13 @@ def render(directory: Path) -> str:
     summary = read_summary(directory / "summary.json", problems)
     text, scene = read_scene(directory / "scene.toml", problems)
     stages = summary.get("stages", {})
-    judged = verdicts(summary.get("told", {}))
+    judged = verdicts(summary.get("stages_known", {}))
     sections, left_out, provenance = build_sections(directory, scene, stages, problems)
     with Results(directory, scene) as results:
-        facts, strange = answer(results, summary.get("told", {})), unusual(results)
-    told = [("realism", strange)] if strange else []
-    told += [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
-    told += [(section.title, warning) for section in sections for warning in section.warnings]
+        facts, strange = answer(results, summary.get("stages_known", {})), unusual(results)
+    remarked = [("realism", strange)] if strange else []
+    remarked += [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
+    remarked += [(section.title, warning) for section in sections for warning in section.warnings]
     loader = FileSystemLoader(Path(__file__).parent)
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     pages.filters |= {"quantity": quantity, "in_script": in_script}
@@ -86,7 +86,7 @@ def render(directory: Path) -> str:
         answer=facts,
         script=live.script(),
         style=live.style(),
-        warnings=[("report", problem) for problem in problems] + told,
+        warnings=[("report", problem) for problem in problems] + remarked,
         stages=stages,
         judged=judged,
         costs=costs(stages),
@@ -122,7 +122,7 @@ def read_summary(path: Path, problems: list[str]) -> dict:
             problems.append("summary.json is not what the run wrote (checksum) and is left out.")
             return {}
         stages = summary.get("stages", {})
-        summary["told"] = stages
+        summary["stages_known"] = stages
         known = sorted(stages, key=lambda name: (*STAGES, name).index(name))
         summary["stages"] = {name: whole_stage(stages[name]) for name in known}
     except (ValueError, AttributeError, TypeError, KeyError) as error:

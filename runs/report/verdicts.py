@@ -45,8 +45,8 @@ def verdicts(stages: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, An
     """(stage, indicator, value, unit, verdict) of every indicator in a summary; the poor ones first."""
     rows = [
         (stage, name, entry["value"], entry.get("unit", ""), verdict(name, entry["value"]))
-        for stage, told in stages.items()
-        for name, entry in (told.get("indicators") or {}).items()
+        for stage, found in stages.items()
+        for name, entry in (found.get("indicators") or {}).items()
     ]
     order = {POOR: 0, FAIR: 1, GOOD: 2, "": 3}
     return sorted(rows, key=lambda row: order[row[4]])

@@ -6,12 +6,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from tireroad.contact.error_bars import ORDERS
+from tireroad.contact.error_bars import CAUSES
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.scene.tables.scene import Scene
 
-CAUSES = tuple(ORDERS)
 FINER = 2**0.5  # of a rung of modes and points; of the step, twice that
 RUNGS = 10
 MODES = 2.25  # highest mode over the highest frequency of interest on the lowest rung: an answer ends at half of it

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.contact.error_bars import ORDERS
+from tireroad.contact.error_bars import CAUSES
 from tireroad.runs.scene.tables.accuracy import Accuracy as Wanted
 from tireroad.runs.stages.accuracy import Accuracy
 
-CAUSES = tuple(ORDERS)
 VERTICAL = 2
 
 

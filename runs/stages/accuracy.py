@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tireroad.contact.error_bars import SHARES, Bars, Told, bars, told, total
+from tireroad.contact.error_bars import CAUSES, Bars, Told, bars, told, total
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.state import StaticState
@@ -29,7 +29,7 @@ from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 SHARE = 0.33  # of the run's own cost, that all companions together take
 _FEWEST = 64  # steps that a companion repeats at the least
-_LOOPS = 2.3  # time loops that four companions take for each step they repeat
+_LOOPS = 3.0  # time loops that four companions take for each step they repeat
 _COARSE = 0.14  # of the cost before the loop, on elements of twice the size
 FORCES = ("contact_force", "axle_force")
 _UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
@@ -81,7 +81,7 @@ class AccuracyStage(Computed[Accuracy]):
         return {"contact": self.contact.key, "up_to": self.job.scene.accuracy.up_to}
 
     def compute(self, record: Record) -> Accuracy:
-        """Companions one by one; a cause whose companion fails is told, and the run goes on. Collective."""
+        """Companions one by one; a cause whose companion fails is reported, and the run goes on. Collective."""
         history, setup = self.contact.product, self.setup.product
         if self._at_rest:
             return self._none("nothing drives the tire: what varies is rounding")
@@ -98,10 +98,10 @@ class AccuracyStage(Computed[Accuracy]):
         exact = {name: told(values, history.step, limit, up_to) for name, values in runs.items()}
         found: dict[str, dict[str, Bars]] = {name: {} for name in exact}
         absent: dict[str, str] = {}
-        for cause, share in SHARES.items():
+        for cause in CAUSES:
             try:
                 with record.timing(cause):
-                    forces, beside = companion(cause, given)
+                    forces, beside, share = companion(cause, given)
             except (ConvergenceError, InputError) as error:
                 absent[cause] = str(error)
                 continue
@@ -135,7 +135,7 @@ class AccuracyStage(Computed[Accuracy]):
 
     def _none(self, reason: str) -> Accuracy:
         observe.say(f"  no error bars: {reason}")
-        absent = dict.fromkeys(SHARES, reason)
+        absent = dict.fromkeys(CAUSES, reason)
         return Accuracy(
             centre=np.zeros(0), window=0.0, up_to=0.0, mean={}, by_cause={}, absent=absent
         )
@@ -200,7 +200,7 @@ class AccuracyStage(Computed[Accuracy]):
 
 
 def _told(forces: Forces, start: float, limit: float, up_to: float) -> dict[str, Told]:
-    """What is told of the forces of a companion after `start` s."""
+    """The figures of the forces of a companion after `start` s."""
     first = round(start / forces.step)
     both = {"contact_force": forces.contact, "axle_force": forces.axle}
     return {name: told(values[first:], forces.step, limit, up_to) for name, values in both.items()}

@@ -9,11 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from tireroad.contact.chatter import choose, oscillation
+from tireroad.contact.error_bars import orders, share
+from tireroad.contact.respaced import halved, ratio, thinned
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.thinned import thinned
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.carried_over import carried_over
 from tireroad.fem.static.state import StaticState
+from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.folder import make_folder
@@ -115,18 +117,26 @@ def longer_step(given: Given) -> Forces:
     return given.longer
 
 
-def fewer_points(given: Given) -> Forces:
-    """Every other point of the grid both ways. Collective."""
+def other_points(given: Given) -> Forces:
+    """Every other point of the grid both ways, or, of a footprint that holds few, twice as many. Collective."""
     job, patch = given.job, given.setup.patch
     if patch.places is None:
         raise InputError(
             "the points are nodes of the mesh: take a grid, contact.points = { dx, dy }"
         )
+    coarser = ratio(given.settled.patch) > 1
     brush = job.scene.contact.brush_stiffness
-    if brush is not None:  # of a point that stands for four
-        contact = replace(job.scene.contact, brush_stiffness=4 * brush)
+    if brush is not None:  # of a point that stands for four, or for a quarter
+        contact = replace(job.scene.contact, brush_stiffness=brush * (4 if coarser else 0.25))
         job = replace(job, scene=replace(job.scene, contact=contact))
-    setup = replace(given.setup, patch=thinned(patch))
+    if coarser:
+        patch = thinned(patch)
+    else:
+        surface = TreadSurface(job.tire.lattice, given.static.product.seen)
+        height = given.static.product.road_height
+        assert height is not None
+        patch = halved(patch, surface, height, given.setup.reach)
+    setup = replace(given.setup, patch=patch)
     setup = settled(job, setup, given.response, given.static.product.normal_force)
     return given.of(job).repeated(setup, given.response)
 
@@ -212,18 +222,23 @@ def _made(job: Job, kind: type[Part], part: Part | None, done: dict[str, Done]) 
 
 COMPANIONS: dict[str, Callable[[Given], Forces]] = {
     "step": longer_step,
-    "points": fewer_points,
+    "points": other_points,
     "modes": fewer_modes,
     "mesh": coarser_mesh,
 }
-"""By the cause of the error that each is for (contact.error_bars.SHARES)."""
+"""By the cause of the error that each is for (contact.error_bars.CAUSES)."""
 
 
-def companion(cause: str, given: Given) -> tuple[Forces, Forces | None]:
-    """The forces of a companion, and those they are compared with (None: the run's own), without a word.
+def companion(cause: str, given: Given) -> tuple[Forces, Forces | None, float]:
+    """The forces of a companion, those they are compared with (None: the run's own), and the share of their
+    difference that is the error, without a word.
 
     Collective; InputError or ConvergenceError where there is none.
     """
     with observe.quiet():
         beside = None if cause == "step" else given.base
-        return COMPANIONS[cause](given), beside
+        found = COMPANIONS[cause](given)
+    points = ratio(given.settled.patch) if cause == "points" else 2.0
+    size = {"step": 2.0, "points": points, "modes": 1 / FEWER, "mesh": 2.0}[cause]
+    order = orders(given.job.tire.section.order)[cause]
+    return found, beside, share(size, order)

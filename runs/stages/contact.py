@@ -23,7 +23,7 @@ from tireroad.runs.stages.build import pattern
 from tireroad.runs.stages.build.energy import Losses, describe_energy, works
 from tireroad.runs.stages.build.loop import driven_tire, freely_rolling, make_loop
 from tireroad.runs.stages.build.point_forces import shortest_period
-from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, told
+from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, reported
 from tireroad.runs.stages.build.stepping import (
     Planned,
     integration,
@@ -104,7 +104,7 @@ class ContactStage(Stage[ContactHistory]):
             if not doubtful:
                 raise
             forget_checkpoint(self.job)
-            chosen = told(record, Chosen(*WATCHED))
+            chosen = reported(record, Chosen(*WATCHED))
             self._attempt(key, record, setup, plan, chosen.scheme, False)
 
     def _rolling_freely(self, record: Record, setup: ContactSetup, plan: Planned, scheme: str):

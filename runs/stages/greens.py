@@ -65,7 +65,7 @@ class GreensStage(Computed[Responses]):
 
     @property
     def _stands_with_air(self) -> bool:
-        """Whether the states are first told here: those of a standing tire alone are its modes'."""
+        """Whether the states are first reported here: those of a standing tire alone are its modes'."""
         return self.job.speed == 0 and has_air(self.job.scene)
 
     @property

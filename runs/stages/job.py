@@ -39,7 +39,7 @@ class Job:
     @property
     def speed(self) -> float:
         """Speed of rotation, rad/s; 0 when the wheel stands. Of a scene with a travel speed a first guess, until
-        the static state has told its rolling radius."""
+        the static state gives its rolling radius."""
         if "speed" in self.found:
             return self.found["speed"]
         return self.scene.rotation.speed if self.scene.rotation else 0.0

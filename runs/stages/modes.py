@@ -13,10 +13,13 @@ from tireroad.fem.static.state import StaticState
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.damping import Damping, StrainEnergy
 from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.team import how_many
 from tireroad.modal.standing import projected, solved, with_fields
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
+from tireroad.runs.process.memory import available_memory
+from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.turning import damping_of
 from tireroad.runs.stages.record import Record
@@ -72,7 +75,8 @@ class ModesStage(Computed[ModalBasis]):
         with record.timing("matrices"):
             operators = motions.operators
         with record.timing("eigensolver"):
-            modes = solved(operators, count=wanted.count, up_to=wanted.up_to)
+            teams = self._teams(record)
+            modes = solved(operators, count=wanted.count, up_to=wanted.up_to, teams=teams)
         with record.timing("air"):
             air = cavity.make_air(self.job, motions, float(modes.frequency[-1]))
         with record.timing("projection"):
@@ -85,6 +89,22 @@ class ModesStage(Computed[ModalBasis]):
         if labels is not None:
             _say_names(modes.frequency, labels)
         return replace(basis, labels=labels)
+
+    def _teams(self, record: Record) -> int:
+        """As many teams of processes as the memory that is free holds factors. Collective."""
+        comm = self.job.comm
+        if comm.size == 1:
+            return 1
+        parts = estimate(self.job.scene).memory
+        needed = sum(parts[name] for name in ("matrices", "factor of the stiffness"))
+        teams = how_many(comm, needed, available_memory())
+        record.headline["teams of processes"] = (teams, "-")
+        if teams < comm.size:
+            observe.say(
+                f"  {teams} team(s) of processes factorise: each factor with its matrices takes about "
+                f"{needed / 1e9:.2g} GB, and not {comm.size} of them fit"
+            )
+        return teams
 
     def write(self, file, product: ModalBasis) -> None:
         """Frequencies, traces, the small matrices; not the fields on all unknowns."""

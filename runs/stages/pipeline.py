@@ -17,13 +17,13 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.checksum import signed
-from tireroad.runs.files.disk import write_text
-from tireroad.runs.files.folder import Summary
+from tireroad.runs.files.disk import FACTORS, remove_factors, write_text
+from tireroad.runs.files.folder import Summary, make_folder
 from tireroad.runs.process import observe
-from tireroad.runs.process.memory import peak_memory
+from tireroad.runs.process.memory import keep_factors_on_disk, peak_memory
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.scene.extent.demand import check_demand, duration
-from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
+from tireroad.runs.scene.extent.estimate import Estimate, estimate
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.rules.road import check_road
@@ -96,9 +96,9 @@ def run_scene(
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
     if scene.road is not None:
-        # A road file that cannot be used should be told before hours of solving, not after.
+        # A road file that cannot be used should be reported before hours of solving, not after.
         on_root(comm, lambda: check_road(scene))
-    _say_demand(scene, directory, comm, until)
+    wanted = _say_demand(scene, directory, comm, until)
     reasons = skipped(scene, until)
     if petsc_options:
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
@@ -108,6 +108,11 @@ def run_scene(
             done[kind.name] = found
         job.settle(done)
     _check_options(petsc_options)
+    on_root(comm, lambda: remove_factors(directory))
+    most = _peak(comm)
+    observe.say(
+        f"memory: {most:.2g} GB of a process at most, {_each(wanted, comm):.2g} GB estimated"
+    )
     if "report" in reasons:
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))
     else:
@@ -115,16 +120,25 @@ def run_scene(
     return Finished(job, done)
 
 
-def _say_demand(scene: Scene, directory: Path, comm: MPI.Comm, until: str | None) -> None:
+def _each(wanted: Estimate, comm: MPI.Comm) -> float:
+    """Memory of one process, GB, by estimate."""
+    return 1e-9 * sum(memory_of(wanted, comm.size).values()) / comm.size
+
+
+def _say_demand(scene: Scene, directory: Path, comm: MPI.Comm, until: str | None) -> Estimate:
     """What the run will take; InputError where the machine has too little by far. Collective."""
     wanted = on_root(comm, lambda: estimate(scene, until))  # it may read the road's file
     for text in on_root(comm, lambda: check_demand(wanted, directory, comm.size)):
         observe.warn(text)
+    if on_root(comm, lambda: out_of_core(wanted, comm.size)):
+        on_root(comm, lambda: make_folder(directory / FACTORS))
+        keep_factors_on_disk(directory / FACTORS)
     observe.say(
-        f"estimated: {sum(wanted.memory.values()) / 1e9:.2g} GB a process, "
+        f"estimated: {_each(wanted, comm):.2g} GB a process, "
         f"{sum(wanted.disk.values()) / 1e9:.2g} GB of disk, "
         f"{duration(sum(wanted.seconds.values()))} of one core"
     )
+    return wanted
 
 
 def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done | None:

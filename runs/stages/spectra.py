@@ -87,7 +87,7 @@ class SpectraStage(Computed[Spectra]):
         limit = self._limit(record, step)
         frequency, contact = amplitudes(total, step)
         below = frequency <= limit.frequency
-        found = levels.told(history, start, limit.frequency)
+        found = levels.levels_of(history, start, limit.frequency)
         levels.describe(record, found)
         axle = {}
         if history.axle_force is not None:
@@ -114,7 +114,7 @@ class SpectraStage(Computed[Spectra]):
         )
 
     def _limit(self, record: Record, step: float) -> Limit:
-        """Where the model ends, told with what sets it."""
+        """Where the model ends, with what sets it."""
         found = all_limits(self.setup.product, self.rotating.product, step)
         limit = lowest(found)
         record.headline["an answer up to"] = (limit.frequency, "Hz")

@@ -74,7 +74,7 @@ class StaticStage(Computed[StaticState]):
         return state
 
     def _conclude(self, record: Record, state: StaticState, loader: Loader) -> None:
-        """What is told of the state, and the error of its load. Collective."""
+        """Figures of the state, and the error of its load. Collective."""
         wanted = self.job.scene.static
         _describe(record, state, loader)
         self._warn_at_rest(record)

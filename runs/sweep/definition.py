@@ -220,8 +220,8 @@ def _named(keys: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> list[Member]
     members = []
     for number, row in enumerate(rows, start=1):
         settings = dict(zip(keys, row, strict=True))
-        told = [f"{key.rpartition('.')[2]}-{_short(value)}" for key, value in settings.items()]
-        members.append(Member("_".join([f"{number:0{digits}d}", *told])[:80], settings))
+        parts = [f"{key.rpartition('.')[2]}-{_short(value)}" for key, value in settings.items()]
+        members.append(Member("_".join([f"{number:0{digits}d}", *parts])[:80], settings))
     return members
 
 

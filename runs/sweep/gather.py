@@ -64,7 +64,7 @@ def gather(sweep: Sweep, folder: Path) -> Gathered:
 
 
 def _figures(run: RunResults) -> dict[tuple[str, str], float]:
-    """Headline numbers of all stages and third-octave levels, by (name, unit)."""
+    """Headline numbers of all stages, third-octave levels and their errors, by (name, unit)."""
     found: dict[tuple[str, str], float] = {}
     for stage, told in run.summary.items():
         for name, entry in (told.get("headline") or {}).items():
@@ -77,6 +77,11 @@ def _figures(run: RunResults) -> dict[tuple[str, str], float]:
         for centre, parts in zip(centres, level, strict=True):
             for axis, value in zip("xyz", parts, strict=True):
                 found[f"axle force {axis}, {centre:g} Hz", "dB re 1 N"] = float(value)
+        if "spectra/third_octave/level_error" in run:
+            errors = run["spectra/third_octave/level_error"]
+            for centre, parts in zip(centres, errors, strict=True):
+                for axis, value in zip("xyz", parts, strict=True):
+                    found[f"error of the axle force {axis}, {centre:g} Hz", "dB"] = float(value)
     return found
 
 

@@ -14,6 +14,7 @@ from tireroad.runs.report.comparison_figures import pen
 from tireroad.runs.report.figures import canvas, encode, styled
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.sweep.gather import Column, Gathered, numeric
+from tireroad.runs.sweep.levels import Levels, levels
 from tireroad.runs.version import PROGRAM, VERSION
 
 Array = NDArray[np.float64]
@@ -54,6 +55,9 @@ def _figures(table: Gathered) -> list[tuple[str, str]]:
         if len(table.names) > CURVES:
             text += f" The first {CURVES} of {len(table.names)} members."
         found.append((_spectra(bands, table.names), text))
+    compared = levels(table)
+    if compared is not None and len(compared.names) > 1:
+        found.append((_differences(compared), _about(compared)))
     chosen = [c for c in _with_level(table, bands) if np.isfinite(c.values).sum() > 1]
     for key, values in axes.items():
         if len(set(values.tolist())) > 1:
@@ -88,6 +92,46 @@ def _spectra(bands: Sequence[Column], names: Sequence[str]) -> str:
     axes[0, 0].set_xticks(place, [c.name.partition(", ")[2] for c in bands], rotation=45)
     axes[0, 0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=7)
     return encode(figure)
+
+
+@styled
+def _differences(compared: Levels) -> str:
+    """In dB of the first, with error bars."""
+    figure, axes = canvas(9.5, 3.2)
+    level, error = compared.differences()
+    place = np.arange(len(compared.bands))
+    for number in range(min(len(level), CURVES - 1)):
+        aside = place + 0.3 * ((number + 1) / min(len(level) + 1, CURVES) - 0.5)
+        bars = np.nan_to_num(error[number])
+        axes[0, 0].errorbar(
+            aside,
+            level[number],
+            bars,
+            marker="o",
+            ms=3,
+            capsize=2,
+            label=compared.names[number + 1],
+            **pen(number + 1),
+        )
+    axes[0, 0].axhline(0.0, color="#52606d", lw=0.8)
+    axes[0, 0].set(ylabel=f"dB of {compared.names[0]}", xlabel="third-octave band")
+    axes[0, 0].set_xticks(place, compared.bands, rotation=45)
+    axes[0, 0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=7)
+    return encode(figure)
+
+
+def _about(compared: Levels) -> str:
+    """What the picture of differences shows."""
+    text = (
+        "Vertical axle force, difference from the first in dB, with what the runs' error bars tell of it; "
+        "where there is no bar nothing is known."
+    )
+    if max(compared.seeds) > 1:
+        text += (
+            f" Mean power over {min(compared.seeds)} to {max(compared.seeds)} seeds; the bars hold the true mean of "
+            "all seeds in 95 of 100 cases."
+        )
+    return text
 
 
 @styled

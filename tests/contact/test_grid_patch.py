@@ -7,10 +7,10 @@ from tireroad.contact import model
 from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle
 from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
+from tireroad.contact.respaced import halved, thinned
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.solver.usual_set import UsualSet
-from tireroad.contact.thinned import thinned
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.tread_surface import TreadSurface
@@ -149,6 +149,20 @@ def test_every_other_point_is_a_grid_of_twice_the_pitch(tread) -> None:
     assert coarse.area == pytest.approx(6.4e-5)
     near, other = coarse.points[~coarse.edge], wanted.points[~wanted.edge]
     assert near[np.lexsort(near.T)] == pytest.approx(other[np.lexsort(other.T)], abs=1e-9)
+
+
+def test_twice_as_many_points_are_those_of_a_grid_of_half_the_pitch(tread) -> None:
+    _, surface, coarse = patches(tread, 3e-3, 0.008)
+    fine, (_, _, wanted) = halved(coarse, surface, tread[2], 3e-3), patches(tread, 3e-3, 0.004)
+    i, j = np.divmod(fine.places.place, fine.places.shape[1])
+    places = np.stack([i, j], axis=1) * fine.places.spacing
+    assert np.ptp(fine.points[:, :2] - places, axis=0) == pytest.approx(0.0, abs=1e-9)
+    assert fine.line.tolist() == j.tolist() and fine.area == pytest.approx(1.6e-5)
+    own, other = ~fine.edge, ~wanted.edge
+    assert fine.points[own] == pytest.approx(wanted.points[other], abs=1e-12)
+    nodes = np.random.default_rng(0).random(len(tread[1]))
+    read = fine.weights[own] @ nodes[fine.index]
+    assert read == pytest.approx(wanted.weights[other] @ nodes[wanted.index], abs=1e-12)
 
 
 def test_a_grid_needs_a_tread_and_a_sane_pitch(tread) -> None:

@@ -9,8 +9,9 @@ from scipy import linalg
 from systems import make
 
 from tireroad.fem.errors import InputError
+from tireroad.greens import recursion
 from tireroad.greens.convolution import Convolution
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import Recursion, sharers
 
 STEPS = 60
 
@@ -162,6 +163,24 @@ def test_the_same_on_any_number_of_processes(scheme) -> None:
     one, all_of_them = march(alone, force), march(spread, force)
     assert np.abs(one - all_of_them).max() < 1e-12 * np.abs(one).max()
     assert np.abs(alone.inertia_force() - spread.inertia_force()).max() < 1e-10
+
+
+@pytest.mark.mpi
+def test_a_small_loop_is_not_shared_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each process takes all of it, and a large one its part: the same motion, the same states at a checkpoint."""
+    response, force = make(speed=60.0).response(), some_force(4)
+    assert sharers(response, MPI.COMM_WORLD).size == 1
+    monkeypatch.setattr(recursion, "SHARED_FROM", 0.0)
+    found = []
+    for comm in (MPI.COMM_SELF, sharers(response, MPI.COMM_WORLD)):
+        tire = Recursion(response=response, step=1e-3, scheme="linear", comm=comm)
+        moved = march(tire, force)
+        states = [tire.state, 2 * tire.state]
+        found.append((moved, tire.snapshot()["state"], tire.everywhere(states)))
+    assert comm.size == MPI.COMM_WORLD.size
+    for alone, shared in zip(*found, strict=True):
+        np.testing.assert_allclose(shared, alone, atol=1e-12 * np.abs(alone).max())
+    np.testing.assert_allclose(found[1][2][1], 2 * found[1][1], rtol=1e-13)
 
 
 def test_dirac_residual_answers_with_a_pulse_of_one_step() -> None:

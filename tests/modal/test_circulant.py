@@ -85,7 +85,7 @@ def test_against_the_dense_problem(segments, mirrored, count):
 def test_the_mirrored_ring_needs_no_complex_numbers():
     for mirrored in (True, False):
         matrix, points = ring(8, mirrored)
-        found = repeated(matrix, Sites.of_nodes(points))
+        found = repeated(distributed(matrix), Sites.of_nodes(points))
         assert (found.kept is not None) == mirrored
         assert found.wave(2).matrix.shape == ((12, 12) if mirrored else (24, 24))
 
@@ -127,7 +127,7 @@ def test_belts_at_an_angle_leave_the_half_turn(segments):
     """
     matrix, points = twisted(segments)
     sites, stiffness = Sites.of_nodes(points), distributed(matrix)
-    found = repeated(matrix, sites)
+    found = repeated(stiffness, sites)
     assert found.segments == segments
     assert found.kept is not None
     exact = np.linalg.eigvalsh(matrix.toarray())
@@ -164,11 +164,11 @@ def test_pairs_are_cos_and_sin_about_the_lowest_point():
 
 def test_one_odd_spring_is_noticed():
     matrix, points = ring(8, True)
-    assert repeated(matrix, Sites.of_nodes(points)).segments == 8
+    assert repeated(distributed(matrix), Sites.of_nodes(points)).segments == 8
     matrix[30, 30] += 1e-8
-    assert repeated(matrix, Sites.of_nodes(points)) is None
+    assert repeated(distributed(matrix), Sites.of_nodes(points)) is None
     matrix, points = ring(8, True)
-    assert repeated(matrix, Sites.of_nodes(points + [0.01, 0.0, 0.0])) is None
+    assert repeated(distributed(matrix), Sites.of_nodes(points + [0.01, 0.0, 0.0])) is None
 
 
 def test_all_below_a_frequency_and_none():

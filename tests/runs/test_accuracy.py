@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.error_bars import SHARES
+from tireroad.contact.error_bars import CAUSES
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.companions import Given, coarser_job, companion
@@ -75,12 +75,25 @@ def contact_force(folder) -> np.ndarray:
     ("cause", "sets"),
     [
         ("step", ("time.step=2e-4",)),
+        ("points", ("time.step=2e-4", "contact.points={dx=0.004,dy=0.004}")),
         ("mesh", ("time.step=2e-4", "tire.segments=10", "tire.elements_arc=4")),
     ],
 )
 def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
+    given = _given(whole)
+    other, _ = run(cause, "contact", *sets)
+    forces, beside, part = companion(cause, given)
+    assert forces.step == 2e-4 and (beside is None) == (cause == "step")
+    # Elements of order 2 make 3; the footprint is a few points wide, so that finer ones tell.
+    wanted = {"step": 1 / 3, "points": 1 / (1 - 0.5**1.5), "mesh": 1 / 7}
+    assert part == pytest.approx(wanted[cause])
+    found = forces.contact
+    assert found[:, 2] == pytest.approx(contact_force(other)[:, 2], rel=1e-8)
+
+
+def _given(whole) -> Given:
     _, done = whole
-    given = Given(
+    return Given(
         job=done.job,
         static=done.done["static"],
         setup=done.setup,
@@ -89,21 +102,16 @@ def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
         step=1e-4,
         steps=300,
     )
-    other, _ = run(cause, "contact", *sets)
-    forces, beside = companion(cause, given)
-    assert forces.step == 2e-4 and (beside is None) == (cause == "step")
-    found = forces.contact
-    assert found[:, 2] == pytest.approx(contact_force(other)[:, 2], rel=1e-8)
 
 
 def test_bars_are_in_the_summary_and_beside_the_bands(whole):
     folder, _ = whole
     stages = json.loads((folder / "summary.json").read_text())["stages"]
     told = stages["accuracy"]
-    assert set(told["cost"]) == set(SHARES)
+    assert set(told["cost"]) == set(CAUSES)
     assert told["headline"]["error of the mean contact force"]["value"] > 0
     with h5py.File(folder / "accuracy.h5") as file:
-        assert set(file["contact_force"]) == set(SHARES)
+        assert set(file["contact_force"]) == set(CAUSES)
     with h5py.File(folder / "spectra.h5") as file:
         shape = file["third_octave/level"].shape
         assert file["third_octave/level_error"].shape == shape

@@ -194,12 +194,16 @@ def test_convergence_tells_what_each_change_costs(tmp_path, monkeypatch) -> None
 
 def test_error_bars_are_compared_with_a_finer_run(tmp_path) -> None:
     coarse = {"segments": 16, "arc": 8, "order": 2, "modes": 16, "pitch": 0.01, "step": 4e-4}
-    fine = coarse | {"modes": 24, "step": 2e-4}
+    fine = coarse | {"modes": 24, "step": 2e-4, "pitch": 0.008}
     cases = [Case("soft", "texture", 40.0)]
-    shares, every = error_bars.tables(tmp_path, cases, coarse, fine, 0.05)
+    given = cases, coarse, fine, 0.05, tmp_path / "kept"
+    shares, causes, every = error_bars.tables(tmp_path / "runs", *given)
     assert {row[0] for row in shares.rows} >= {"mean", "deviation", "all"}
-    assert all(row[3] >= 0 and row[4] >= 0 for row in every.rows)
-    check_page([shares, every], 0)
+    assert {row[0] for row in causes.rows} == {"step", "points", "modes", "mesh"}
+    assert all(row[4] >= 0 and row[5] >= 0 for row in every.rows)
+    check_page([shares, causes, every], 0)
+    again = error_bars.tables(tmp_path / "again", *given)  # from what was kept: nothing is run
+    assert again[2].rows == every.rows and not (tmp_path / "again").exists()
 
 
 def test_searches_are_judged_by_the_least_cost() -> None:
@@ -213,9 +217,9 @@ def test_searches_are_judged_by_the_least_cost() -> None:
     assert accuracy_on_demand._spent(trials) == 11.0 + 3.0 + 11.0
     target = accuracy_on_demand.TARGET
     found = [
-        accuracy_on_demand.Outcome("a", True, 0.9 * target, 0.8 * target, 12.0, 8.0, 20.0, 0.01),
-        accuracy_on_demand.Outcome("b", False, 2.0 * target, 3.0 * target, 10.0, None, 30.0, 0.01),
+        accuracy_on_demand.Outcome("a", True, 0.9 * target, 0.8 * target, 12.0, 8.0, 20.0),
+        accuracy_on_demand.Outcome("b", False, 2.0 * target, 3.0 * target, 10.0, None, 30.0),
     ]
-    tables = [accuracy_on_demand._summary(found, rungs), accuracy_on_demand._every(found)]
+    tables = [accuracy_on_demand._summary(found), accuracy_on_demand._every(found)]
     assert [row[1] for row in tables[0].rows] == [50.0, 1.5, 1.5, 2.5, 2.5]
     check_page(tables, 0)

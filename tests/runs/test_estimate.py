@@ -12,6 +12,22 @@ from tireroad.runs.scene.extent.estimate import estimate, memory
 from tireroad.runs.scene.extent.sizes import highest_frequency, sizes
 from tireroad.runs.scene.load import load
 
+ON_DISK = """
+from pathlib import Path
+import numpy as np
+from scipy import sparse
+from tireroad.runs.process.memory import keep_factors_on_disk
+from tireroad.modal.solver.shifted import Shifted
+folder = Path({folder!r}) / "factors"
+folder.mkdir()
+keep_factors_on_disk(folder)
+matrix = sparse.diags([-1.0, 2.5, -1.0], [-1, 0, 1], shape=(900, 900), format="csr")
+factor = Shifted(matrix, 0.1)
+answer = factor.solve(np.ones((900, 2)))
+factor_files = any(folder.iterdir())
+print(factor._factor.getMumpsIcntl(22), factor_files, np.allclose(matrix @ answer - 0.1 * answer, 1.0))
+"""
+
 
 @pytest.fixture
 def quickstart(root: Path) -> Path:
@@ -81,10 +97,36 @@ def test_doubt_is_a_warning_and_certainty_an_error(quickstart, monkeypatch, tmp_
             with pytest.raises(InputError, match="matrices"):
                 demand.check_demand(wanted, tmp_path)
         else:
-            assert len(demand.check_demand(wanted, tmp_path)) == (outcome == "warned")
-    # Each process holds its own matrices.
-    with pytest.raises(InputError, match="memory"):
-        demand.check_demand(wanted, tmp_path, processes=4)
+            told = " ".join(demand.check_demand(wanted, tmp_path))
+            assert ("GB are free" in told) == ("out of core" in told) == (outcome == "warned")
+    # Factors and matrices are spread over the processes; each one has a program and a pencil of its own.
+    together = demand.memory_of(wanted, 4)
+    assert together["matrices"] == wanted.memory["matrices"]
+    assert together["program"] == 4 * wanted.memory["program"]
+
+
+def test_factors_go_to_disk_where_memory_is_short(quickstart, monkeypatch, tmp_path) -> None:
+    """Twelve times the mesh: its factor, and with it the run, fits only so; said, and not refused."""
+    larger = ["tire.segments=300", "tire.elements_arc=32", "modal.count=20"]
+    wanted = estimate(load(quickstart, larger), until="static")
+    needed, factor = sum(wanted.memory.values()), wanted.memory[demand.FACTOR]
+    assert factor > needed / 4
+    room = (needed - demand.ON_DISK * factor) / demand.DOUBTFUL * 1.01
+    monkeypatch.setattr(demand, "available_memory", lambda: room)
+    assert demand.out_of_core(wanted, 1)
+    (warning,) = (one for one in demand.check_demand(wanted, tmp_path) if "memory" in one)
+    assert "MUMPS out of core" in warning
+    monkeypatch.setattr(demand, "available_memory", lambda: 2 * needed)
+    assert not demand.out_of_core(wanted, 1)
+
+
+def test_a_factor_on_disk_is_a_factor(tmp_path: Path, launch) -> None:
+    """In a process of its own: PETSc's options stay as they are to its end."""
+    script = tmp_path / "on_disk.py"
+    script.write_text(ON_DISK.format(folder=str(tmp_path)))
+    done = launch(script)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["1", "True", "True"]
 
 
 def test_the_disk_is_that_of_the_result_folder(quickstart, monkeypatch, tmp_path) -> None:

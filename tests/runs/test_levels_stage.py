@@ -32,7 +32,7 @@ def history() -> ContactHistory:
 
 
 def test_every_quantity_has_its_level_weighted_and_not(history: ContactHistory) -> None:
-    found = levels.told(history, 0, 400.0)
+    found = levels.levels_of(history, 0, 400.0)
     band = list(found["third_octave/nominal"]).index(100.0)
     for name, exact in (
         ("contact_level", 20 * np.log10(2 / np.sqrt(2))),
@@ -50,7 +50,7 @@ def test_every_quantity_has_its_level_weighted_and_not(history: ContactHistory) 
 
 
 def test_nothing_is_beyond_the_limit_and_all_is_of_one_length(history: ContactHistory) -> None:
-    found = levels.told(history, 0, 400.0)
+    found = levels.levels_of(history, 0, 400.0)
     assert found["third_octave/centre"][-1] * 10**0.05 <= 400.0
     assert found["density/frequency"][-1] <= 400.0
     for name, values in found.items():
@@ -61,7 +61,7 @@ def test_nothing_is_beyond_the_limit_and_all_is_of_one_length(history: ContactHi
 
 
 def test_stored_and_read_again_with_units(history: ContactHistory, tmp_path: Path) -> None:
-    found = levels.told(history, 0, 400.0)
+    found = levels.levels_of(history, 0, 400.0)
     with h5py.File(tmp_path / "spectra.h5", "w") as file:
         levels.write(file, found)
         assert file["third_octave/point_velocity_level"].attrs["unit"] == "dB re 1 nm/s"
@@ -74,13 +74,13 @@ def test_stored_and_read_again_with_units(history: ContactHistory, tmp_path: Pat
 
 def test_a_record_too_short_for_bands_says_so(history: ContactHistory) -> None:
     record = Record()
-    levels.describe(record, levels.told(history, 9500, 200.0))
+    levels.describe(record, levels.levels_of(history, 9500, 200.0))
     assert record.headline["bands left out, narrower than three lines"][0] == "20 to 160 Hz"
 
 
 def test_sums_have_names_that_do_not_change_with_the_bands(history: ContactHistory) -> None:
     record = Record()
-    levels.describe(record, levels.told(history, 0, 400.0))
+    levels.describe(record, levels.levels_of(history, 0, 400.0))
     assert record.headline["bands"][0].endswith(" to 315 Hz")
     value, unit = record.headline["level of the vertical contact force"]
     assert (value, unit) == (pytest.approx(20 * np.log10(2 / np.sqrt(2)), abs=0.05), "dB re 1 N")

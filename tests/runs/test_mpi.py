@@ -97,7 +97,7 @@ def test_root_tells_all() -> None:
     for error in (InputError("bad key"), ConvergenceError("no luck")):
         with pytest.raises(type(error), match=str(error)):
             mpi.on_root(comm, lambda error=error: fail(error))
-    unexpected = KeyError if comm.rank == 0 else mpi.ToldByRoot
+    unexpected = KeyError if comm.rank == 0 else mpi.FailedOnRoot
     with pytest.raises(unexpected):
         mpi.on_root(comm, lambda: fail(KeyError("odd")))
 

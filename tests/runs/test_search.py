@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.error_bars import ORDERS
+from tireroad.contact.error_bars import orders
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Stopped
@@ -57,7 +57,7 @@ def modelled(scene, settings: Settings) -> Trial:
     """A trial whose errors fall by their orders, and whose seconds are those estimated."""
     first = Ladders.of(scene).first()
     history = {
-        cause: AT_FIRST[cause] * size_ratio(cause, first, settings) ** ORDERS[cause]
+        cause: AT_FIRST[cause] * size_ratio(cause, first, settings) ** orders(settings.order)[cause]
         for cause in CAUSES
     }
     seconds = estimate(applied(scene, settings)).seconds

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from tireroad.runs.process.testing import _chosen
+
 SUITE = """
 import pytest
 from mpi4py import MPI
@@ -31,7 +33,7 @@ def test_last_fails():
 def run(launch, folder: Path, text: str, *arguments: str):
     file = folder / "test_sample.py"
     file.write_text(text)
-    (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n    mpi\n    slow\n")
+    (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n    mpi\n    slow\n    long\n")
     done = launch("-m", "runs", "test", *arguments, file)
     return done, done.stdout.splitlines()[-1]
 
@@ -46,6 +48,14 @@ def test_the_fast_part_is_on_one_process_without_slow_ones(launch, tmp_path: Pat
     slow = "\n@pytest.mark.slow\ndef test_long():\n    assert False\n"
     done, last = run(launch, tmp_path, SUITE + slow, "--fast")
     assert (done.returncode, last) == (0, "1 passed, 0 failed, 1 skipped")
+
+
+def test_long_ones_run_when_all_or_they_are_asked_for() -> None:
+    assert _chosen(["-x"]) == (["-m", "not long", "-x"], (1, 2, 3))
+    assert _chosen(["--all", "-x"]) == (["-x"], (1, 2, 3))
+    assert _chosen(["tests/fem"]) == (["tests/fem"], (1, 2, 3))
+    assert _chosen(["-m", "long"]) == (["-m", "long"], (1, 2, 3))
+    assert _chosen(["--fast"])[1] == (1,)
 
 
 @pytest.mark.slow

@@ -83,7 +83,7 @@ class LaserFile(Levelled):
             how = f"across an isotropic random surface as rough as the line, which is its middle (seed {self.seed})"
         x: Array = np.float64(pitch) * np.arange(len(profile))
         road = Grid(x, y, z, end=self.end, source=source)
-        road.notes = (sound.told, f"extended to {self.width:g} m: {how}")
+        road.notes = (sound.summary, f"extended to {self.width:g} m: {how}")
         return road
 
     def _read(self, path: Path, source: str) -> _Line:

@@ -31,7 +31,7 @@ class Cleaned:
     longest: float
 
     @property
-    def told(self) -> str:
+    def summary(self) -> str:
         """What was done, in a line."""
         count = len(self.profile)
         lost = 100 * (self.missing + self.outliers) / count

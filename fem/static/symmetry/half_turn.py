@@ -48,7 +48,7 @@ def looks_the_same(ring: Ring, rolling: Rolling) -> bool:
 class HalfTurnEquilibrium(Equilibrium):
     """Equilibrium of half of a body's ring, from the lowest point over x > 0 to the highest. Collective.
 
-    The state is `body.u` of its own `body`; the loads asked for and told are the whole tire's.
+    The state is `body.u` of its own `body`; loads asked for and returned are the whole tire's.
     """
 
     def __init__(self, whole: Body, rolling: Rolling) -> None:

@@ -1,17 +1,24 @@
-"""The cases on which estimated errors and searches are judged: 3 tires, 4 roads, 2 speeds."""
+"""The cases on which estimated errors and searches are judged: 3 tires, 4 roads, 2 speeds; and far finer runs of them,
+whose forces are kept, so that a bench goes on where it was stopped and another one shares them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 from mpi4py import MPI
 
 from tireroad.runs.files.cache import NO_CACHE, Cache
+from tireroad.runs.files.disk import replacing
 from tireroad.runs.process import observe
+from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.pipeline import Finished, run_scene
 
@@ -35,6 +42,18 @@ ROADS = {
     "cobblestones": 'kind = "cobblestones"\njoint_depth = 0.003\nheight_scatter = 0.0002',
 }
 SPEEDS = (30.0, 60.0)  # rad/s
+DURATION = 0.16  # s
+# Finer than any setting that is judged, and than its companions: elements at the footprint half as long as those of
+# 18 x 8, of order 3, and points nearer to each other than half of 8 mm.
+FINE: dict[str, Any] = {
+    "segments": 30,
+    "arc": 12,
+    "order": 3,
+    "footprint": 0.2,
+    "modes": 200,
+    "pitch": 0.003,
+    "step": 1e-4,
+}
 # m, of the patch: the same on every road, so that what comes before the loop is shared
 REACH = 0.012
 SCENE = """
@@ -51,6 +70,8 @@ error_estimate = false
 mass = 300.0
 [rotation]
 speed = {speed}
+[greens]
+residual = "{residual}"
 [contact]
 youngs_modulus = 1e7
 reach = {reach}
@@ -87,6 +108,8 @@ class Case:
             cords=BELTS if self.tire == "belted" else "",
             road=ROADS[self.road],
             speed=self.speed,
+            # rolling belts couple kept modes with the rest (docs/method.md)
+            residual="attachment" if self.tire == "belted" else "static",
             reach=REACH,
             duration=duration,
         )
@@ -97,27 +120,57 @@ class Case:
 CASES = tuple(Case(*one) for one in product(TIRES, ROADS, SPEEDS))
 
 
+def by_wheel(cases: Iterable[Case]) -> list[Case]:
+    """Cases of one wheel, which share their stages, after each other."""
+    return sorted(cases, key=lambda case: (list(TIRES).index(case.tire), case.speed))
+
+
 def sets(
-    *, segments: int, arc: int, order: int, modes: int, pitch: float, step: float
+    *,
+    segments: int,
+    arc: int,
+    order: int,
+    modes: int,
+    pitch: float,
+    step: float,
+    footprint: float = 0.25,
 ) -> tuple[str, ...]:
     """Settings of mesh, modes, points and step as of --set."""
     return (
         f"tire.segments={segments}",
         f"tire.elements_arc={arc}",
         f"tire.order={order}",
+        f"tire.footprint_size={footprint}",
         f"modal.count={modes}",
         f"contact.points={{ dx = {pitch}, dy = {pitch} }}",
         f"time.step={step}",
     )
 
 
-@dataclass(frozen=True)
-class Driven:
-    """What a run left: its products, and the `total_force` and `axle_force` (n, 3) N."""
+def told_settings(keys: dict) -> str:
+    """Settings as of `sets` in words."""
+    return (
+        f"{keys['segments']} x {keys['arc']} elements of order {keys['order']}, {keys['modes']} modes, points "
+        f"{1e3 * keys['pitch']:g} mm apart, steps of {1e3 * keys['step']:g} ms"
+    )
 
-    done: Finished
+
+NAMES = ("total_force", "axle_force")
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """The `total_force` and `axle_force` (n, 3) N of a run after each of its steps of `step` s."""
+
     forces: dict[str, np.ndarray]
     step: float
+
+
+@dataclass(frozen=True)
+class Driven(Recorded):
+    """What a run left: its products and forces."""
+
+    done: Finished
 
 
 def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> Driven:
@@ -134,5 +187,20 @@ def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> D
             cache=cache,
         )
     with h5py.File(folder / "contact.h5") as file:
-        forces = {name: file[name][:] for name in ("total_force", "axle_force")}
-    return Driven(done, forces, done.done["contact"].product.step)
+        forces = {name: file[name][:] for name in NAMES}
+    return Driven(forces, done.done["contact"].product.step, done)
+
+
+def recorded(scene: Scene, folder: Path, kept: Path, cache: Cache = NO_CACHE) -> Recorded:
+    """The forces of a run in the folder, from the folder `kept` where a bench left those of the same scene: by
+    whatever state of the program, until they are removed there. On one process."""
+    bare = replace(scene, accuracy=Accuracy(estimate=False))
+    file = kept / f"{hashlib.sha256(dumps(bare).encode()).hexdigest()[:16]}.npz"
+    if not file.exists():
+        run = driven(bare, folder, "contact", cache)
+        kept.mkdir(parents=True, exist_ok=True)
+        with replacing(file) as part, part.open("wb") as opened:
+            forces = [run.forces[name] for name in NAMES]
+            np.savez_compressed(opened, step=run.step, forces=np.array(forces))
+    with np.load(file) as found:
+        return Recorded(dict(zip(NAMES, found["forces"], strict=True)), float(found["step"]))

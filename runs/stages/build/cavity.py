@@ -1,4 +1,4 @@
-"""The air in the tire of a run: made at the static state, stored beside the modes, told in figures."""
+"""The air in the tire of a run: made at the static state, stored beside the modes, summed up in figures."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.friction import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.free_rolling import free_slip
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response
 from tireroad.runs.stages.build.point_forces import directions, histories
 from tireroad.runs.stages.job import Job
@@ -90,7 +90,9 @@ def forces(
 
     `scheme` "linear" or "constant". ConvergenceError where the road touches beyond the patch.
     """
-    tire = Recursion(response=response.resolved(step), step=step, scheme=scheme, comm=job.comm)
+    kept = response.resolved(step)
+    comm = sharers(kept, job.comm)
+    tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm)
     loop = make_loop(job.scene.contact, setup, driven_tire(job, tire, step, steps) or tire, step)
     contact, axle = np.zeros((2, steps, 3))
     given = setup.patch, setup.drive, step, steps

@@ -30,10 +30,10 @@ def chosen_scheme(
         chosen = Chosen(wanted, f'time.scheme = "{wanted}"')
     elif begun == "constant" and chosen.scheme != begun:
         chosen = Chosen(*WATCHED)
-    return told(record, chosen)
+    return reported(record, chosen)
 
 
-def told(record: Record, chosen: Chosen) -> Chosen:
+def reported(record: Record, chosen: Chosen) -> Chosen:
     """The choice, shown and kept in the record."""
     observe.say(f"  scheme {chosen.scheme}: {chosen.reason}")
     record.indicators["reason for the scheme"] = (chosen.reason, "-")

@@ -8,7 +8,7 @@ import numpy as np
 
 from tireroad.contact.steps import equal_steps, steps_of
 from tireroad.greens.convolution import Convolution
-from tireroad.greens.recursion import Recursion
+from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.contact import Time
@@ -82,7 +82,10 @@ def integration(job: Job, plan: Planned, scheme: str) -> Integration:
     if scheme == "convolution":
         tire = Convolution(response=plan.response, step=plan.step, steps=plan.steps)
     else:
-        tire = Recursion(response=plan.response, step=plan.step, scheme=scheme, comm=job.comm)
+        comm = sharers(plan.response, job.comm)
+        tire = Recursion(response=plan.response, step=plan.step, scheme=scheme, comm=comm)
+        if comm.size < job.comm.size:
+            observe.say("  each process takes the whole loop: too small to share out")
     return Integration(tire, plan.step, plan.steps, scheme)
 
 

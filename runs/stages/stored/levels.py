@@ -49,7 +49,7 @@ def series(history: ContactHistory, start: int) -> dict[str, np.ndarray]:
     return {name: values[start:] for name, values in found.items() if values is not None}
 
 
-def told(history: ContactHistory, start: int, up_to: float) -> dict[str, np.ndarray]:
+def levels_of(history: ContactHistory, start: int, up_to: float) -> dict[str, np.ndarray]:
     """All of `UNITS` that the history has, after the run-in and below `up_to` Hz, by their names in spectra.h5.
 
     Levels (b, 3), of points (b, k, 3), dB of the root mean square; `…_a_weighted` of the same, each line weighted;

@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
 
+from tireroad.fem.garbage import collect
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
@@ -36,6 +37,7 @@ def obtained(stage: Stage) -> Obtained:
             observe.say(f"{name:9s} computed anew: {path.name} is there, but {reason}")
         record = Record()
         product = stage.produce(key, record)
+        collect(job.comm)
         figures = vars(record).copy()
         on_root(job.comm, lambda: job.cache.keep(name, key, path, figures))
     return Obtained(done=Done(key, lambda: product), record=record)

@@ -1,4 +1,4 @@
-"""What is kept and told of the road that was driven over: its texture, and what was done to a measurement."""
+"""What is kept and reported of the road that was driven over: its texture, and what was done to a measurement."""
 
 from __future__ import annotations
 

@@ -1,0 +1,58 @@
+"""Products of a sparse matrix that is spread over processes with very sparse ones that each process has whole."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
+
+
+def congruent(matrix: PETSc.Mat, basis: sparse.csr_matrix) -> PETSc.Mat:
+    """B^T A B of a real basis (n, d) that every process has, spread by rows. Collective."""
+    size, columns = basis.shape
+    start, end = matrix.getOwnershipRange()
+    own = basis[start:end]
+    across = end - start if columns == size else PETSc.DECIDE  # as A is spread, where it can be
+    spread = PETSc.Mat().createAIJ(
+        ((end - start, size), (across, columns)),
+        csr=(_index(own.indptr), _index(own.indices), own.data),
+        comm=matrix.comm,
+    )
+    product = matrix.ptap(spread)
+    spread.destroy()
+    return product
+
+
+def rows_of(matrix: PETSc.Mat, wanted: np.ndarray) -> sparse.csr_matrix:
+    """Rows (k, n) of the matrix by their numbers, ascending, other ones on each process. Collective."""
+    rows = PETSc.IS().createGeneral(_index(np.asarray(wanted)), comm=PETSc.COMM_SELF)
+    every = PETSc.IS().createStride(matrix.getSize()[1], first=0, step=1, comm=PETSc.COMM_SELF)
+    (found,) = matrix.createSubMatrices(rows, every)
+    indptr, indices, values = found.getValuesCSR()
+    size = found.getSize()
+    for one in (rows, every, found):
+        one.destroy()
+    return sparse.csr_matrix((values, indices, indptr), size)
+
+
+def largest_entry(matrix: PETSc.Mat) -> float:
+    """In size. Collective."""
+    values = matrix.getValuesCSR()[2]
+    return matrix.comm.tompi4py().allreduce(float(np.abs(values).max(initial=0.0)), MPI.MAX)
+
+
+def row_sum(matrix: PETSc.Mat) -> float:
+    """Largest sum of the sizes of a row's entries: no eigenvalue of a symmetric matrix is larger. Collective."""
+    return float(matrix.norm(PETSc.NormType.NORM_INFINITY))
+
+
+def less(matrix: PETSc.Mat, other: PETSc.Mat) -> PETSc.Mat:
+    """A - B. Collective."""
+    difference = matrix.copy()
+    difference.axpy(-1.0, other, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    return difference
+
+
+def _index(values: np.ndarray) -> np.ndarray:
+    return values.astype(PETSc.IntType, copy=False)

@@ -1,0 +1,117 @@
+"""Figures of rolling with their true and their estimated errors, and tables of how good the estimates are."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from tireroad.runs.measure.tabulate import Table
+
+RANGE, ASKED = (0.5, 2.0), 80.0  # effectivity; % of the cases in it
+SMALL = {
+    "mean": 1e-4,
+    "deviation": 1e-3,
+    "history": 0.1,
+    "level": 0.02,
+}  # of the load, of the deviation, %, dB: below, no error
+ALL = "all"  # causes together
+FORCES = {"contact_force": "total_force", "axle_force": "axle_force"}
+
+
+@dataclass(frozen=True)
+class Effectivity:
+    """A figure of a case with its true and its estimated error (N, % or dB), by one `cause` or all."""
+
+    case: str
+    force: str
+    cause: str
+    figure: str
+    true: float
+    estimated: float
+    small: float
+
+    @property
+    def kind(self) -> str:
+        """Third octaves are one kind."""
+        return self.figure if self.figure in SMALL else "third octaves"
+
+    @property
+    def good(self) -> bool:
+        """Within `RANGE`, or both too small to matter."""
+        if max(self.true, self.estimated) <= self.small:
+            return True
+        return RANGE[0] * self.true <= self.estimated <= RANGE[1] * self.true
+
+
+def _judgement(some: list[Effectivity]) -> list[float]:
+    """Number, share that is good (%), median and tenths of estimated over true where there is an error."""
+    ratio = [one.estimated / one.true for one in some if one.true > one.small] or [float("nan")]
+    good = 100 * float(np.mean([one.good for one in some]))
+    return [len(some), good, *map(float, np.quantile(ratio, [0.5, 0.1, 0.9]))]
+
+
+_JUDGED = [
+    ("figures", "-"),
+    (f"within {RANGE[0]:g} to {RANGE[1]:g}", "%"),
+    ("median", "-"),
+    ("a tenth below", "-"),
+    ("a tenth above", "-"),
+]
+
+
+def shares(found: list[Effectivity], note: str) -> Table:
+    """All causes together; `note` says what of and against what."""
+    some = [one for one in found if one.cause == ALL]
+    kinds = ("mean", "deviation", "history", "third octaves")
+    parts = {kind: [one for one in some if one.kind == kind] for kind in kinds}
+    rows = [[kind, *_judgement(part)] for kind, part in parts.items() if part]
+    return Table(
+        "Error bars: estimated over true error",
+        [("figure", ""), *_JUDGED],
+        [*rows, ["all", *_judgement(some)]],
+        [
+            f"{len({one.case for one in found})} cases; asked: {ASKED:g} % within. {note} Where both are below {SMALL['mean']:g} of the load, {SMALL['deviation']:g} of the "
+            f"deviation, {SMALL['history']:g} % of the history or {SMALL['level']:g} dB a figure counts as good.",
+        ],
+    )
+
+
+def by_cause(found: list[Effectivity]) -> Table:
+    """Each cause by itself."""
+    rows = []
+    for cause in dict.fromkeys(one.cause for one in found if one.cause != ALL):
+        for force in FORCES:
+            for kind in dict.fromkeys(one.kind for one in found):
+                where = (cause, force, kind)
+                some = [one for one in found if (one.cause, one.force, one.kind) == where]
+                if some:
+                    rows.append([cause, force.replace("_", " "), kind, *_judgement(some)])
+    return Table(
+        "By cause", [("cause", ""), ("force", ""), ("figure", ""), *_JUDGED], rows, [_PAIRS]
+    )
+
+
+_PAIRS = (
+    "True: of two runs that differ in the cause alone, the finer as fine in it as the reference; of the mesh both "
+    "with the modes of the reference."
+)
+
+
+def every(found: list[Effectivity]) -> Table:
+    """Each figure of all causes together, and the history by each."""
+    columns = [
+        ("case", ""),
+        ("force", ""),
+        ("cause", ""),
+        ("figure", ""),
+        ("true", "N, % or dB"),
+        ("estimated", "N, % or dB"),
+        ("good", ""),
+    ]
+    rows = [
+        [*list(asdict(one).values())[:-1], one.good]
+        for one in found
+        if one.cause == ALL or one.figure == "history"
+    ]
+    return Table("Every figure", columns, rows)

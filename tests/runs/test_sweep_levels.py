@@ -1,0 +1,64 @@
+"""Levels of a sweep: averaged over seeds, in dB of the first, with how sure that is."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tireroad.runs.sweep.gather import Column, Gathered
+from tireroad.runs.sweep.levels import levels
+from tireroad.runs.sweep.page import _figures
+
+LOUD = np.array([[0.0, 10.0], [1.0, 12.0], [-1.0, 11.0], [0.5, 10.5]])
+
+
+def table(settings: dict, level: np.ndarray, error: np.ndarray | None) -> Gathered:
+    """Of members with two bands."""
+    bands = "100 Hz", "125 Hz"
+    columns = [
+        Column(f"axle force z, {band}", "dB re 1 N", level[:, k]) for k, band in enumerate(bands)
+    ]
+    if error is not None:
+        columns += [
+            Column(f"error of the axle force z, {band}", "dB", error[:, k])
+            for k, band in enumerate(bands)
+        ]
+    names = tuple(f"m{k}" for k in range(len(level)))
+    return Gathered(names, settings, tuple(columns), ())
+
+
+def test_seeds_are_samples_of_one_road() -> None:
+    """Mean power and its confidence, against scipy's interval of the mean; 3 dB more is 3 dB more."""
+    level = np.vstack([LOUD, LOUD + 3.0])
+    given = {"rotation.speed": (30.0,) * 4 + (60.0,) * 4, "road.seed": (1, 2, 3, 4) * 2}
+    found = levels(table(given, level, None))
+    assert found.names == ("rotation.speed = 30.0", "rotation.speed = 60.0")
+    assert found.seeds == (4, 4)
+    power = 10 ** (LOUD / 10)
+    np.testing.assert_allclose(found.level[0], 10 * np.log10(power.mean(axis=0)))
+    top = stats.t.interval(0.95, 3, power.mean(axis=0), stats.sem(power, axis=0))[1]
+    np.testing.assert_allclose(found.level[0] + found.error[0], 10 * np.log10(top))
+    apart, sure = found.differences()
+    np.testing.assert_allclose(apart, 3.0)
+    np.testing.assert_allclose(sure[0], np.sqrt(2) * found.error[0])
+
+
+def test_what_runs_tell_of_their_errors_adds_up() -> None:
+    error = np.array([[0.3, np.nan], [0.4, np.nan]])
+    found = levels(table({"static.load": (1.0, 2.0)}, LOUD[:2], error))
+    apart, sure = found.differences()
+    np.testing.assert_allclose(apart, LOUD[1:2] - LOUD[:1])
+    assert sure[0, 0] == pytest.approx(0.5) and np.isnan(sure[0, 1])
+
+
+def test_a_member_without_results_is_left_out_of_the_mean() -> None:
+    level = LOUD.copy()
+    level[1] = np.nan
+    found = levels(table({"road.seed": (1, 2, 3, 4)}, level, None))
+    kept = 10 ** (LOUD[[0, 2, 3]] / 10)
+    np.testing.assert_allclose(found.level[0], 10 * np.log10(kept.mean(axis=0)))
+    assert levels(Gathered(("a",), {}, (), ())) is None
+
+
+def test_the_page_draws_the_differences() -> None:
+    shown = _figures(table({"static.load": (1.0, 2.0, 3.0, 4.0)}, LOUD, None))
+    assert any("difference from the first" in text for _, text in shown)
