@@ -75,7 +75,7 @@ def run() -> list[Table]:
 def _law(name: str, given: Prepared, tread: str, **keys: float) -> Told:
     """The time loop with that tread law."""
     run = given.run
-    spec = replace(given.trial.spec, tread=tread, law=TREADS.make(tread, **keys))
+    spec = replace(given.run.job.scene.contact, tread=tread, law=TREADS.make(tread, **keys))
     setup, _ = run.setup.settled(run.greens.contact, run.static.normal_force, spec)
     trial = Trial(spec, setup, DURATION)
     history = modal(Prepared(run, trial), run.greens.contact, STEP)
@@ -91,7 +91,7 @@ def _wedges(given: Prepared, states: list[StaticState]) -> Told:
     places = np.broadcast_to(tire.x[:, None], tire.y.shape)
     began, force = time.process_time(), []
     for k in range(1, round(DURATION / STEP) + 1):
-        road = setup.road.height(places + setup.rolled.speed * STEP * k, tire.y)
+        road = setup.road.height(np.asarray(places + setup.rolled.speed * STEP * k), tire.y)
         force.append(tire.force(road + rise, table))
     name = f"Mancosu and Minen: wedges, look-up within {100 * table.scatter:.2g} %"
     return Told(name, np.array(force), time.process_time() - began)
@@ -158,7 +158,7 @@ def _asperities(given: Prepared) -> Told:
     """By the statistics of the road's own middle line."""
     setup, static = given.trial.setup, given.run.static
     pitch = 0.25 * setup.road.spacing
-    line = setup.patch.extent[1] + np.arange(
+    line: np.ndarray = setup.patch.extent[1] + np.arange(
         0.0, setup.rolled.travel - setup.patch.extent[1], pitch
     )
     road = asperities(setup.road.height(line, 0 * line), pitch)
@@ -176,7 +176,7 @@ def _asperities(given: Prepared) -> Told:
     )
     began = time.process_time()
     way = setup.rolled.speed * STEP * (np.arange(round(DURATION / STEP)) + 1)
-    force = springs.forces(way)
+    force = springs.forces(np.asarray(way))
     name = (
         f"Fujikawa: asperities {1e3 * road.spacing:.2g} mm apart, of {1e3 * road.radius:.2g} mm radius, "
         f"{1e3 * road.unevenness:.2g} mm uneven"
