@@ -67,6 +67,11 @@ class Journal:
         return []
 
 
+def read_trials(path: Path) -> list[Trial]:
+    """All trials that a file holds, whatever they are of; OSError, ValueError or KeyError where it holds none."""
+    return [_trial(one) for one in json.loads(path.read_text(encoding="utf-8"))["trials"]]
+
+
 def _trial(data: dict[str, Any]) -> Trial:
     settings = data["settings"] | {"mesh": tuple(data["settings"]["mesh"])}
     found = data["found"]

@@ -39,6 +39,10 @@ def spectra(results: Results) -> Section:
         if value is not None:
             section.facts.append((name, quantity(value, unit)))
     octaves(results, section, of)
+    if (results.directory / "search.json").is_file():  # what reads it loads all stages
+        from tireroad.runs.report.sections import search
+
+        search.add(results, section)
     section.show(
         figures.spectrum(frequency, force, of), "Amplitude spectrum.", _lines(frequency, force, of)
     )
