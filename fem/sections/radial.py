@@ -20,21 +20,21 @@ POLYESTER = {
     "density": 1380.0,
     "compression": 0.1,
 }
-BELT_ANGLE = np.radians(24)
+BELT_ANGLE = np.radians(22)
 
 # E Pa, Poisson's ratio, kg/m3, dynamic over static modulus, loss factor.
 COMPOUNDS = {
-    "tread": (4.2e6, 0.49, 850.0, 1.5, 0.25),
-    "skim": (9.0e6, 0.49, 1200.0, 1.5, 0.15),
-    "ply": (4.6e6, 0.49, 1150.0, 1.5, 0.15),
-    "sidewall": (3.2e6, 0.49, 1120.0, 1.5, 0.15),
-    "apex": (40e6, 0.49, 1200.0, 1.5, 0.15),
+    "tread": (6.3e6, 0.49, 900.0, 1.15, 0.25),
+    "skim": (11.7e6, 0.49, 1200.0, 1.15, 0.15),
+    "ply": (6.0e6, 0.49, 1150.0, 1.15, 0.15),
+    "sidewall": (5.0e6, 0.49, 1120.0, 1.15, 0.15),
+    "apex": (52e6, 0.49, 1200.0, 1.15, 0.15),
     "bead": (400e6, 0.49, 2200.0, 1.0, 0.05),
 }
 
 FLANGE = 0.016  # m above the rim: from there down the rim holds the tire
-RIM, WIDEST, APEX = 0.40, 0.55, 0.8
-FALL = 0.03
+RIM, WIDEST, APEX = 0.39, 0.60, 1.0
+FALL, TREAD, SHOULDER = 0.03, 0.29, 0.11
 LEAST_HEIGHT = 0.055  # m of a section: below, no sidewall is left above the flange
 
 
@@ -99,9 +99,9 @@ def _layers(at: _Stations) -> tuple[Layer, ...]:
         return Layer(name, compound, tuple(zip(places, np.multiply(1e-3, values), strict=True)))
 
     return (
-        layer("tread", "tread", 8.0, 8.0, 7.0, 1.7, 2.0, 2.8, 3.0),
-        layer("belt skim", "skim", 1.3, 1.3, 2.0, 0.6, 1.4, 1.8, 2.0),
-        layer("belt base", "skim", 1.5, 1.6, 2.5, 1.0, 3.0, 5.5, 9.0),
+        layer("tread", "tread", 8.0, 8.0, 6.3, 1.7, 2.0, 2.8, 3.0),
+        layer("belt skim", "skim", 1.3, 1.3, 1.8, 0.6, 1.4, 1.8, 2.0),
+        layer("belt base", "skim", 1.5, 1.6, 2.25, 1.0, 3.0, 5.5, 9.0),
         layer("carcass", "ply", 2.0, 2.0, 2.0, 1.7, 1.6, 1.9, 2.0),
     )
 
@@ -114,7 +114,8 @@ def _outline(tire: Size) -> np.ndarray:
     y = flat * np.array([0, 0.25, 0.5, 0.75, 0.92])
     crown = np.stack([top - FALL * upper * (y / flat) ** 2, y], axis=-1)
     middle = np.array([widest, 0.5 * w])
-    above = _leaving(middle, np.array([widest + 0.62 * upper, 0.47 * w]))
+    shoulder = min(flat + SHOULDER * w, 0.47 * w)
+    above = _leaving(middle, np.array([widest + 0.72 * upper, shoulder]))
     lean = min(0.009, 0.044 * w)  # of the flange, outwards
     below = _leaving(middle, np.array([tire.rim + FLANGE, rim + lean]))
     seat = [(tire.rim + FLANGE / 2, rim + lean / 3), (tire.rim, rim)]
@@ -132,7 +133,7 @@ def _leaving(middle: np.ndarray, end: np.ndarray) -> np.ndarray:
 def _flat(tire: Size) -> float:
     """Half width of the tread up to its rounded shoulder, m: low tires have it wider."""
     ratio = tire.height / tire.width
-    return float(np.clip(0.325 + 0.3 * (0.6 - ratio), 0.30, 0.42)) * tire.width
+    return float(np.clip(TREAD + 0.3 * (0.6 - ratio), 0.27, 0.42)) * tire.width
 
 
 def _stations(tire: Size, outline: Outline) -> _Stations:

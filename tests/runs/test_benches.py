@@ -15,7 +15,7 @@ from tireroad.runs.bench import (
     scaling,
     skipping,
 )
-from tireroad.runs.bench.floors import exponent
+from tireroad.runs.bench.parts.floors import exponent
 from tireroad.runs.bench.parts.rolling_cases import Case
 from tireroad.runs.bench.rough_road import Mesh
 from tireroad.runs.measure import tabulate

@@ -46,6 +46,19 @@ def test_quickstart_is_as_measured(quickstart: Path) -> None:
     assert 14.6 / 2 < wanted.disk["contact.h5"] / 1e6 < 14.6 * 2
 
 
+def test_passenger_is_as_measured(root: Path) -> None:
+    """Measured on one process without error bars: 92 s of one core and 1.69 GB; the pivot's matrices are in it."""
+    scene = root / "runs" / "scenes" / "passenger.toml"
+    wanted = estimate(load(scene, ["accuracy.estimate=false"]))
+    assert 92 / 1.6 < sum(wanted.seconds.values()) < 92 * 1.6
+    assert 1.69 / 1.6 < sum(wanted.memory.values()) / 1e9 < 1.69 * 1.6
+    assert wanted.sizes.points == pytest.approx(1631, rel=0.3)
+    product = estimate(load(scene, ["accuracy.estimate=false", 'contact.solver="projected-cg"']))
+    pivoted = wanted
+    matrix = 8.0 * pivoted.sizes.points**2
+    assert pivoted.memory["contact"] - product.memory["contact"] > 3 * matrix
+
+
 def test_modes_below_a_frequency_count(quickstart: Path) -> None:
     """A wall like the quickstart's with c10 = 1.2 MPa was measured to have 523 modes below 500 Hz."""
     soft = ["tire.material.model=yeoh", "tire.material.youngs_modulus=", "tire.material.c10=1.2e6"]

@@ -91,6 +91,43 @@ angle = 30.0
     assert tire.shape.angles(tire)["belt 1"] == 30
 
 
+def test_names_of_parts_are_matched_in_any_case(tmp_path):
+    """Of a radial tire and of a file alike; results carry the section's own spelling."""
+    (tmp_path / "section.toml").write_text(DRAWING)
+    for kind, region, cords in (
+        ('section = "radial"', "TREAD", "Belt 1"),
+        ('file = "section.toml"\nsection = "file"', "RUBBER", "PLY"),
+    ):
+        text = f"""[tire]\n{kind}\n[[tire.region]]\nname = "{region}"\nloss_factor = 0.4
+[[tire.cords]]\nname = "{cords}"\nangle = 30.0\n"""
+        tire = scene(tmp_path, text).tire
+        assert tire.shape.rubbers(tire)[region.lower()].loss_factor == 0.4
+        found = {line.name: line.angle for line in tire.shape.cords(tire)}
+        assert found[cords.lower()] == pytest.approx(np.radians(30))
+        assert tire.shape.angles(tire)[cords.lower()] == 30.0
+
+
+def test_the_ring_of_a_file_is_made_once(tmp_path, monkeypatch):
+    """However often sizes are asked for; anew when the file, the order or the elements change."""
+    from tireroad.runs.scene.sections import own_file
+
+    made = []
+    revolved = own_file._revolved
+    monkeypatch.setattr(own_file, "_revolved", lambda *of: made.append(of) or revolved(*of))
+    drawing = tmp_path / "section.toml"
+    drawing.write_text(DRAWING)
+    text = '[tire]\nsection = "file"\nfile = "section.toml"\n'
+    tire = scene(tmp_path, text).tire
+    for _ in range(3):
+        tire.free_unknowns()
+        tire.proportions()
+    assert len(made) == 1
+    scene(tmp_path, text, "tire.segments=20").tire.ring()
+    assert len(made) == 2
+    drawing.write_text(DRAWING.replace("thickness = 6", "thickness = 7"))
+    assert tire.ring() is not scene(tmp_path, text, "tire.segments=20").tire.ring()
+
+
 def test_a_section_file_is_a_tire(tmp_path):
     """Compounds and cords by name, of the order asked for; the hash changes with the drawing."""
     from tireroad.fem.sections.ring import wall_thickness

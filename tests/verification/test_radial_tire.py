@@ -5,6 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.road_stiffness import road_stiffness
 from tireroad.fem.sections.radial import radial
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.loading import Loader
@@ -23,6 +24,28 @@ def test_first_modes_and_mass_beside_the_public_ones():
     tire = InflatedRing(radial("205/60 R15"), 26, 2, PRESSURE)
     np.testing.assert_allclose(lowest(tire), [42.4, 59.0, 53.5, 77.2], rtol=0.08)
     assert tire.weight == pytest.approx(9.3, rel=0.03)
+
+
+@pytest.mark.slow
+def test_loaded_stiffness_beside_the_public_one(tmp_path):
+    """Loads at 10.5 and 20.3 mm 2000 and 4000 N, the slope between them, longitudinal (358 to 382 N/mm) and lateral
+    stiffness (103 to 158 N/mm) of the stuck footprint: within 10 % on coarse elements.
+    """
+    path = tmp_path / "radial.toml"
+    path.write_text('[tire]\nsection = "radial"\n')
+    mesh = ["tire.segments=14", "tire.elements_arc=14", "tire.footprint_size=0.4"]
+    tire = load(path, mesh).tire
+    body = make_body(MPI.COMM_SELF, tire, tire.ring())
+    loader = Loader(Equilibrium(body), lambda progress: None)
+    loader.inflate(PRESSURE)
+    first, last = [loader.load() for _ in loader.visit((10.5e-3, 20.3e-3))]
+    assert [first, last] == pytest.approx([2000.0, 4000.0], rel=0.1)
+    assert (last - first) / 9.8 == pytest.approx(2000 / 9.8, rel=0.1)
+    force, place = loader.equilibrium.contact_force(), body.lattice.points(body.ids)
+    centre = force @ (place + body.owned(body.u.x.array)) / last
+    stuck = road_stiffness(body, PRESSURE, np.flatnonzero(force > 0), centre)
+    assert stuck.longitudinal == pytest.approx(358e3, rel=0.1)
+    assert 103e3 < stuck.lateral < 158e3
 
 
 @pytest.mark.slow

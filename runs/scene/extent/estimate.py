@@ -19,6 +19,10 @@ DENSE = 1000
 """Contact points up to which a tread's matrix is kept (contact.model.DENSE_POINTS)."""
 BLOCK = 512
 """Steps of contact results held between two writes (stages.stored.contact_file)."""
+MOST = 1000
+"""Touching points up to which "auto" takes the active set (contact.model.MOST_TOUCHING)."""
+PIVOT = 5
+"""Copies of the matrix of the points that touch, while it is pivoted (contact.solver.pivot)."""
 PACKED = 0.3
 """Size of contact.h5 over its numbers: most forces are 0 (measured: 0.24 on stones, 0.29 on texture)."""
 
@@ -77,7 +81,7 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
     unknowns of second order, this gives 88 MB and 211 MB. A turning tire's has both triangles.
     """
     tire, free, count = scene.tire, size.free, size.modes
-    block = 3 * (tire.proportions().through * tire.order + 1)
+    block = _column(scene)
     columns = max(free / block, 2.0)
     parts = {
         "program": PROGRAM,
@@ -109,18 +113,27 @@ def _each_step(scene: Scene, points: int) -> int:
 def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
     directions = 3 if scene.contact.rubs else 1
     loads = directions * size.nodes
-    grid = scene.contact.points != "nodes" and size.points > DENSE
     parts = {
         "flexibility of the patch": 8.0 * 2 * size.free * loads,
         "contact": 16.0 * 4 * loads * 2 * size.modes
         + 8.0 * 3 * loads**2
-        + (0.0 if grid else 8.0 * 3 * size.points**2)
+        + 8.0 * _matrices_of_points(scene, size) * size.points**2
         + 8.0 * BLOCK * size.points * (3 + directions),
         "time series": 8.0 * size.steps * 24,
     }
     if scene.time.scheme == "convolution":
         parts["time series"] += 8.0 * size.steps * loads**2
     return parts
+
+
+def _matrices_of_points(scene: Scene, size: Sizes) -> int:
+    """How many matrices of the contact points there are at once."""
+    if scene.contact.points == "nodes" or size.points <= DENSE:
+        return 3
+    by_product = scene.contact.solver == "projected-cg"
+    if scene.contact.solver == "auto":
+        by_product = size.points > 2 * MOST  # about half of them touch
+    return 0 if by_product else PIVOT
 
 
 def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
@@ -142,19 +155,21 @@ def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, floa
     return parts
 
 
-# Seconds of one core of 2020, measured on the quickstart (27,900 unknowns, 200 modes, 277 nodes) and
-# scaled by the operations that grow fastest.
+# Seconds of one core of 2020, measured on the quickstart (27,900 unknowns, 9 a column of nodes, 200 modes, 277
+# nodes) and scaled by the operations that grow fastest. The passenger tire has 27 a column: each unknown then meets
+# three times as many, which its stages show (36, 15, 12 s where without it 9, 7, 3 s came out).
 def _seconds(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
-    mesh, count = size.free / 27_900, size.modes / 200
-    parts = {"static": 8.0 * mesh**1.2}
+    count = size.modes / 200
+    mesh = (size.free / 27_900) ** 1.2 * _column(scene) / 9
+    parts = {"static": 8.0 * mesh}
     if "modes" not in left_out:
-        parts["modes"] = 7.0 * mesh**1.2 * count
+        parts["modes"] = 7.0 * mesh * count
     if "rotating" not in left_out:
         parts["rotating"] = 0.8 * count**3 * (1 + size.speeds)
     if "contact" not in left_out:
         loads = size.nodes * (3 if scene.contact.rubs else 1)
-        parts["greens"] = 3.0 * mesh**1.2 * loads / 277
-        dense = size.points**2 if size.points <= DENSE else 300 * size.points
+        parts["greens"] = 3.0 * mesh * loads / 277
+        dense = size.points**2 if _matrices_of_points(scene, size) else 300 * size.points
         step = 2e-4 + 1e-9 * (4 * loads * size.modes + dense)
         if scene.time.scheme == "convolution":
             step += 1e-9 * 0.5 * size.steps * loads**2
@@ -162,6 +177,11 @@ def _seconds(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, f
     if "response" not in left_out:
         parts["response"] = size.steps * 2e-5 + size.frequencies * (2e-5 + 5e-8 * size.modes)
     return parts
+
+
+def _column(scene: Scene) -> int:
+    """Unknowns of one column of nodes through the wall."""
+    return 3 * (scene.tire.proportions().through * scene.tire.order + 1)
 
 
 def _columns_coupled(order: int) -> float:

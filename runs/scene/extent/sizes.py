@@ -7,7 +7,10 @@ automatic step resolves. Each is an estimate within a factor of two or so of wha
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from tireroad.fem.errors import InputError
+from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.runs.scene.rules.road import least_travel, made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.scene import Scene
@@ -126,7 +129,7 @@ def road_height(scene: Scene) -> float:
 
 
 def _points(scene: Scene, free: int) -> tuple[int, int]:
-    """Nodes and points of the patch: where a torus is within reach of the road."""
+    """Nodes and points of the patch: where the tire is within reach of the road."""
     if scene.contact is None:
         return 0, 0
     static, contact, mesh = scene.static, scene.contact, scene.tire
@@ -137,7 +140,7 @@ def _points(scene: Scene, free: int) -> tuple[int, int]:
     if static.load is not None and static.inflation > 0:
         # A membrane carries its load by the pressure on the area that is pressed flat.
         deflection = min(static.load / (2 * math.pi * static.inflation * round_), tire.height)
-    area = 2 * math.pi * (reach + deflection) * round_
+    area = _area_within(mesh.ring().section, reach + deflection)
     graded = math.sqrt(mesh.footprint_size)  # the patch reaches beyond the finest elements
     around = 2 * math.pi * tire.outer_radius / (mesh.segments * mesh.order) * graded
     along = 2 * math.radians(tire.half_angle) * tire.height
@@ -145,6 +148,16 @@ def _points(scene: Scene, free: int) -> tuple[int, int]:
     nodes = max(min(int(area / (around * along)), free // 6), 9)
     pitch = contact.points
     return nodes, int(area / (pitch.dx * pitch.dy)) if isinstance(pitch, Pitch) else nodes
+
+
+def _area_within(section: SectionMesh, depth: float) -> float:
+    """Area (m²) of the undeformed outer face that a plane cuts off at a depth (m) below its lowest point.
+
+    2 sqrt(2 r (depth - fall)) of the length at each place across; 2 pi depth sqrt(R r) of a torus.
+    """
+    r, y = section.nodes[section.chain(section.outer)].T
+    chord = 2 * np.sqrt(2 * r * np.clip(depth - (r.max() - r), 0.0, None))
+    return float((np.diff(y) * (chord[1:] + chord[:-1]) / 2).sum())
 
 
 def _steps(scene: Scene, modes: int) -> int:

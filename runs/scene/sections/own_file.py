@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.sections.parts import cords_of, losses_of, region_of
+from tireroad.runs.scene.sections.parts import cords_of, losses_of, region_of, spelt
 
 if TYPE_CHECKING:
     from tireroad.fem.decks.compounds import Rubber
     from tireroad.fem.decks.own import OwnSection, Wishes
+    from tireroad.fem.sections.mesh2d import SectionMesh
+    from tireroad.fem.sections.ring import Ring
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.sections.kinds.file import FileSection
+    from tireroad.runs.scene.tables.tire import Cords as Line
     from tireroad.runs.scene.tables.tire import Tire
 
 
@@ -27,6 +30,16 @@ def _keys(tire: Tire) -> FileSection:
 
 def own_section(tire: Tire) -> OwnSection:
     """The section of the tire's file. InputError, with file and line, for what is wrong in it."""
+    return _read(*_source(tire))
+
+
+def own_ring(tire: Tire) -> Ring:
+    """It in the scene's order and elements around, the same object for the same scene and file."""
+    return _ring(*_source(tire), tire.order, tire.segments, tire.footprint_size)
+
+
+def _source(tire: Tire) -> tuple[Path, int, Wishes]:
+    """The file, when it was changed, and what is asked of it."""
     from tireroad.fem.decks.own import Wishes
 
     keys = _keys(tire)
@@ -40,10 +53,9 @@ def own_section(tire: Tire) -> OwnSection:
         materials=frozenset(r.name for r in tire.region if r.name and r.material is not None),
     )
     try:
-        stamp = path.stat().st_mtime_ns
+        return path, path.stat().st_mtime_ns, wishes
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}") from None
-    return _read(path, stamp, wishes)
 
 
 @lru_cache(maxsize=4)
@@ -51,6 +63,26 @@ def _read(path: Path, _: int, wishes: Wishes) -> OwnSection:
     from tireroad.fem.decks.own import read
 
     return read(path, wishes)
+
+
+@lru_cache(maxsize=4)
+def _ring(
+    path: Path, stamp: int, wishes: Wishes, order: int, segments: int, footprint_size: float
+) -> Ring:
+    mesh = _read(path, stamp, wishes).mesh.of_order(order)
+    return _revolved(mesh, segments, footprint_size)
+
+
+def _revolved(mesh: SectionMesh, segments: int, footprint_size: float) -> Ring:
+    """The section as a ring; half as many elements around make its coarser companion."""
+    from tireroad.fem.sections.ring import revolved
+    from tireroad.fem.sections.torus import LEAST
+
+    def coarser() -> Ring | None:
+        half = segments // 2
+        return _revolved(mesh, half, footprint_size) if half >= LEAST[0] else None
+
+    return revolved(mesh, segments, footprint_size, coarser)
 
 
 def fingerprint(tire: Tire) -> str:
@@ -79,7 +111,7 @@ def check_regions(tire: Tire, own: OwnSection) -> None:
 
 def check_cords(tire: Tire, own: OwnSection) -> None:
     """That every [[tire.cords]] names a line of the file, and every line without data has cords."""
-    for number, cords in enumerate(tire.cords):
+    for number, cords in enumerate(spelt(tire.cords, own.mesh.plies)):
         if cords.name not in own.mesh.plies:
             known = ", ".join(own.mesh.plies) or "none"
             raise InputError(
@@ -116,11 +148,16 @@ def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
     return compound(rubber.model, density, **rubber.coefficients, **change)
 
 
+def given_cords(tire: Tire) -> list[Line]:
+    """The scene's [[tire.cords]] by the names of the file's lines."""
+    return spelt(tire.cords, own_section(tire).mesh.plies)
+
+
 def own_cords(tire: Tire) -> list[Cords]:
     """The cords on the lines of the file: of [[tire.cords]] by name, else of the file."""
     from tireroad.fem.tire.cords import Cords
 
-    given = {cords.name: cords_of(cords) for cords in tire.cords}
+    given = {cords.name: cords_of(cords) for cords in given_cords(tire)}
     found = [
         Cords(**{key: value for key, value in vars(ply).items() if key != "sides"})
         for ply in own_section(tire).plies
@@ -142,7 +179,7 @@ def described(tire: Tire) -> list[str]:
         for ply in own.plies
     ]
     lines += [f"  {note}" for note in own.notes]
-    with_data = {ply.name for ply in own.plies} | {cords.name for cords in tire.cords}
+    with_data = {ply.name for ply in own.plies} | {cords.name for cords in given_cords(tire)}
     lines += [
         f'  line {name}: no cords on it ([[tire.cords]] name = "{name}" lays some)'
         for name in mesh.plies

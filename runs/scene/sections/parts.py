@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +24,12 @@ def cords_of(line: Line) -> Cords:
 
     values = {k: v for k, v in vars(line).items() if k not in ("depth", "arc", "angle")}
     return Cords(angle=float(np.radians(line.angle)), **values)
+
+
+def spelt(lines: Sequence[Line], names: Iterable[str]) -> list[Line]:
+    """The lines of a [[tire.cords]] with the names of the section's plies as the section spells them."""
+    own = {name.upper(): name for name in names}
+    return [replace(line, name=own.get(line.name.upper(), line.name)) for line in lines]
 
 
 def region_of(tire: Tire, name: str) -> Region | None:

@@ -9,15 +9,13 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import choice, filename, flag, text, texts
-from tireroad.fem.sections.ring import Ring, revolved
-from tireroad.fem.sections.torus import LEAST
 from tireroad.runs.scene.sections import own_file
 from tireroad.runs.scene.sections.kind import Proportions, SectionKind, section_kind
 from tireroad.runs.scene.sections.parts import proportions_of
 from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:
-    from tireroad.fem.sections.mesh2d import SectionMesh
+    from tireroad.fem.sections.ring import Ring
     from tireroad.fem.tire.cords import Cords
     from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.tables.tire import Tire
@@ -63,8 +61,7 @@ class FileSection(SectionKind):
         return proportions_of(self.ring(tire), own_file.own_section(tire).mesh)
 
     def ring(self, tire: Tire) -> Ring:
-        mesh = own_file.own_section(tire).mesh.of_order(tire.order)
-        return _revolved(mesh, tire.segments, tire.footprint_size)
+        return own_file.own_ring(tire)
 
     def rubbers(self, tire: Tire) -> dict[str, Material]:
         return own_file.own_materials(tire)
@@ -79,7 +76,8 @@ class FileSection(SectionKind):
 
     def angles(self, tire: Tire) -> dict[str, float]:
         own = own_file.own_section(tire).plies
-        return {ply.name: float(np.degrees(ply.angle)) for ply in own} | super().angles(tire)
+        given = {line.name: line.angle for line in own_file.given_cords(tire)}
+        return {ply.name: float(np.degrees(ply.angle)) for ply in own} | given
 
     def coarser(self, tire: Tire) -> FileSection:
         """The file's elements: there are no others."""
@@ -94,13 +92,3 @@ class FileSection(SectionKind):
 
     def described(self, tire: Tire) -> list[str]:
         return own_file.described(tire)
-
-
-def _revolved(mesh: SectionMesh, segments: int, footprint_size: float) -> Ring:
-    """The section as a ring; half as many elements around make its coarser companion."""
-
-    def coarser() -> Ring | None:
-        half = segments // 2
-        return _revolved(mesh, half, footprint_size) if half >= LEAST[0] else None
-
-    return revolved(mesh, segments, footprint_size, coarser)

@@ -18,6 +18,7 @@ from tireroad.runs.scene.sections.parts import (
     losses_of,
     proportions_of,
     region_of,
+    spelt,
 )
 from tireroad.runs.scene.source import Source
 
@@ -85,7 +86,7 @@ class RadialSection(SectionKind):
     def cords(self, tire: Tire) -> list[Cords]:
         from tireroad.fem.tire.cords import Cords
 
-        changed = {line.name: cords_of(line) for line in tire.cords}
+        changed = {line.name: cords_of(line) for line in self._changed(tire)}
         own = (
             Cords(**{key: value for key, value in vars(line).items() if key not in ("under", "to")})
             for line in built(self.size).cords
@@ -94,7 +95,10 @@ class RadialSection(SectionKind):
 
     def angles(self, tire: Tire) -> dict[str, float]:
         own = {line.name: float(np.degrees(line.angle)) for line in built(self.size).cords}
-        return own | super().angles(tire)
+        return own | {line.name: line.angle for line in self._changed(tire)}
+
+    def _changed(self, tire: Tire) -> list[Line]:
+        return spelt(tire.cords, [line.name for line in built(self.size).cords])
 
     def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
         return FINER
@@ -113,11 +117,13 @@ class RadialSection(SectionKind):
 def _known(table: str, given: Sequence[Region | Line], names: list[str], source: Source) -> None:
     """Note what names no part of the tire, names it twice, or gives a part a place that it has already."""
     default = type(given[0])() if given else None
+    known = {name.upper() for name in names}
     for number, one in enumerate(given):
         path = ("tire", table, str(number))
-        if one.name not in names:
+        own = (one.name or "").upper()
+        if own not in known:
             source.add((*path, "name"), f"must be one of {', '.join(names)} in a radial tire")
-        elif one.name in [other.name for other in given[:number]]:
+        elif own in [(other.name or "").upper() for other in given[:number]]:
             source.add((*path, "name"), f'= "{one.name}" is taken')
         for key in ("arc", "depth", "side"):
             if getattr(one, key, None) != getattr(default, key, None):
