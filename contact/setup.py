@@ -66,14 +66,16 @@ class Rolled:
 @dataclass(frozen=True, kw_only=True)
 class ContactSetup:
     """The `patch` of points whose static gap is within `reach` (m), the strip of `road` under it, and the `slip`
-    of the wheel, (s_x, s_y) or (c, 2), as contact.tread.brush has it."""
+    (s_x, s_y) of the wheel, as contact.tread.brush has it, with that of the static shape at the outer face's nodes,
+    `shape_slip` (s, 2), where bristles feel it."""
 
     patch: Patch
     reach: float
     road: PreparedRoad
     rolled: Rolled
     pattern: Pattern | None = None
-    slip: np.ndarray | tuple[float, float] = (0.0, 0.0)
+    slip: tuple[float, float] = (0.0, 0.0)
+    shape_slip: np.ndarray | None = None
 
     @property
     def drive(self) -> Drive:
@@ -116,6 +118,14 @@ class ContactSetup:
         x0, x1, y0, y1 = self.patch.extent
         strip = x0, x1 + self.rolled.travel, y0, y1
         return self.road.highest(*strip) - self.road.lowest(*strip)
+
+    @property
+    def slips(self) -> np.ndarray:
+        """Slip (2,) of the wheel, or (c, 2) at the points."""
+        if self.shape_slip is None:
+            return np.array(self.slip)
+        nodes, weights = self.shape_slip[self.patch.index], self.patch.weights
+        return self.slip + (nodes if weights is None else weights @ nodes)
 
     def smooth(self, duration: float) -> ContactSetup:
         """The same on a road without heights, at rest, for `duration` s; a slick."""
@@ -161,7 +171,7 @@ def contact_setup(
         assert face.road_height is not None, "contact needs a tire that stands on a road"
         surface = TreadSurface(lattice, face.seen)
         patch = make_grid_patch(surface, face.road_height, patch, spacing, reach)
-    patch = _on_shape(patch, face.road)
+    patch = on_shape(patch, face.road)
     if pattern is not None:
         pattern.land(patch.points[~patch.edge, 1])
     under = _under(road, patch, rolled)
@@ -173,7 +183,7 @@ def _nodes(face: OuterFace, reach: float) -> Patch:
     return make_patch(face.seen, *given)
 
 
-def _on_shape(patch: Patch, road: RoadShape) -> Patch:
+def on_shape(patch: Patch, road: RoadShape) -> Patch:
     """The patch with its points where they are, and gaps, forces and motions counted along the road's normal."""
     if road.flat:
         return patch

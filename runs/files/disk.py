@@ -14,7 +14,11 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG}
 
 
-def explained(error: BaseException, path: Path | str) -> InputError | None:
+class Refused(InputError):
+    """A disk that takes no more while the program runs: exit status 3, what is finished is kept."""
+
+
+def explained(error: BaseException, path: Path | str) -> Refused | None:
     """A full disk or a refused write as one message, or None when it is neither.
 
     HDF5 reports the operating system's error inside its own text, hence the search.
@@ -27,7 +31,7 @@ def explained(error: BaseException, path: Path | str) -> InputError | None:
         reason = "the folder is not writable: choose another with --out"
     else:
         return None
-    return InputError(f"{path}: cannot be written, {reason}; what was there before is kept")
+    return Refused(f"{path}: cannot be written, {reason}; what was there before is kept")
 
 
 def _sync(path: Path) -> None:

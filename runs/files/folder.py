@@ -148,9 +148,10 @@ def _check_purpose(directory: Path) -> None:
 def _unusable(directory: Path, error: OSError) -> InputError:
     if isinstance(error, FileExistsError | NotADirectoryError):
         return InputError(f"{directory}: is not a folder; choose another with --out")
-    return explained(error, directory) or InputError(
+    clear = explained(error, directory) or (
         f"{directory}: cannot be written: {error.strerror}; choose another with --out"
     )
+    return InputError(str(clear))
 
 
 class Summary:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from tireroad.fem import parallel
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.parallel import FailedOnRoot
-from tireroad.runs.files.disk import Removed, explained
+from tireroad.runs.files.disk import Refused, Removed, explained
 from tireroad.runs.process.packages import missing
 from tireroad.runs.process.signals import STOP_SIGNALS, Stopped, raised
 from tireroad.runs.process.statuses import BUG, DONE, GAVE_UP, INPUT, STOPPED
@@ -48,10 +48,10 @@ def judged(function: Callable[[], None]) -> tuple[int, str]:
 def _judged(function: Callable[[], None]) -> tuple[int, str]:
     try:
         function()
+    except (ConvergenceError, Removed, Refused) as error:
+        return GAVE_UP, f"error: {error}"
     except InputError as error:
         return INPUT, f"error: {error}"
-    except (ConvergenceError, Removed) as error:
-        return GAVE_UP, f"error: {error}"
     except Stopped as stop:
         return (
             STOPPED,
@@ -66,7 +66,7 @@ def _judged(function: Callable[[], None]) -> tuple[int, str]:
         return (INPUT, message) if message else (BUG, traceback.format_exc())
     except Exception as error:
         clear = explained(error, getattr(error, "filename", None) or "the result folder")
-        return (INPUT, f"error: {clear}") if clear else (BUG, traceback.format_exc())
+        return (GAVE_UP, f"error: {clear}") if clear else (BUG, traceback.format_exc())
     return DONE, ""
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from tireroad.contact.chatter import choose, oscillation
 from tireroad.contact.error_bars import orders, share
 from tireroad.contact.respaced import halved, ratio, thinned
-from tireroad.contact.setup import ContactSetup
+from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.carried_over import carried_over
 from tireroad.fem.static.state import StaticState
@@ -136,6 +136,7 @@ def other_points(given: Given) -> Forces:
         height = given.static.product.road_height
         assert height is not None
         patch = halved(patch, surface, height, given.setup.reach)
+        patch = on_shape(patch, given.static.product.road)
     setup = replace(given.setup, patch=patch)
     setup = settled(job, setup, given.response, given.static.product.normal_force)
     return given.of(job).repeated(setup, given.response)

@@ -57,3 +57,28 @@ def test_bristles_sum_up_the_slip_of_their_way() -> None:
         brush.take(-past, np.zeros((201, 2)), share >= 0)
     expected = -c * (a**2 - x**2) / 2
     assert brush.deflection[:, 0] == pytest.approx(expected, abs=0.03 * np.abs(expected).max())
+
+
+def test_slips_follow_the_points_whatever_grid_they_are_on() -> None:
+    """The shape's slip belongs to nodes: another grid on the same nodes, as error bars take, reads its own."""
+    from dataclasses import dataclass
+
+    from scipy import sparse
+
+    from tireroad.contact.setup import ContactSetup
+
+    @dataclass
+    class Points:
+        index: np.ndarray
+        weights: object
+
+    nodes = np.stack([np.arange(6.0), -np.arange(6.0)], axis=-1)
+    given = {"reach": 1.0, "road": None, "rolled": None, "slip": (0.5, 0.25)}
+    halves = sparse.csr_matrix(np.array([[0.5, 0.5], [0.0, 1.0], [1.0, 0.0]]))
+    fine = ContactSetup(patch=Points(np.array([2, 4]), halves), shape_slip=nodes, **given)
+    assert fine.slips == pytest.approx(np.array([[3.5, -2.75], [4.5, -3.75], [2.5, -1.75]]))
+    on_nodes = ContactSetup(patch=Points(np.array([1, 3]), None), shape_slip=nodes, **given)
+    assert on_nodes.slips == pytest.approx(np.array([[1.5, -0.75], [3.5, -2.75]]))
+    assert ContactSetup(patch=Points(np.array([1]), None), **given).slips == pytest.approx(
+        [0.5, 0.25]
+    )

@@ -15,13 +15,14 @@ from tireroad.runs.bench import (
     scaling,
     skipping,
 )
-from tireroad.runs.bench.floors import exponent
+from tireroad.runs.bench.parts.floors import exponent
 from tireroad.runs.bench.parts.rolling_cases import Case
 from tireroad.runs.bench.rough_road import Mesh
 from tireroad.runs.measure import tabulate
 from tireroad.runs.measure.measured_page import _shown, page
 from tireroad.runs.measure.plots import drawn
 from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.scene.sections.kinds import torus
 from tireroad.runs.search.journal import Trial
 from tireroad.runs.search.settings import CAUSES, Settings
 
@@ -204,6 +205,23 @@ def test_error_bars_are_compared_with_a_finer_run(tmp_path) -> None:
     check_page([shares, causes, every], 0)
     again = error_bars.tables(tmp_path / "again", *given)  # from what was kept: nothing is run
     assert again[2].rows == every.rows and not (tmp_path / "again").exists()
+
+
+def test_a_search_is_held_against_all_settings_and_not_run_twice(tmp_path, monkeypatch) -> None:
+    fine = {"segments": 16, "arc": 8, "order": 2, "modes": 40, "pitch": 0.008, "step": 5e-4}
+    changed = {"FINE": fine, "TARGET": 0.9, "UP_TO": 70.0, "DURATION": 0.08}
+    for name, value in changed.items():
+        monkeypatch.setattr(accuracy_on_demand, name, value)
+    wanted = "accuracy.target=0.9", "accuracy.up_to=70"
+    monkeypatch.setattr(accuracy_on_demand, "WANTED", wanted)
+    monkeypatch.setattr(torus, "ORDER", 2)
+    grid = {"mesh": (0,), "modes": (0,), "points": (0, 1), "step": (0, 1)}
+    given = [Case("soft", "texture", 30.0)], grid, tmp_path / "kept"
+    found = accuracy_on_demand.tables(tmp_path / "runs", *given)
+    ((_, _, true, met, cost, best, search),) = found[1].rows
+    assert met and 0 < true <= 90 and best <= cost <= search
+    again = accuracy_on_demand.tables(tmp_path / "again", *given)
+    assert again[1].rows == found[1].rows and not (tmp_path / "again").exists()
 
 
 def test_searches_are_judged_by_the_least_cost() -> None:

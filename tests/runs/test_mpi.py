@@ -48,7 +48,7 @@ sys.exit(mpi.guarded(comm, cases[sys.argv[1]]))
         ("all", 2, "error: bad key\n"),
         ("last", 2, "error: bad key\n"),
         ("told", 1, "KeyError: 'odd'"),
-        ("full", 2, "disk is full"),
+        ("full", 3, "disk is full"),
     ],
 )
 def test_endings(launch, case: str, status: int, message: str, processes: int) -> None:

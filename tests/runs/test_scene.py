@@ -241,7 +241,9 @@ def test_a_windows_file_is_read(tmp_path: Path) -> None:
     assert load(path).static.load == 3
 
 
-@pytest.mark.parametrize("name", ["quickstart", "point_force", "flat_rest", "measured_road"])
+@pytest.mark.parametrize(
+    "name", ["quickstart", "point_force", "flat_rest", "measured_road", "corner"]
+)
 def test_shipped_scenes_are_valid(root: Path, name: str) -> None:
     scene = load(root / "runs" / "scenes" / f"{name}.toml")
     assert scene.name == name.replace("_", "-")

@@ -1,5 +1,6 @@
 """Streams, paths, folders and limits that are not as a program would like them."""
 
+import errno
 import os
 import shutil
 import subprocess
@@ -10,7 +11,9 @@ from pathlib import Path
 import pytest
 from started import ROOT, environment
 
+from tireroad.runs.cli import main
 from tireroad.runs.files.disk import part_of, remove_leftovers
+from tireroad.runs.stages.modes import ModesStage
 
 pytestmark = pytest.mark.slow
 
@@ -116,6 +119,27 @@ def test_result_folder_removed_under_a_run(scene: Path, processes: int) -> None:
         _, error = process.communicate(timeout=LONG)
     assert process.returncode == 3, error
     assert "was removed during the run" in error and "Traceback" not in error
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS])
+def test_a_disk_that_refuses_keeps_what_is_finished(
+    scene: Path, number: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Full or read-only in the middle of modes.h5: status 3; the same command goes on from the static state."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    out = scene.parent / "out"
+    run = ["run", str(scene), "--out", str(out), "--until", "modes"]
+    with monkeypatch.context() as patched:
+        patched.setattr(ModesStage, "write", refuse)
+        assert main(run) == 3
+    told = capsys.readouterr().err
+    assert "modes.h5: cannot be written" in told and "Traceback" not in told
+    assert not (out / "modes.h5").exists() and not list(out.glob(".*.part"))
+    assert main(run) == 0
+    assert "static    reused" in (out / "log.txt").read_text()
 
 
 def test_working_folder_that_is_gone(scene: Path) -> None:

@@ -16,11 +16,11 @@ _LONGEST = 0.2
 
 
 class Repeated:
-    """h(x mod L) of a road h; in the last part b of the length, h runs out while what lies before its beginning comes in:
+    """h(x mod L) of a road h; over the last part b of the length it goes over into the mirror image of its beginning:
 
-        z = (1 - w) h(L) + w h(b + x - L),   w from 0 to 1 over L - b < x < L,  else h(b + x).
+        z = (1 - w) h(x) + w h(L - x),   w from 0 to 1 over L - b < x < L.
 
-    The road is needed from 0 to its `length` L (m): its last height is held while the seam lasts.
+    So z is continuous and only its slope jumps, and the road is needed from 0 to its `length` L (m), no further.
     """
 
     def __init__(self, road: Road, length: float) -> None:
@@ -41,15 +41,14 @@ class Repeated:
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m) at x, y (m) of equal shape."""
         place = np.mod(x, self._length)
-        z = self._road.height(np.minimum(place + self._seam, self._length), y)
+        z = self._road.height(place, y)
         share = (place - (self._length - self._seam)) / self._seam
         late = share > 0
         if late.any():
             w = share[late] ** 2 * (3.0 - 2.0 * share[late])
-            # Beyond the end there is no road: its last height runs out, as z there has less and less weight.
-            again = self._road.height(place[late] + self._seam - self._length, np.asarray(y)[late])
+            mirrored = self._road.height(self._length - place[late], np.asarray(y)[late])
             z = np.array(z)
-            z[late] = (1.0 - w) * z[late] + w * again
+            z[late] = (1.0 - w) * z[late] + w * mirrored
         return z
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:

@@ -16,7 +16,7 @@ from tireroad.contact.solver.grid_compliance import SpreadCompliance
 from tireroad.contact.solver.projected_cg import ProjectedCG
 from tireroad.contact.tread.compliance import half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
-from tireroad.runs.bench.floors import durations
+from tireroad.runs.bench.parts.floors import durations
 from tireroad.runs.measure.tabulate import Table
 
 ELASTIC = 5e6, 0.45

@@ -49,7 +49,7 @@ def _friction(spec, setup: ContactSetup, tire, step: float) -> Friction:
     """The brush of the scene, at rest."""
     patch = setup.patch
     stiffness = spec.brush_stiffness or spec.brush_stiffness_per_area * patch.area
-    law = BrushLaw(stiffness, spec.friction, setup.slip, spec.brush)
+    law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0)
     return Friction(brush, tire.same_step, patch.weights)
@@ -65,7 +65,7 @@ def freely_rolling(
     smooth, load = setup.smooth(steps * step), float(setup.patch.force.sum())
 
     def with_slip(of: ContactSetup, slip: float) -> ContactSetup:
-        return replace(of, slip=np.asarray(of.slip) + [slip, 0.0])
+        return replace(of, slip=(of.slip[0] + slip, of.slip[1]))
 
     def drag(slip: float) -> float:
         found = forces(job, with_slip(smooth, slip), response, step, steps, scheme).contact

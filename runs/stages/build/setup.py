@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -53,25 +54,23 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
         reach=scene.contact.reach,
         pattern=make_pattern(scene.pattern, rolling_radius(job, state)),
     )
-    return replace(setup, slip=_slip(job, state, setup)) if scene.contact.rubs else setup
+    return _slipping(job, state, setup) if scene.contact.rubs else setup
 
 
-def _slip(job: Job, state: StaticState, setup: ContactSetup) -> np.ndarray:
-    """The scene's slip, and slip angle, (2,); of a wheel that is to roll freely with that of its static shape, (c, 2),
-    and what has been found for it."""
-    rotation = job.scene.rotation
-    slip = np.array(job.scene.contact.slip)
+def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup:
+    """With the scene's slip and slip angle; of a wheel that is to roll freely with the slip of its static shape, and
+    what has been found for it."""
+    rotation, (along, across) = job.scene.rotation, job.scene.contact.slip
     if rotation is None:
-        return slip
-    slip[1] += np.tan(np.radians(rotation.slip_angle))
+        return replace(setup, slip=(along, across))
+    slip = (
+        along + job.found.get("free slip", 0.0),
+        across + math.tan(math.radians(rotation.slip_angle)),
+    )
     if not rotation.free_rolling:
-        return slip
-    nodes = shape_slip(
-        state.positions, job.tire.lattice.ring, state.shape, rolling_radius(job, state)
-    )[setup.patch.index]
-    weights = setup.patch.weights
-    own = nodes if weights is None else weights @ nodes
-    return slip + own + [job.found.get("free slip", 0.0), 0.0]
+        return replace(setup, slip=slip)
+    given = state.positions, job.tire.lattice.ring, state.shape, rolling_radius(job, state)
+    return replace(setup, slip=slip, shape_slip=shape_slip(*given))
 
 
 def rolling_speed(job: Job, state: StaticState) -> float:

@@ -1,0 +1,80 @@
+"""Wedges of the tire and the volume of road in them (Mancosu and Minen 1998, second model; thesis 3.1).
+
+The tire is cut into wedges around the axle. The volume in which a wedge of the unloaded tire and the road intersect gives its
+force by a look-up: of our own finite elements, pressed on a plane at several heights. Per metre around, the area A of
+a wedge's cross-section that is inside the road, and the force F it carries, are pairs of all wedges at all heights; the
+look-up is their mean in classes of A, made monotone. Wedges do not know of each other, and the tire gives no answer in time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.fem.errors import InputError
+
+Array = NDArray[np.float64]
+_CLASSES = 24
+
+
+@dataclass(frozen=True)
+class LookUp:
+    """Force (k,) N/m over area (k,) m^2, both from 0; `scatter`: what it leaves of the pairs, relative to their largest."""
+
+    area: Array
+    force: Array
+    scatter: float
+
+    def __call__(self, area: Array) -> Array:
+        """N/m; beyond the largest area carried on by its last slope."""
+        slope = (self.force[-1] - self.force[-2]) / (self.area[-1] - self.area[-2])
+        beyond = np.maximum(area - self.area[-1], 0.0)
+        return np.interp(area, self.area, self.force) + slope * beyond
+
+
+def look_up(area: Array, force: Array) -> LookUp:
+    """From pairs (n,) m^2 and N/m. InputError when fewer than three of them are inside the road."""
+    inside = area > 0
+    if inside.sum() < 3:
+        raise InputError("wedges: fewer than three of them meet the road: press further")
+    a, f = area[inside], force[inside]
+    order = np.argsort(a)
+    groups = np.array_split(order, min(_CLASSES, len(order)))
+    x = np.array([a[group].mean() for group in groups])
+    y = _monotone(np.array([f[group].mean() for group in groups]))
+    grid, values = np.concatenate([[0.0], x]), np.concatenate([[0.0], y])
+    left = f - np.interp(a, grid, values)
+    return LookUp(grid, values, float(np.sqrt(np.mean(left**2)) / f.max()))
+
+
+def _monotone(values: Array) -> Array:
+    """The nearest ascending sequence in least squares: neighbours that descend are pooled."""
+    pools: list[list[float]] = []
+    for value in values:
+        pools.append([value, 1.0])
+        while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
+            (a, m), (b, n) = pools[-2:]
+            pools[-2:] = [[(a * m + b * n) / (m + n), m + n]]
+    return np.concatenate([np.full(int(n), a) for a, n in pools])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wedges:
+    """The unloaded tire's face as the road sees it: `x` (a,) m of the wedges, `length` (a,) m around of each, `y` (a, b) and
+    `height` (a, b) m over the road's plane, `width` (a, b) m that each point stands for."""
+
+    x: Array
+    length: Array
+    y: Array
+    height: Array
+    width: Array
+
+    def area(self, road: Array) -> Array:
+        """Area (a,) m^2 of each wedge inside a road of heights (a, b) m under its points."""
+        return (np.maximum(road - self.height, 0.0) * self.width).sum(axis=1)
+
+    def force(self, road: Array, table: LookUp) -> float:
+        """Total force, N."""
+        return float(table(self.area(road)) @ self.length)
