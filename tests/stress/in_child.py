@@ -83,12 +83,14 @@ def judged(status: int | None, said: str, memory: int, out: Path) -> str:
 
 
 def _not_finite(out: Path) -> str:
-    """Results that are no numbers; branches of a Campbell diagram end where they cannot be followed."""
+    """Results that are no numbers; branches of a Campbell diagram end where they cannot be followed, and an error
+    that is not known is none."""
     bad: list[str] = []
+    known_gap = re.compile("campbell|/history$|/level$|level_error$")
 
     def look(name: str, item: object) -> None:
         numbers = isinstance(item, h5py.Dataset) and item.dtype.kind in "fc"
-        if numbers and "campbell" not in name and not np.isfinite(item[()]).all():
+        if numbers and not known_gap.search(name) and not np.isfinite(item[()]).all():
             bad.append(name)
 
     for path in out.glob("*.h5"):
