@@ -1,8 +1,10 @@
-"""The road as a contact point meets it: its mean over the rectangle that the point stands for.
+"""The road as a contact point meets it: smoothed over the rectangle that the point stands for.
 
 A point has one force for its rectangle, and so one height. Read at the point alone, waves shorter than two
-rectangles would fold back into long ones that the road does not have; the mean holds next to nothing of them:
-sin(k a) / (k a) of a wave number k for a half width a, along and across.
+rectangles would fold back into long ones that the road does not have. The mean over the rectangle holds next to nothing
+of them, sin(k a) / (k a) of a wave number k for a half width a, but lowers waves of four rectangles by a tenth, and
+every crest: cobblestones at points 8 mm apart lost 5 % of the mean load. Four thirds of it less a third of the mean over
+twice the rectangle leaves out that part of second order: 1 % of waves of four rectangles, 15 % of two.
 """
 
 from __future__ import annotations
@@ -31,27 +33,27 @@ class CellMean:
 
     Along, the road is sampled every `spacing`, at the same places whatever is asked for, so that the answer does
     not depend on how a run is cut into pieces; each sample counts by the part of its length within the rectangle, and
-    between the places of samples the mean is linear. Across, samples are means of equal strips.
+    between the places of samples the result is linear. Across, samples are means of equal strips.
     """
 
     def __init__(self, road: Strip, y: Array, half: Array) -> None:
         self._road = road
         rows, self._row = np.unique(np.column_stack([y, half]), axis=0, return_inverse=True)
         self._row = self._row.reshape(-1)
-        widest = float(half[:, 0].max())
-        self._step = max(road.spacing, 2 * widest / MOST)
-        reach = int(np.ceil(widest / self._step + 0.5))
+        widest, broadest = half.max(axis=0)
+        self._step = min(max(road.spacing, 2 * widest / MOST), widest / 4)
+        self._reach = reach = int(np.ceil(2 * widest / self._step + 0.5))
         offset = self._step * np.arange(-reach, reach + 1)
-        low = np.maximum(offset - self._step / 2, -rows[:, 1:2])
-        high = np.minimum(offset + self._step / 2, rows[:, 1:2])
-        self._weight = np.maximum(high - low, 0.0) / (2 * rows[:, 1:2])  # (r, 2 reach + 1)
-        count = int(np.clip(np.ceil(2 * rows[:, 2].max() / road.spacing), 1, MOST))
-        middles = (np.arange(count) + 0.5) / count * 2 - 1
+        parts = [_parts(offset, self._step, share * rows[:, 1:2]) for share in (1, 2)]
+        # Of samples within the rectangle's width, and within twice that: (2, r, 2 reach + 1).
+        self._weight = np.stack([4 / 3 * parts[0], -1 / 3 * parts[1]])
+        count = 4 * int(np.clip(np.ceil(broadest / road.spacing), 2, MOST // 2))
+        middles = (np.arange(count) + 0.5) / count * 4 - 2
+        self._within = np.abs(middles) < 1
         self._y = rows[:, 0, None] + rows[:, 2, None] * middles  # (r, m)
-        self._reach = reach
 
     def height(self, x: Array, _: Array) -> Array:
-        """Mean heights (n, c) m with the points at x (n, c) m; y is known."""
+        """Heights (n, c) m with the points at x (n, c) m; y is known."""
         place = np.asarray(x) / self._step
         first = np.floor(place).astype(int)
         share = place - first
@@ -65,11 +67,20 @@ class CellMean:
         """(r, end - begin) m at the places begin * step, …"""
         places = self._step * np.arange(begin - self._reach, end + self._reach)
         x = np.minimum(places, self._road.end)
-        sample = np.zeros((len(self._y), len(x)))
-        for column in self._y.T:
-            sample += self._road.height(*np.broadcast_arrays(x, column[:, None]))
-        sample /= self._y.shape[1]
+        sample = np.zeros((2, len(self._y), len(x)))
+        for column, within in zip(self._y.T, self._within, strict=True):
+            here = self._road.height(*np.broadcast_arrays(x, column[:, None]))
+            sample[1] += here
+            if within:
+                sample[0] += here
+        sample /= np.array([self._within.sum(), len(self._within)])[:, None, None]
         mean = np.zeros((len(self._y), end - begin))
-        for k, weight in enumerate(self._weight.T):
-            mean += weight[:, None] * sample[:, k : k + end - begin]
+        for k in range(self._weight.shape[2]):
+            mean += (self._weight[:, :, k, None] * sample[:, :, k : k + end - begin]).sum(axis=0)
         return mean
+
+
+def _parts(offset: Array, step: float, half: Array) -> Array:
+    """Share (r, n) of each sample's length within rectangles of half lengths (r, 1) m."""
+    low, high = np.maximum(offset - step / 2, -half), np.minimum(offset + step / 2, half)
+    return np.maximum(high - low, 0.0) / (2 * half)

@@ -1,4 +1,4 @@
-"""The road under a point is its mean over the point's rectangle: in closed form, and without aliases."""
+"""The road under a point is smoothed over the point's rectangle: in closed form, and without aliases."""
 
 from __future__ import annotations
 
@@ -29,18 +29,29 @@ def mean(road, x, y=0.0, half=HALF):
     return CellMean(road, np.full(1, y), half).height(np.atleast_1d(x)[:, None], None)[:, 0]
 
 
+def left(half, length, across=np.inf):
+    """What is left of a wave: four thirds of its mean over the rectangle less a third of that over twice it."""
+    one, two = (
+        np.sinc(2 * k * half[0] / length) * np.sinc(2 * k * half[1] / across) for k in (1, 2)
+    )
+    return 4 / 3 * one - 1 / 3 * two
+
+
 @pytest.mark.parametrize("length", [5e-3, 0.02, 0.2])
-def test_a_wave_is_lowered_by_its_mean(length) -> None:
-    """sin(k a) / (k a), along and across."""
+def test_a_wave_is_lowered_by_its_means(length) -> None:
     x = np.linspace(0.1, 0.13, 50)
-    lowered = np.sinc(2 * HALF[0, 0] / length)
-    np.testing.assert_allclose(
-        mean(Wave(length), x), lowered * Wave(length).height(x, 0.0), atol=8e-3
-    )
-    both = lowered * np.sinc(2 * HALF[0, 1] / 8e-3)
-    np.testing.assert_allclose(
-        mean(Wave(length, 8e-3), x, 3e-3), both * Wave(length, 8e-3).height(x, 3e-3), atol=8e-3
-    )
+    expected = left(HALF[0], length) * Wave(length).height(x, 0.0)
+    np.testing.assert_allclose(mean(Wave(length), x), expected, atol=8e-3)
+    expected = left(HALF[0], length, 8e-3) * Wave(length, 8e-3).height(x, 3e-3)
+    np.testing.assert_allclose(mean(Wave(length, 8e-3), x, 3e-3), expected, atol=8e-3)
+
+
+def test_waves_of_four_rectangles_and_more_stay() -> None:
+    """To second order in the rectangle: a mean would take a tenth of one of four, this 1.2 % (1.7 as sampled), and 0.1 % of eight."""
+    x = np.linspace(0.1, 0.13, 50)
+    for count, lost in ((4, 0.016), (8, 2e-3)):
+        wave = Wave(count * 4e-3, spacing=count * 2e-3)
+        assert abs(mean(wave, x) - wave.height(x, 0.0)).max() == pytest.approx(lost, abs=lost / 2)
 
 
 def test_a_slope_and_a_flat_road_stay_as_they_are() -> None:
@@ -65,7 +76,7 @@ def test_points_of_other_sizes_have_means_of_their_own() -> None:
     half = np.array([[2e-3, 1e-3], [1e-3, 1e-3]])
     x = np.full((1, 2), 0.1)
     found = CellMean(Wave(0.01), np.zeros(2), half).height(x, None)[0]
-    np.testing.assert_allclose(found, np.sinc(2 * half[:, 0] / 0.01), atol=2e-3)
+    np.testing.assert_allclose(found, [left(one, 0.01) for one in half], atol=3e-3)
 
 
 def test_a_strip_ends_where_it_was_cut() -> None:
@@ -78,10 +89,10 @@ def test_a_strip_ends_where_it_was_cut() -> None:
 
 
 def test_waves_that_points_cannot_tell_are_gone() -> None:
-    """Points 4 mm apart take a wave of 4.1 mm for one of 164 mm; of their means 3 % of it are left."""
+    """Points 4 mm apart take a wave of 4.1 mm for one of 164 mm; of what they are given 4 % of it are left."""
     x = 4e-3 * np.arange(41)
     wave = Wave(4.1e-3)
     means = CellMean(wave, np.zeros(41), np.repeat(HALF, 41, axis=0)).height(x[None], None)[0]
     false = np.exp(-2j * np.pi * x / 0.164)
     assert 2 * abs(false @ wave.height(x, 0.0)) / 41 == pytest.approx(1.0, abs=0.05)
-    assert 2 * abs(false @ means) / 41 < 0.035
+    assert 2 * abs(false @ means) / 41 < 0.045
