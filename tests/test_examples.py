@@ -116,6 +116,7 @@ def test_own_section() -> None:
     assert ellipse == pytest.approx(594.6, rel=1e-3)
 
 
+@pytest.mark.long
 def test_own_output(capfd: pytest.CaptureFixture[str]) -> None:
     """Points 5 mm apart: the tire at rest touches on 50 mm or so; pinned when it was written."""
     import own_output
@@ -127,6 +128,7 @@ def test_own_output(capfd: pytest.CaptureFixture[str]) -> None:
     assert "mean length of the footprint 0.0508 m" in capfd.readouterr().out
 
 
+@pytest.mark.long
 def test_read_results(launch, tmp_path: Path) -> None:
     import read_results
 
@@ -139,6 +141,7 @@ def test_read_results(launch, tmp_path: Path) -> None:
     assert found["mean"] == pytest.approx(300.0, rel=0.05) and found["deviation"] > 0
 
 
+@pytest.mark.long
 def test_own_road_and_tread(capsys: pytest.CaptureFixture[str]) -> None:
     """Registered classes serve in a scene as ours do; pinned when it was written."""
     import own_road

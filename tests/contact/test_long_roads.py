@@ -44,6 +44,7 @@ def long_road(file: Path) -> None:
         stream.write(np.full(-count * WIDTH % 20, np.nan).astype(">f4").tobytes())
 
 
+@pytest.mark.long
 def test_ten_kilometres_in_bounded_memory(tmp_path: Path) -> None:
     """164 MB of file, 328 MB as doubles; levelled by `longest_wave` and driven from end to end."""
     long_road(tmp_path / "long.crg")

@@ -61,7 +61,7 @@ def test_a_spectrum_that_no_surface_has_is_met_as_near_as_can_be() -> None:
     assert (profile_power(edges) @ density)[-1] == pytest.approx(power[-1], rel=0.5)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_slopes_have_their_levels() -> None:
     spec = TwoSlope(seed=3, road_class="B")
     road, x = spec.make(), PITCH * np.arange(40_000)

@@ -239,7 +239,7 @@ def test_newton_steps_do_not_grow_towards_incompressibility(make_body, ratio):
     assert max(step.step.iterations for step in steps) <= 8
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     "rolling",

@@ -83,6 +83,7 @@ def march(full, step, size=PUSH, last=0.02, first=0.0):
     return np.array(out)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("radius", [0.0, 1.0])
 def test_second_order_in_the_step(tire, radius):
     fine = march(nonlinear(tire, 2.5e-5, 1.0), 2.5e-5)
@@ -106,6 +107,7 @@ def test_differs_from_the_linear_tire_by_the_square_of_the_motion(tire):
     assert np.log2(apart[1] / apart[0]) == pytest.approx(2.0, abs=0.15)
 
 
+@pytest.mark.long
 def test_energy_is_the_work_done_and_stays(tire):
     """Undamped, average acceleration: off by the square of the step; the quiet method only loses."""
     drift = []

@@ -104,6 +104,7 @@ def test_the_diagonal_mass_is_positive_and_all_there(make_body, order):
     )
 
 
+@pytest.mark.slow
 def test_frequencies_of_the_diagonal_mass_close_in_on_the_consistent_ones(make_body, csr):
     errors = []
     for segments, arc in ((8, 4), (16, 8)):

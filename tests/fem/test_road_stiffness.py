@@ -99,6 +99,7 @@ def test_symmetric_tire_has_no_coupling_across_its_mirror_planes(make_body):
     assert abs(found[1, 5] / scale[1, 5]) < 1e-7
 
 
+@pytest.mark.long
 def test_finer_elements_come_down_to_a_limit(make_body):
     """Lateral stiffness of three meshes: softer with refinement, and by less each time."""
     values = [

@@ -64,6 +64,7 @@ def history(tire, step, radius, speed=60.0, force=pulse, duration=0.02, damping=
     return out, full
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [0.0, 0.6, 1.0])
 def test_second_order_in_the_step_also_when_rolling(tire, radius):
     """Errors against a fine solution fall by four a halving."""

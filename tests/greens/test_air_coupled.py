@@ -90,6 +90,7 @@ def near_the_air(made) -> np.ndarray:
     return np.append(made.air.duct.frequency[:2] + np.array([-4.0, 3.0]), 20.0)
 
 
+@pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.parametrize("speed", [0.0, 60.0])
 def test_all_modes_with_air_are_the_full_matrices_with_air(speed) -> None:
@@ -173,6 +174,7 @@ def test_full_tire_with_air_goes_on_from_a_snapshot() -> None:
     assert np.abs(whole.snapshot()["air"]).max() > 0
 
 
+@pytest.mark.long
 @pytest.mark.mpi
 def test_axle_force_by_momentum_of_tire_and_air_is_that_by_the_rim_and_its_pressure() -> None:
     """All modes: sum of loads - d/dt momentum of a held rim, against the force that holds a free rim, which the

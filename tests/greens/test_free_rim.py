@@ -103,7 +103,7 @@ def test_static_answer_is_the_pseudo_inverse() -> None:
     assert np.abs(found.residual).max() < 1e-9 * np.abs(exact).max()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.parametrize("speed", [0.0, 60.0])
 def test_axle_force_of_the_free_rim_is_that_from_momentum(speed) -> None:
@@ -122,7 +122,7 @@ def test_axle_force_of_the_free_rim_is_that_from_momentum(speed) -> None:
     assert off(found, exact) < (1e-3 if speed else 1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.0, 60.0])
 def test_axle_force_from_few_modes(speed) -> None:
     """Sixty modes and attachments of rim and loads, against all modes."""

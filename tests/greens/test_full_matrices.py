@@ -102,6 +102,7 @@ def test_static_limit_is_exact(speed, damping, inertia) -> None:
         assert found.eigenvalue.real.max() <= 1e-9 * np.abs(found.eigenvalue).max(), option
 
 
+@pytest.mark.slow
 def test_error_up_to_half_the_highest_mode() -> None:
     """Standing and rolling: what each option leaves of the full matrices' receptance."""
     operators, _, modes, readings, loads = tire()
@@ -121,6 +122,7 @@ def test_error_up_to_half_the_highest_mode() -> None:
         assert none > 0.3 and error["attachment"] < error["static"] / 5
 
 
+@pytest.mark.slow
 def test_estimates_are_of_the_size_of_the_errors() -> None:
     """Within twelve times of the truth and not below a quarter of it."""
     _, _, modes, readings, loads = tire()

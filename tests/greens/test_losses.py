@@ -129,7 +129,7 @@ def test_residual_states_lose_by_their_own_frequency():
         assert (zeta < 0.155).all(), option
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.0, 60.0])
 def test_the_reference_in_time_has_the_same_losses(speed):
     """A pulse on full finite elements with mode by mode damping against the matrix exponential of the dense

@@ -59,7 +59,7 @@ def off(stages: dict) -> float:
     return next(v["value"] for name, v in indicators.items() if "off the full" in name)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_residual_and_its_distance_from_the_full_matrices(run) -> None:
     """From one set of modes; the modes reused, attachments find all their unknowns again."""
     distance = {}
@@ -122,7 +122,7 @@ def test_states_made_static_are_told(run) -> None:
         assert file["force/eigenvalue"].shape == (15,)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_states_of_the_full_problem_take_the_static_residual_only(run, launch, tmp_path) -> None:
     """Its own states complete with K_Omega^-1; residuals that complete the modes are refused."""
     full = "--set", "rotation.method=full", "--set", "rotation.count=20", "--until", "response"

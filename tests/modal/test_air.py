@@ -75,6 +75,7 @@ def differences(area: np.ndarray) -> np.ndarray:
     return GAS.sound_speed * np.sqrt(values)
 
 
+@pytest.mark.slow
 def test_narrowed_duct_against_differences_and_first_order_split():
     """Six frequencies to 1e-4 of 2,000 differences; the n = 1 pair splits by the share eps of
     its second harmonic in the section, as first-order perturbation says."""

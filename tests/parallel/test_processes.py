@@ -49,6 +49,7 @@ def values(folder, file, name):
         return stored[name][:]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("processes", [2, 3])
 @pytest.mark.parametrize(
     ("file", "name", "tolerance"),

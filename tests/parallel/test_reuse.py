@@ -57,7 +57,7 @@ def receptance(folder) -> np.ndarray:
         return read_responses(file, False)["contact"].receptance(FREQUENCY)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_modes_of_other_processes_with_attachments(run) -> None:
     """1 -> 2 -> 3 -> 1: eigenvectors have other signs there, and the rotating matrices between modes
     and attachments have them too."""

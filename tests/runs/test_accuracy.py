@@ -70,7 +70,7 @@ def contact_force(folder) -> np.ndarray:
         return file["total_force"][:]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cause", "sets"),
     [

@@ -62,7 +62,7 @@ def run(tmp_path_factory, launch):
     return started
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_corner_free_wheel_and_the_fixed_axle_as_its_limit(run):
     """In one folder, so that what does not depend on the axle is computed once."""
     car, summary, folder = run(SCENE + CAR)

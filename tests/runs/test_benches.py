@@ -64,6 +64,7 @@ def check_page(tables: list[Table], images: int) -> str:
     return text
 
 
+@pytest.mark.long
 def test_pareto_names_its_front(tmp_path, monkeypatch) -> None:
     for name, value in (("STEPS", (2e-4, 4e-4)), ("DURATION", 0.04), ("FINEST", 1e-4)):
         monkeypatch.setattr(pareto, name, value)
@@ -107,6 +108,7 @@ def test_headline_tells_the_cheapest_within_the_error(tmp_path) -> None:
     check_page([table], images=1)
 
 
+@pytest.mark.long
 def test_skipping_changes_nothing_but_the_time(tmp_path) -> None:
     keys = {"modes": 16, "residual": "static", "duration": 0.1, "step": 2e-4}
     table = skipping.table(tmp_path, TINY, keys)
@@ -118,6 +120,7 @@ def test_skipping_changes_nothing_but_the_time(tmp_path) -> None:
     check_page([table], images=1)
 
 
+@pytest.mark.long
 def test_scaling_on_small_sizes(tmp_path) -> None:
     sizes = scaling.unknowns(tmp_path, (TINY, Mesh(12, 6, 0.5)), 12)
     assert sizes.rows[0][0] < sizes.rows[1][0]
@@ -193,6 +196,7 @@ def test_convergence_tells_what_each_change_costs(tmp_path, monkeypatch) -> None
     assert all(row[3] > 0 for row in found.rows)
 
 
+@pytest.mark.long
 def test_error_bars_are_compared_with_a_finer_run(tmp_path) -> None:
     coarse = {"segments": 16, "arc": 8, "order": 2, "modes": 16, "pitch": 0.01, "step": 4e-4}
     fine = coarse | {"modes": 24, "step": 2e-4, "pitch": 0.008}

@@ -55,6 +55,7 @@ def run(folder: Path, name: str, *overrides: str, up_to: str = "contact") -> str
     return (out / "log.txt").read_text()
 
 
+@pytest.mark.slow
 def test_another_road_takes_what_the_first_found(home: Path, capsys) -> None:
     first = run(home, "one", "road.kind=flat")
     assert "reused" not in first
@@ -76,6 +77,7 @@ def test_another_road_takes_what_the_first_found(home: Path, capsys) -> None:
     assert not Cache.of_user().entries() and (home / "two" / "static.h5").is_file()
 
 
+@pytest.mark.long
 def test_another_road_takes_the_coarser_companion_of_the_first(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -118,6 +120,7 @@ def test_the_longest_unused_goes_first(home: Path, monkeypatch: pytest.MonkeyPat
     assert [one.path.name for one in Cache.of_user().entries()] == ["static-b.h5", "static-c.h5"]
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_written_is_none(home: Path) -> None:
     (home / "cache").write_text("a file")
     assert "static    done" in run(home, "one", "time=", "contact=", "road=")

@@ -43,7 +43,7 @@ def run(tmp_path_factory, launch):
     return started
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_standing_air_in_states_receptance_and_reuse(run):
     """Its resonances are told, the full matrices agree, and the air alone recomputes no static state."""
     folder, stages = run("standing", SCENE)
@@ -71,7 +71,7 @@ def test_standing_air_in_states_receptance_and_reuse(run):
     assert "modes of the air between rigid walls" in page
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_rolling_splits_the_air_by_twice_the_speed(run):
     """The lowest pair: f -+ Omega / 2 pi, to the coupling with the wall."""
     folder, _ = run("rolling", SCENE + "[rotation]\nspeed = 60.0\n")

@@ -45,6 +45,7 @@ def test_every_command_is_in_the_help(launch) -> None:
         assert option in text
 
 
+@pytest.mark.slow
 def test_check_is_light_and_shows_all(launch, scene: Path) -> None:
     # The section is drawn: its mesh is checked with scipy's graphs, all else heavy stays out.
     light = LIGHT.replace(', "scipy"', "")
@@ -59,6 +60,7 @@ def test_check_is_light_and_shows_all(launch, scene: Path) -> None:
     assert "estimated memory" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 2])
 @pytest.mark.parametrize("command", ["run", "check"])
 def test_bad_scene_ends_with_two(launch, scene: Path, command: str, processes: int) -> None:

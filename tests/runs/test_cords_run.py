@@ -61,7 +61,7 @@ def run(tmp_path_factory, launch):
     return started
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_belted_tire_of_lossy_compounds(run):
     """Units, shapes and bounds of what the files hold; a run again takes the same state from them."""
     folder, stages = run()
@@ -93,7 +93,7 @@ def test_a_belted_tire_of_lossy_compounds(run):
     assert again["static"]["status"] == again["modes"]["status"] == "reused"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_damping_in_proportion_where_the_scene_gives_it(run):
     folder, stages = run("--set", "damping.mass=100.0", "--until", "rotating")
     assert "the loss factors do not act" in stages["modes"]["headline"]["damping"]["value"]

@@ -94,6 +94,7 @@ def test_what_cannot_succeed_is_refused_by_its_key(
         assert word in str(caught.value)
 
 
+@pytest.mark.slow
 def test_run_refuses_what_check_refuses(quickstart: Path, launch, tmp_path: Path) -> None:
     out = ("--out", tmp_path / "out", "--set", "modal.count=27000")
     done = launch("-m", "runs", "run", quickstart, *out)

@@ -33,12 +33,14 @@ def launcher(root: Path, tmp_path: Path):
     return run
 
 
+@pytest.mark.slow
 def test_check_from_anywhere(launcher) -> None:
     done = launcher("check", "my scene.toml", "--set", "static.load=400")
     assert done.returncode == 0, done.stderr
     assert "400.0" in done.stdout
 
 
+@pytest.mark.slow
 def test_start_up_is_quick(launcher) -> None:
     launcher("--version")
     spent = []
@@ -63,6 +65,7 @@ def test_bad_process_numbers(launcher, number: str) -> None:
     assert done.returncode == 2 and "number of processes" in done.stderr
 
 
+@pytest.mark.slow
 def test_bad_value_with_blanks_arrives_whole(launcher) -> None:
     done = launcher("run", "my scene.toml", "--set", "name=a  b", "-n", "2")
     assert done.returncode == 2

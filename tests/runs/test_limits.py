@@ -22,7 +22,7 @@ def _run(launch, folder: Path, *overrides: str):
     return launch("-m", "runs", "run", folder / "scene.toml", "--out", folder / "out", *given)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_too_much_speed_is_named(launch, tmp_path: Path) -> None:
     """1000 rad/s: no rolling shape. Not "the tire may fold": at rest the same loads converge."""
     done = _run(launch, tmp_path, "rotation.speed=1000", "road=", "contact=", "static.load=")

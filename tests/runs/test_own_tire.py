@@ -66,6 +66,7 @@ def frequencies(folder, name):
         return file["frequency"][:]
 
 
+@pytest.mark.long
 def test_frequencies_of_the_torus(folder):
     """A torus with a slanted ply from a deck, embedded at half the wall, and the built-in one of the same
     elements: static state and modes agree to rounding (asked: 0.1 %).

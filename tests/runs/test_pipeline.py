@@ -62,6 +62,7 @@ step = 1e-4
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rotation", ["", "[rotation]\nspeed = 40.0\n"])
 def test_flat_road_at_rest_leaves_the_tire_exactly_at_rest(run, rotation):
     folder, stages = run("rolling-flat" if rotation else "flat", FLAT + rotation)
@@ -87,6 +88,7 @@ def test_the_load_comes_with_its_estimated_error_and_a_breakdown_of_the_time(run
     assert "factorisation" in log
 
 
+@pytest.mark.long
 def test_another_road_reuses_everything_before_it(run):
     road = FLAT.replace('kind = "flat"', 'kind = "sine"\namplitude = 1e-4\nwavelength = 0.2')
     rolling = "[rotation]\nspeed = 40.0\n"
@@ -148,6 +150,7 @@ def test_constant_force_ends_at_the_static_flexibility_and_on_the_axle(run, spee
     assert np.abs(reciprocal).max() < 0.05 * size if speed == 0 else np.abs(reciprocal).max() > 0
 
 
+@pytest.mark.long
 def test_measured_belgian_block_road(run, roads):
     text = (
         TIRE
@@ -181,6 +184,7 @@ duration = 0.03
     assert "belgian_block.crg" in page
 
 
+@pytest.mark.long
 def test_missing_scene_tire_that_cannot_carry_and_full_patch_are_told_in_one_line(base, launch):
     scene = base / "heavy.toml"
     scene.write_text(FLAT.replace("load = 400.0", "load = 4e6"))
@@ -202,6 +206,7 @@ def test_missing_scene_tire_that_cannot_carry_and_full_patch_are_told_in_one_lin
     assert (base / "edge" / "greens.h5").exists()
 
 
+@pytest.mark.long
 def test_a_force_on_the_tire_in_contact_ends_where_statics_has_it(run):
     """Point force and contact in one loop: once settled, df = -A_aa^-1 B_a F on the points that
     touch, with the exact static flexibility; found at contact.h5 and response.h5 alike."""
@@ -247,6 +252,7 @@ def test_options_that_petsc_did_not_read_are_told(monkeypatch) -> None:
         options.delValue(name)
 
 
+@pytest.mark.long
 def test_the_estimated_memory_is_about_what_a_run_takes(run):
     from tireroad.runs.scene.extent.estimate import memory
     from tireroad.runs.scene.load import load

@@ -191,6 +191,7 @@ def test_not_a_number_in_a_result_does_not_stop_the_report(results: Path) -> Non
     assert {TITLES["contact.h5"], TITLES["spectra.h5"]} <= set(shown)
 
 
+@pytest.mark.long
 def test_an_earlier_report_is_replaced_whole(results: Path) -> None:
     first = page(results)
     assert page(results) == first, "the same results give the same page"

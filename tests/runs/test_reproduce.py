@@ -135,7 +135,7 @@ def test_printed_formula_has_only_its_third_term_wrong() -> None:
     assert np.abs(half_space.printed(x, 0.3, 1.0, 2.0) / exact - 1).min() > 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_cheap_ones_end_to_end(launch, tmp_path) -> None:
     command = "-m", "runs", "reproduce", "table-B.2", "figure-D.1", "--out", tmp_path / "out"
     done = launch(*command, processes=2)

@@ -37,7 +37,7 @@ spectra = false
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["SIGTERM"])
 def test_stopped_and_resumed(tmp_path: Path, launch, name: str) -> None:
     scene = tmp_path / "scene.toml"

@@ -58,6 +58,7 @@ def test_check_opens_the_file(scene: Path) -> None:
         explain(load(scene))
 
 
+@pytest.mark.slow
 def test_run_refuses_before_it_solves(scene: Path, launch, tmp_path: Path) -> None:
     done = launch(
         *("-m", "runs", "run", scene, "--out", tmp_path / "out", "--set", "time.duration=0.2")

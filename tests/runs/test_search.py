@@ -210,7 +210,7 @@ def test_a_target_that_cannot_be_is_refused(file, sets, said) -> None:
         load(file, sets)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
     """The real thing: one trial misses a hard target, and meets a loose one without being run again."""
     monkeypatch.setattr(torus, "ORDER", 2)

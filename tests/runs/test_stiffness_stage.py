@@ -37,7 +37,7 @@ def run(tmp_path_factory, launch):
     return started
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_curve_and_stiffness_of_a_loaded_tire(run):
     """The curve passes the scene's own state; later stages get that state back to the last bit."""
     text = "[static]\nload = 900.0\nerror_estimate = false\n"
@@ -78,7 +78,7 @@ def test_deflections_without_a_road_of_the_scene(run):
     assert stages["modes"]["status"] == "skipped"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_vertical_alone(run):
     folder, _ = run(
         "vertical",

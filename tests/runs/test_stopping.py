@@ -175,6 +175,7 @@ def test_killed_supervisor_takes_its_worker_along(scene: Path) -> None:
     assert list(out.glob(".*.part")) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGKILL])
 def test_two_processes_and_their_launcher(scene: Path, number: signal.Signals) -> None:
     """A stop is status 4; a launcher that is killed leaves nothing running."""
@@ -192,6 +193,7 @@ def test_two_processes_and_their_launcher(scene: Path, number: signal.Signals) -
     assert processes_with(str(out)) == []
 
 
+@pytest.mark.long
 def test_mpirun_ends_with_four(scene: Path) -> None:
     """A batch script's own mpirun, without the launcher; it hands SIGUSR1 on."""
     out = scene.parent / "batch"

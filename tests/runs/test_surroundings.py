@@ -92,6 +92,7 @@ def test_output_that_is_lost_is_an_error_where_it_is_all_there_is(scene: Path) -
     assert done.returncode == 2 and b"standard output cannot be written" in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("locale", [{}, {"LC_ALL": "C", "PYTHONUTF8": "0"}])
 def test_paths_that_are_not_text(scene: Path, locale: dict[str, str]) -> None:
     out = os.fsencode(scene.parent) + b"/o\xff\xfe \xc3\xa4"
@@ -106,6 +107,7 @@ def test_paths_that_are_not_text(scene: Path, locale: dict[str, str]) -> None:
         assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("processes", [1, 2])
 def test_result_folder_removed_under_a_run(scene: Path, processes: int) -> None:
     scene.write_text(SCENE + ROLLING)

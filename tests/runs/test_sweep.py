@@ -101,6 +101,7 @@ def test_mistakes_are_named(folder: Path, text: str, wanted: str) -> None:
     assert wanted in str(caught.value)
 
 
+@pytest.mark.long
 def test_a_sweep_runs_gathers_and_shares(folder: Path, launch) -> None:
     path = folder / "family.toml"
     members = {"light": "250.0", "same": "250.0", "crushed": "1e7"}

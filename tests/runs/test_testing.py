@@ -44,6 +44,7 @@ def test_all_runs_are_summed(launch, tmp_path: Path) -> None:
     assert (done.returncode, last) == (0, "4 passed, 0 failed, 1 skipped")
 
 
+@pytest.mark.slow
 def test_the_fast_part_is_on_one_process_without_slow_ones(launch, tmp_path: Path) -> None:
     slow = "\n@pytest.mark.slow\ndef test_long():\n    assert False\n"
     done, last = run(launch, tmp_path, SUITE + slow, "--fast")
@@ -65,6 +66,7 @@ def test_failure_on_one_process_fails(launch, tmp_path: Path) -> None:
     assert "seen on process 1" in done.stdout and "seen on process 2" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["import nothing_of_this_name\n", "# no tests\n"])
 def test_suite_that_cannot_run_fails(launch, tmp_path: Path, text: str) -> None:
     done, last = run(launch, tmp_path, text)

@@ -85,7 +85,7 @@ def test_the_shortest_period_is_a_wave_of_the_road_or_of_its_motion() -> None:
     assert passing_period(Road(), 0.1, 0.0) == np.inf
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_duration_that_is_no_multiple_of_the_step_runs_to_the_end_of_its_last_step(run) -> None:
     folder, _, said = run()
     with h5py.File(folder / "contact.h5") as file:
@@ -108,7 +108,7 @@ def test_one_step_is_a_run(run) -> None:
     assert "no spectrum" in (folder / "report.html").read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_run_in_that_cannot_be_left_out_of_the_spectra_is_said(run) -> None:
     folder, stages, _ = run("time.duration=0.006")
     assert any("hold the run-in" in text for text in stages["spectra"]["warnings"])
@@ -123,7 +123,7 @@ def test_a_run_in_that_cannot_be_left_out_of_the_spectra_is_said(run) -> None:
         assert file["frequency"].shape == (int(file.attrs["limit"] * seen) + 1,)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_axle_force_is_kept_where_it_is_wanted_and_only_there(run) -> None:
     folder, _, _ = run("output.axle_force=false")
     for name in ("contact.h5", "spectra.h5"):

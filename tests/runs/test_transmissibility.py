@@ -46,6 +46,7 @@ def test_refused_where_no_axle_is_held_or_nothing_drives(tmp_path, changed: str)
         load(tmp_path / "a.toml", [changed])
 
 
+@pytest.mark.slow
 def test_both_ways_agree_and_slow_forces_pass(tmp_path) -> None:
     """Two modal bases of one mesh, 1 % at most below 150 Hz (8 segments: rolling also by the lumped mass)."""
     (tmp_path / "a.toml").write_text(SCENE)

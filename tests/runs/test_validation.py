@@ -75,6 +75,7 @@ def tires(tmp_path_factory) -> Tires:
     return Tires(SCENE.format(amplitude=1e-5, modes=120, **mesh), tmp_path_factory.mktemp("tires"))
 
 
+@pytest.mark.slow
 def test_full_elements_in_contact_go_on_from_a_checkpoint_with_the_same_bits(tires) -> None:
     trial, step = tires.trial, 2e-4
     patch, drive = trial.setup.patch, trial.setup.drive

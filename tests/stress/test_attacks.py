@@ -7,11 +7,11 @@ import kills
 import pytest
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_killed_runs_recover(tmp_path: Path) -> None:
     assert kills.attack(tmp_path, kills=3, seed=7) == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_damage_is_never_used(tmp_path: Path) -> None:
     assert damaged_files.attack(tmp_path, files=5, seed=7) == []

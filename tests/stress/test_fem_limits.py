@@ -30,6 +30,7 @@ def converged(**asked) -> StaticState:
     return found.state
 
 
+@pytest.mark.long
 def test_deflection_until_the_section_folds():
     """Half again the section's height: the crown passes the beads' level, and the tire carries as a solid."""
     state = converged(inflation=2e4, deflection=0.15, youngs_modulus=4.8e6, mesh=(8, 6, 2))
@@ -38,6 +39,7 @@ def test_deflection_until_the_section_folds():
     assert 4e3 < state.load < 12e3
 
 
+@pytest.mark.long
 def test_inflation_beyond_the_limit_point():
     """A neo-Hookean membrane of E = 1 MPa holds no more than some hundredths of a MPa."""
     found = ended(inflation=5e6, youngs_modulus=1e6, mesh=(8, 6, 2))
@@ -70,12 +72,14 @@ def test_a_single_contact_node(load):
     assert state.load == pytest.approx(load, rel=1e-6)
 
 
+@pytest.mark.long
 def test_many_contact_nodes():
     state = converged(load=4e3, mesh=(40, 12, 2), size=0.1)
     assert (state.force > 0).sum() > 100
     assert state.load == pytest.approx(4e3, rel=1e-6)
 
 
+@pytest.mark.long
 def test_hundreds_of_contact_nodes():
     state = converged(
         inflation=4e4, deflection=0.05, youngs_modulus=4.8e6, mesh=(70, 28, 1), size=0.1
@@ -84,6 +88,7 @@ def test_hundreds_of_contact_nodes():
     assert state.gap.min() == 0.0
 
 
+@pytest.mark.long
 def test_a_load_out_of_reach_is_refused():
     found = ended(inflation=2e4, load=1e7, youngs_modulus=4.8e6, mesh=(8, 4, 2))
     assert "deflection stops at" in found.message or "out of reach" in found.message
@@ -107,6 +112,7 @@ def test_a_state_out_of_balance_is_caught():
         assert stress_fem.outcome(wrong)[1] == "not caught"
 
 
+@pytest.mark.long
 def test_the_last_good_state_is_kept(tmp_path, launch):
     scene = tmp_path / "burst.toml"
     scene.write_text(

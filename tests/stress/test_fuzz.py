@@ -17,7 +17,7 @@ def test_random_scenes_through_check(tmp_path: Path) -> None:
         assert end in ("exit 0", "exit 2"), f"case {number}, {tried}: {end}"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_damaged_road_files(tmp_path: Path) -> None:
     files = list(road_files(tmp_path))
     for number in range(60):
@@ -25,7 +25,7 @@ def test_damaged_road_files(tmp_path: Path) -> None:
         assert end in ("refused", "driven"), f"case {number}, {tried}: {end}"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_random_scenes_through_run(root: Path, launch: Callable) -> None:
     """In a process of its own: a fork of this one would count what other tests hold as the run's memory."""
     script, limit = root / "tests" / "stress" / "fuzz_scenes.py", 600

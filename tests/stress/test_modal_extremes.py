@@ -52,6 +52,7 @@ def test_all_modes_are_the_dense_ones(operators, modes):
     np.testing.assert_allclose(modes.squares, exact, rtol=1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("gamma", [0.0, 500.0, 5000.0, 1e5])
 @pytest.mark.parametrize("inertia", ["full", "doppler"])
 def test_every_speed_and_damping_keeps_its_identities(operators, modes, inertia, gamma):

@@ -292,6 +292,7 @@ def test_mutants(tmp_path, name):
     assert refused > 100
 
 
+@pytest.mark.slow
 def test_large_decks(tmp_path):
     """What is not used is not kept: 40 MB of output requests take seconds of one processor and no memory."""
     import resource
