@@ -127,6 +127,10 @@ class ContactSetup:
         nodes, weights = self.shape_slip[self.patch.index], self.patch.weights
         return self.slip + (nodes if weights is None else weights @ nodes)
 
+    def with_slip(self, more: float) -> ContactSetup:
+        """The same with `more` slip along the road."""
+        return replace(self, slip=(self.slip[0] + more, self.slip[1]))
+
     def smooth(self, duration: float) -> ContactSetup:
         """The same on a road without heights, at rest, for `duration` s; a slick."""
         still = replace(self.rolled, duration=duration, motion=lambda time: 0.0, lift=0.0)

@@ -153,7 +153,8 @@ class AccuracyStage(Computed[Accuracy]):
         return Given(
             job=self.job,
             static=self.static,
-            setup=self.setup.product,
+            setup=self.setup.product.with_slip(self.contact.product.free_slip),
+            free_slip=self.contact.product.free_slip,
             response=self.greens.product.contact,
             rolling=self.rotating.product,
             step=self.contact.product.step,

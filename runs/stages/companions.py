@@ -52,7 +52,8 @@ LEAST = (8, 4)  # elements around and along that a companion has
 @dataclass(frozen=True, kw_only=True)
 class Given:
     """A run: its `job`, its static state, patch and road (not settled), response
-    and rolling modes, and the first `steps` of `step` s of its loop, by a `scheme`, that companions repeat."""
+    and rolling modes, and the first `steps` of `step` s of its loop, by a `scheme`, that companions repeat; `free_slip`: what the
+    setup has of it, and another setup of the scene needs."""
 
     job: Job
     static: Done[StaticState]
@@ -62,6 +63,7 @@ class Given:
     step: float
     steps: int
     scheme: str = "linear"
+    free_slip: float = 0.0
 
     @cached_property
     def settled(self) -> ContactSetup:
@@ -186,7 +188,8 @@ def coarser_mesh(given: Given) -> Forces:
         if (found := _made(job, kind, part, done)) is not None:
             done[kind.name] = found
     response, state = done["greens"].product.contact, done["static"].product
-    setup = settled(job, done["setup"].product, response, state.normal_force)
+    setup = done["setup"].product.with_slip(given.free_slip)
+    setup = settled(job, setup, response, state.normal_force)
     return given.of(job).repeated(setup, response)
 
 

@@ -93,36 +93,35 @@ class ContactStage(Stage[ContactHistory]):
                 record.indicators["rise of the tire as it settles on the grid"] = (rise, "m")
             begun = begun_with(self.job, key)
             chosen = chosen_scheme(self.job, record, setup, plan, begun)
-            setup = self._rolling_freely(record, setup, plan, chosen.scheme)
+            setup, slip = self._rolling_freely(record, setup, plan, chosen.scheme)
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
         observe.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
         doubtful = self.job.scene.time.scheme == "auto" and chosen.scheme == "linear"
         try:
-            self._attempt(key, record, setup, plan, chosen.scheme, doubtful)
+            self._attempt(key, record, setup, slip, plan, chosen.scheme, doubtful)
         except Chatter:
             if not doubtful:
                 raise
             forget_checkpoint(self.job)
             chosen = reported(record, Chosen(*WATCHED))
-            self._attempt(key, record, setup, plan, chosen.scheme, False)
+            self._attempt(key, record, setup, slip, plan, chosen.scheme, False)
 
     def _rolling_freely(self, record: Record, setup: ContactSetup, plan: Planned, scheme: str):
-        """With the slip of free rolling, where the scene wants that. Collective."""
+        """(setup, slip) of free rolling, where the scene wants that. Collective."""
         rotation, response = self.job.scene.rotation, self.greens.product.contact
         if rotation is None or not rotation.free_rolling:
-            return setup
-        # Found about the present setup, whose slip has nothing found yet.
+            return setup, 0.0
         setup, slip = freely_rolling(self.job, setup, response, plan.step, scheme)
-        self.job.found["free slip"] = slip
         record.headline["slip of free rolling"] = (100 * slip, "%")
-        return setup
+        return setup, slip
 
     def _attempt(
         self,
         key: str,
         record: Record,
         setup: ContactSetup,
+        slip: float,
         plan: Planned,
         scheme: str,
         watched: bool,
@@ -136,6 +135,7 @@ class ContactStage(Stage[ContactHistory]):
         losses = Losses(chosen.tire, response, self.rotating.product, chosen.step)
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
+            attributes["free_slip"] = slip
             file = ContactFile(self.job, key, setup, attributes)
             kept = file.open(stack, self.job.path(self.name))
             if kept is not None:

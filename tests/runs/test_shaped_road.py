@@ -64,6 +64,25 @@ def test_on_a_smooth_drum_nothing_moves(tmp_path, launch, axle) -> None:
     assert push[1] / push[2] == pytest.approx(np.tan(np.radians(4.0)), rel=1e-6)
 
 
+@pytest.mark.long
+def test_companions_of_a_freely_rolling_wheel_roll_freely(tmp_path, launch) -> None:
+    """Without its slip a companion would be dragged, and the mean along the road be off by that."""
+    scene = tmp_path / "scene.toml"
+    text = SCENE.replace("speed = 40.0", "speed = 40.0\nfree_rolling = true")
+    text = text.replace('kind = "flat"', 'kind = "sine"\namplitude = 2e-4\nwavelength = 0.1')
+    text = text.replace("duration = 0.01", "duration = 0.04")
+    text = text.replace("[accuracy]\nestimate = false\n", "")
+    scene.write_text(text)
+    done = launch("-m", "runs", "run", scene, "--out", tmp_path / "out", "--until", "accuracy")
+    assert done.returncode == 0, done.stderr + done.stdout
+    slip = float(done.stdout.partition("slip of free rolling ")[2].split()[0]) / 100
+    with h5py.File(tmp_path / "out" / "contact.h5") as contact:
+        assert contact.attrs["free_slip"] == pytest.approx(slip, rel=1e-3)
+    with h5py.File(tmp_path / "out" / "accuracy.h5") as accuracy:
+        off = {cause: one["mean"][0] for cause, one in accuracy["contact_force"].items()}
+    assert len(off) >= 3 and max(map(abs, off.values())) < 3.0, off
+
+
 @pytest.mark.parametrize(
     ("old", "new", "named"),
     [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -64,15 +63,12 @@ def freely_rolling(
     steps = max(int(np.ceil(6 * (x1 - x0) / setup.rolled.speed / step)), 20)
     smooth, load = setup.smooth(steps * step), float(setup.patch.force.sum())
 
-    def with_slip(of: ContactSetup, slip: float) -> ContactSetup:
-        return replace(of, slip=(of.slip[0] + slip, of.slip[1]))
-
     def drag(slip: float) -> float:
-        found = forces(job, with_slip(smooth, slip), response, step, steps, scheme).contact
+        found = forces(job, smooth.with_slip(slip), response, step, steps, scheme).contact
         return float(found[-max(steps // 6, 1) :, 0].mean())
 
     slip = free_slip(drag, load)
-    return with_slip(setup, slip), slip
+    return setup.with_slip(slip), slip
 
 
 class Forces(NamedTuple):

@@ -58,15 +58,11 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
 
 
 def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup:
-    """With the scene's slip and slip angle; of a wheel that is to roll freely with the slip of its static shape, and
-    what has been found for it."""
+    """With the scene's slip and slip angle; of a wheel that is to roll freely with the slip of its static shape too."""
     rotation, (along, across) = job.scene.rotation, job.scene.contact.slip
     if rotation is None:
         return replace(setup, slip=(along, across))
-    slip = (
-        along + job.found.get("free slip", 0.0),
-        across + math.tan(math.radians(rotation.slip_angle)),
-    )
+    slip = along, across + math.tan(math.radians(rotation.slip_angle))
     if not rotation.free_rolling:
         return replace(setup, slip=slip)
     given = state.positions, job.tire.lattice.ring, state.shape, rolling_radius(job, state)

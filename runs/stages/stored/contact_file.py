@@ -47,7 +47,7 @@ _OF_WHEEL = {
 class ContactHistory:
     """What the road did to the tire, n steps of `step` s at the times `time` (n,): `total_force` (n, 3) N,
     `axle_force` (n, 3) N where it is kept, displacement (n, k, 3) m at `driven` points, where there are any, and by the names of runs.stages.corner the
-    motions and moments of a `wheel` that moves.
+    motions and moments of a `wheel` that moves. `free_slip`: what slip was added so that the wheel rolls freely.
     """
 
     step: float
@@ -57,6 +57,7 @@ class ContactHistory:
     axle_force: np.ndarray | None = None
     driven: np.ndarray | None = None
     wheel: dict[str, np.ndarray] = field(default_factory=dict)
+    free_slip: float = 0.0
 
     @staticmethod
     def of(file: h5py.File) -> ContactHistory:
@@ -69,6 +70,7 @@ class ContactHistory:
             total_force=file["total_force"][:],
             **{name: file[stored][:] for name, stored in kept.items() if stored in file},
             wheel={name: file[name][:] for name in corner.UNITS if name in file},
+            free_slip=float(file.attrs["free_slip"]),
         )
 
 
