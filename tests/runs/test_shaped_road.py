@@ -80,7 +80,7 @@ def test_companions_of_a_freely_rolling_wheel_roll_freely(tmp_path, launch) -> N
         assert contact.attrs["free_slip"] == pytest.approx(slip, rel=1e-3)
     with h5py.File(tmp_path / "out" / "accuracy.h5") as accuracy:
         off = {cause: one["mean"][0] for cause, one in accuracy["contact_force"].items()}
-    assert len(off) >= 3 and max(map(abs, off.values())) < 3.0, off
+    assert 0 < abs(off["step"]) < 1.0, off  # 0.44 N; 2.1 N without the slip, -0.2 %
 
 
 @pytest.mark.parametrize(
