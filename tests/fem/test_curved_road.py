@@ -53,6 +53,7 @@ def test_a_drum_is_a_circle() -> None:
     assert np.allclose(SHAPES["inside"].height(x, 0 * x), 0.9 - np.sqrt(0.81 - x**2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
 def test_pressed_on_it_the_tire_is_in_balance_with_what_is_normal_to_it(name, make_body) -> None:
     """The forces of wall and air are, dof by dof, those of the road along its normal; nothing is inside it."""
@@ -72,6 +73,7 @@ def test_pressed_on_it_the_tire_is_in_balance_with_what_is_normal_to_it(name, ma
     assert np.allclose(normal, state.push, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_drum_of_a_kilometre_is_a_plane(make_body) -> None:
     plane, _ = pressed(make_body, FLAT, deflection=0.008)
     drum, _ = pressed(make_body, RoadShape(drum_radius=1e3), deflection=0.008)
@@ -79,6 +81,7 @@ def test_a_drum_of_a_kilometre_is_a_plane(make_body) -> None:
     assert drum.load != plane.load
 
 
+@pytest.mark.long
 def test_what_a_drum_does_to_the_footprint(make_body) -> None:
     """Shorter and softer on it, longer and stiffer inside it; fore and aft alike."""
     states = [
@@ -92,6 +95,7 @@ def test_what_a_drum_does_to_the_footprint(make_body) -> None:
     assert abs(push[0]) < 1e-9 * push[2]
 
 
+@pytest.mark.slow
 def test_camber_loads_the_side_it_leans_to(make_body) -> None:
     """To the right, -y, and as its mirror image to the left; the load is along the road's normal."""
     right, left = (
@@ -106,6 +110,7 @@ def test_camber_loads_the_side_it_leans_to(make_body) -> None:
     assert push[1] / push[2] == pytest.approx(np.tan(np.radians(4.0)))
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_the_same_on_any_number_of_processes(make_body) -> None:
     alone, _ = pressed(make_body, SHAPES["both"])

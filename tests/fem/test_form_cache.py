@@ -99,6 +99,7 @@ def test_stopped_while_compiling(tmp_path: Path, number: signal.Signals, process
         assert incomplete(tmp_path) == []
 
 
+@pytest.mark.long
 def test_forms_are_kept_and_used_again(tmp_path: Path) -> None:
     for _ in range(2):
         with start(tmp_path, 2) as process:

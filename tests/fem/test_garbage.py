@@ -16,6 +16,7 @@ def _memory() -> float:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+@pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="no /proc to read memory from")
 def test_a_tire_that_is_let_go_takes_its_matrices_with_it() -> None:

@@ -36,6 +36,7 @@ def _loaded(body, rolling=AT_REST) -> Loader:
     return loader
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rolling", [AT_REST, Rolling(speed=40.0)])
 def test_half_the_ring_finds_the_state_of_the_whole(make_body, monkeypatch, rolling):
     """Displacement, force of every node and deflection; the whole takes no tangent of its own."""
@@ -57,6 +58,7 @@ def test_half_the_ring_finds_the_state_of_the_whole(make_body, monkeypatch, roll
     np.testing.assert_allclose(*forces, atol=1e-8 * LOAD)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_half_the_ring_on_several_processes(make_body):
     """As on one, to rounding, with the cut faces on whatever process."""
@@ -66,6 +68,7 @@ def test_half_the_ring_on_several_processes(make_body):
     assert shared.equilibrium.points() == alone.equilibrium.points()
 
 
+@pytest.mark.slow
 def test_a_curve_by_halves_is_that_of_the_whole(make_body, monkeypatch):
     """Loads at three deflections, and what the whole finds out of balance between them: nothing."""
 

@@ -79,7 +79,7 @@ def off(found: np.ndarray, exact: np.ndarray) -> np.ndarray:
 OPTIONS = ("dirac", "static", "second-order", "attachment")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     ("speed", "damping", "inertia"),

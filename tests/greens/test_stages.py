@@ -73,7 +73,7 @@ def test_every_residual_and_its_distance_from_the_full_matrices(run) -> None:
     assert max(distance["second-order"], distance["attachment"]) < distance["static"] / 3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_stored_responses_give_the_same_again(run) -> None:
     """A longer run reuses the Green's functions from their file, residual states included."""
     options = "--set", "greens.residual=second-order", "--until", "response"

@@ -134,7 +134,7 @@ def test_springs_are_a_diagonal_or_a_matrix(tmp_path):
     assert (axle_of(one).stiffness == axle_of(load(scene)).stiffness).all()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_travel_speed_is_the_speed_over_the_road(tmp_path, launch):
     """The wheel's speed times the rolling radius of the state that rolls at it; written back, and told once only."""
     scene, folder = tmp_path / "wheel.toml", tmp_path / "wheel"

@@ -97,6 +97,7 @@ def test_front_is_what_no_other_beats() -> None:
     assert "none of these" in pareto._named(0.5, [choice(5, 1)], [])
 
 
+@pytest.mark.long
 def test_headline_tells_the_cheapest_within_the_error(tmp_path) -> None:
     table = headline.table(tmp_path, TINY, 20, 0.1, ((10, 2500), (None, 10000)))
     coarse, fine = table.rows
@@ -130,6 +131,7 @@ def test_scaling_on_small_sizes(tmp_path) -> None:
     check_page([scaling.machine_rates(), sizes, loop], images=2)
 
 
+@pytest.mark.long
 def test_efficiency_over_processes(tmp_path, monkeypatch) -> None:
     """Twice as fast on the same mesh, and as fast on twice the mesh, is an efficiency of 1."""
     alone = scaling._on(tmp_path, "strong", TINY, 12, 1)
@@ -211,6 +213,7 @@ def test_error_bars_are_compared_with_a_finer_run(tmp_path) -> None:
     assert again[2].rows == every.rows and not (tmp_path / "again").exists()
 
 
+@pytest.mark.long
 def test_a_search_is_held_against_all_settings_and_not_run_twice(tmp_path, monkeypatch) -> None:
     fine = {"segments": 16, "arc": 8, "order": 2, "modes": 40, "pitch": 0.008, "step": 5e-4}
     changed = {"FINE": fine, "TARGET": 0.9, "UP_TO": 70.0, "DURATION": 0.08}

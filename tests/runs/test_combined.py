@@ -16,7 +16,7 @@ def test_every_combination_is_a_scene(tmp_path) -> None:
         load(tmp_path / "scene.toml", [])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_free_cambered_patterned_wheel_on_a_drum_comes_to_its_end() -> None:
     ((_, _, what, how),) = combined.rows(["free wheel, camber, drum, pattern with friction"])
     assert "steps, load" in what

@@ -40,7 +40,7 @@ def test_a_road_up_to_the_flanks_is_named(launch, tmp_path: Path) -> None:
     assert again.returncode == 2 and "contact.points" in again.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_states_of_the_full_matrices_carry_a_contact(launch, tmp_path: Path) -> None:
     """Their coordinates are not the modes': the energy balance tells the work alone (it crashed)."""
     done = _run(launch, tmp_path, "rotation.method=full", "road.kind=flat")

@@ -74,6 +74,7 @@ def test_flat_road_at_rest_leaves_the_tire_exactly_at_rest(run, rotation):
     assert (stages["rotating"]["status"] == "skipped") == (rotation == "")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wanted", [True, False])
 def test_the_load_comes_with_its_estimated_error_and_a_breakdown_of_the_time(run, wanted):
     option = () if wanted else ("--set", "static.error_estimate=false")
@@ -128,6 +129,7 @@ receptance = { to = 200.0, step = 50.0 }
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.0, 40.0])
 def test_constant_force_ends_at_the_static_flexibility_and_on_the_axle(run, speed):
     text = POINT + (f"[rotation]\nspeed = {speed}\n" if speed else "")

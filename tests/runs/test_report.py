@@ -206,6 +206,7 @@ def test_a_folder_without_results_is_an_input_error(tmp_path: Path, name: str) -
     assert list((tmp_path / "empty").iterdir()) == []
 
 
+@pytest.mark.long
 def test_a_typical_run_takes_seconds_and_a_small_page_without_dolfinx(tmp_path: Path) -> None:
     directory = write_results(tmp_path / "run", around=120, across=33, steps=10000, modes=60)
     program = (
@@ -231,6 +232,7 @@ def test_stages_come_in_the_order_they_ran(results: Path) -> None:
     assert order == sorted(order)
 
 
+@pytest.mark.long
 def test_a_search_is_drawn_by_cost_and_error(
     results: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

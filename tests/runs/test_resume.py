@@ -67,9 +67,11 @@ def test_stopped_and_resumed(tmp_path: Path, launch, name: str) -> None:
     assert "goes on from the checkpoint" in again.stdout
     assert not (broken / "checkpoint.h5").exists()
     with h5py.File(whole / "contact.h5") as one, h5py.File(broken / "contact.h5") as other:
-        assert sorted(one) == sorted(other)
-        for dataset in one:
-            assert np.array_equal(one[dataset][:], other[dataset][:]), dataset
+        names: list[str] = []
+        one.visititems(lambda name, item: names.append(name) if hasattr(item, "shape") else None)
+        assert len(names) > 8 and all(name in other for name in names)
+        for name in names:
+            assert np.array_equal(one[name][()], other[name][()]), name
 
 
 def test_resume_needs_a_result_folder(tmp_path: Path, launch) -> None:

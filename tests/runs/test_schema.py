@@ -196,8 +196,11 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
         x, y = np.arange(0.0, 2.0, 0.01), np.arange(-0.3, 0.3, 0.01)
         (tmp_path / "rolling").mkdir()
         np.savez(tmp_path / "rolling" / "road.npz", x=x, y=y, z=np.zeros((len(x), len(y))))
+        line = np.column_stack([1e3 * x, np.sin(40 * x)])  # mm
+        np.savetxt(tmp_path / "rolling" / "line.csv", line, fmt="%.4f", delimiter=",")
+        files = {"grid": ["road.file=road.npz"], "laser": ["road.file=line.csv"]}
         for kind in ROADS:
-            file = ["road.file=road.npz"] if kind == "grid" else []
+            file = files.get(kind, [])
             if kind != "crg":  # its keys are the grid's
                 _run(tmp_path / "rolling", ROLLING.format(kind=kind), *file)
         for tread in ("layer", "winkler", "viscoelastic"):

@@ -6,6 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.chatter import Alternation, Chatter
+from tireroad.runs.files.cache import Cache
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.load import load
@@ -53,7 +54,7 @@ def run(tmp_path):
                 until="contact",
                 fresh=False,
                 petsc_options=[],
-                cache=tmp_path / "cache",
+                cache=Cache(tmp_path / "cache"),
             )
 
     return started

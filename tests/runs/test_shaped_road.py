@@ -42,7 +42,7 @@ kind = "corner"
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("axle", ["", CAR])
 def test_on_a_smooth_drum_nothing_moves(tmp_path, launch, axle) -> None:
     scene = tmp_path / "scene.toml"
@@ -98,7 +98,7 @@ def test_roads_that_cannot_be(tmp_path, old, new, named) -> None:
         load(tmp_path / "scene.toml")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_freely_rolling_wheel_is_not_dragged(tmp_path, launch) -> None:
     """On a smooth road, cambered: none of the force along the road is left, some of it across (camber thrust)."""
     scene = tmp_path / "scene.toml"

@@ -66,7 +66,7 @@ def test_curve_and_stiffness_of_a_loaded_tire(run):
     assert again["stiffness"]["status"] == "reused"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_deflections_without_a_road_of_the_scene(run):
     folder, stages = run(
         "given", "[stiffness]\ndeflections = [0.004, 0.012]\n", "--until", "stiffness"

@@ -136,7 +136,7 @@ def test_the_axle_force_is_kept_where_it_is_wanted_and_only_there(run) -> None:
         assert file["axle_force"].shape == (334, 3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_friction_is_compared_with_the_one_that_is_sure_of_its_answer(run) -> None:
     """The limit of this tire, some hundreds, is beyond what a scene may ask for."""
     _, stages, _ = run("contact.brush_stiffness=2e5", "time.duration=0.0015")

@@ -64,6 +64,7 @@ def test_every_speed_and_damping_keeps_its_identities(operators, modes, inertia,
         checks(rotating(drag, stiffness), drag, stiffness)
 
 
+@pytest.mark.long
 def test_growth_begins_where_onset_says(operators, modes):
     """Far past critical the pressed tire is unstable; onset brackets the first speed."""
     projection = project(modes, operators.rotation(), operators.carried, COMM)
@@ -74,6 +75,7 @@ def test_growth_begins_where_onset_says(operators, modes):
     assert growth(projection, 0.99 * first, (50.0, 0.0), "full") == 0
 
 
+@pytest.mark.long
 def test_bulk_a_thousand_times_the_shear_modulus():
     """Rounding leaves more than 1e-8 of the lowest eigenvalue: as good as LAPACK's, and not refused."""
     section = thesis_torus(segments=12, elements_arc=4, order=3)

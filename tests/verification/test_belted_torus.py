@@ -33,7 +33,7 @@ angle = -20.0
 REFERENCE = np.array([13.43, 21.40, 21.40, 35.22, 42.28, 42.28, 45.11, 45.11, 52.45, 52.45])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.mpi
 def test_frequencies_of_the_belted_torus(tmp_path):
     """All within 0.6 % on the default elements (order 3, 14 along the arc, one a ply); 8 segments are as good as 30

@@ -133,6 +133,7 @@ def test_full_contact_of_waves_is_linear(solver: str) -> None:
     assert np.abs(found - exact).max() < 1e-6 * full
 
 
+@pytest.mark.slow
 def test_figure_5_5_of_the_thesis() -> None:
     """Roughness peaks in a half-space of 20 MPa, nu = 0.49: they touch, nothing goes through, and the
     surface around a peak that is one point wide follows, as it would not if points were on their own."""

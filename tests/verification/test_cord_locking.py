@@ -35,6 +35,7 @@ def stiffness(body, more=0) -> sparse.csc_matrix:
     return sparse.csc_matrix(sparse.csr_matrix(matrix.getValuesCSR()[::-1], shape=matrix.getSize()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "angle", "within"), [(2, 15.0, 0.01), (3, 15.0, 0.01)])
 def test_bending_of_a_curved_strip_with_a_ply_off_its_middle(order, angle, within):
     """Moment of a sector bent by its end sections: E b int (r - r_p)^2 / r dr a unit turn per angle, the ply at r_p its
@@ -90,6 +91,7 @@ def _cell_radii(body) -> np.ndarray:
     return np.array([radius[body.space.dofmap.cell_dofs(cell)].mean() for cell in range(count)])
 
 
+@pytest.mark.long
 def test_ring_modes_of_a_belt_under_tension():
     """In the plane, n = 2 to 7, on 100 segments around as by default:
 

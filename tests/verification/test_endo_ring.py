@@ -107,7 +107,7 @@ def endo(speed: float) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([turn + root, turn - root])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.0, 5.0, 20.0])
 def test_turning_ring(ring, speed):
     """0.1 % in the ring's frame and in the one at rest."""

@@ -74,7 +74,7 @@ def tire() -> TireModel:
     return TireModel(section, lambda: Body(COMM, section, rubber))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_chain_gives_what_the_program_gives(tire, tmp_path, launch) -> None:
     static = press(tire, inflation=2e5, load=300.0, rolling=Rolling(speed=SPEED, damping=500.0))
     motions = SmallMotions(tire, static)
@@ -107,6 +107,7 @@ def test_the_chain_gives_what_the_program_gives(tire, tmp_path, launch) -> None:
     assert spectrum.shape == (101, 3)
 
 
+@pytest.mark.slow
 def test_what_does_not_fit_together_is_refused(tire) -> None:
     static = press(tire, inflation=2e5, rolling=Rolling(speed=SPEED))
     motions = SmallMotions(tire, static)

@@ -35,6 +35,7 @@ def pressed(section, rolling=AT_REST, comm=MPI.COMM_SELF, regions=(), height=HEI
     return loader
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("segments", "arc", "order"), [(16, 8, 2), (24, 10, 2), (16, 6, 3)])
 def test_the_estimate_lies_between_half_and_twice_the_error(segments, arc, order):
     loader = pressed(ring(segments, arc, order))
@@ -52,6 +53,7 @@ def test_a_sign_is_told_where_the_parts_do_not_cancel(footprint, bulk, known):
     assert found.signed == known
 
 
+@pytest.mark.long
 def test_the_tire_is_left_as_it_was_and_the_companion_rolls_too():
     """A companion that takes over the state ends where one that was loaded from the beginning does."""
     rolling = Rolling(speed=60.0, damping=500.0)

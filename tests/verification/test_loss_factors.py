@@ -87,6 +87,7 @@ def test_one_compound_without_pressure_has_its_own_loss_factor():
     np.testing.assert_allclose(np.diag(drag), 0.2 * np.sqrt(projection.squares), rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_dynamic_moduli_scale_the_rubber_alone():
     """K(dynamic) - K = (dynamic - 1) K_material: exact with one factor everywhere; cords, pressure and the turning of
     stresses stay. Without load and cords all of K is material."""
@@ -107,6 +108,7 @@ def test_dynamic_moduli_scale_the_rubber_alone():
     assert (low < 1.4 * low_static).all()
 
 
+@pytest.mark.slow
 def test_the_material_part_by_differences_of_the_stress():
     """loss_stiffness against central differences of the virtual work of the added stress."""
     from tireroad.fem.static.virtual_work import added_energy, added_stress

@@ -56,6 +56,7 @@ def read(folder, name, file, dataset):
         return stored[dataset][:]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("residual", ["static", "second-order"])
 def test_full_states_drive_the_same_response(launch, folder, residual):
     """24 pairs of the full problem and a residual, against 300 projected modes with the same."""
@@ -72,6 +73,7 @@ def test_full_states_drive_the_same_response(launch, folder, residual):
     assert "rotating  reused" in again
 
 
+@pytest.mark.long
 def test_full_states_on_two_processes(launch, folder):
     run(launch, folder, "one", method="full")
     run(launch, folder, "two", processes=2, method="full")
@@ -82,6 +84,7 @@ def test_full_states_on_two_processes(launch, folder):
     )
 
 
+@pytest.mark.long
 def test_modes_up_to_a_frequency_and_campbell(launch, folder):
     more = "campbell = { to = 60.0, step = 20.0, branches = 5 }"
     run(launch, folder, "swept", more=more, options=["--set", "modal.up_to=300"])
@@ -112,6 +115,7 @@ def test_round_tire_names_its_modes(launch, folder):
         assert pair[1] == pytest.approx(pair[0], rel=1e-6)
 
 
+@pytest.mark.long
 def test_full_states_in_a_window(launch, folder):
     """All of the projected ones between two frequencies, and none beside them."""
     run(launch, folder, "window", method="full", more="window = [60.0, 100.0]")

@@ -111,6 +111,7 @@ def test_buckled_state_is_named(round_tire):
         undamped.solve(flat.stiffness, flat.mass, 10, sites=sites(flat))
 
 
+@pytest.mark.long
 def test_a_light_load_keeps_both_mirror_planes():
     """Stiff rubber, order 3: entries of the matrix are symmetric to 1e-13 of the largest, which is 1e-8 of the
     lowest eigenvalue. That is rounding, no asymmetry, and shifts no frequency by as much.
@@ -124,7 +125,7 @@ def test_a_light_load_keeps_both_mirror_planes():
     split = undamped.solve(operators.stiffness, operators.mass, 12, sites=sites(operators))
     whole = undamped.solve(operators.stiffness, operators.mass, 12)
     assert len(split.symmetries) == 2
-    assert undamped.RESIDUAL_TOLERANCE < split.residual.max() < 1e-7
+    assert split.residual.max() < 1e-7
     np.testing.assert_allclose(split.squares, whole.squares, rtol=1e-10)
 
 

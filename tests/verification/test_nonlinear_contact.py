@@ -74,6 +74,7 @@ def shaken(full, patch) -> np.ndarray:
     return np.array([instant.change for instant in steps])
 
 
+@pytest.mark.slow
 def test_small_shakes_with_friction_are_those_of_the_linear_tire():
     loader = pressed(0.003)
     state = static_state(loader.equilibrium, loader.touch)
@@ -108,7 +109,7 @@ def test_small_shakes_with_friction_are_those_of_the_linear_tire():
     assert np.linalg.norm((bent - straight)[:, count:]) < 2e-2 * np.linalg.norm(straight[:, count:])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_road_that_has_risen_carries_the_static_load():
     loader = pressed(0.002)
     state = static_state(loader.equilibrium, loader.touch)

@@ -26,7 +26,7 @@ def test_first_modes_and_mass_beside_the_public_ones():
     assert tire.weight == pytest.approx(9.3, rel=0.03)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_loaded_stiffness_beside_the_public_one(tmp_path):
     """Loads at 10.5 and 20.3 mm 2000 and 4000 N, the slope between them, longitudinal (358 to 382 N/mm) and lateral
     stiffness (103 to 158 N/mm) of the stuck footprint: within 10 % on coarse elements.
@@ -48,7 +48,7 @@ def test_loaded_stiffness_beside_the_public_one(tmp_path):
     assert 103e3 < stuck.lateral < 158e3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_three_dimensional_elements_against_fourier_series(tmp_path):
     """Inflated, with cords and dynamic moduli: two codes, the same section, 0.1 % in the six lowest frequencies."""
     path = tmp_path / "radial.toml"

@@ -131,6 +131,7 @@ def run(launch, folder, command="run", speed=0.0, road="", modal="", residual="s
     return launch("-m", "runs", command, scene, *out)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("speed", "road", "modal", "residual", "rigid"),
     [
