@@ -129,6 +129,21 @@ def test_in_the_first_second(scene: Path, number: signal.Signals, after: float) 
     assert "Traceback" not in error
 
 
+def test_a_request_that_the_parent_ignores_is_heard(scene: Path) -> None:
+    """Signals that are ignored stay so in what a process starts: here they count all the same."""
+    out = scene.parent / "ignored"
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        process = begin([*PROGRAM, "run", scene, "--out", out])
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    with process:
+        in_the_loop(process, out)
+        process.send_signal(signal.SIGTERM)
+        _, error = process.communicate(timeout=LONG)
+    assert process.returncode == 4, error
+
+
 def test_deaf_worker_is_ended(tmp_path: Path) -> None:
     with begin([sys.executable, "-P", "-c", DEAF], cwd=tmp_path) as process:
         assert process.stdout.readline() == "begun\n"
