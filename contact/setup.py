@@ -79,8 +79,8 @@ class ContactSetup:
 
     @property
     def drive(self) -> Drive:
-        """The road as the time loop asks for it: smoothed over each point's rectangle where it has waves of four of
-        them or shorter; a pattern's depth is road that is missing, but for what the static state knows of it."""
+        """The road as the time loop asks for it: smoothed over each point's rectangle where it resolves less than
+        that; a pattern's depth is road that is missing, but for what the static state knows of it."""
         road = (
             CellMean(self.road, self.patch.points[:, 1], self.patch.half_sizes)
             if self.fine
@@ -97,8 +97,8 @@ class ContactSetup:
 
     @property
     def fine(self) -> bool:
-        """Whether the road has waves shorter than four points along or across, which these hardly resolve."""
-        return self.road.spacing < 4 * float(self.patch.half_sizes.max())
+        """Whether the road has waves shorter than two points along or across, which the points cannot tell."""
+        return self.road.spacing < 2 * float(self.patch.half_sizes.max())
 
     @property
     def shortest(self) -> float:

@@ -35,8 +35,6 @@ _PR_SET_PDEATHSIG = 1
 def supervise() -> None:
     """Fork. Returns in the worker; the caller's process stays here and exits as the worker ends."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {*signals.STOP_SIGNALS, signal.SIGCHLD})
-    for number in signals.STOP_SIGNALS:  # what a parent ignored would be dropped, not waited for
-        signal.signal(number, signal.SIG_DFL)
     hears, tells = os.pipe()
     supervisor = os.getpid()
     worker = os.fork()
