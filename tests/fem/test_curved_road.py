@@ -53,7 +53,7 @@ def test_a_drum_is_a_circle() -> None:
     assert np.allclose(SHAPES["inside"].height(x, 0 * x), 0.9 - np.sqrt(0.81 - x**2))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", SHAPES)
 def test_pressed_on_it_the_tire_is_in_balance_with_what_is_normal_to_it(name, make_body) -> None:
     """The forces of wall and air are, dof by dof, those of the road along its normal; nothing is inside it."""

@@ -106,6 +106,7 @@ def test_all_modes_with_air_are_the_full_matrices_with_air(speed) -> None:
         assert off(exact, exact.swapaxes(1, 2)) < 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.0, 60.0])
 def test_every_residual_knows_the_air(speed) -> None:
     """250 modes: exact at 0 Hz, and second-order and attachment close near the air's resonance."""
@@ -134,6 +135,7 @@ def march(tire, step: float, steps: int) -> np.ndarray:
     return out
 
 
+@pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.parametrize("speed", [0.0, 60.0])
 def test_full_finite_elements_in_time_agree_with_all_modes(speed) -> None:

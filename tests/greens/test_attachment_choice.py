@@ -37,7 +37,7 @@ def tire():
     return operators, modes, sparse.csr_matrix(np.stack(spots))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.parametrize("speed", [0.0, 30.0, 90.0])
 def test_what_is_left_out_is_within_the_tolerance(tire, speed, monkeypatch):

@@ -215,7 +215,7 @@ def dense_receptance(speed: float, axle: Axle) -> np.ndarray:
     return np.stack([load.T @ np.linalg.solve(z * z * M + z * D + K, load) for z in s])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.0, 60.0])
 def test_all_modes_with_a_corner_are_the_full_matrices_of_a_free_rim(speed) -> None:
     """Six directions, a body, gyroscopic torque, a loaded tire: nothing is left out, so nothing differs."""
@@ -247,7 +247,7 @@ def test_hub_by_the_blocked_force_and_its_moments_by_the_springs(speed) -> None:
         assert np.abs(force[3:] - h[7:]).max() < 1e-9 * np.abs(force[3:]).max()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.mpi
 def test_residuals_with_a_corner_are_those_of_the_held_rim() -> None:
     """Static: all that 60 modes lack of the held tire, whatever the corner does. And attachment comes closer.

@@ -102,7 +102,7 @@ def test_static_limit_is_exact(speed, damping, inertia) -> None:
         assert found.eigenvalue.real.max() <= 1e-9 * np.abs(found.eigenvalue).max(), option
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_error_up_to_half_the_highest_mode() -> None:
     """Standing and rolling: what each option leaves of the full matrices' receptance."""
     operators, _, modes, readings, loads = tire()
@@ -191,6 +191,7 @@ def test_vectors_of_another_solution_are_refused() -> None:
         made.respond(basis, other, loads, loads, "attachment")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.0, 50.0])
 @pytest.mark.parametrize("option", ["static", "second-order", "attachment"])
 def test_the_error_of_the_axle_force_is_about_what_is_estimated(speed, option) -> None:

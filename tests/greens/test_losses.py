@@ -95,6 +95,7 @@ def made(t, speed) -> tuple[Wheel, Basis]:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.0, 60.0])
 @pytest.mark.parametrize("option", ["static", "second-order", "attachment"])
 def test_every_residual_with_losses(speed, option):

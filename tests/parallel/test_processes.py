@@ -76,6 +76,7 @@ def test_results_do_not_depend_on_the_number_of_processes(
     assert np.abs(many - one).max() <= tolerance * np.abs(one).max()
 
 
+@pytest.mark.long
 def test_the_road_is_felt(folders):
     """What is compared above must not be a tire that never met its road."""
     load = values(folders[1], "contact.h5", "total_force")[:, 2]

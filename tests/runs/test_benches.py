@@ -185,6 +185,7 @@ def test_a_table_without_a_picture() -> None:
     assert drawn(Table("t", [("n", "-")], [[1]])) is None
 
 
+@pytest.mark.long
 def test_convergence_tells_what_each_change_costs(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(convergence, "DURATION", 0.03)
     finest = {"segments": 12, "arc": 6, "order": 2, "footprint": 0.5}

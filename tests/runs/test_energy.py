@@ -90,7 +90,7 @@ STIFF = (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["linear", "constant", "auto"])
 def test_a_stiff_tread_on_long_steps_chatters_where_forces_are_linear(run, scheme: str) -> None:
     """The balance fails then; forces constant over the step, which "auto" takes, balance with what they take."""

@@ -188,7 +188,7 @@ def _run(folder: Path, text: str, *overrides: str) -> None:
     run_scene(scene, folder, MPI.COMM_WORLD, until="spectra", fresh=False, petsc_options=[])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
     """Scenes that between them have every table: no key stands in `check` for nothing."""
     with monkeypatch.context() as patched:

@@ -61,6 +61,7 @@ def family(folder: Path, duration: float) -> Path:
     return folder / "family.toml"
 
 
+@pytest.mark.long
 def test_a_sweep_through_slurm(tmp_path: Path, launch, queue) -> None:
     out = tmp_path / "out"
     sweep = family(tmp_path, 0.01)
@@ -78,6 +79,7 @@ def test_a_sweep_through_slurm(tmp_path: Path, launch, queue) -> None:
     assert sum("modes     reused" in text for text in logs) == 2
 
 
+@pytest.mark.long
 def test_a_warning_requeues_the_job_and_it_goes_on(tmp_path: Path, launch, queue) -> None:
     """Slurm's signal before the time limit, sent by hand: checkpoint, requeue, and the same end."""
     out = tmp_path / "out"
