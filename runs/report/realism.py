@@ -46,13 +46,12 @@ def _outside(value: float, low: float, high: float) -> bool:
 
 def _pressure(results: Results) -> Iterator[str]:
     """Load over area: near the inflation, more of a stiff carcass and a light load."""
-    force, area = (
-        results.array("static.h5", "contact/force"),
-        results.array("static.h5", "contact/area"),
+    force = results.array("static.h5", "contact/force")[:, 2]
+    inflation, area = (
+        _number(results, "static.h5", key) for key in ("inflation", "footprint_area")
     )
-    inflation, active = _number(results, "static.h5", "inflation"), force[:, 2] > 0
-    if inflation > 0 and active.any():
-        mean = float(force[active, 2].sum() / area[active].sum())
+    if inflation > 0 and area > 0:
+        mean = float(force.sum()) / area
         if _outside(mean / inflation, 0.6, 2.0):
             yield (
                 f"mean contact pressure {quantity(mean, 'Pa')}, {digits(mean / inflation)} times the inflation "

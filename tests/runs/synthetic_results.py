@@ -86,7 +86,11 @@ def write_static(path: Path, around: int, across: int) -> NDArray:
         provenance(file, "static")
         file.attrs.update(load=500.0, deflection=0.015, inflation=2.0e5, touch_height=-0.324)
         file.attrs.update(
-            road_height=ROAD, rolling_radius=0.316, footprint_length=0.14, footprint_width=0.08
+            road_height=ROAD,
+            rolling_radius=0.316,
+            footprint_length=0.14,
+            footprint_width=0.08,
+            footprint_area=0.009,
         )
         put(file, "mesh/points", points, "m")
         put(file, "displacement", displacement, "m")

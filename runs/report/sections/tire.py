@@ -83,10 +83,12 @@ def footprint(results: Results, section: Section) -> None:
     active = force[:, 2] > 0
     section.facts.append(("points in contact", quantity(int(active.sum()))))
     caption = f"Contact force, {quantity(float(force[:, 2].sum()), 'N')} in all"
-    if area is not None:
-        section.facts.append(("contact area", f"{1e4 * area[active].sum():.4g} cm²"))
-        mean = float(force[active, 2].sum() / area[active].sum())
+    whole = results.attribute("static.h5", "footprint_area")
+    if isinstance(whole, float) and whole > 0:
+        section.facts.append(("contact area", f"{1e4 * whole:.4g} cm²"))
+        mean = float(force[active, 2].sum()) / whole
         section.facts.append(("mean contact pressure", quantity(mean, "Pa")))
+    if area is not None:
         caption = f"Contact pressure of {quantity(float(force[:, 2].sum()), 'N')}"
     picture = surface_figures.footprints(points, [values], ["footprint at rest"], unit, 6.2)
     section.show(picture, caption + ". Grey dots: surface points that do not touch.")
