@@ -153,7 +153,7 @@ class Equilibrium:
         change, force = self._system.solve(-out, closing)
         force += out[held]
         if load is not None:
-            further, more = self._system.solve(np.zeros_like(out), self._system.raising)
+            further, more = self._system.lift()
             total, rate = self.body.comm.allreduce(np.array([force.sum(), more.sum()]))
             if not rate > 0:
                 return "the road meets nothing that resists"
@@ -171,8 +171,7 @@ class Equilibrium:
         self._before.x.array[:] = self.body.u.x.array
         if not self._take_tangent():
             return float("nan")
-        nothing = np.zeros(len(self._work.array_r))
-        _, force = self._system.solve(nothing, self._system.raising)
+        _, force = self._system.lift()
         return self.body.comm.allreduce(float(force.sum()))
 
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:

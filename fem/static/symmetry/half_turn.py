@@ -95,6 +95,7 @@ class HalfTurnEquilibrium(Equilibrium):
         i, node = np.divmod(own.ids, lattice.shape[1])
         own.owned(own.u.x.array)[:] = whole.body.displacement()[i * lattice.shape[1] + node]
         own.u.x.scatter_forward()
+        self.road.active[:], self.road.force[:] = False, 0.0
         self.pressure.value = float(whole.pressure.value)
 
     def on(self, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
