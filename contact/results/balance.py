@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tireroad.contact.energy import Dissipation, stored
+from tireroad.contact.results.energy import Dissipation, stored
 from tireroad.greens.response import Response
 from tireroad.modal.damping import rates
 from tireroad.modal.rolling import RollingModes, pencil

@@ -1,7 +1,7 @@
 """Chatter: points that open and close from step to step, because a step is too long for the contact.
 
 Between the points that touch, a force meets a compliance at once, B (tread and residual flexibility); a force
-linear over the steps that alternates meets the tire's states as a negative one, X (greens.alternating). With
+linear over the steps that alternates meets the tire's states as a negative one, X (greens.residual.alternating). With
 
     -X v = mu B v,   mu the largest,
 
@@ -22,7 +22,7 @@ from scipy import linalg
 from tireroad.contact.model import Spec, touching_compliance
 from tireroad.contact.patch import Patch
 from tireroad.fem.errors import ConvergenceError
-from tireroad.greens.alternating import alternating, at_once
+from tireroad.greens.residual.alternating import alternating, at_once
 from tireroad.greens.response import Response
 
 # Steps in the fastest oscillation from which forces are taken as linear: at fewer, undamped modes between impacts

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.contact.spectra import low_part, third_octaves
+from tireroad.contact.results.spectra import low_part, third_octaves
 
 _NAMES = ("mean", "deviation", "level", "history")
 CAUSES = ("step", "points", "modes", "mesh")
@@ -39,7 +39,7 @@ def share(ratio: float, order: float) -> float:
 @dataclass(frozen=True)
 class Told:
     """What is told of a force: `mean`, `deviation` (3,) N, `level` (b, 3) dB of the bands at `centre` (b,) Hz,
-    and `low` (f, 3) N, the Fourier coefficients of what varies up to a frequency (contact.spectra.low_part)."""
+    and `low` (f, 3) N, the Fourier coefficients of what varies up to a frequency (contact.results.spectra.low_part)."""
 
     mean: np.ndarray
     deviation: np.ndarray

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal
 
-from tireroad.contact.levels import a_weighting, band_sums, confidence
+from tireroad.contact.results.levels import a_weighting, band_sums, confidence
 
 FORCE, MOMENT, VELOCITY = (
     1.0,
@@ -39,7 +39,7 @@ def third_octaves(
     weighted: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Band centres (b,) Hz and levels (b, d), dB re `reference` (rms), of values (n, d), or, as `rate`, of their rate
-    of change per second; A-weighted line by line if wanted; bands as of `contact.levels.band_sums`, below `up_to` Hz and
+    of change per second; A-weighted line by line if wanted; bands as of `contact.results.levels.band_sums`, below `up_to` Hz and
     half the sampling rate. Hann window over the whole record, mean removed. A record of one value has no band.
     """
     if len(values) < 2:
@@ -56,7 +56,7 @@ def third_octaves(
 @dataclass(frozen=True)
 class Density:
     """Power spectral `density` (f, d), one-sided, at `frequency` (f,) Hz, by Welch's method: Hann windows of
-    `segment` s, half overlapping, `averages` of them; `confidence` (2,) dB, 95 %, as of contact.levels."""
+    `segment` s, half overlapping, `averages` of them; `confidence` (2,) dB, 95 %, as of contact.results.levels."""
 
     frequency: np.ndarray
     density: np.ndarray

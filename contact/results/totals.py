@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tireroad.contact.chatter import Alternation, Chatter
-from tireroad.contact.energy import Work
+from tireroad.contact.results.chatter import Alternation, Chatter
+from tireroad.contact.results.energy import Work
 from tireroad.contact.patch import Patch
 
 RUNAWAY = 100.0  # times the patch's reach: half a metre at least

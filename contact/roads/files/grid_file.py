@@ -4,10 +4,10 @@ import zipfile
 import zlib
 from pathlib import Path
 
+from tireroad.contact.roads.files.grid_csv import read_csv
+from tireroad.contact.roads.files.grid_hdf5 import read_hdf5
+from tireroad.contact.roads.files.grid_npz import read_npz
 from tireroad.contact.roads.grid import Grid
-from tireroad.contact.roads.grid_csv import read_csv
-from tireroad.contact.roads.grid_hdf5 import read_hdf5
-from tireroad.contact.roads.grid_npz import read_npz
 from tireroad.contact.roads.plausible import check_plausible
 from tireroad.contact.roads.rows import Scaled
 from tireroad.fem.errors import InputError

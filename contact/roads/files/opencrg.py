@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.roads.files.opencrg_header import MAX_BYTES, Blocks, key_values, read_header
+from tireroad.contact.roads.files.opencrg_payload import Payload, read_payload
 from tireroad.contact.roads.grid import Grid
-from tireroad.contact.roads.opencrg_header import MAX_BYTES, Blocks, key_values, read_header
-from tireroad.contact.roads.opencrg_payload import Payload, read_payload
 from tireroad.contact.roads.rows import Columns, Rows, pieces
 from tireroad.fem.errors import InputError
 

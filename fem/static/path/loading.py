@@ -10,11 +10,11 @@ import numpy as np
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.parallel import on_root
 from tireroad.fem.static.equilibrium import Equilibrium, Step
-from tireroad.fem.static.stepping import Attempt, Show, march
+from tireroad.fem.static.path.stepping import Attempt, Show, march
+from tireroad.fem.static.path.way import Way
 from tireroad.fem.static.symmetry.half_turn import HalfTurnEquilibrium, looks_the_same
 from tireroad.fem.static.symmetry.round import RoundEquilibrium
 from tireroad.fem.static.tread_surface import TreadSurface
-from tireroad.fem.static.way import Way
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.static.step import Step
-from tireroad.fem.static.stepping import Show
+from tireroad.fem.static.path.step import Step
+from tireroad.fem.static.path.stepping import Show
 
 if TYPE_CHECKING:
-    from tireroad.fem.static.loading import Loader
+    from tireroad.fem.static.path.loading import Loader
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
 _REACH = 1.9  # times the largest deflection so far: a load is sought no further away

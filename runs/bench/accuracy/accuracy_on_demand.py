@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.contact.error_bars import Told, bars, told
+from tireroad.contact.results.error_bars import Told, bars, told
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import by_processor
 from tireroad.runs.bench.parts.kept import read_kept, write_kept

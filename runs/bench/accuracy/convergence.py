@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.contact.error_bars import told
-from tireroad.contact.spectra import distance
-from tireroad.runs.bench.rough_road import Mesh, Rolled, rolled
+from tireroad.contact.results.error_bars import told
+from tireroad.contact.results.spectra import distance
+from tireroad.runs.bench.accuracy.rough_road import Mesh, Rolled, rolled
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
 

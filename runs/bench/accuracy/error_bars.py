@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.contact.error_bars import Bars, bars, told
+from tireroad.contact.results.error_bars import Bars, bars, told
 from tireroad.runs.bench.parts.effectivity import (
     ALL,
     FORCES,

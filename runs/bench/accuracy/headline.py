@@ -5,8 +5,8 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from tireroad.contact.spectra import distance
-from tireroad.runs.bench.rough_road import BAND, SPEED, Mesh, Rolled, rolled
+from tireroad.contact.results.spectra import distance
+from tireroad.runs.bench.accuracy.rough_road import BAND, SPEED, Mesh, Rolled, rolled
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.bench.rough_road import (
+from tireroad.runs.bench.accuracy.rough_road import (
     BAND,
     SPEED,
     Mesh,

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.spectra import distance
+from tireroad.contact.results.spectra import distance
 from tireroad.fem.matrices.probe import nodes
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response

@@ -8,8 +8,8 @@ from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar, Generic, TypeVar
 
-from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
 
 P = TypeVar("P")
 

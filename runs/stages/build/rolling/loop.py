@@ -17,8 +17,8 @@ from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.free_rolling import free_slip
 from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response
+from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.build.point_forces import directions, histories
-from tireroad.runs.stages.job import Job
 
 
 def driven_tire(job: Job, tire, step: float, steps: int) -> Driven | None:

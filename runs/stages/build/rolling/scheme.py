@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from tireroad.contact.chatter import Chosen, choose, oscillation
+from tireroad.contact.results.chatter import Chosen, choose, oscillation
 from tireroad.contact.setup import ContactSetup
 from tireroad.runs.process import observe
-from tireroad.runs.stages.build.stepping import Planned
-from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.build.rolling.stepping import Planned
 
 WATCHED = "constant", "forces linear over the step made points open and close from step to step"
 

@@ -13,8 +13,8 @@ from tireroad.greens.response import Response
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.contact import Time
 from tireroad.runs.scene.tables.scene import Road
-from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
 
 # Radians a kept mode may turn in one automatic step: 0.3 leaves less than a percent in its phase.
 _TURN = 0.3
