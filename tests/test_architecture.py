@@ -75,7 +75,9 @@ def test_files_stay_short() -> None:
 
 
 def test_folders_stay_small() -> None:
-    folders = {file.parent for file in MODULES.values()} | {file.parent for file in (ROOT / "tests").rglob("*.py")}
+    folders = {file.parent for file in MODULES.values()} | {
+        file.parent for file in (ROOT / "tests").rglob("*.py")
+    }
     count = {str(one.relative_to(ROOT)): len(list(one.glob("*.py"))) for one in folders}
     assert {name: files for name, files in count.items() if files > FILES} == {}
 
