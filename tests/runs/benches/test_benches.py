@@ -6,14 +6,13 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from tireroad.runs.bench import (
+from tireroad.runs.bench import scaling, skipping
+from tireroad.runs.bench.accuracy import (
     accuracy_on_demand,
     convergence,
     error_bars,
     headline,
     pareto,
-    scaling,
-    skipping,
 )
 from tireroad.runs.bench.accuracy.rough_road import Mesh
 from tireroad.runs.bench.parts.floors import exponent

@@ -55,6 +55,7 @@ def test_long_ones_run_when_all_or_they_are_asked_for() -> None:
     assert _chosen(["-x"]) == (["-m", "not long", "-x"], (1, 2, 3))
     assert _chosen(["--all", "-x"]) == (["-x"], (1, 2, 3))
     assert _chosen(["tests/fem"]) == (["tests/fem"], (1, 2, 3))
+    assert _chosen(["--durations", "40"])[0][:2] == ["-m", "not long"]
     assert _chosen(["-m", "long"]) == (["-m", "long"], (1, 2, 3))
     assert _chosen(["--fast"])[1] == (1,)
 
