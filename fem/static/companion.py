@@ -12,11 +12,11 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.sections.ring import Ring
-from tireroad.fem.static.carried_over import sampled
 from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.carried_over import sampled
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.symmetry.half_turn import HalfTurnEquilibrium, looks_the_same
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body

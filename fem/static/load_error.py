@@ -18,7 +18,7 @@ from tireroad.fem.matrices import probe
 from tireroad.fem.sections.split import split_ring
 from tireroad.fem.static.companion import Balance
 from tireroad.fem.static.footprint import Footprint
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.mesh import Lattice, field_lattice
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tireroad.contact.levels import nominal
-from tireroad.contact.spectra import deviation
+from tireroad.contact.results.levels import nominal
+from tireroad.contact.results.spectra import deviation
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.read import Absent, Results
 from tireroad.runs.report.quantities import digits, quantity

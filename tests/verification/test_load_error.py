@@ -15,7 +15,7 @@ from tireroad.fem.static import companion
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import ENOUGH, LoadError, load_error
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body

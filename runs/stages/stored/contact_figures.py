@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from tireroad.contact.chatter import LIMIT, warning
 from tireroad.contact.patch import Patch
-from tireroad.contact.totals import Totals
-from tireroad.runs.stages.build.stepping import Integration
-from tireroad.runs.stages.record import Record
+from tireroad.contact.results.chatter import LIMIT, warning
+from tireroad.contact.results.totals import Totals
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.build.rolling.stepping import Integration
 
 FEW = 4  # points across: three, 8 mm apart on cobblestones, made the force vary 36 % more than five
 LINEAR = (
