@@ -16,11 +16,11 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.cavity import has_air
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.setup import components, probes
 from tireroad.runs.stages.build.turning import turning_of
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done
 from tireroad.runs.stages.stored.responses import fill_response, read_responses
 
 
@@ -159,7 +159,7 @@ def _share_of_residual(record, where: str, response: Response) -> None:
     """How much of the static flexibility the modes lack: the truncation, were it not for the residual."""
     diagonal = np.diag(response.residual)
     total = diagonal + np.diag(response.static())
-    record.indicators[f"share of the residual in the static flexibility of the {where}"] = (
-        float((diagonal / total).max()),
-        "-",
-    )
+    # A point of a coarse mesh may lie on the rim, which nothing moves.
+    part = np.divide(diagonal, total, out=np.zeros_like(total), where=total != 0)
+    name = f"share of the residual in the static flexibility of the {where}"
+    record.indicators[name] = (float(part.max()), "-")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.turning import Turning
 from tireroad.modal.damping import Damping, Proportional, StrainEnergy
-from tireroad.runs.stages.job import Job
+from tireroad.runs.stages.base.job import Job
 
 
 def damping_of(job: Job) -> Damping:
