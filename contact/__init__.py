@@ -10,7 +10,7 @@ _HOMES = {
     "RoadUnderTire": "roads.under_tire",
     "Rolled": "setup",
     "TreadLaw": "tread.law",
-    "amplitudes": "spectra",
+    "amplitudes": "results.spectra",
     "contact_setup": "setup",
     "equal_steps": "steps",
     "make_patch": "patch",
@@ -18,7 +18,7 @@ _HOMES = {
     "road_kind": "roads.kind",
     "roll": "rolling",
     "step_solver": "model",
-    "third_octaves": "spectra",
+    "third_octaves": "results.spectra",
     "tread_law": "tread.law",
 }
 __all__ = sorted(_HOMES)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tireroad.contact.rolling import Tire
-from tireroad.greens.sparse_columns import LoadedColumns
+from tireroad.greens.residual.sparse_columns import LoadedColumns
 
 
 class Driven:

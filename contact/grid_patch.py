@@ -24,7 +24,7 @@ from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.greens.sparse_columns import LoadedColumns
+from tireroad.greens.residual.sparse_columns import LoadedColumns
 
 # Points of the largest grid that is laid out before the reach is known.
 MOST_POINTS = 1_000_000

@@ -19,7 +19,7 @@ from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.friction import Friction
 from tireroad.contact.tread.creep import TreadMemory
-from tireroad.greens.sparse_columns import LoadedColumns
+from tireroad.greens.residual.sparse_columns import LoadedColumns
 
 # Road heights that are found at once: as many steps as make this many points, so that what a call
 # costs is shared; and at most so many steps.

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
+from tireroad.greens.residual.second_order import Moments, modal_moments
 from tireroad.greens.response import Response, couple
-from tireroad.greens.second_order import Moments, modal_moments
 from tireroad.modal.basis import Projection
 from tireroad.modal.corner import MOMENTS, SEEN
 from tireroad.modal.rolling import RollingModes

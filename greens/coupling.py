@@ -26,11 +26,11 @@ from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.turning import Turning
-from tireroad.greens.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.axle import axle_transfer
 from tireroad.greens.basis import Array, Basis, Pencil, Probes, regained
+from tireroad.greens.residual.attachment import dynamic, fewest, foremost, with_attachments
+from tireroad.greens.residual.second_order import Moments, modal_moments, second_order
 from tireroad.greens.response import Response, couple
-from tireroad.greens.second_order import Moments, modal_moments, second_order
 from tireroad.modal.basis import Projection, project, with_air
 from tireroad.modal.damping import Damping, StrainEnergy, tail_loss
 from tireroad.modal.rolling import decouple

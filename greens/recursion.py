@@ -17,8 +17,8 @@ from mpi4py import MPI
 from scipy import linalg
 
 from tireroad.fem.collective import joined
+from tireroad.greens.residual.sparse_columns import LoadedColumns
 from tireroad.greens.response import Response
-from tireroad.greens.sparse_columns import LoadedColumns
 
 SHARED_FROM = 8e6  # bytes of both matrices: a pass over less takes no longer than a few messages
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg
 
-from tireroad.greens.parted import parted
+from tireroad.greens.residual.parted import parted
 from tireroad.modal.states import StateModes, growing
 
 # Radians a state may turn in a step and stay dynamic. Undamped and bouncing on a stiff tread, up to 3

@@ -10,9 +10,9 @@ from scipy import sparse
 
 from tireroad.fem.errors import InputError
 from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.residual.state_selection import keep
+from tireroad.greens.residual.truncation import Cutoff, estimate, estimate_axle
 from tireroad.greens.response import Response
-from tireroad.greens.state_selection import keep
-from tireroad.greens.truncation import Cutoff, estimate, estimate_axle
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.damping import beyond
 from tireroad.modal.rolling import RollingModes, rolling_modes

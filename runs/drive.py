@@ -8,13 +8,13 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from tireroad.contact.chatter import choose, oscillation
-from tireroad.contact.limits import Limit, limits, lowest, pitch
 from tireroad.contact.patch import Patch
+from tireroad.contact.results.chatter import choose, oscillation
+from tireroad.contact.results.limits import Limit, limits, lowest, pitch
+from tireroad.contact.results.spectra import amplitudes, third_octaves
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.rolling import Instant, roll
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
-from tireroad.contact.spectra import amplitudes, third_octaves
 from tireroad.contact.steps import Steps, equal_steps
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -22,7 +22,7 @@ from tireroad.fem.matrices import probe
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.library import RollingTire
-from tireroad.runs.stages.build.loop import make_loop
+from tireroad.runs.stages.build.rolling.loop import make_loop
 
 Array = NDArray[np.float64]
 _TURN = 0.3  # rad that the fastest mode turns in a step by default: under a percent in its phase
@@ -49,7 +49,7 @@ class History:
         return self.force.sum(axis=1)
 
     def spectrum(self) -> tuple[Array, NDArray[np.complex128]]:
-        """Frequencies (f,) Hz up to the limit and amplitudes (f, 3) N of the axle force (contact.spectra)."""
+        """Frequencies (f,) Hz up to the limit and amplitudes (f, 3) N of the axle force (contact.results.spectra)."""
         frequency, amplitude = amplitudes(self.axle_force, self.time[1] - self.time[0])
         below = frequency <= self.limit.frequency
         return frequency[below], amplitude[below]

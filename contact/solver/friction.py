@@ -16,7 +16,7 @@ from tireroad.contact.solver.conditions import ContactSolver, Mask
 from tireroad.contact.solver.tangential import Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush
 from tireroad.fem.errors import ConvergenceError
-from tireroad.greens.sparse_columns import LoadedColumns
+from tireroad.greens.residual.sparse_columns import LoadedColumns
 
 Array = NDArray[np.float64]
 

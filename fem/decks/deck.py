@@ -18,11 +18,12 @@ BOTH_SIDES = -2  # of a membrane in a surface: where it lies
 
 @dataclass
 class Members:
-    """One set as written: labels, ranges (first, last, step), names of other sets."""
+    """One set as written: labels, ranges (first, last, step), names of other sets; whether it is to stay so ordered."""
 
     labels: list[np.ndarray] = field(default_factory=list)
     ranges: list[tuple[int, int, int]] = field(default_factory=list)
     names: list[tuple[str, Place]] = field(default_factory=list)
+    unsorted: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,17 @@ class Sets:
     def labels(self, name: str, asked: Place | None = None) -> np.ndarray:
         """The labels of a set, ascending, each once. Raises InputError for a set that is not there."""
         return self._resolved(name.upper(), asked, {})
+
+    def ordered(self, name: str, asked: Place) -> np.ndarray:
+        """The labels of a set in its own order: ascending unless it is UNSORTED."""
+        labels = self.labels(name, asked)
+        members = self.members[name.upper()]
+        if not members.unsorted:
+            return labels
+        if members.names:
+            raise asked.error(f"{self.sort} {name} is UNSORTED and made of other sets: not read")
+        given = np.concatenate([*members.labels, *(self._range(*r) for r in members.ranges)])
+        return given[np.sort(np.unique(given, return_index=True)[1])]
 
     def _resolved(self, name: str, asked: Place | None, done: dict) -> np.ndarray:
         if name in done:

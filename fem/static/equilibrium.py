@@ -14,9 +14,9 @@ from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
+from tireroad.fem.static.path.step import Step
 from tireroad.fem.static.road import Road
 from tireroad.fem.static.shape_damping import ShapeDamping
-from tireroad.fem.static.step import Step
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,

@@ -17,9 +17,9 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices import probe
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.split import split_ring
-from tireroad.fem.static.carried_over import sampled
 from tireroad.fem.static.curved.balance import make_equilibrium
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.carried_over import sampled
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.mesh import Lattice

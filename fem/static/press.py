@@ -10,7 +10,7 @@ from tireroad.fem.model import TireModel
 from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.friction.press import Friction, with_friction
-from tireroad.fem.static.loading import Loader, Progress
+from tireroad.fem.static.path.loading import Loader, Progress
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 

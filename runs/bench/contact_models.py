@@ -13,13 +13,13 @@ from scipy.optimize import brentq
 from tireroad.contact.literature.asperities import ShiftedSprings, asperities
 from tireroad.contact.literature.springs import fitted_stiffness
 from tireroad.contact.literature.wedges import LookUp, Wedges, look_up
-from tireroad.contact.spectra import distance, third_octaves
+from tireroad.contact.results.spectra import distance, third_octaves
 from tireroad.contact.tread.law import TREADS
 from tireroad.fem.static.curved.balance import make_equilibrium
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.tread_surface import TreadSurface
-from tireroad.runs.bench.rough_road import BAND, Mesh, Prepared, modal, prepared
+from tireroad.runs.bench.accuracy.rough_road import BAND, Mesh, Prepared, modal, prepared
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.histories import Trial
 

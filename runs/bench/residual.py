@@ -11,16 +11,16 @@ from scipy import sparse
 from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.state import static_state
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.fem.turning import Turning
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.recursion import Recursion
+from tireroad.greens.residual.state_selection import keep
+from tireroad.greens.residual.truncation import Cutoff, estimate
 from tireroad.greens.small_motions import wheel_of
-from tireroad.greens.state_selection import keep
-from tireroad.greens.truncation import Cutoff, estimate
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes

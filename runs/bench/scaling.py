@@ -16,9 +16,9 @@ from tireroad.contact.rolling import Drive, roll
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.recursion import Recursion
+from tireroad.runs.bench.accuracy.rough_road import Mesh, prepared, write_scene
 from tireroad.runs.bench.parts.floors import bandwidth, exponent, fastest, flop_rate
 from tireroad.runs.bench.parts.launched import launched
-from tireroad.runs.bench.rough_road import Mesh, prepared, write_scene
 from tireroad.runs.measure.synthetic import Strip, oval_patch
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.runs.bench.rough_road import SPEED, Mesh, Rolled, prepared, rolled
+from tireroad.runs.bench.accuracy.rough_road import SPEED, Mesh, Rolled, prepared, rolled
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
 

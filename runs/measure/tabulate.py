@@ -33,15 +33,14 @@ class Table:
 
 
 def modules(package: str) -> dict[str, ModuleType]:
-    """The modules of a package by name, each with ABOUT (a line) and run() -> list[Table].
+    """The modules of a package and its folders by name, each with ABOUT (a line) and run() -> list[Table].
 
     Some have run_large() too: the same on a mesh that takes longer than one would wait for.
     """
-    (folder,) = importlib.import_module(package).__path__
-    path = Path(folder)
-    names = sorted(found.name for found in pkgutil.iter_modules([str(path)]))
-    loaded = {name: importlib.import_module(f"{package}.{name}") for name in names}
-    return {name: module for name, module in loaded.items() if hasattr(module, "run")}
+    path = importlib.import_module(package).__path__
+    names = [found.name for found in pkgutil.walk_packages(path, f"{package}.") if not found.ispkg]
+    loaded = {name.rpartition(".")[2]: importlib.import_module(name) for name in names}
+    return {name: loaded[name] for name in sorted(loaded) if hasattr(loaded[name], "ABOUT")}
 
 
 def run_all(package: str, names: list[str], out: Path | None, large: bool = False) -> None:

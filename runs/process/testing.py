@@ -162,7 +162,7 @@ def _chosen(arguments: list[str]) -> tuple[list[str], tuple[int, ...]]:
     rest = [one for one in arguments if one not in ("--fast", "--all")]
     if "--fast" in arguments:
         return ["-m", "not slow and not long and not mpi", *rest], (1,)
-    named = any(not one.startswith("-") for one in rest) or "-m" in rest
+    named = "-m" in rest or any(Path(one.partition("::")[0]).exists() for one in rest)
     return rest if named or "--all" in arguments else ["-m", "not long", *rest], (1, *PARALLEL)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tireroad.contact.levels import nominal
+from tireroad.contact.results.levels import nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.read import Absent, Results
 from tireroad.runs.report.quantities import digits, quantity

@@ -18,8 +18,8 @@ from tireroad.fem.registry import Registry
 
 if TYPE_CHECKING:
     from tireroad.runs.scene.tables.scene import Scene
+    from tireroad.runs.stages.base.record import Record
     from tireroad.runs.stages.build.driven import Driven
-    from tireroad.runs.stages.record import Record
 
 Curves = dict[str, tuple[np.ndarray, str]]
 Where = Callable[[tuple[str, ...], str], InputError]

@@ -1,6 +1,6 @@
 """Which settings to try next: those that are predicted to meet the target at least cost.
 
-From a trial's errors by cause, each falling as a known power of its size (contact.error_bars.orders), and from its
+From a trial's errors by cause, each falling as a known power of its size (contact.results.error_bars.orders), and from its
 measured seconds by stage, scaled by how the sizes of the stages grow (scene.extent.estimate), rungs are climbed one
 by one: each time the one that takes away most of the squared error for its cost, until the target would be met.
 """
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tireroad.contact.error_bars import orders
+from tireroad.contact.results.error_bars import orders
 from tireroad.runs.process.memory import available_memory
 from tireroad.runs.scene.extent.demand import DOUBTFUL
 from tireroad.runs.scene.extent.estimate import estimate

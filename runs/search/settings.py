@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from tireroad.contact.error_bars import CAUSES
+from tireroad.contact.results.error_bars import CAUSES
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.scene.tables.scene import Scene

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.contact.error_bars import CAUSES
+from tireroad.contact.results.error_bars import CAUSES
 from tireroad.runs.scene.tables.accuracy import Accuracy as Wanted
 from tireroad.runs.stages.accuracy import Accuracy
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tireroad.contact.error_bars import CAUSES, Bars, Told, bars, told, total
+from tireroad.contact.results.error_bars import CAUSES, Bars, Told, bars, told, total
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.state import StaticState
@@ -18,13 +18,13 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.extent.estimate import estimate
-from tireroad.runs.stages.build.loop import Forces
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build.model_limit import model_limit
-from tireroad.runs.stages.build.run_in import first_step
+from tireroad.runs.stages.build.rolling.loop import Forces
+from tireroad.runs.stages.build.rolling.run_in import first_step
 from tireroad.runs.stages.companions import COARSER, Given, companion
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 SHARE = 0.33  # of the run's own cost, that all companions together take

@@ -8,12 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from tireroad.contact.chatter import choose, oscillation
-from tireroad.contact.error_bars import orders, share
 from tireroad.contact.respaced import halved, ratio, thinned
+from tireroad.contact.results.chatter import choose, oscillation
+from tireroad.contact.results.error_bars import orders, share
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.static.carried_over import carried_over
+from tireroad.fem.static.path.carried_over import carried_over
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.greens.response import Response
@@ -21,15 +21,15 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.folder import make_folder
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.build.cavity import AirColumn
-from tireroad.runs.stages.build.loop import Forces, forces
+from tireroad.runs.stages.build.rolling.loop import Forces, forces
 from tireroad.runs.stages.build.setup import Setup
 from tireroad.runs.stages.greens import GreensStage
-from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.modes import Fields, ModesStage, Motions
-from tireroad.runs.stages.record import Record
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
-from tireroad.runs.stages.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stored.obtained import obtained
 
@@ -230,7 +230,7 @@ COMPANIONS: dict[str, Callable[[Given], Forces]] = {
     "modes": fewer_modes,
     "mesh": coarser_mesh,
 }
-"""By the cause of the error that each is for (contact.error_bars.CAUSES)."""
+"""By the cause of the error that each is for (contact.results.error_bars.CAUSES)."""
 
 
 def companion(cause: str, given: Given) -> tuple[Forces, Forces | None, float]:

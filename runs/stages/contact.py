@@ -9,31 +9,31 @@ from typing import ClassVar
 
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.chatter import Chatter, Chosen
 from tireroad.contact.model import solver_name
+from tireroad.contact.results.chatter import Chatter, Chosen
+from tireroad.contact.results.totals import Totals
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.totals import Totals
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Deferred, Stopped
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Done, Stage
 from tireroad.runs.stages.build import pattern
 from tireroad.runs.stages.build.energy import Losses, describe_energy, works
-from tireroad.runs.stages.build.loop import driven_tire, freely_rolling, make_loop
 from tireroad.runs.stages.build.point_forces import shortest_period
-from tireroad.runs.stages.build.scheme import WATCHED, chosen_scheme, reported
-from tireroad.runs.stages.build.stepping import (
+from tireroad.runs.stages.build.rolling.loop import driven_tire, freely_rolling, make_loop
+from tireroad.runs.stages.build.rolling.scheme import WATCHED, chosen_scheme, reported
+from tireroad.runs.stages.build.rolling.stepping import (
     Planned,
     integration,
     passing_period,
     planned,
 )
-from tireroad.runs.stages.build.watch import Watch
+from tireroad.runs.stages.build.rolling.watch import Watch
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Done, Stage
 from tireroad.runs.stages.stored import contact_figures, road_file
 from tireroad.runs.stages.stored.contact_file import (
     ContactFile,

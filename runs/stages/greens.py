@@ -16,11 +16,11 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.cavity import has_air
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.setup import components, probes
 from tireroad.runs.stages.build.turning import turning_of
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done
 from tireroad.runs.stages.stored.responses import fill_response, read_responses
 
 

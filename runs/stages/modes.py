@@ -20,10 +20,10 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import available_memory
 from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Computed, Done, Shared
 from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.turning import damping_of
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done, Shared
 
 _NAMED = 8  # modes of a round tire shown by name
 

@@ -1,6 +1,7 @@
 """The parts of the pipeline in their order."""
 
 from tireroad.runs.stages.accuracy import AccuracyStage
+from tireroad.runs.stages.base.stage import Part
 from tireroad.runs.stages.build.cavity import AirColumn
 from tireroad.runs.stages.build.setup import Setup
 from tireroad.runs.stages.contact import ContactStage
@@ -10,7 +11,6 @@ from tireroad.runs.stages.motion import MotionStage
 from tireroad.runs.stages.response import ResponseStage
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
 from tireroad.runs.stages.spectra import SpectraStage
-from tireroad.runs.stages.stage import Part
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stiffness import StiffnessStage
 from tireroad.runs.stages.vibration import VibrationStage

@@ -28,10 +28,10 @@ from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.rules.road import check_road
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.parts import PARTS
-from tireroad.runs.stages.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.stored.obtained import obtained
 
 

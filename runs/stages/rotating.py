@@ -20,11 +20,11 @@ from tireroad.modal.full_states import full_states
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.rotating import StateModes
 from tireroad.runs.files.store import put
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Computed, Done, Shared
 from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.turning import turning_of
-from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done, Shared
 
 _UNITS = {
     "eigenvalue": "1/s",

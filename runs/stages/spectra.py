@@ -7,18 +7,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from tireroad.contact.limits import Limit, lowest
+from tireroad.contact.results.limits import Limit, lowest
+from tireroad.contact.results.spectra import amplitudes
 from tireroad.contact.setup import ContactSetup
-from tireroad.contact.spectra import amplitudes
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.stages.accuracy import Accuracy
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.model_limit import all_limits
-from tireroad.runs.stages.build.run_in import first_step, run_in
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.build.rolling.run_in import first_step, run_in
 from tireroad.runs.stages.stored import levels
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 

@@ -11,18 +11,18 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.diagnosis import with_cause
 from tireroad.fem.static.load_error import load_error
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.press import place
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Computed
 from tireroad.runs.stages.build.tire import road_shape
 from tireroad.runs.stages.build.turning import friction_of, rolling_shape, turning_of, wheel_slip
-from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed
 from tireroad.runs.stages.stored import cords_file, friction_file, static_file
 
 _SPEEDS, _SAME_SPEED = 6, 1e-6  # solutions at a travel speed at most, and when they agree

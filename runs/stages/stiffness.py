@@ -10,14 +10,14 @@ import numpy as np
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.road_stiffness import RoadStiffness, road_stiffness
 from tireroad.fem.static.curved.balance import make_equilibrium
-from tireroad.fem.static.load_curve import CurvePoint, load_curve, slopes
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.load_curve import CurvePoint, load_curve, slopes
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.stiffness import deflections
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.static import steady_rolling
 
 _CURVE = {

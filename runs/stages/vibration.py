@@ -8,16 +8,16 @@ from typing import ClassVar
 import h5py
 import numpy as np
 
-from tireroad.contact.levels import a_weighting, band_sums
-from tireroad.contact.spectra import amplitudes
+from tireroad.contact.results.levels import a_weighting, band_sums
+from tireroad.contact.results.spectra import amplitudes
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.vibration import Surface, coordinates, mean_square_velocity, radiated_power
 from tireroad.runs.files.store import put
+from tireroad.runs.stages.base.stage import Done
 from tireroad.runs.stages.build.forces import Forces
 from tireroad.runs.stages.build.whole_tire import WholeTire
 from tireroad.runs.stages.spectra import Spectra
-from tireroad.runs.stages.stage import Done
 
 VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: references of the levels, ISO 1683
 _LARGEST = 2e8  # bytes of displacement fields kept

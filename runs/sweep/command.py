@@ -79,7 +79,7 @@ def _group(scene: Scene) -> str:
     """What the static state and the modes depend on, as one key."""
     from mpi4py import MPI
 
-    from tireroad.runs.stages.job import Job
+    from tireroad.runs.stages.base.job import Job
     from tireroad.runs.stages.static import StaticStage
 
     static = StaticStage(job=Job(scene, Path("."), MPI.COMM_SELF))

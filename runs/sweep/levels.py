@@ -2,7 +2,7 @@
 
 Members that differ in a seed only are samples of one road: their powers are averaged, and the mean power is within
 t s / sqrt(n) of that of all roads, in 95 of 100 cases (Student's t of n - 1 degrees of freedom, s the standard
-deviation over the n seeds). Beside it stands what the error bars of the runs tell (contact.error_bars). Both are
+deviation over the n seeds). Beside it stands what the error bars of the runs tell (contact.results.error_bars). Both are
 independent of each other and of those of the other member.
 """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tireroad.contact.spectra import BAND, Distance, distance
+from tireroad.contact.results.spectra import BAND, Distance, distance
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.histories import History, follow
 from tireroad.runs.validation.tires import Choice, Tires

@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from tireroad.contact.spectra import distance
+from tireroad.contact.results.spectra import distance
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import compare, digits, percent, verdicts
 from tireroad.runs.validation.histories import follow

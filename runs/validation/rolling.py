@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.contact.spectra import BAND
+from tireroad.contact.results.spectra import BAND
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import Comparison, compare, verdicts
 from tireroad.runs.validation.tires import Choice, Tires

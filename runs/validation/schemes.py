@@ -6,8 +6,8 @@ import math
 import tempfile
 from pathlib import Path
 
-from tireroad.contact.chatter import choose, oscillation
-from tireroad.contact.spectra import BAND, distance
+from tireroad.contact.results.chatter import choose, oscillation
+from tireroad.contact.results.spectra import BAND, distance
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response

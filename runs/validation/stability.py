@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.validation import stress_contact, stress_fem, stress_greens, stress_modal
 from tireroad.runs.validation.parts import combined
+from tireroad.runs.validation.stress import contact as stress_contact
+from tireroad.runs.validation.stress import fem as stress_fem
+from tireroad.runs.validation.stress import greens as stress_greens
+from tireroad.runs.validation.stress import modal as stress_modal
 
 ABOUT = "finite elements, modes, Green's functions and the contact loop under stress"
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.energy import Work
+from tireroad.contact.results.energy import Work
 from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.rolling import Drive, _roads, roll
 from tireroad.contact.solver.complementarity import ActiveSet

@@ -8,11 +8,11 @@ from scipy import sparse
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
-from tireroad.greens import attachment
 from tireroad.greens.coupling import Basis, Wheel
+from tireroad.greens.residual import attachment
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
 from tireroad.runs.measure.torus import thesis_torus

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from systems import make
 
-from tireroad.greens.state_selection import keep, participation
-from tireroad.greens.truncation import Cutoff, estimate
+from tireroad.greens.residual.state_selection import keep, participation
+from tireroad.greens.residual.truncation import Cutoff, estimate
 
 
 def error(found, exact, frequency) -> np.ndarray:

@@ -13,11 +13,11 @@ from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.greens.coupling import Basis, Wheel
-from tireroad.greens.truncation import Cutoff, estimate, estimate_axle
+from tireroad.greens.residual.truncation import Cutoff, estimate, estimate_axle
 from tireroad.modal.basis import project
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
@@ -139,7 +139,7 @@ def test_estimates_are_of_the_size_of_the_errors() -> None:
 
 def test_attachments_keep_the_modes_and_the_orthonormality() -> None:
     from tireroad.fem.matrices.compliance import static_shapes
-    from tireroad.greens.attachment import with_attachments
+    from tireroad.greens.residual.attachment import with_attachments
 
     operators, _, modes, _, loads = tire()
     made, _ = wheel(60.0)

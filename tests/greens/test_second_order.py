@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from systems import make
 
+from tireroad.greens.residual.second_order import Moments, second_order
 from tireroad.greens.response import couple
-from tireroad.greens.second_order import Moments, second_order
 from tireroad.modal.rotating import rotating
 
 KEPT = 6

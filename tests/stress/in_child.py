@@ -24,7 +24,7 @@ def warm() -> None:
 
     mpi.start_petsc([])
     import tireroad.runs.cli
-    import tireroad.runs.stages.build.watch  # noqa: F401
+    import tireroad.runs.stages.build.rolling.watch  # noqa: F401
 
 
 def forked(function: Callable[[], int], output: Path, limit: float) -> tuple[int | None, str, int]:

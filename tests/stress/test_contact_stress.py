@@ -12,7 +12,7 @@ from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.greens.recursion import Recursion
 from tireroad.runs.measure.synthetic import Strip, oval_patch
-from tireroad.runs.validation.stress_contact import (
+from tireroad.runs.validation.stress.contact import (
     CRITICAL,
     Ended,
     cases,

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.static.state import StaticState
-from tireroad.runs.validation import stress_fem
-from tireroad.runs.validation.stress_fem import Attempt, Ended, attempts, result
+from tireroad.runs.validation.stress import fem as stress_fem
+from tireroad.runs.validation.stress.fem import Attempt, Ended, attempts, result
 
 pytestmark = pytest.mark.slow
 

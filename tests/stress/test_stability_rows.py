@@ -2,7 +2,8 @@
 
 import pytest
 
-from tireroad.runs.validation import stress_greens, stress_modal
+from tireroad.runs.validation.stress import greens as stress_greens
+from tireroad.runs.validation.stress import modal as stress_modal
 
 
 @pytest.mark.slow

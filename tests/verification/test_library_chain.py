@@ -8,11 +8,11 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.model import step_solver
+from tireroad.contact.results.spectra import amplitudes
 from tireroad.contact.roads.motion import make_motion
 from tireroad.contact.roads.road import make_road
 from tireroad.contact.rolling import roll
 from tireroad.contact.setup import Rolled, contact_setup
-from tireroad.contact.spectra import amplitudes
 from tireroad.contact.tread.laws.elastic import HalfSpace
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.probe import nodes

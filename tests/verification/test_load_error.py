@@ -11,7 +11,7 @@ from mpi4py import MPI
 from tireroad.fem.sections.split import split_ring
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.load_error import LoadError, load_error
-from tireroad.fem.static.loading import Loader
+from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.roads.files.grid_file import UNITS
 from tireroad.contact.roads.grid import Grid
-from tireroad.contact.roads.grid_file import UNITS
 from tireroad.contact.roads.kind import Levelled, road_kind
 from tireroad.contact.roads.rows import check_count
 from tireroad.contact.roads.texture.cleaning import cleaned

@@ -12,6 +12,8 @@ from tireroad.fem.decks.deck import SCOPE, Deck, Sets
 from tireroad.fem.decks.files.abaqus_sections import SectionReader
 from tireroad.fem.decks.files.abaqus_sets import SetReader
 from tireroad.fem.decks.files.elements import Block, kind
+from tireroad.fem.decks.files.generation import Generator
+from tireroad.fem.decks.files.known import KnownElements, KnownNodes
 from tireroad.fem.decks.files.lines import Card, Data, Place, cards
 from tireroad.fem.decks.files.numbers import LABEL, records, rows
 from tireroad.fem.errors import InputError
@@ -29,10 +31,16 @@ PARAMETER|PERTURBATION|PHYSICAL CONSTANTS|PREPRINT|PRE-TENSION SECTION|PRINT|RAD
 RIGID SURFACE|ROTARY INERTIA|SECTION CONTROLS|SPRING|STATIC|STEADY STATE DYNAMICS|STEADY STATE TRANSPORT|
 STEP|SURFACE BEHAVIOR|SURFACE INTERACTION|SYMMETRIC MODEL GENERATION|SYMMETRIC RESULTS TRANSFER|SYSTEM|
 TEMPERATURE|TIE|TIME POINTS|TRANSFORM|TRANSPORT VELOCITY|USER SUBROUTINES|VISCO|SURFACE SMOOTHING|MOTION|
-CONTACT DAMPING|FASTENER|CONNECTOR SECTION|CONNECTOR BEHAVIOR|BEAM SECTION|SHELL SECTION|RELEASE""".replace(
+CONTACT DAMPING|FASTENER|CONNECTOR SECTION|CONNECTOR BEHAVIOR|BEAM SECTION|RELEASE""".replace(
         "\n", ""
     ).split("|")
 )
+# Without these the tire would be another one than the deck's.
+_REFUSED = {
+    "NMAP": "nodes are read as they are given, moved by no map: write their places out",
+    "REBAR": "cords are read from *REBAR LAYER in *SURFACE SECTION or *MEMBRANE SECTION",
+    "SYSTEM": "nodes are read in the global system alone",
+}
 
 
 def read(path: Path) -> Deck:
@@ -57,19 +65,20 @@ class _Reader:
         self.parts: dict[str, int] = {}
         self.step: Place | None = None
         self.part: Place | None = None
-        self.nodes: list[tuple[np.ndarray, np.ndarray]] = []
-        self.blocks: list[Block] = []
+        self.nodes, self.elements = KnownNodes(), KnownElements()
         self.sets = SetReader()
         self.sections = SectionReader()
         self.unused: dict[str, list] = {}
         self.handlers = {
             "NODE": self._node,
             "ELEMENT": self._element,
-            "NSET": self.sets.nodes_of,
+            "NSET": self._node_set,
             "ELSET": self.sets.elements_of,
             "SURFACE": self.sets.surface,
             "DSLOAD": self.sets.pressure,
+            **Generator(self.nodes, self.elements, self.sets).handlers,
             **self.sections.handlers,
+            **dict.fromkeys(_REFUSED, self._refuse),
         }
 
     def begin(self, card: Card) -> None:
@@ -138,7 +147,7 @@ class _Reader:
             radius, angle = points[:, 0].copy(), np.radians(points[:, 1])
             points[:, 0], points[:, 1] = radius * np.cos(angle), radius * np.sin(angle)
         labels = labels.astype(np.int64) + scope * SCOPE
-        self.nodes.append((labels, points))
+        self.nodes.add(labels, points)
         self.sets.add_nodes(card, labels)
 
     def _element(self, card: Card, lines: list[Data], scope: int) -> None:
@@ -149,11 +158,25 @@ class _Reader:
         if shape is None:
             self.unused.setdefault(f"ELEMENT, TYPE={name}", []).append(card.place)
             self.sets.add_elements(card, np.empty(0, np.int64))
+            self.elements.others = True
             return
         table = records(lines, shape.nodes + 1)
         table = table + scope * SCOPE
-        self.blocks.append(Block(name, shape, table[:, 0], table[:, 1:], card.place))
+        self.elements.add(Block(name, shape, table[:, 0], table[:, 1:], card.place))
         self.sets.add_elements(card, table[:, 0])
+
+    def _node_set(self, card: Card, lines: list[Data], scope: int) -> None:
+        self.sets.nodes_of(card, lines, scope)
+        name = card.options.get("ELSET")
+        if name:
+            sets = Sets("element set", self.sets.element_sets, self.elements.labels())
+            parts = self.elements.within(sets.labels(name, card.place))
+            nodes = [np.empty(0, np.int64), *(block.nodes.ravel() for block in parts)]
+            self.sets.add_nodes(card, np.unique(np.concatenate(nodes)))
+
+    def _refuse(self, card: Card, lines: list[Data], _: int) -> None:
+        if card.keyword != "SYSTEM" or lines:  # *SYSTEM alone goes back to the global one
+            raise card.place.error(f"*{card.keyword} is not read: {_REFUSED[card.keyword]}")
 
     def finish(self) -> Deck:
         """The deck, once the file has ended."""
@@ -164,16 +187,14 @@ class _Reader:
             raise open_.error(f"*{what} has no *END {what}: is the deck cut short?")
         if self.card is None:
             raise InputError(f"{self.path}: no keyword in it: this is no Abaqus deck")
-        labels, points = self._all_nodes()
-        elements = np.sort(
-            np.concatenate([np.empty(0, np.int64), *(b.labels for b in self.blocks)])
-        )
-        self._unique(elements)
+        labels, points = self.nodes.table(self.path.name)
+        self.elements.check_once()
+        elements = self.elements.labels()
         return Deck(
             file=self.path.name,
             labels=labels,
             points=points,
-            blocks=tuple(self.blocks),
+            blocks=tuple(self.elements.blocks),
             node_sets=Sets("node set", self.sets.node_sets, labels),
             element_sets=Sets("element set", self.sets.element_sets, elements),
             surfaces=self.sets.resolved_surfaces(elements),
@@ -188,32 +209,10 @@ class _Reader:
             unused=tuple(self._not_used()),
         )
 
-    def _all_nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Labels ascending and their points; a node given twice must be at one place."""
-        labels = np.concatenate([np.empty(0, np.int64), *(part[0] for part in self.nodes)])
-        points = np.concatenate([np.empty((0, 3)), *(part[1] for part in self.nodes)])
-        order = np.argsort(labels, kind="stable")
-        labels, points = labels[order], points[order]
-        again = np.flatnonzero(labels[1:] == labels[:-1])
-        moved = again[(points[again] != points[again + 1]).any(axis=1)]
-        if len(moved):
-            raise InputError(
-                f"{self.path.name}: node {labels[moved[0]] % SCOPE} is defined twice, at two places"
-            )
-        keep = np.append(labels[1:] != labels[:-1], True)[: len(labels)]
-        return labels[keep], points[keep]
-
-    def _unique(self, elements: np.ndarray) -> None:
-        again = elements[1:][elements[1:] == elements[:-1]]
-        if len(again):
-            block = next(b for b in reversed(self.blocks) if again[0] in b.labels)
-            raise block.place.error(f"element {again[0] % SCOPE} is defined twice")
-
     def _used(self) -> Iterator[str]:
         """One line for each kind of thing that is read."""
-        count = sum(len(part[0]) for part in self.nodes)
-        yield f"{count} nodes in {len(self.nodes)} blocks"
-        for block in self.blocks:
+        yield f"{self.nodes.count} nodes in {self.nodes.blocks} blocks"
+        for block in self.elements.blocks:
             yield f"{len(block.labels)} elements {block.type} ({block.place})"
         yield from self.sections.used()
 

@@ -38,6 +38,7 @@ class SectionReader:
             "SOLID SECTION": self._solid,
             "SURFACE SECTION": self._membrane,
             "MEMBRANE SECTION": self._membrane,
+            "SHELL SECTION": self._shell,
             "REBAR LAYER": self._layer,
             "EMBEDDED ELEMENT": self._embed,
             "ORIENTATION": self._orientation,
@@ -62,10 +63,17 @@ class SectionReader:
                 f"({card.options['MATERIAL']}) is not ({card.place})"
             )
 
+    def _shell(self, card: Card, lines: list[Data], _: int) -> None:
+        """Not used: a road or a wheel. Its cords would be the tire's."""
+        self._membranes = None
+        self.unused.append(f"*SHELL SECTION: not used ({card.place})")
+
     def _layer(self, card: Card, lines: list[Data], _: int) -> None:
         """name, area, spacing, position, material, angle, direction, extension, radius."""
         if self._membranes is None:
-            raise card.place.error("*REBAR LAYER before any *SURFACE SECTION or *MEMBRANE SECTION")
+            raise card.place.error(
+                "*REBAR LAYER belongs after a *SURFACE SECTION or *MEMBRANE SECTION; cords in shells are not read"
+            )
         geometry = card.options.get("GEOMETRY", "CONSTANT").upper()
         geometry = "ANGULAR" if "ANGULAR SPACING" in card.options else geometry
         if geometry not in ("CONSTANT", "ANGULAR", "LIFT EQUATION"):

@@ -37,22 +37,26 @@ class SetReader:
         self.pressed: list[str] = []
         self.scopes: dict[str, int] = {}
         self.unused: list[str] = []
+        self.reflected: list[
+            np.ndarray
+        ] = []  # elements whose faces have other numbers than their originals'
 
     def add_nodes(self, card: Card, labels: np.ndarray) -> None:
         """The NSET of a *NODE."""
-        if card.options.get("NSET"):
-            self._members(self.node_sets, card.options["NSET"]).labels.append(labels)
+        self.into(self.node_sets, card.options.get("NSET"), labels)
 
     def add_elements(self, card: Card, labels: np.ndarray) -> None:
         """The ELSET of an *ELEMENT."""
-        if card.options.get("ELSET"):
-            self._members(self.element_sets, card.options["ELSET"]).labels.append(labels)
+        self.into(self.element_sets, card.options.get("ELSET"), labels)
+
+    def into(self, sets: dict[str, Members], name: str | None, labels: np.ndarray) -> None:
+        """Put labels into the set of a name, if there is one."""
+        if name:
+            self._members(sets, name).labels.append(labels)
 
     def nodes_of(self, card: Card, lines: list[Data], scope: int) -> None:
         """A *NSET."""
         self._set(self.node_sets, "NSET", card, lines, scope)
-        if card.options.get("ELSET"):
-            self.unused.append(f"*NSET of the nodes of an ELSET: not used ({card.place})")
 
     def elements_of(self, card: Card, lines: list[Data], scope: int) -> None:
         """An *ELSET."""
@@ -68,6 +72,7 @@ class SetReader:
         if not card.options.get(key):
             raise card.place.error(f"*{key} without {key}=name")
         members = self._members(sets, card.options[key])
+        members.unsorted |= "UNSORTED" in card.options
         offset = SCOPE * self._scope(card, scope)
         if "GENERATE" in card.options:
             self._ranges(members, card, lines, offset)
@@ -104,6 +109,8 @@ class SetReader:
             members = self._members(self.node_sets, name)
             members.names += [(p[0].upper(), place) for place, p in data_lines(lines) if p[0]]
             return
+        if "COMBINE" in card.options or "CROP" in card.options:
+            raise card.place.error("*SURFACE with COMBINE or CROP is not read: name its elements")
         if sort != "ELEMENT":
             self.unused.append(f"*SURFACE, TYPE={sort}: not used ({card.place})")
             return
@@ -144,5 +151,10 @@ class SetReader:
                 else np.array([label(of, place) + offset])
             )
             given = given[np.isin(given, sets.known)]
+            if face >= 0 and any(np.isin(given, turned).any() for turned in self.reflected):
+                raise place.error(
+                    "the faces of elements copied with REFLECT have no known numbers: "
+                    "name the surface by a node set, or leave the face out"
+                )
             found.append(np.column_stack([given, np.full(len(given), face)]))
         return np.unique(np.concatenate(found), axis=0)

@@ -23,6 +23,12 @@ class Kind:
     corners: int
     faces: tuple[tuple[int, ...], ...] = ()
 
+    def reflected(self, asked: Place) -> list[int]:
+        """The nodes' order that gives the mirror image of an element a positive volume again."""
+        if self not in _REFLECTED:
+            raise asked.error(f"*ELCOPY, REFLECT of elements of {self.nodes} nodes is not read")
+        return _REFLECTED[self]
+
 
 _TRIANGLE = ((0, 1), (1, 2), (2, 0))
 _QUAD = ((0, 1), (1, 2), (2, 3), (3, 0))
@@ -66,6 +72,17 @@ _MEMBRANES = {
     (3, 8): Kind("membrane", 3, 8, 4),
     (3, 9): Kind("membrane", 3, 9, 4),
 }
+# The first node stays, the rest go round the other way; bodies: end faces in turn.
+_REFLECTED = {
+    _SOLIDS[2, 3]: [0, 2, 1],
+    _SOLIDS[2, 4]: [0, 3, 2, 1],
+    _SOLIDS[2, 6]: [0, 2, 1, 5, 4, 3],
+    _SOLIDS[2, 8]: [0, 3, 2, 1, 7, 6, 5, 4],
+    _SOLIDS[3, 6]: [0, 2, 1, 3, 5, 4],
+    _SOLIDS[3, 8]: [0, 3, 2, 1, 4, 7, 6, 5],
+    _SOLIDS[3, 15]: [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13],
+    _SOLIDS[3, 20]: [0, 3, 2, 1, 4, 7, 6, 5, 11, 10, 9, 8, 15, 14, 13, 12, 16, 19, 18, 17],
+}
 
 
 def kind(name: str) -> Kind | None:
@@ -94,3 +111,7 @@ class Block:
     labels: np.ndarray
     nodes: np.ndarray
     place: Place
+
+    def rows(self, rows: list[int] | np.ndarray) -> Block:
+        """Some of them."""
+        return Block(self.type, self.kind, self.labels[rows], self.nodes[rows], self.place)

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.step import Step
+from tireroad.fem.static.path.step import Step
 from tireroad.fem.static.symmetry.cut import TURN, Cut
 from tireroad.fem.static.symmetry.folded_system import FoldedSystem
 from tireroad.fem.static.virtual_work import Rolling

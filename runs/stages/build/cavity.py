@@ -15,9 +15,9 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.cavity import has_air
-from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Done, Shared
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Done, Shared
 
 if TYPE_CHECKING:
     from tireroad.fem.cavity.column import Column

@@ -15,8 +15,8 @@ from tireroad.greens.blocked import disagreement
 from tireroad.modal.corner import ARRAYS, SEEN, Corner
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
-from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
 
 READINGS = SEEN + 3  # motions of wheel and body, moments on the hub
 UNITS = {

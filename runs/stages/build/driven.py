@@ -15,13 +15,13 @@ from tireroad.greens.response import Response
 from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.standing import standing_modes
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.stage import Done
 from tireroad.runs.stages.build.point_forces import directions, histories
+from tireroad.runs.stages.build.rolling.stepping import Integration
 from tireroad.runs.stages.build.setup import driven_points
-from tireroad.runs.stages.build.stepping import Integration
 from tireroad.runs.stages.build.turning import turning_of
 from tireroad.runs.stages.greens import Responses
-from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.stage import Done
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 Array = np.ndarray

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.contact.balance import Motion, energy_left, own_states, springs
 from tireroad.contact.driven import Driven
-from tireroad.contact.energy import Circulation, Work
+from tireroad.contact.results.balance import Motion, energy_left, own_states, springs
+from tireroad.contact.results.energy import Circulation, Work
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process import observe
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.base.record import Record
 
 # Of the energy that moved: beyond it the steps are too long, or something is wrong. Where forces were right to a
 # percent up to 300 Hz it was 0.012 at most, where they were off by 35 %, 0.024.

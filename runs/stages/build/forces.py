@@ -12,9 +12,9 @@ from scipy import sparse
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import opened
+from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.build.point_forces import histories
 from tireroad.runs.stages.build.setup import components, probes
-from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 _ROWS = 4096  # steps read at once

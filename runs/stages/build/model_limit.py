@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tireroad.contact.limits import Limit, limits, lowest, pitch
+from tireroad.contact.results.limits import Limit, limits, lowest, pitch
 from tireroad.contact.setup import ContactSetup
 from tireroad.modal.rolling import RollingModes
 

@@ -16,8 +16,8 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files import store
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.pattern import PatternTable
-from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
 
 MOST = 20_000_000  # depths of a file
 _SHOWN = 2e-3  # m between the depths that are kept for the report

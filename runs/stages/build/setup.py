@@ -15,12 +15,12 @@ from tireroad.contact.tread.free_rolling import shape_slip
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.scene.schema import Pitch
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.stage import Done, Shared
 from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.pattern import make_pattern
-from tireroad.runs.stages.build.stepping import run_time
+from tireroad.runs.stages.build.rolling.stepping import run_time
 from tireroad.runs.stages.build.turning import wheel_slip
-from tireroad.runs.stages.job import Job
-from tireroad.runs.stages.stage import Done, Shared
 
 
 @dataclass(frozen=True, kw_only=True)

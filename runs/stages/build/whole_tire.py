@@ -12,9 +12,9 @@ from tireroad.greens.basis import Basis
 from tireroad.greens.responses import Wanted, band
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build.forces import Forces, driven_loads
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Computed, Done
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 P = TypeVar("P")

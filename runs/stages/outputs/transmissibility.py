@@ -19,8 +19,8 @@ from tireroad.runs.scene.tables.cavity import has_air
 
 if TYPE_CHECKING:
     from tireroad.runs.scene.tables.scene import Scene
+    from tireroad.runs.stages.base.record import Record
     from tireroad.runs.stages.build.driven import Driven
-    from tireroad.runs.stages.record import Record
 
 # Of the highest mode. Of a tire of 48 MPa with 60, 120, 250 modes (311, 448, 687 Hz) the two ways are 0.5, 0.25, 0.2 %
 # apart up to half of it, and 40, 3, 0.2 % up to 300 Hz.

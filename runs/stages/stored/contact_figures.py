@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tireroad.contact.chatter import LIMIT, warning
-from tireroad.contact.totals import Totals
-from tireroad.runs.stages.build.stepping import Integration
-from tireroad.runs.stages.record import Record
+from tireroad.contact.results.chatter import LIMIT, warning
+from tireroad.contact.results.totals import Totals
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.build.rolling.stepping import Integration
 
 LINEAR = (
     1 / 3

@@ -18,8 +18,8 @@ from tireroad.runs.files.checksum import seal
 from tireroad.runs.files.disk import part_of, replacing
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.build import corner, pattern
-from tireroad.runs.stages.job import Job
 from tireroad.runs.stages.stored import road_file
 
 BLOCK = 512  # steps kept in memory between two writes

@@ -5,10 +5,10 @@ from __future__ import annotations
 import h5py
 import numpy as np
 
-from tireroad.contact import levels
-from tireroad.contact.spectra import FORCE, MOMENT, VELOCITY, density, third_octaves
+from tireroad.contact.results import levels
+from tireroad.contact.results.spectra import FORCE, MOMENT, VELOCITY, density, third_octaves
 from tireroad.runs.files.store import put
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 # name in `third_octave/` -> name in `density/`, reference of the level, its unit, unit of the density, rate of what is kept

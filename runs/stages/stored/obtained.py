@@ -10,8 +10,8 @@ from tireroad.fem.garbage import collect
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.record import Record
-from tireroad.runs.stages.stage import Done, Stage
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Done, Stage
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ import h5py
 from tireroad.contact.setup import ContactSetup
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.stages.record import Record
+from tireroad.runs.stages.base.record import Record
 
 
 def describe(record: Record, setup: ContactSetup) -> None:

@@ -1,0 +1,164 @@
+"""Chatter: points that open and close from step to step, because a step is too long for the contact.
+
+Between the points that touch, a force meets a compliance at once, B (tread and residual flexibility); a force
+linear over the steps that alternates meets the tire's states as a negative one, X (greens.residual.alternating). With
+
+    -X v = mu B v,   mu the largest,
+
+the fastest oscillation of the points that touch takes  2 pi / theta  steps,  cos theta = (1 - 4 mu) / (1 + 2 mu).
+A mass m on a compliance C has mu = h^2 / (12 m C): its true oscillation turns by (12 mu)^1/2 in a step. At
+mu = 1 it takes two steps, and from there on it grows without bound. A force that is constant over the step has
+X = 0: it takes from such an oscillation what it has, and errs by the first order of the step.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from tireroad.contact.model import Spec, touching_compliance
+from tireroad.contact.patch import Patch
+from tireroad.fem.errors import ConvergenceError
+from tireroad.greens.residual.alternating import alternating, at_once
+from tireroad.greens.response import Response
+
+# Steps in the fastest oscillation from which forces are taken as linear: at fewer, undamped modes between impacts
+# gained energy (measured from 2.9 down: contact force a hundred times too large).
+FEWEST = 3.0
+# Points of which the oscillation is found: a second of eigenvalues.
+MOST = 1000
+# Share of the points that touch, of which all but these came back to where they were two steps before.
+# (Seen: 0.11 to 1 where forces were wrong, 0.035 at most where they were right.)
+LIMIT = 0.05
+WINDOW = 200  # steps over which it is counted
+
+
+class Chatter(ConvergenceError):
+    """The steps are too long for the contact."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The force's course within a step, "linear" or "constant", and why."""
+
+    scheme: str
+    reason: str
+
+
+def choose(steps: float) -> Chosen:
+    """What to take where the fastest oscillation of the contact takes so many `steps`."""
+    if steps >= FEWEST:
+        why = "resolve" if math.isfinite(steps) else "have none to resolve:"
+        count = f" in {steps:.3g} steps" if math.isfinite(steps) else ""
+        return Chosen("linear", f"the steps {why} the contact's fastest oscillation{count}")
+    return Chosen(
+        "constant",
+        f"the contact's fastest oscillation takes {steps:.3g} steps, fewer than {FEWEST:g}: forces linear over "
+        "the step would chatter",
+    )
+
+
+def oscillation(spec: Spec, patch: Patch, response: Response, step: float) -> float:
+    """Steps (2 or more, inf) that the fastest oscillation of the points touching at rest takes, with
+    forces linear over steps of `step` s.
+
+    `response` as the loop takes it (Response.resolved), its first inputs and outputs the patch's nodes.
+    Of more than `MOST` points those nearest to their middle.
+    """
+    index = _nearest(patch)
+    if len(index) == 0:
+        return math.inf
+    p = len(patch.index)
+    seen = [matrix[:p, :p] for matrix in (-alternating(response, step), at_once(response))]
+    if patch.weights is not None:
+        rows = patch.weights[index]
+        approach = rows @ (rows @ seen[0].T).T
+    else:
+        approach = seen[0][np.ix_(index, index)]
+    return _steps(_largest(approach, touching_compliance(spec, patch, seen[1], index)))
+
+
+def _nearest(patch: Patch) -> np.ndarray:
+    """The points that touch at rest, (n,) of them."""
+    index = np.flatnonzero(patch.force > 0)
+    if len(index) <= MOST:
+        return index
+    place = patch.points[index, :2]
+    away = ((place - place.mean(axis=0)) ** 2).sum(axis=1)
+    return np.sort(index[np.argsort(away, kind="stable")[:MOST]])
+
+
+def _largest(approach: np.ndarray, compliance: np.ndarray) -> float:
+    """mu of the symmetric parts (n, n); infinite where the compliance is none."""
+    last = [len(approach) - 1] * 2
+    symmetric = [(matrix + matrix.T) / 2 for matrix in (approach, compliance)]
+    try:
+        return float(linalg.eigh(*symmetric, eigvals_only=True, subset_by_index=last)[0])
+    except np.linalg.LinAlgError:  # not positive definite: nothing gives way at once
+        return math.inf
+
+
+def _steps(mu: float) -> float:
+    """Steps a period of the oscillation of that mu."""
+    if mu <= 0.0:
+        return math.inf
+    cosine = (1 - 4 * mu) / (1 + 2 * mu) if math.isfinite(mu) else -2.0
+    return 2 * math.pi / math.acos(max(cosine, -1.0))
+
+
+def warning(share: float) -> str:
+    """What to say of a share of points that open and close."""
+    return (
+        f"contact: {100 * share:.2g} % of the points that touch open and close from step to step: take a smaller "
+        'time.step, or time.scheme = "constant"'
+    )
+
+
+class Alternation:
+    """How many of the points that touch change back in every step, counted as the loop goes.
+
+    An event is a point that touches or not as two steps before, and not as in the step between. `worst`
+    is the largest share of events in the points that touch, of all windows of `WINDOW` steps.
+    """
+
+    def __init__(self) -> None:
+        self.worst = 0.0
+        self._last = np.zeros((0, 0), dtype=bool)
+        self._window = np.zeros(3, dtype=np.int64)  # steps, events, points that touch
+
+    def add(self, force: np.ndarray) -> None:
+        """Count n steps: forces (n, c) N."""
+        active = force > 0
+        rows = np.concatenate([self._last.reshape(-1, active.shape[1]), active])
+        back = (rows[2:] == rows[:-2]) & (rows[2:] != rows[1:-1])
+        events = np.zeros(len(active), dtype=np.int64)
+        events[len(active) - len(back) :] = back.sum(axis=1)
+        # Windows begin at the first step: they do not depend on how the steps are blocked.
+        for now in zip(events.tolist(), active.sum(axis=1).tolist(), strict=True):
+            self._window += (1, *now)
+            steps, back_now, touching = self._window.tolist()
+            if steps == WINDOW:
+                self.worst = max(self.worst, back_now / max(touching, steps))
+                self._window[:] = 0
+        self._last = rows[-2:]
+
+    def check(self) -> None:
+        """Chatter where more than `LIMIT` of the points change back."""
+        if self.worst > LIMIT:
+            raise Chatter(warning(self.worst))
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What a checkpoint keeps."""
+        return {
+            "alternation": np.array(self.worst),
+            "alternation_window": self._window,
+            "alternation_last": self._last,
+        }
+
+    def set_state(self, kept: dict[str, np.ndarray]) -> None:
+        """Go on from `state`."""
+        self.worst = float(kept["alternation"])
+        self._window, self._last = kept["alternation_window"].copy(), kept["alternation_last"]

@@ -1,0 +1,97 @@
+"""How far the figures of a run may be off, by companions whose error is larger or smaller by a known ratio.
+
+For a quantity Q with an error that goes as h^r, of a run at h and a companion at q h:
+
+    Q_h - Q_0 = (Q_qh - Q_h) / (q^r - 1),
+
+the share 1 / |q^r - 1| of the difference of both; of a history the difference is taken line by line of its
+spectrum, with phase. Errors of several causes add up as squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tireroad.contact.results.spectra import low_part, third_octaves
+
+_NAMES = ("mean", "deviation", "level", "history")
+CAUSES = ("step", "points", "modes", "mesh")
+
+
+def orders(elements: int) -> dict[str, float]:
+    """The order, by cause, in the size of what makes the error; `elements` of which order the mesh is.
+
+    Points: a footprint's pressure ends as the root of the distance to its edge. Modes: in the highest frequency, what
+    static answers leave out falls as its cube. Mesh: displacements of order p, p + 1 in the mean (Nitsche), seen
+    between 3.7 and 4.7 of order 3 (histories of 18 x 8 elements beside 9 x 4 and 30 x 12; bench error_bars).
+    """
+    return {"step": 2.0, "points": 1.5, "modes": 3.0, "mesh": elements + 1.0}
+
+
+def share(ratio: float, order: float) -> float:
+    """Error of a run over its difference to a companion whose size is `ratio` times that of the run."""
+    return 1 / abs(ratio**order - 1)
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is told of a force: `mean`, `deviation` (3,) N, `level` (b, 3) dB of the bands at `centre` (b,) Hz,
+    and `low` (f, 3) N, the Fourier coefficients of what varies up to a frequency (contact.results.spectra.low_part)."""
+
+    mean: np.ndarray
+    deviation: np.ndarray
+    centre: np.ndarray
+    level: np.ndarray
+    low: np.ndarray
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Estimated errors: of the `mean` and `deviation` (3,) N and of each `level` (b, 3) dB, NaN where unknown;
+    of the `history` (3,), relative L2 norm of what varies up to a frequency, NaN where nothing does."""
+
+    mean: np.ndarray
+    deviation: np.ndarray
+    level: np.ndarray
+    history: np.ndarray
+
+
+def told(force: np.ndarray, step: float, limit: float, up_to: float = np.inf) -> Told:
+    """Of a force (n, 3) N in steps of `step` s, with the bands below `limit` Hz; its history up to `up_to` Hz,
+    if that is lower."""
+    centre, level = third_octaves(force, step, limit)
+    mean = force.mean(axis=0)
+    low = low_part(force - mean, len(force) * step, min(limit, up_to))
+    return Told(mean, force.std(axis=0), centre, level, low)
+
+
+def bars(run: Told, companion: Told, share: float) -> Bars:
+    """The error of the run: the `share` of its difference to the companion, without sign."""
+    level = np.full(run.level.shape, np.nan)
+    for k, centre in enumerate(run.centre):
+        same = np.flatnonzero(np.isclose(companion.centre, centre))
+        if len(same):
+            level[k] = share * np.abs(companion.level[same[0]] - run.level[k])
+    return Bars(
+        share * np.abs(companion.mean - run.mean),
+        share * np.abs(companion.deviation - run.deviation),
+        level,
+        share * _apart(run.low, companion.low),
+    )
+
+
+def _apart(run: np.ndarray, companion: np.ndarray) -> np.ndarray:
+    """Relative L2 distance (3,) of two spectra (f, 3) on the same lines."""
+    count = min(len(run), len(companion))
+    size = np.linalg.norm(run, axis=0)
+    off = np.linalg.norm(companion[:count] - run[:count], axis=0)
+    return np.divide(off, size, out=np.full(size.shape, np.nan), where=size > 0)
+
+
+def total(causes: Mapping[str, Bars]) -> Bars:
+    """Of all causes at once: the root of the sum of squares, NaN where a cause is unknown."""
+    parts = [np.sqrt(sum(getattr(bar, name) ** 2 for bar in causes.values())) for name in _NAMES]
+    return Bars(*parts)

@@ -1,0 +1,128 @@
+"""Spectra of what was computed in time: amplitudes, densities, third-octave levels, and how far two are apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from tireroad.contact.results.levels import a_weighting, band_sums, confidence
+
+FORCE, MOMENT, VELOCITY = (
+    1.0,
+    1.0,
+    1e-9,
+)  # N, N m, m/s: references of the levels; ISO 1683 of velocity
+BAND = 300.0  # Hz, up to which two histories are compared where nothing else is said
+_SEGMENTS = 4.5  # of half overlap make eight averages
+_LONGEST = 0.5  # s of a segment: lines of 2 Hz; longer records give more averages instead
+
+
+def amplitudes(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (f,) Hz and complex amplitudes (f, d), in the unit of values (n, d).
+
+    Hann window, mean removed, scaled so that a sine of amplitude a on a line of the spectrum shows |a|.
+    """
+    window = signal.get_window("hann", len(values))[:, None]
+    spectrum = np.fft.rfft(window * (values - values.mean(axis=0)), axis=0)
+    return np.fft.rfftfreq(len(values), step), 2 * spectrum / window.sum()
+
+
+def third_octaves(
+    values: np.ndarray,
+    step: float,
+    up_to: float = np.inf,
+    *,
+    reference: float = FORCE,
+    rate: bool = False,
+    weighted: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Band centres (b,) Hz and levels (b, d), dB re `reference` (rms), of values (n, d), or, as `rate`, of their rate
+    of change per second; A-weighted line by line if wanted; bands as of `contact.results.levels.band_sums`, below `up_to` Hz and
+    half the sampling rate. Hann window over the whole record, mean removed. A record of one value has no band.
+    """
+    if len(values) < 2:
+        return np.zeros(0), np.zeros((0, values.shape[1]))
+    frequency, power = signal.periodogram(values, 1 / step, "hann", detrend="constant", axis=0)
+    if rate:
+        power = power * (2 * np.pi * frequency[:, None]) ** 2
+    if weighted:
+        power = power * 10 ** (a_weighting(frequency)[:, None] / 10)
+    centre, square = band_sums(frequency, power * frequency[1], up_to)
+    return centre, 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference**2)
+
+
+@dataclass(frozen=True)
+class Density:
+    """Power spectral `density` (f, d), one-sided, at `frequency` (f,) Hz, by Welch's method: Hann windows of
+    `segment` s, half overlapping, `averages` of them; `confidence` (2,) dB, 95 %, as of contact.results.levels."""
+
+    frequency: np.ndarray
+    density: np.ndarray
+    segment: float
+    averages: int
+    confidence: np.ndarray
+
+
+def density(values: np.ndarray, step: float, up_to: float = np.inf, rate: bool = False) -> Density:
+    """Of values (n, d) in steps of `step` s, or of their `rate`; unit of the values squared per Hz.
+
+    Segments of half the record and less: eight averages, more where segments of 0.5 s make more. Each has its mean
+    removed. The integral is the variance (Parseval). The power of segments that overlap by half under Hann's
+    window is correlated by 1/36 with the next: of k averages k / (1 + (k - 1) / 18 k) count.
+    """
+    count = len(values)
+    width = max(min(2 * int(count / _SEGMENTS / 2), round(_LONGEST / step)), min(count, 8))
+    shift = width - width // 2
+    averages = max(1 + (count - width) // shift, 1)
+    frequency, power = signal.welch(
+        values, 1 / step, "hann", width, width // 2, detrend="constant", axis=0
+    )
+    if rate:
+        power = power * (2 * np.pi * frequency[:, None]) ** 2
+    independent = averages / (1 + (averages - 1) / (18 * averages))
+    kept = frequency <= up_to
+    return Density(
+        frequency[kept],
+        power[kept],
+        width * step,
+        averages,
+        confidence(np.array(2 * independent)),
+    )
+
+
+@dataclass(frozen=True)
+class Distance:
+    """Relative L2 distance in the band, and the largest difference there over the largest variation."""
+
+    mean: float
+    worst: float
+
+
+def distance(
+    reference: np.ndarray, found: np.ndarray, duration: float, band: float = BAND
+) -> Distance:
+    """How far `found` (n', k) is from what varies of `reference` (n, k), both over `duration` s, from
+    0 to `band` Hz.
+
+    Each is looked at with its own step: thinned out to a common one, force above half its sampling
+    frequency would fold down into the band (seen: 0.6 % where there was 0.03 %). Hann window.
+    """
+    rest = reference.mean(axis=0)
+    exact = low_part(reference - rest, duration, band)
+    off = low_part(found - rest, duration, band) - exact
+    # Seen in time again, the same number of instants for both.
+    seen = [np.fft.irfft(part, 8 * len(exact), axis=0) for part in (off, exact)]
+    worst, most = (np.abs(part).max() for part in seen)
+    return Distance(float(np.linalg.norm(off) / np.linalg.norm(exact)), float(worst / most))
+
+
+def low_part(values: np.ndarray, duration: float, band: float) -> np.ndarray:
+    """Fourier coefficients of windowed values (n, k) at t = h, 2h, ... = duration, up to `band` Hz."""
+    n = len(values)
+    # The window vanishes at both ends, so the value at t = 0 may be any.
+    window = np.sin(np.pi * np.arange(n) / n)[:, None] ** 2
+    shifted = np.concatenate([values[:1], values[:-1]])
+    keep = np.arange(n // 2 + 1) <= band * duration * (1 + 1e-9)
+    return np.fft.rfft(window * shifted, axis=0)[keep] / n

@@ -1,0 +1,88 @@
+"""Road heights on a grid from .npz, .csv and .h5 files, read as data and checked before use."""
+
+import zipfile
+import zlib
+from pathlib import Path
+
+from tireroad.contact.roads.files.grid_csv import read_csv
+from tireroad.contact.roads.files.grid_hdf5 import read_hdf5
+from tireroad.contact.roads.files.grid_npz import read_npz
+from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.plausible import check_plausible
+from tireroad.contact.roads.rows import Scaled
+from tireroad.fem.errors import InputError
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+READERS = {".npz": read_npz, ".csv": read_csv, ".h5": read_hdf5, ".hdf5": read_hdf5}
+# What the standard library, numpy and h5py raise for damaged files; NotImplementedError and
+# RuntimeError are zipfile's for damaged version numbers and flags, KeyError is h5py's.
+UNREADABLE = (
+    OSError,
+    EOFError,
+    KeyError,
+    zipfile.BadZipFile,
+    zlib.error,
+    NotImplementedError,
+    RuntimeError,
+)
+
+
+def read_grid(
+    file: Path,
+    holes: str = "refuse",
+    end: str = "refuse",
+    *,
+    length_unit: str | None = None,
+    height_unit: str | None = None,
+) -> Grid:
+    """The road of a grid file: x (nx,), y (ny,) and z (nx, ny), x in rolling direction, y to the left.
+
+    .npz: arrays x, y, z. .h5 or .hdf5: datasets x, y, z in the root. .csv: with a first line
+    `x,y,z`, one point a line, every point of the grid once, in any order; otherwise a matrix whose
+    first line holds an ignored corner and then all y, and whose further lines hold one x and its
+    heights. Lines starting with # are skipped; `nan` is a hole. InputError names file and place of
+    what is wrong.
+
+    `length_unit` is that of x and y, `height_unit` that of z (one of UNITS). None: metres, and the
+    sizes of the road must be plausible in metres (InputError), since a file in millimetres looks the
+    same. A height unit of None is the length unit where that is given.
+
+    Heights stay in the file, whose part under the tire is read when it is needed: .h5, and .npz as
+    numpy.savez writes it. A .csv matrix or a compressed .npz is converted once, at the start, to a
+    temporary file (contact.rows.Spool). Only a list of points is held in memory, 10 million at most.
+    """
+    reader = READERS.get(file.suffix.lower())
+    if reader is None:
+        raise InputError(
+            f"road.file {file}: the ending {file.suffix!r} is not .npz, .csv, .h5 or .hdf5; for "
+            'OpenCRG files take kind = "crg"'
+        )
+    if not file.is_file():
+        raise InputError(f"road.file {file}: no such file")
+    source = f"road.file {file}"
+    try:
+        x, y, rows = reader(file)
+        length, height = _factors(length_unit, height_unit)
+        if height != 1.0:
+            rows = Scaled(rows, height)
+        grid = Grid(length * x, length * y, rows, holes=holes, end=end, source=source)
+        check_plausible(
+            grid.extent_of_file,
+            grid.steps,
+            rows,
+            source,
+            lengths=length_unit is None,
+            heights=length_unit is None and height_unit is None,
+        )
+    except UNREADABLE as error:
+        raise InputError(f"{source}: cannot be read ({error}); is it complete?") from error
+    return grid
+
+
+def _factors(length_unit: str | None, height_unit: str | None) -> tuple[float, float]:
+    """Metres in a unit of x and y, and of z."""
+    for key, unit in (("length_unit", length_unit), ("height_unit", height_unit)):
+        if unit is not None and unit not in UNITS:
+            raise InputError(f'road: {key} = "{unit}" is unknown: take one of {", ".join(UNITS)}')
+    length = UNITS[length_unit or "m"]
+    return length, UNITS[height_unit] if height_unit else length

@@ -1,0 +1,238 @@
+"""OpenCRG roads (curved regular grid, ASAM OpenCRG 1.2), text and binary, read as data.
+
+The tire follows the reference line: the height under it at the distance u along and v to the left
+of the line is the grid's z(u, v). The line's curvature is neglected within the patch: 0.12 m ahead
+of the axle a line of radius R has moved aside by 0.12^2/2R, below 0.4 mm for R >= 20 m, and lines
+of smaller radius are refused. Slope and banking of the line, modifiers and options that change
+heights are refused by name where they are not zero.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tireroad.contact.roads.files.opencrg_header import MAX_BYTES, Blocks, key_values, read_header
+from tireroad.contact.roads.files.opencrg_payload import Payload, read_payload
+from tireroad.contact.roads.grid import Grid
+from tireroad.contact.roads.rows import Columns, Rows, pieces
+from tireroad.fem.errors import InputError
+
+Array = NDArray[np.float64]
+Channel = tuple[int, str, str]  # line in the file, name, unit
+
+SMALLEST_RADIUS = 20.0
+# Steps (m) beyond it are damage, and would overflow further on.
+LONGEST_STEP = 1e6
+FORMATS = ("KRBI", "KDBI", "LRFI", "LDFI")
+# Options that say how to search, check and log: heights do not depend on them.
+HARMLESS_OPTIONS = ("REFLINE_SEARCH_", "WARN_", "LOG_", "CHECK_")
+# Modifiers that only move the road in its plane.
+HARMLESS_MODIFIERS = (
+    "REFPOINT_U", "REFPOINT_V", "REFPOINT_X", "REFPOINT_Y", "REFPOINT_PHI",
+    "REFLINE_ROTCENTER_", "REFLINE_OFFSET_X", "REFLINE_OFFSET_Y", "REFLINE_OFFSET_PHI",
+)  # fmt: skip
+
+
+def read_opencrg(file: Path | str, holes: str = "refuse", end: str = "refuse") -> Grid:
+    """The road of an OpenCRG file as a Grid: x = u from its beginning, y = v to the left, z in m.
+
+    Formats LRFI, LDFI, KRBI (also where none is named) and KDBI; long sections numbered or `at v
+    =`. `holes` and `end` as in Grid. InputError names file and line or byte of what is missing,
+    damaged or not supported.
+    """
+    file = Path(file)
+    if not file.is_file():
+        raise InputError(f"road.file {file}: no such file")
+    try:
+        blocks, start, line = read_header(file)
+        _refuse_blocks(file, blocks)
+        parameters = key_values(file, blocks.get("ROAD_CRG", []))
+        code, channels = _definition(file, blocks)
+        step, rows = _rows(file, parameters, blocks["KD_DEFINITION"])
+        payload = Payload(file, code, start, line, len(channels), rows)
+        table = read_payload(payload)
+    except OSError as error:
+        raise InputError(f"road.file {file}: cannot be read ({error})") from error
+    count = table.shape[0]
+    if count < 2:
+        raise InputError(f"{file}: {count} cross sections, at least 2 are needed")
+    _check_line(file, channels, parameters, table, step)
+    v, columns = _sections(file, channels, parameters)
+    u = step * np.arange(count, dtype=float)
+    return Grid(u, v, Columns(table, columns), holes=holes, end=end, source=f"road.file {file}")
+
+
+def _refuse_blocks(file: Path, blocks: Blocks) -> None:
+    """What would change the heights and is not honoured, by name."""
+    for name in ("ROAD_CRG", "KD_DEFINITION"):
+        if name not in blocks and "ROAD_CRG_FILE" not in blocks:
+            raise InputError(f"{file}: no block ${name}: this is no OpenCRG file, or it is damaged")
+    if "ROAD_CRG_FILE" in blocks:
+        raise InputError(f"{file}: refers to another file ($ROAD_CRG_FILE); name that file instead")
+    for block, harmless in (
+        ("ROAD_CRG_OPTS", HARMLESS_OPTIONS),
+        ("ROAD_CRG_MODS", HARMLESS_MODIFIERS),
+    ):
+        for key, value in key_values(file, blocks.get(block, [])).items():
+            without_effect = value == 0.0 or (value == 1.0 and key.startswith("SCALE_"))
+            if not without_effect and not key.startswith(harmless):
+                raise InputError(
+                    f"{file}: ${block} {key} = {value:g} is not supported; apply it to the file "
+                    "first, or remove it"
+                )
+
+
+def _definition(file: Path, blocks: Blocks) -> tuple[str, list[Channel]]:
+    """Format code and the channels as (line, name, unit) of $KD_DEFINITION."""
+    code, channels = "KRBI", []
+    for number, text in blocks["KD_DEFINITION"]:
+        if text.startswith("#:"):
+            code = text[2:].strip().upper()
+            if code not in FORMATS:
+                known = ", ".join(FORMATS)
+                raise InputError(f"{file}, line {number}: format {code!r}, not one of {known}")
+        elif text.upper().startswith("D:"):
+            name, _, unit = text[2:].partition(",")
+            channels.append((number, " ".join(name.lower().split()), unit.strip().lower()))
+    if not channels:
+        raise InputError(f"{file}: $KD_DEFINITION defines no channel (lines of D:name,unit)")
+    return code, channels
+
+
+def _rows(
+    file: Path, parameters: dict[str, float], definition: list[tuple[int, str]]
+) -> tuple[float, int | None]:
+    """Step along the line (m), and the number of cross sections where the header gives an end."""
+    step = parameters.get("REFERENCE_LINE_INCREMENT")
+    for number, text in definition:
+        # The virtual channel repeats the step: U:reference line u,m,start,step
+        fields = [field.strip().lower() for field in text.split(",")]
+        if fields[:2] != ["u:reference line u", "m"] or len(fields) < 4:
+            continue
+        (virtual,) = key_values(file, [(number, f"U={fields[3]}")]).values()
+        if step is not None and abs(virtual - step) > 1e-3 * abs(step):
+            raise InputError(
+                f"{file}, line {number}: step {virtual:g} m, but REFERENCE_LINE_INCREMENT = "
+                f"{step:g} m"
+            )
+        step = virtual if step is None else step
+    if step is None:
+        raise InputError(f"{file}: REFERENCE_LINE_INCREMENT is missing in $ROAD_CRG")
+    if not 0.0 < step < LONGEST_STEP:
+        raise InputError(f"{file}: REFERENCE_LINE_INCREMENT = {step:g} m is no step of a road")
+    if "REFERENCE_LINE_END_U" not in parameters:
+        return step, None
+    length = parameters["REFERENCE_LINE_END_U"] - parameters.get("REFERENCE_LINE_START_U", 0.0)
+    steps = length / step
+    if not (1.0 - 1e-3 < steps < MAX_BYTES and abs(steps - round(steps)) < 1e-3 * max(1.0, steps)):
+        raise InputError(
+            f"{file}: REFERENCE_LINE_START_U to END_U, {length:g} m, is no whole number of "
+            f"REFERENCE_LINE_INCREMENT = {step:g} m"
+        )
+    return step, round(steps) + 1
+
+
+def _sections(
+    file: Path, channels: list[Channel], parameters: dict[str, float]
+) -> tuple[Array, list[int]]:
+    """Ascending v (m) of the long sections, and their columns in the data."""
+    places: list[float] = []
+    numbers: list[float] = []
+    columns: list[int] = []
+    for column, (line, name, unit) in enumerate(channels):
+        if not name.startswith("long section"):
+            continue
+        if unit != "m":
+            raise InputError(f"{file}, line {line}: long sections must be in m, not {unit!r}")
+        text = name.removeprefix("long section").strip()
+        value = re.sub(r"^at v\s*=\s*", "", text)
+        try:
+            (numbers if value == text else places).append(float(value))
+        except ValueError:
+            raise InputError(f"{file}, line {line}: {name!r} has no position") from None
+        columns.append(column)
+    if places and numbers:
+        raise InputError(f"{file}: long sections are defined by number and by position at once")
+    if len(columns) < 2:
+        raise InputError(f"{file}: {len(columns)} long sections, at least 2 are needed")
+    v = np.array(places) if places else _numbered(file, np.array(numbers), parameters)
+    order = np.argsort(v, kind="stable")
+    return v[order], [columns[i] for i in order]
+
+
+def _numbered(file: Path, numbers: Array, parameters: dict[str, float]) -> Array:
+    """v (m) of numbered sections, from the right border on; centred on the line by default."""
+    if not np.array_equal(np.sort(numbers), np.arange(1, len(numbers) + 1)):
+        raise InputError(f"{file}: long sections are not numbered 1 to {len(numbers)}")
+    borders = ("LONG_SECTION_V_RIGHT", "LONG_SECTION_V_LEFT")
+    step = parameters.get("LONG_SECTION_V_INCREMENT")
+    if step is None and all(key in parameters for key in borders):
+        step = (parameters[borders[1]] - parameters[borders[0]]) / (len(numbers) - 1)
+    if step is None or not 0.0 < step < LONGEST_STEP:
+        raise InputError(
+            f"{file}: LONG_SECTION_V_INCREMENT is "
+            f"{'missing' if step is None else f'{step:g} m, no step of a road'}"
+        )
+    right = parameters.get("LONG_SECTION_V_RIGHT", -0.5 * step * (len(numbers) - 1))
+    left = right + step * (len(numbers) - 1)
+    announced = parameters.get("LONG_SECTION_V_LEFT", left)
+    if abs(announced - left) > 1e-3 * step:
+        raise InputError(
+            f"{file}: LONG_SECTION_V_LEFT = {announced:g} m, but {len(numbers)} long sections "
+            f"every {step:g} m from {right:g} m end at {left:g} m"
+        )
+    return right + step * (numbers - 1.0)
+
+
+def _check_line(
+    file: Path,
+    channels: list[Channel],
+    parameters: dict[str, float],
+    table: Rows,
+    step: float,
+) -> None:
+    """Refuse lines that slope, bank or turn too sharply for heights to be read at (u, v)."""
+    for letter, name in (("S", "slope"), ("B", "banking")):
+        for key in (f"REFERENCE_LINE_START_{letter}", f"REFERENCE_LINE_END_{letter}"):
+            if parameters.get(key, 0.0) != 0.0:
+                raise InputError(f"{file}: {key} = {parameters[key]:g}: {name} is not supported")
+    start = parameters.get("REFERENCE_LINE_START_Z", 0.0)
+    if abs(parameters.get("REFERENCE_LINE_END_Z", start) - start) > 1e-9:
+        raise InputError(f"{file}: REFERENCE_LINE_START_Z and END_Z differ: slope is not supported")
+    lines = [c for c in channels if c[1].startswith("reference line ")]
+    for line, name, _ in lines:
+        if name in ("reference line x", "reference line y"):
+            raise InputError(f"{file}, line {line}: channel {name!r} is not supported")
+    if lines:
+        # Each piece repeats a row: what turns or slopes between two rows is in one of them.
+        for first, rows in pieces(table, overlap=1):
+            _check_rows(file, channels, rows, (first, step))
+
+
+def _check_rows(file: Path, channels: list[Channel], rows: Array, place: tuple[int, float]) -> None:
+    """Refuse slope, banking and sharp turns in some rows; `place`: the first row and the step (m)."""
+    first, step = place
+    for column, (line, name, _) in enumerate(channels):
+        # Slope and heading belong to the segment before a point: the road's first value is not used.
+        values = rows[0 if first or name == "reference line banking" else 1 :, column]
+        if name in ("reference line slope", "reference line banking"):
+            if np.any(np.nan_to_num(values) != 0.0):
+                raise InputError(f"{file}, line {line}: {name} is not zero: not supported")
+        elif name == "reference line phi":
+            _check_radius(file, values, step, step * max(first, 1))
+
+
+def _check_radius(file: Path, phi: Array, step: float, start: float) -> None:
+    """InputError where heading (rad) turns faster than the smallest radius allows; begins at `start`."""
+    if np.isnan(phi).any():
+        missing = int(np.isnan(phi).sum())
+        raise InputError(f"{file}: reference line phi is missing at {missing} points")
+    turn = np.abs(np.diff(np.unwrap(phi))) / step
+    if len(turn) > 0 and turn.max() > 1.0 / SMALLEST_RADIUS:
+        raise InputError(
+            f"{file}: the reference line turns with a radius of {1.0 / turn.max():.3g} m at "
+            f"{start + step * int(turn.argmax()):.4g} m along; below {SMALLEST_RADIUS:g} m heights "
+            "cannot be read along it"
+        )

@@ -1,0 +1,1 @@
+"""The path of load steps to the wanted static state."""

@@ -1,0 +1,64 @@
+"""Load over deflection: the road raised in steps, the footprint read at each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from tireroad.fem.static.footprint import Footprint
+from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.state import static_state
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """The tire at one `deflection` (m): `load` N, `tangent` N/m there while the same nodes touch: between two nodes
+    that come into contact it lags behind the slope of the curve, the less the finer the mesh;
+    `footprint`, `points` in contact, effective `rolling_radius` m.
+    """
+
+    deflection: float
+    load: float
+    tangent: float
+    footprint: Footprint
+    points: int
+    rolling_radius: float
+
+    @property
+    def pressure(self) -> float:
+        """Mean contact pressure, Pa."""
+        return self.load / self.footprint.area if self.footprint.area else 0.0
+
+
+def load_curve(loader: Loader, deflections: Sequence[float]) -> list[CurvePoint]:
+    """The states at ascending deflections (m) of an inflated tire. Collective.
+
+    Each step starts from a line through the two states before it; ConvergenceError where one does not
+    converge by halved steps either.
+    """
+    upright = loader.equilibrium.shape.upright
+    raised = loader.visit([deflection / upright for deflection in deflections])
+    return [_point(loader, deflection * upright) for deflection in raised]
+
+
+def slopes(deflection: np.ndarray, load: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """dF/d(deflection), N/m, `at` deflections (k,) m, of a smooth curve from 0 through the points (n,)."""
+    x, y = np.concatenate([[0.0], deflection]), np.concatenate([[0.0], load])
+    if len(x) < 4:
+        return np.interp(at, x, np.gradient(y, x))
+    return CubicSpline(x, y)(at, 1)
+
+
+def _point(loader: Loader, deflection: float) -> CurvePoint:
+    state = static_state(loader.equilibrium, loader.touch)
+    return CurvePoint(
+        deflection,
+        state.load,
+        loader.equilibrium.road_stiffness() / loader.equilibrium.shape.upright**2,
+        state.footprint(),
+        int((state.force > 0).sum()),
+        state.rolling_radius(),
+    )

@@ -1,0 +1,201 @@
+"""Load steps to a wanted state: inflation, then the road by height, deflection or load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.parallel import on_root
+from tireroad.fem.static.equilibrium import Equilibrium, Step
+from tireroad.fem.static.path.stepping import Attempt, Show, march
+from tireroad.fem.static.path.way import Way
+from tireroad.fem.static.symmetry.half_turn import HalfTurnEquilibrium, looks_the_same
+from tireroad.fem.static.symmetry.round import RoundEquilibrium
+from tireroad.fem.static.tread_surface import TreadSurface
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One load step done: what was stepped to, and the road's total force (N) on how many points."""
+
+    what: str
+    value: float
+    unit: str
+    load: float
+    active: int
+    step: Step
+
+
+@dataclass(frozen=True)
+class _Half:
+    """Half of the ring of a loader's body."""
+
+    loader: Loader
+    equilibrium: HalfTurnEquilibrium
+
+
+class Loader:
+    """Brings the body of one equilibrium problem to the wanted state. All methods are collective."""
+
+    def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]) -> None:
+        self.equilibrium = equilibrium
+        self.body = equilibrium.body
+        self.report = report
+        self.newton_steps = 0
+        self._touch: float | None = None
+
+    def inflate(self, pressure: float) -> None:
+        """Inflation from 0 to `pressure` (Pa), without a road; also the steady-rolling loads alone.
+
+        By the round shape of one section, where that is near enough for Newton; else in steps.
+        """
+        if not (self.body.plies.cords and self._start_round(pressure)):
+            self._inflate_in_steps(pressure)
+        self._touch = self.lowest()
+
+    def _start_round(self, pressure: float) -> bool:
+        """Whether equilibrium is found from the round shape. Collective."""
+
+        def shape() -> np.ndarray:
+            section = RoundEquilibrium(self.body, self.equilibrium.rolling)
+            Loader(section, self.report)._inflate_in_steps(pressure)
+            return section.on(self.body.lattice)
+
+        before = self.body.u.x.array.copy()
+        self.body.set_displacement(on_root(self.body.comm, shape))
+        step = self._solve_at(pressure)
+        self.newton_steps += step.iterations
+        if step.converged:
+            self.tell("inflation", pressure, "Pa", step)
+        else:
+            self.body.u.x.array[:] = before
+        return step.converged
+
+    def begin_at(self, other: Loader) -> None:
+        """Take another loader's first touch, and count its steps."""
+        self._touch, self.newton_steps = other.touch, other.newton_steps
+
+    def _inflate_in_steps(self, pressure: float) -> None:
+        self.march(
+            lambda part: self._solve_at(part * pressure),
+            1.0,
+            1.0,
+            Show("inflation", pressure, "Pa"),
+        )
+
+    def _solve_at(self, pressure: float) -> Step:
+        before = float(self.equilibrium.pressure.value)
+        self.equilibrium.pressure.value = pressure
+        step = self.equilibrium.solve()
+        if not step.converged:
+            self.equilibrium.pressure.value = before  # as the displacement is put back
+        return step
+
+    @property
+    def touch(self) -> float:
+        """Height of a road that just touches the inflated tire, m."""
+        assert self._touch is not None, "inflate() comes before the road"
+        return self._touch
+
+    @property
+    def deflection(self) -> float:
+        """How far the road has been raised from first touch, m."""
+        assert self.equilibrium.road_height is not None, "there is no road"
+        return self.equilibrium.road_height - self.touch
+
+    def lowest(self) -> float:
+        """Height of the lowest point of the outer face over the road's shape, m. Collective."""
+        lattice = self.body.lattice
+        moved = self.body.surface(self.body.owned(self.body.u.x.array))
+        places = lattice.points(lattice.face) + moved
+        places[:, 2] -= self.equilibrium.shape.height(*places[:, :2].T)
+        return TreadSurface(lattice, places).lowest()
+
+    def deflect(self, deflection: float) -> None:
+        """Raise the road by `deflection` (m) from first touch of the inflated tire."""
+        if not self._by_half(lambda half: Way(half).climb(deflection)):
+            Way(self).climb(deflection)
+
+    def visit(self, deflections: Sequence[float]) -> Iterator[float]:
+        """Raise the road to ascending deflections (m) in turn, from a line through the last two states."""
+        half, own = self._half(), Way(self)
+        way = None if half is None else Way(half.loader)
+        for deflection in deflections:
+            if half is None or way is None:
+                own.to(deflection)
+            else:
+                way.to(deflection)
+                if not self._taken_over(half):
+                    half = None
+                    own.to(deflection)
+            yield deflection
+
+    def _half(self) -> _Half | None:
+        """Half of the ring in the present state, where half a turn leaves tire and loads as they are. Collective."""
+        rolling = self.equilibrium.rolling
+        if not (self.equilibrium.shape.flat and looks_the_same(self.body.ring, rolling)):
+            return None
+        equilibrium = HalfTurnEquilibrium(self.body, rolling)
+        equilibrium.start(self.equilibrium)
+        loader = Loader(equilibrium, self.report)
+        loader._touch = self._touch
+        return _Half(loader, equilibrium)
+
+    def _taken_over(self, half: _Half) -> bool:
+        """Put the state of half the ring on the whole; whether it is balance there too. Collective."""
+        other = half.equilibrium
+        self.newton_steps += half.loader.newton_steps
+        half.loader.newton_steps = 0
+        self.equilibrium.cost.take(other.cost)
+        return self.equilibrium.resume(*other.on(self.body.lattice), other.road_height).converged
+
+    def _by_half(self, press: Callable[[Loader], object]) -> bool:
+        """Press half of the ring, if that is of use; whether it was. An error leaves the whole in the last state of
+        the half. Collective.
+        """
+        half, start = self._half(), self.body.u.x.array.copy()
+        if half is None:
+            return False
+        try:
+            press(half.loader)
+        except ConvergenceError:
+            self._taken_over(half)
+            raise
+        found = self._taken_over(half)
+        if not found:
+            self.body.u.x.array[:] = start
+        return found
+
+    def carry(self, load: float) -> float:
+        """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket.
+
+        States on the way may be out of balance; the one that an error leaves is not.
+        """
+        if load <= 0:
+            raise InputError(f"static.load = {load:g} N: a road carries a positive load")
+        if not self._by_half(lambda half: Way(half).carry(load)):
+            Way(self).carry(load)
+        return self.deflection
+
+    def load(self) -> float:
+        """Total vertical force of the road, N. Collective."""
+        return self.equilibrium.load()
+
+    def march(
+        self, attempt: Attempt, end: float, first: float, show: Show, start: float = 0.0
+    ) -> None:
+        def tried(target: float) -> Step:
+            step = attempt(target)
+            self.newton_steps += step.iterations
+            if step.converged:
+                self.tell(show.what, target * show.scale, show.unit, step)
+            return step
+
+        march(tried, start, end, first, show)
+
+    def tell(self, what: str, value: float, unit: str, step: Step) -> None:
+        loads = self.equilibrium.load(), self.equilibrium.points()
+        self.report(Progress(what, value, unit, *loads, step))

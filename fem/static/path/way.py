@@ -1,0 +1,146 @@
+"""The way to a load or a deflection: states that are known, and where to try next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.static.path.step import Step
+from tireroad.fem.static.path.stepping import Show
+
+if TYPE_CHECKING:
+    from tireroad.fem.static.path.loading import Loader
+
+LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
+_REACH = 1.9  # times the largest deflection so far: a load is sought no further away
+_NEAR = 0.1  # of a wanted load: what may be out of balance on the way to it (12 tangents in place of 21)
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A converged state on the way to a load."""
+
+    deflection: float
+    load: float
+    displacement: np.ndarray
+
+
+class Way:
+    """Of a loader's inflated body, from the present state, on which there is no road. All methods are collective."""
+
+    def __init__(self, loader: Loader) -> None:
+        self._loader, self._equilibrium, self._body = loader, loader.equilibrium, loader.body
+        self._known = [_Known(0.0, 0.0, self._body.u.x.array.copy())]
+
+    def climb(self, deflection: float) -> None:
+        """Raise the road to `deflection` (m) from first touch in steps."""
+        self._body.u.x.array[:] = self._known[0].displacement
+        self._raise_road(0.0, deflection, 0.0)
+
+    def carry(self, load: float) -> float:
+        """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket.
+
+        States on the way may be out of balance; the one that an error leaves is not.
+        """
+        try:
+            return self._seek(load, _NEAR * load)
+        except ConvergenceError:
+            if self._equilibrium.solve(self._equilibrium.road_height).converged:
+                raise
+            return self._seek(load, 0.0)
+
+    def _seek(self, load: float, allowed: float) -> float:
+        """That deflection, with states on the way `allowed` (N) out of balance."""
+        self._known = self._known[:1]
+        self._body.u.x.array[:] = self._known[0].displacement
+        trial = 0.1 * self._body.ring.thickness
+        for _ in range(60):
+            self.to(trial, allowed)
+            rounding = self._equilibrium.rounding
+            if not allowed and abs(self._known[-1].load - load) <= max(
+                LOAD_TOLERANCE * load, rounding
+            ):
+                return trial
+            trial = self._next_deflection(load)
+            if trial < _REACH * max(k.deflection for k in self._known):
+                if self._meet(load, trial):
+                    return self._loader.deflection
+                if allowed:  # from here on a bracket has to close
+                    self._known, allowed = self._known[:1], 0.0
+        nearest = min(self._known, key=lambda k: abs(k.load - load))
+        raise ConvergenceError(
+            f"static: the load of {load:g} N was not met in 60 trials; nearest is {nearest.load:g} N. "
+            "Give static.deflection instead, or refine the mesh."
+        )
+
+    def _meet(self, load: float, trial: float) -> bool:
+        """Solve for the load and the road's height at once, from the state guessed at a deflection."""
+        self._guess(trial)
+        step = self._equilibrium.solve(self._loader.touch + trial, load)
+        self._loader.newton_steps += step.iterations
+        if step.converged:
+            self._loader.tell("deflection", self._loader.deflection, "m", step)
+        return step.converged
+
+    def _guess(self, trial: float) -> bool:
+        """Put the body on a line through the two states nearest to a deflection, if there are two."""
+        near = sorted(self._known, key=lambda k: abs(k.deflection - trial))[:2]
+        if len(near) < 2:
+            return False
+        reach = (trial - near[0].deflection) / (near[0].deflection - near[1].deflection)
+        change = near[0].displacement - near[1].displacement
+        self._body.u.x.array[:] = near[0].displacement + reach * change
+        return True
+
+    def to(self, trial: float, allowed: float = 0.0) -> None:
+        """Solve at the trial deflection from a line through the two nearest states, else by steps.
+
+        What converges on the way is known from then on, `allowed` (N) out of balance.
+        """
+        if self._guess(trial):
+            step = self._equilibrium.solve(self._loader.touch + trial, allowed=allowed)
+            self._loader.newton_steps += step.iterations
+            if step.converged:
+                self._loader.tell("deflection", trial, "m", step)
+                self._known.append(_Known(trial, self._loader.load(), self._body.u.x.array.copy()))
+                return
+        below = max((k for k in self._known if k.deflection <= trial), key=lambda k: k.deflection)
+        self._body.u.x.array[:] = below.displacement
+        self._raise_road(below.deflection, trial, allowed)
+
+    def _next_deflection(self, load: float) -> float:
+        """Secant through the two loads nearest to the wanted one, kept inside the bracket."""
+        below = max((k for k in self._known if k.load <= load), key=lambda k: k.deflection)
+        above = [k.deflection for k in self._known if k.load > load]
+        far, near = sorted(self._known, key=lambda k: -abs(k.load - load))[-2:]
+        rise, run = near.load - far.load, near.deflection - far.deflection
+        slope = rise / run if run else 0.0
+        secant = near.deflection + (load - near.load) / slope if slope > 0 else np.inf
+        if above:
+            low, high = below.deflection, min(above)
+            return secant if low < secant < high else (low + high) / 2
+        if below.deflection > self._body.ring.height:
+            raise ConvergenceError(
+                f"static: the tire carries {below.load:.4g} N at {below.deflection:.4g} m of "
+                f"deflection, beyond its section; {load:g} N is out of reach. Lower static.load or "
+                "raise static.inflation."
+            )
+        # Beyond what was tried the curve is not known: at most double the deflection.
+        return float(np.clip(secant, 1.01 * below.deflection, 2 * below.deflection))
+
+    def _raise_road(self, start: float, end: float, allowed: float) -> None:
+        """In steps, each of which is known from then on."""
+
+        def attempt(deflection: float) -> Step:
+            step = self._equilibrium.solve(self._loader.touch + deflection, allowed=allowed)
+            if step.converged:
+                self._known.append(
+                    _Known(deflection, self._loader.load(), self._body.u.x.array.copy())
+                )
+            return step
+
+        largest = 0.25 * self._body.ring.thickness
+        self._loader.march(attempt, end, largest, Show("deflection", 1.0, "m"), start)

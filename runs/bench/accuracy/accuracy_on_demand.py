@@ -1,0 +1,239 @@
+"""Accuracy on demand: is the target met, and at what cost beside the best settings that there are."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from tireroad.contact.results.error_bars import Told, bars, told
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.timing import by_processor
+from tireroad.runs.bench.parts.kept import read_kept, write_kept
+from tireroad.runs.bench.parts.rolling_cases import (
+    CASES,
+    DURATION,
+    FINE,
+    Case,
+    Driven,
+    Recorded,
+    by_wheel,
+    driven,
+    recorded,
+    sets,
+    told_settings,
+)
+from tireroad.runs.files.cache import Cache
+from tireroad.runs.files.identity import identity
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.process import observe
+from tireroad.runs.search.journal import Journal, Trial
+from tireroad.runs.search.search import Search, seconds
+from tireroad.runs.search.settings import Ladders, Settings, applied
+from tireroad.runs.search.shares import worst
+
+ABOUT = "a search for settings beside an exhaustive one: 3 tires, 4 roads, 2 speeds"
+TARGET, UP_TO = 0.15, 100.0  # -, Hz
+WANTED = (f"accuracy.target={TARGET}", f"accuracy.up_to={UP_TO}")
+# Rungs of the exhaustive search, none finer than the reference.
+GRID = {"mesh": (0, 1, 2), "modes": (0, 2), "points": (0, 1, 2), "step": (0, 1, 2)}
+# On what a stage's cost depends: what differs in none of it is computed once in a search.
+DEPENDS = {
+    "static": ("mesh",),
+    "modes": ("mesh", "modes"),
+    "rotating": ("mesh", "modes"),
+    "greens": ("mesh", "modes", "points"),
+}
+ASKED = {"met": 90.0, "cost": 2.0, "search": 3.0}  # % of the cases; times the least cost
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of a case: whether the search ended within its target by its own `estimated` error, the `true` one of
+    what it chose; seconds of a run with that, of the `best` of the exhaustive search (None: nothing met the
+    target) and of the whole `search`."""
+
+    case: str
+    ended: bool
+    estimated: float
+    true: float
+    cost: float
+    best: float | None
+    search: float
+
+    @property
+    def met(self) -> bool:
+        """Whether the true error is as asked for."""
+        return self.ended and self.true <= TARGET
+
+
+def run(kept: Path | None = None) -> list[Table]:
+    """All cases; what the folder `kept` holds of them is not computed again. On one process."""
+    with tempfile.TemporaryDirectory() as folder:
+        return tables(Path(folder), CASES, GRID, kept or Path(folder) / "kept")
+
+
+def tables(folder: Path, cases: Iterable[Case], grid: Mapping, kept: Path) -> list[Table]:
+    """Of the cases, with the rungs of the exhaustive search. On one process."""
+    found = []
+    for case in by_wheel(cases):
+        file = kept / "accuracy_on_demand" / f"{case.wheel}-{case.road}.json"
+        of = [identity("accuracy").code, TARGET, UP_TO, DURATION, FINE, dict(grid)]
+        known = read_kept(file, of)
+        if known is None:
+            observe.say(f"  {case} ...")
+            with by_processor():
+                outcome = _outcome(folder / case.wheel, case, grid, kept / "forces")
+            known = [asdict(outcome)]
+            write_kept(file, of, known)
+        found.append(Outcome(**known[0]))
+        observe.say(f"    {found[-1]}")
+    return [_summary(found), _every(found)]
+
+
+def _outcome(folder: Path, case: Case, grid: Mapping, forces: Path) -> Outcome:
+    """Reference, search and exhaustive search of a case. On one process."""
+    fine = case.scene(folder, DURATION, *sets(**FINE))
+    exact = recorded(fine, folder / "reference", forces, _cache(folder))
+    scene = case.scene(folder, DURATION, *WANTED)
+    ladders = Ladders.of(scene)
+    ended, trials = _searched(folder / case.road, scene)
+    last = min(trials, key=lambda trial: worst(trial.found.over(scene.accuracy))[0])
+    true = _true(exact, _driven(folder, ladders, last.settings))
+    best = _cheapest(folder, ladders, grid, exact)
+    estimated = TARGET * worst(last.found.over(scene.accuracy))[0]
+    return Outcome(str(case), ended, estimated, true, _cost(last.seconds), best, _spent(trials))
+
+
+def _cheapest(folder: Path, ladders: Ladders, grid: Mapping, exact: Recorded) -> float | None:
+    """Seconds of the cheapest of all settings of the grid that meet the target; those whose stages before the loop
+    alone are known to cost more are not run."""
+    best: float | None = None
+    known: dict[tuple, float] = {}
+    for rungs in product(*grid.values()):
+        at = dict(zip(grid, rungs, strict=True))
+        keys = [(stage, *(at[cause] for cause in causes)) for stage, causes in DEPENDS.items()]
+        if best is not None and sum(known.get(key, 0.0) for key in keys) >= best:
+            continue
+        tried = _driven(folder, ladders, ladders.at(at))
+        spent = seconds(folder / "grid")
+        known |= {key: spent.get(key[0], 0.0) for key in keys}
+        if _true(exact, tried) <= TARGET:
+            best = min(best or np.inf, _cost(spent))
+    return best
+
+
+def _searched(folder: Path, scene) -> tuple[bool, list[Trial]]:
+    """Whether a search met its target, and its trials that came to an end. Collective."""
+    folder.mkdir(parents=True, exist_ok=True)
+    ended = True
+    try:
+        with observe.quiet():
+            Search(scene, folder, MPI.COMM_WORLD, [], _cache(folder.parent)).run()
+    except ConvergenceError:
+        ended = False
+    return ended, [trial for trial in Journal(folder, scene).trials if trial.found is not None]
+
+
+def _driven(folder: Path, ladders: Ladders, settings: Settings | None) -> Driven:
+    """A run with settings, from stages that those of the same wheel share. Collective."""
+    assert settings is not None  # the grid's rungs are all there
+    scene = applied(ladders.scene, settings)
+    return driven(scene, folder / "grid", "contact", _cache(folder))
+
+
+def _cache(folder: Path) -> Cache:
+    """Of all that a wheel's roads share, in the wheel's folder."""
+    return Cache(folder / "cache")
+
+
+def _cost(spent: Mapping[str, float]) -> float:
+    """Seconds of a run up to its forces."""
+    return sum(value for stage, value in spent.items() if stage != "accuracy")
+
+
+def _spent(trials: list[Trial]) -> float:
+    """Seconds of all trials, their error bars too, each stage once where its inputs are the same."""
+    once = {}
+    for trial in trials:
+        for stage, value in trial.seconds.items():
+            rungs = trial.settings.rungs
+            once[stage, *(rungs[cause] for cause in DEPENDS.get(stage, rungs))] = value
+    return sum(once.values())
+
+
+def _true(exact: Recorded, run: Recorded) -> float:
+    """The error that is asked for: of the history and of the mean, relative, the larger one."""
+    one, other = _told(exact), _told(run)
+    far = bars(one, other, 1.0)
+    return float(max(far.history[2], far.mean[2] / abs(one.mean[2])))
+
+
+def _told(run: Recorded) -> Told:
+    """Of the axle force after the first quarter, in which all roads have begun."""
+    force = run.forces["axle_force"]
+    return told(force[len(force) // 4 :], run.step, UP_TO, UP_TO)
+
+
+def _summary(found: list[Outcome]) -> Table:
+    solved = [one for one in found if one.best is not None]
+    ratio = [one.cost / one.best for one in solved if one.best]
+    whole = [one.search / one.best for one in solved if one.best]
+    met = 100 * float(np.mean([one.met for one in found]))
+    rows = (
+        [
+            ["target met, of the cases", met, ASKED["met"], "%"],
+            ["cost over the least, median", float(np.median(ratio)), ASKED["cost"], "-"],
+            ["cost over the least, largest", float(np.max(ratio)), ASKED["cost"], "-"],
+            [
+                "with the search over the least, median",
+                float(np.median(whole)),
+                ASKED["search"],
+                "-",
+            ],
+            ["with the search over the least, largest", float(np.max(whole)), ASKED["search"], "-"],
+        ]
+        if ratio
+        else [["target met, of the cases", met, ASKED["met"], "%"]]
+    )
+    notes = [
+        f"{len(found)} cases; {100 * TARGET:g} % of the axle force up to {UP_TO:g} Hz, {DURATION:g} s. True error: against "
+        f"{told_settings(FINE)}. The exhaustive search takes rungs of the same ladders. Costs are processor seconds; "
+        "without error bars, but for the search."
+    ]
+    return Table(
+        "Accuracy on demand",
+        [("what", ""), ("found", ""), ("asked", ""), ("unit", "")],
+        rows,
+        notes,
+    )
+
+
+def _every(found: list[Outcome]) -> Table:
+    rows = [
+        [
+            one.case,
+            100 * one.estimated,
+            100 * one.true,
+            one.met,
+            one.cost,
+            one.best if one.best is not None else "none",
+            one.search,
+        ]
+        for one in found
+    ]
+    columns = [
+        ("case", ""),
+        ("estimated error", "%"),
+        ("true error", "%"),
+        ("met", ""),
+        ("cost of the chosen run", "s"),
+        ("least cost", "s"),
+        ("cost of the search", "s"),
+    ]
+    return Table("Every case", columns, rows)

@@ -1,0 +1,157 @@
+"""The problem that the benchmarks of rolling share: a tire on a rough road, and how errors are told."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from threadpoolctl import threadpool_limits
+
+from tireroad.contact.results.spectra import distance
+from tireroad.fem.matrices.probe import nodes
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import Response
+from tireroad.greens.responses import make_response
+from tireroad.modal.rolling import rolling_modes
+from tireroad.runs.files.store import opened
+from tireroad.runs.process import observe
+from tireroad.runs.stages.pipeline import Finished, run_scene
+from tireroad.runs.validation.histories import History, Trial, follow
+
+BAND = 500.0  # Hz, up to which errors are told
+SPEED = 100.0  # rad/s
+
+SCENE = """
+name = "bench"
+[tire]
+segments = {segments}
+elements_arc = {arc}
+footprint_size = {footprint}
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 500.0
+[damping]
+mass = 300.0
+[rotation]
+speed = {speed}
+[modal]
+count = {modes}
+[greens]
+residual = "{residual}"
+[contact]
+points = {{ dx = {pitch}, dy = {pitch} }}
+youngs_modulus = 1e7
+[road]
+kind = "texture"
+rms = 2e-4
+roll_off = 0.2
+cut_off = 0.03
+[time]
+duration = {duration}
+step = {step}
+"""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Elements around and from bead to bead, and their size where the road touches."""
+
+    segments: int
+    arc: int
+    footprint: float
+
+    def __str__(self) -> str:
+        return f"{self.segments} x {self.arc}"
+
+
+def write_scene(file: Path, mesh: Mesh, **keys: object) -> Path:
+    """The scene with some of its keys changed: speed, modes, residual, pitch, duration, step."""
+    values: dict[str, object] = {"speed": SPEED, "modes": 100, "residual": "static"}
+    values |= {"pitch": 0.008, "duration": 0.2, "step": 1e-4} | vars(mesh) | keys
+    file.write_text(SCENE.format(**values))
+    return file
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A `run` up to its Green's functions, and the `trial` of its road, its points settled."""
+
+    run: Finished
+    trial: Trial
+
+
+def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Prepared:
+    """A run up to its Green's functions, its points settled; `sets` as of --set. Collective."""
+    from tireroad.runs.scene.load import load
+
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
+    with observe.quiet():
+        run = run_scene(
+            scene, folder, MPI.COMM_WORLD, until="greens", fresh=False, petsc_options=[]
+        )
+    setup, _ = run.setup.settled(run.greens.contact, run.static.force, scene.contact)
+    return Prepared(run, Trial(scene.contact, setup, scene.time.duration))
+
+
+@dataclass(frozen=True)
+class Rolled:
+    """A run as a user starts it: its stages' entries of summary.json, and forces (n, 3) N by name."""
+
+    stages: dict[str, dict]
+    forces: dict[str, np.ndarray]
+
+    def figure(self, stage: str, name: str):
+        """A headline figure or an indicator of a stage."""
+        entry = self.stages[stage]
+        return (entry["headline"] | entry["indicators"])[name]["value"]
+
+    @property
+    def loop(self) -> float:
+        """Wall time (s) of the time loop, files and checks included."""
+        return self.stages["contact"]["cost"]["time loop"]
+
+
+def rolled(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Rolled:
+    """A run up to its contact forces; stages that the folder holds are reused. Collective."""
+    from tireroad.runs.scene.load import load
+
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
+    with observe.quiet():
+        run_scene(scene, folder, MPI.COMM_WORLD, until="contact", fresh=False, petsc_options=[])
+    stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
+    with opened(folder / "contact.h5") as file:
+        forces = {name: file[name][:] for name in ("total_force", "axle_force")}
+    return Rolled(stages, forces)
+
+
+def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
+    """The response that the run would have with its first modes and another residual. Collective."""
+    run, job = given.run, given.run.job
+    rolling = rolling_modes(run.fields.first(count), run.wheel.turning, job.comm)
+    points = nodes(given.trial.setup.patch.index, len(run.static.points), 2)
+    pair = points, points, residual
+    return make_response(lambda: run.wheel, rolling, *pair, lambda: rolling.basis).response
+
+
+def modal(given: Prepared, response: Response, step: float) -> History:
+    """The loop on the states that the step resolves."""
+    tire = Recursion(
+        response=response.resolved(step), step=step, scheme="linear", comm=MPI.COMM_SELF
+    )
+    with threadpool_limits(1, "blas"):
+        return follow(given.trial, tire, step, 0.0)
+
+
+def errors(reference: History, found: History, duration: float) -> tuple[float, float]:
+    """Relative L2 up to BAND of what varies in the contact force and in the axle force, %."""
+    contact, axle = (
+        100 * distance(reference.values[name], found.values[name], duration, BAND).mean
+        for name in ("contact force", "axle force")
+    )
+    return contact, axle

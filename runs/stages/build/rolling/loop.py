@@ -1,0 +1,103 @@
+"""A scene's time loop: the tire as it is driven, the normal solver, the brush."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from tireroad.contact.driven import Driven
+from tireroad.contact.grid_patch import OnPoints
+from tireroad.contact.model import step_solver, tread_memory
+from tireroad.contact.rolling import Loop, roll
+from tireroad.contact.setup import ContactSetup
+from tireroad.contact.solver.friction import Friction
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.contact.tread.free_rolling import free_slip
+from tireroad.greens.recursion import Recursion, sharers
+from tireroad.greens.response import Response
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.build.point_forces import directions, histories
+
+
+def driven_tire(job: Job, tire, step: float, steps: int) -> Driven | None:
+    """The tire under the scene's prescribed forces, and with a wheel that is read, where there is either."""
+    forces = job.scene.force
+    if not forces and job.axle is None:
+        return None
+    time = step * np.arange(steps + 1)
+    return Driven(tire, histories(forces, time), directions(forces))
+
+
+def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
+    """The tire as seen at the patch's points, normal solver and friction of the table [contact]."""
+    patch = setup.patch
+    p = len(patch.index)
+    memory = tread_memory(spec, patch, setup.rolled.speed, step)
+    at_once = memory.at_once if memory else 1.0
+    solver, friction = step_solver(spec, patch, tire.same_step[:p, :p], at_once), None
+    if spec.rubs:
+        friction = _friction(spec, setup, tire, step)
+    if patch.weights is not None:
+        tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
+    return Loop(tire, solver, friction, memory)
+
+
+def _friction(spec, setup: ContactSetup, tire, step: float) -> Friction:
+    """The brush of the scene, at rest."""
+    patch = setup.patch
+    stiffness = spec.brush_stiffness or spec.brush_stiffness_per_area * patch.area
+    law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
+    brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
+    brush.begin(patch.force > 0)
+    return Friction(brush, tire.same_step, patch.weights)
+
+
+def freely_rolling(
+    job: Job, setup: ContactSetup, response: Response, step: float, scheme: str
+) -> tuple[ContactSetup, float]:
+    """The setup (settled) with the slip at which the tire rolls freely over a smooth road, and that slip: by the loop
+    itself, until the patch has passed six times. ConvergenceError where there is none. Collective."""
+    x0, x1, _, _ = setup.patch.extent
+    steps = max(int(np.ceil(6 * (x1 - x0) / setup.rolled.speed / step)), 20)
+    smooth, load = setup.smooth(steps * step), float(setup.patch.force.sum())
+
+    def drag(slip: float) -> float:
+        found = forces(job, smooth.with_slip(slip), response, step, steps, scheme).contact
+        return float(found[-max(steps // 6, 1) :, 0].mean())
+
+    slip = free_slip(drag, load)
+    return setup.with_slip(slip), slip
+
+
+class Forces(NamedTuple):
+    """Of the road on the tire, `contact`, and on the axle, `axle`, (n, 3) N after each of n steps of `step` s."""
+
+    contact: np.ndarray
+    axle: np.ndarray
+    step: float
+
+
+def forces(
+    job: Job, setup: ContactSetup, response: Response, step: float, steps: int, scheme: str
+) -> Forces:
+    """The loop of the job's scene by another response, step or setup (settled), kept in memory. Collective.
+
+    `scheme` "linear" or "constant". ConvergenceError where the road touches beyond the patch.
+    """
+    kept = response.resolved(step)
+    comm = sharers(kept, job.comm)
+    tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm)
+    loop = make_loop(job.scene.contact, setup, driven_tire(job, tire, step, steps) or tire, step)
+    contact, axle = np.zeros((2, steps, 3))
+    given = setup.patch, setup.drive, step, steps
+    with threadpool_limits(1, "blas"):
+        for k, instant in enumerate(
+            roll(loop.tire, loop.solver, *given, loop.friction, 0, loop.memory)
+        ):
+            contact[k, :2] = instant.horizontal.sum(axis=0)
+            contact[k, 2], axle[k] = instant.force.sum(), instant.axle_force
+            if instant.force[setup.patch.edge].any():
+                setup.patch.check_edge(instant.force[None], np.array([instant.time]), setup.reach)
+    return Forces(contact, axle, step)

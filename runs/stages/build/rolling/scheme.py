@@ -1,0 +1,40 @@
+"""The force's course within a step: as the scene says, or by what the contact's oscillation asks for."""
+
+from __future__ import annotations
+
+import math
+
+from tireroad.contact.results.chatter import Chosen, choose, oscillation
+from tireroad.contact.setup import ContactSetup
+from tireroad.runs.process import observe
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.build.rolling.stepping import Planned
+
+WATCHED = "constant", "forces linear over the step made points open and close from step to step"
+
+
+def chosen_scheme(
+    job: Job, record: Record, setup: ContactSetup, plan: Planned, begun: str | None
+) -> Chosen:
+    """What to take, and why; shown, and kept in the record.
+
+    `begun`: the scheme of the checkpoint from which the loop goes on, or None.
+    """
+    wanted = job.scene.time.scheme
+    steps = oscillation(job.scene.contact, setup.patch, plan.response, plan.step)
+    if math.isfinite(steps):
+        record.indicators["steps in the fastest oscillation of the contact"] = (steps, "-")
+    chosen = choose(steps)
+    if wanted != "auto":
+        chosen = Chosen(wanted, f'time.scheme = "{wanted}"')
+    elif begun == "constant" and chosen.scheme != begun:
+        chosen = Chosen(*WATCHED)
+    return reported(record, chosen)
+
+
+def reported(record: Record, chosen: Chosen) -> Chosen:
+    """The choice, shown and kept in the record."""
+    observe.say(f"  scheme {chosen.scheme}: {chosen.reason}")
+    record.indicators["reason for the scheme"] = (chosen.reason, "-")
+    return chosen

@@ -1,0 +1,1 @@
+"""The parts of `validate stability`, a package of the program each."""

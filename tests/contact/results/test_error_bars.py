@@ -1,0 +1,62 @@
+"""Error bars from companions whose error is larger by a known ratio."""
+
+import numpy as np
+import pytest
+
+from tireroad.contact.results.error_bars import Bars, Told, bars, told, total
+
+
+def at(size: float, rate: float) -> Told:
+    """Figures whose error is known: 0.3 N, 0.2 N and 0.1 dB at size 1."""
+    off = size**rate
+    return Told(
+        np.full(3, 7.0 + 0.3 * off),
+        np.full(3, 2.0 - 0.2 * off),
+        np.array([100.0, 200.0]),
+        np.full((2, 3), 20.0 + 0.1 * off),
+        np.full((5, 3), 1.0 + 0.04j * off),
+    )
+
+
+@pytest.mark.parametrize("rate", [1.5, 2.0, 3.0])
+def test_the_error_of_a_known_order_is_told_exactly(rate):
+    found = bars(at(1.0, rate), at(2.0, rate), 1 / (2**rate - 1))
+    assert found.mean == pytest.approx(0.3)
+    assert found.deviation == pytest.approx(0.2)
+    assert found.level == pytest.approx(0.1)
+    assert found.history == pytest.approx(0.04 / abs(1 + 0.04j))
+
+
+def test_a_band_that_the_companion_lacks_is_unknown():
+    companion = at(2.0, 2.0)
+    companion = Told(
+        companion.mean,
+        companion.deviation,
+        companion.centre[1:],
+        companion.level[1:],
+        companion.low,
+    )
+    found = bars(at(1.0, 2.0), companion, 1 / 3)
+    assert np.isnan(found.level[0]).all()
+    assert found.level[1] == pytest.approx(0.1)
+
+
+def test_causes_add_up_as_squares():
+    one, other = (
+        Bars(np.full(3, a), np.full(3, a), np.full((1, 3), a), np.full(3, a)) for a in (3.0, 4.0)
+    )
+    found = total({"step": one, "mesh": other})
+    assert found.mean == pytest.approx(5.0)
+    assert found.level == pytest.approx(5.0)
+
+
+def test_figures_of_a_sine():
+    step, amplitude = 1e-3, 2.0
+    time = step * np.arange(4000)
+    force = np.outer(amplitude * np.sin(2 * np.pi * 100.0 * time) + 5.0, [0.0, 0.0, 1.0])
+    found = told(force, step, 300.0)
+    assert found.mean[2] == pytest.approx(5.0)
+    assert found.deviation[2] == pytest.approx(amplitude / np.sqrt(2))
+    assert found.centre.max() < 300.0
+    band = np.abs(found.centre - 100.0).argmin()
+    assert found.level[band, 2] == pytest.approx(10 * np.log10(amplitude**2 / 2), abs=0.01)

@@ -1,0 +1,43 @@
+"""How far the contact moves beyond the static state, as the wheel sees it, and what is said of it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tireroad.contact.results.totals import Totals
+from tireroad.runs.measure.synthetic import oval_patch
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.stored.contact_figures import excursion
+
+
+def block(displacement: np.ndarray, **more: np.ndarray) -> dict[str, np.ndarray]:
+    n, c = displacement.shape
+    zeros = np.zeros((n, c))
+    given = {name: zeros for name in ("normal_force", "change", "moved")}
+    given |= {name: np.zeros(n) for name in ("time", "residual", "penetration", "active")}
+    return given | {"displacement": displacement, "total_force": np.zeros((n, 3))} | more
+
+
+def test_points_that_touch_at_rest_count_less_the_wheel() -> None:
+    patch = oval_patch((5, 4), (0.015, 0.02), 500.0)
+    force = patch.force.copy()
+    one, other = np.flatnonzero(force > 0)[:2]
+    force[one] = 0.0
+    totals = Totals(replace(patch, force=force), 1.0)
+    moved = np.zeros((3, 20))
+    moved[1, other], moved[2, one] = -4e-3, 0.5  # the second no longer touches at rest
+    totals.add(block(moved))
+    assert totals.figures.excursion == 4e-3
+    lifted = np.full((2, 20), 6e-3)
+    totals.add(block(lifted, wheel_height=np.array([6e-3, 5e-3])))
+    assert totals.figures.excursion == 4e-3  # nothing but the wheel's own motion, or 1 mm of it
+
+
+def test_beyond_a_third_of_the_deflection_it_is_said() -> None:
+    record = Record()
+    excursion(record, 2e-3, 0.01)
+    assert not record.warnings
+    assert record.indicators["that, of the static deflection"] == (0.2, "-")
+    excursion(record, 4e-3, 0.01)
+    assert "0.4 of the static deflection of 10 mm" in record.warnings[0]
+    excursion(record, 4e-3, None)

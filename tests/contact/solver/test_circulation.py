@@ -1,0 +1,37 @@
+"""Work against the skew part of a flexibility: twice the area that the force encloses, times the skew entry."""
+
+import numpy as np
+import pytest
+
+from tireroad.contact.results.energy import Circulation
+
+
+@pytest.mark.parametrize("blocks", [1, 7])
+def test_a_circle_of_forces(blocks: int) -> None:
+    flexibility = np.array([[2.0, 0.7], [-0.1, 3.0]])  # skew part 0.4
+    angle = np.linspace(0.0, 2 * np.pi, 2001)
+    forces = 5.0 * np.column_stack([np.cos(angle) - 1, np.sin(angle)])
+    found = Circulation(flexibility)
+    for part in np.array_split(forces[1:], blocks):
+        found.add(part)
+    # int f . S df = 0.4 int (f_x df_y - f_y df_x) = 0.4 times twice the area, by Green's theorem.
+    assert found.work == pytest.approx(0.4 * 2 * np.pi * 25.0, rel=1e-5)
+
+
+def test_what_is_symmetric_stores_and_loses_nothing() -> None:
+    forces = np.random.default_rng(1).standard_normal((50, 3))
+    symmetric = np.random.default_rng(2).standard_normal((3, 3))
+    found = Circulation(symmetric + symmetric.T)
+    found.add(forces)
+    assert found.work == 0.0
+
+
+def test_goes_on_from_a_checkpoint() -> None:
+    forces = np.random.default_rng(3).standard_normal((20, 2))
+    flexibility = np.array([[0.0, 1.0], [0.0, 0.0]])
+    whole, first, second = (Circulation(flexibility) for _ in range(3))
+    whole.add(forces)
+    first.add(forces[:9])
+    second.set_state(first.state())
+    second.add(forces[9:])
+    assert second.work == whole.work

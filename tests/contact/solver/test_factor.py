@@ -1,0 +1,77 @@
+"""The bordered factor against a fresh one, and a checkpoint in the middle of its life."""
+
+import numpy as np
+import pytest
+
+from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.factor import ActiveFactor
+from tireroad.contact.solver.grid_compliance import MatrixCompliance
+from tireroad.fem.errors import ConvergenceError
+from tireroad.greens.residual.sparse_columns import LoadedColumns
+
+
+def compliance(rng: np.random.Generator, n: int) -> np.ndarray:
+    factor, turn = rng.standard_normal((2, n, n))
+    return factor @ factor.T / n + 0.1 * np.eye(n) + 0.02 * (turn - turn.T)
+
+
+def test_points_come_and_go_without_a_new_factor_each_time() -> None:
+    rng = np.random.default_rng(4)
+    n, steps = 120, 200
+    matrix = compliance(rng, n)
+    factor = ActiveFactor(MatrixCompliance(matrix))
+    active = rng.random(n) < 0.6
+    for _ in range(steps):
+        active[rng.integers(0, n, 2)] ^= True
+        factor.take(active)
+        right = rng.standard_normal(active.sum())
+        wanted = np.linalg.solve(matrix[np.ix_(active, active)], right)
+        assert np.abs(factor.solve(right) - wanted).max() < 1e-11 * np.abs(wanted).max()
+    assert factor.factorisations < steps / 2
+
+
+def test_from_nothing_to_everything_and_back() -> None:
+    rng = np.random.default_rng(5)
+    matrix = compliance(rng, 30)
+    factor = ActiveFactor(MatrixCompliance(matrix))
+    for count in (0, 1, 2, 0, 30, 29, 0, 3):
+        active = np.arange(30) < count
+        factor.take(active)
+        right = rng.standard_normal(count)
+        assert np.allclose(matrix[:count, :count] @ factor.solve(right), right, atol=1e-11)
+
+
+def test_singular_set_is_refused_and_forgotten() -> None:
+    matrix = np.diag([1.0, 0.0, 1.0])
+    factor = ActiveFactor(MatrixCompliance(matrix))
+    with pytest.raises(ConvergenceError, match="singular"):
+        factor.take(np.array([False, True, True]))
+    factor.take(np.array([True, False, True]))
+    assert np.array_equal(factor.solve(np.ones(2)), np.ones(2))
+
+
+def test_goes_on_from_a_checkpoint_with_the_same_bits() -> None:
+    rng = np.random.default_rng(6)
+    matrix = compliance(rng, 80)
+    first, second = ActiveSet(matrix), ActiveSet(matrix)
+    q = rng.standard_normal(80) - 0.5
+    for k in range(60):
+        q = q + 0.02 * rng.standard_normal(80)
+        force = first.solve(q)
+        if k >= 30:
+            assert np.array_equal(second.solve(q), force)
+        if k == 29:
+            assert not np.array_equal(first.active, first.state()["factorised"])
+            second.set_state({name: value.copy() for name, value in first.state().items()})
+
+
+@pytest.mark.parametrize("loaded", [0, 1, 7, 40])
+def test_loaded_columns_are_the_whole_product(loaded: int) -> None:
+    rng = np.random.default_rng(loaded)
+    matrix, force = rng.standard_normal((13, 40)), np.zeros(40)
+    columns = LoadedColumns(matrix)
+    for _ in range(3):
+        force[:] = 0.0
+        force[rng.choice(40, loaded, replace=False)] = rng.standard_normal(loaded)
+        assert np.allclose(columns @ force, matrix @ force, atol=1e-13)
+        assert np.array_equal(columns @ force, LoadedColumns(matrix) @ force)

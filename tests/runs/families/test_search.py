@@ -1,0 +1,236 @@
+"""Settings that are searched for: from coarse to what meets the target, at little more than the least cost."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from tireroad.contact.results.error_bars import orders
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.process import observe
+from tireroad.runs.process.signals import Stopped
+from tireroad.runs.scene.check import explain
+from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.scene.load import load
+from tireroad.runs.scene.sections.kinds import torus
+from tireroad.runs.search import search as searching
+from tireroad.runs.search.journal import Journal, Trial
+from tireroad.runs.search.search import Search
+from tireroad.runs.search.settings import CAUSES, Ladders, Settings, applied, size_ratio
+from tireroad.runs.search.shares import Found, worst
+
+SCENE = """
+name = "wanted"
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 400.0
+[rotation]
+speed = 40.0
+[contact]
+youngs_modulus = 1e7
+reach = 0.006
+[road]
+kind = "sine"
+amplitude = 2e-4
+wavelength = 0.1
+run_in = 0.05
+[time]
+duration = 0.1
+[accuracy]
+target = 0.05
+up_to = 100.0
+"""
+AT_FIRST = {"step": 0.04, "points": 0.2, "modes": 0.06, "mesh": 0.3}
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "wanted.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def modelled(scene, settings: Settings) -> Trial:
+    """A trial whose errors fall by their orders, and whose seconds are those estimated."""
+    first = Ladders.of(scene).first()
+    history = {
+        cause: AT_FIRST[cause] * size_ratio(cause, first, settings) ** orders(settings.order)[cause]
+        for cause in CAUSES
+    }
+    seconds = estimate(applied(scene, settings)).seconds
+    found = Found(history, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ()))
+    return Trial(settings, seconds, sum(seconds.values()), found, "linear")
+
+
+@pytest.fixture
+def search(file, monkeypatch):
+    """A search over the model; what it tried, and the scene whose results it left."""
+    tried: list[Settings] = []
+    final = []
+
+    def attempt(self, settings):
+        tried.append(settings)
+        return modelled(self.scene, settings)
+
+    monkeypatch.setattr(Search, "_tried", attempt)
+    monkeypatch.setattr(Search, "_final", lambda self, scene: final.append(scene))
+
+    def started(*sets: str):
+        (file.parent / "out").mkdir(exist_ok=True)
+        with observe.quiet():
+            Search(load(file, sets), file.parent / "out", MPI.COMM_SELF, []).run()
+
+    return started, tried, final
+
+
+def cheapest(scene, target: float) -> float:
+    """Seconds of the cheapest settings of all that meet the target, tried one by one."""
+    ladders = Ladders.of(scene)
+    best = np.inf
+    for rungs in np.ndindex(3, 6, 4, 6):
+        settings = ladders.at(dict(zip(("step", "points", "modes", "mesh"), rungs, strict=True)))
+        trial = modelled(scene, settings)
+        if worst(trial.found.over(scene.accuracy))[0] <= 1:
+            best = min(best, sum(trial.seconds.values()))
+    return best
+
+
+def test_it_ends_within_the_target_near_the_least_cost(file, search, monkeypatch) -> None:
+    started, tried, final = search
+    started()
+    scene = load(file)
+    last = modelled(scene, tried[-1])
+    assert worst(last.found.over(scene.accuracy))[0] <= 1
+    assert all(worst(modelled(scene, one).found.over(scene.accuracy))[0] > 1 for one in tried[:-1])
+    monkeypatch.setattr(torus, "FINER", torus.FINER[:6])
+    least = cheapest(scene, 0.05)
+    spent = sum(sum(modelled(scene, one).seconds.values()) for one in tried)
+    assert sum(last.seconds.values()) <= 2 * least
+    assert spent <= 3 * least
+    assert final == [applied(scene, tried[-1])]
+
+
+def test_the_chosen_scene_needs_no_search_and_is_the_run_s(file, search) -> None:
+    started, _, final = search
+    started()
+    chosen = load(file.parent / "out" / "chosen.toml")
+    assert chosen == final[0]
+    assert chosen.accuracy.target == 0.05 and not chosen.accuracy.searches
+
+
+def test_a_search_that_was_stopped_goes_on_and_a_looser_one_is_known(file, search, monkeypatch):
+    started, tried, _ = search
+    started()
+    whole = list(tried)
+    (file.parent / "out" / "search.json").unlink()
+    tried.clear()
+    attempt = Search._tried
+
+    def stopped(self, settings):
+        if tried:
+            raise Stopped("SIGINT")
+        return attempt(self, settings)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Search, "_tried", stopped)
+        with pytest.raises(Stopped):
+            started()
+    started()
+    assert tried == whole
+    tried.clear()
+    started("accuracy.target=0.9")
+    assert tried == []  # its trials are those of before
+    started("road.amplitude=3e-4")
+    assert tried[0] == whole[0]  # another scene: anew
+
+
+@pytest.mark.parametrize(
+    ("sets", "why"), [("accuracy.trials=1", "trials"), ("accuracy.budget=1", "budget")]
+)
+def test_limits_end_it_with_what_was_reached(file, search, sets, why) -> None:
+    started, tried, final = search
+    with pytest.raises(ConvergenceError, match=f"accuracy.{why}.*largest part: mesh"):
+        started(sets)
+    assert len(tried) == 1
+    assert final == [applied(load(file, [sets]), tried[0])]
+    assert load(file.parent / "out" / "scene.toml").accuracy.searches
+
+
+def test_what_fails_is_made_finer(file, monkeypatch, search) -> None:
+    started, tried, _ = search
+    attempt = Search._tried
+
+    def failing(self, settings):
+        trial = attempt(self, settings)
+        unknown = {c: e for c, e in trial.found.history.items() if c != "mesh" or len(tried) > 2}
+        found = replace(trial.found, history=unknown)
+        return (
+            replace(trial, failed="no balance", found=None)
+            if len(tried) == 1
+            else replace(trial, found=found)
+        )
+
+    monkeypatch.setattr(Search, "_tried", failing)
+    started()
+    assert tried[1].rungs == {"step": 1, "points": 0, "modes": 0, "mesh": 1}
+    assert tried[2].rungs["mesh"] > 1  # the companion of the mesh had failed
+
+
+def test_bands_count_each_by_itself(file) -> None:
+    wanted = load(file, ["accuracy.target=", "accuracy.target_db=1"]).accuracy
+    level = {cause: (0.1, 0.2) for cause in CAUSES} | {"mesh": (0.1, 3.0)}
+    found = Found({}, {}, (50.0, 63.1), level)
+    assert worst(found.over(wanted)) == (pytest.approx(np.sqrt(9.12)), 1)
+    assert (
+        worst(replace(found, centre=(), level=dict.fromkeys(CAUSES, ())).over(wanted))[0] == np.inf
+    )
+
+
+def test_check_tells_of_the_search_and_its_bounds(file) -> None:
+    text = explain(load(file))
+    assert "search for settings with 5 % of the axle force up to 100 Hz" in text
+    assert "from  16 x 8" in text and "12 trials" in text
+    assert "search for settings with" not in explain(load(file, ["accuracy.search=false"]))
+
+
+@pytest.mark.parametrize(
+    ("sets", "said"),
+    [
+        (["accuracy.estimate=false"], "accuracy.estimate = true"),
+        (["output.axle_force=false"], "output.axle_force = true"),
+        (["accuracy.up_to=20"], "four periods"),
+        (["accuracy.target=2"], "accuracy.target"),
+    ],
+)
+def test_a_target_that_cannot_be_is_refused(file, sets, said) -> None:
+    with pytest.raises(InputError, match=said):
+        load(file, sets)
+
+
+@pytest.mark.long
+def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
+    """The real thing: one trial misses a hard target, and meets a loose one without being run again."""
+    monkeypatch.setattr(torus, "ORDER", 2)
+    out = file.parent / "out"
+    out.mkdir()
+    smooth = ["accuracy.up_to=70", "road.wavelength=0.25"]
+
+    def started(*sets: str) -> None:
+        scene = load(file, [*smooth, *sets])
+        with observe.quiet():
+            searching.run(scene, out, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])
+
+    with pytest.raises(ConvergenceError, match="accuracy.trials = 1 are done. Reached"):
+        started("accuracy.target=0.001", "accuracy.trials=1")
+    assert (out / "contact.h5").exists() and (out / "search" / "cache").exists()
+    started("accuracy.target=0.5")
+    stages = json.loads((out / "summary.json").read_text())["stages"]
+    assert {stages[name]["status"] for name in ("static", "modes", "contact", "accuracy")} == {
+        "reused"
+    }
+    assert load(out / "scene.toml") == load(out / "chosen.toml")
+    assert not (out / "search").exists()
+    assert len(Journal(out, load(file, smooth)).trials) == 1

@@ -1,0 +1,275 @@
+"""The report: complete, self-contained, honest about what is missing, and quick."""
+
+import json
+import re
+import resource
+import subprocess
+import sys
+from base64 import b64decode
+from dataclasses import asdict
+from html import unescape
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic_results import sealed, write_results, write_rotating
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.report import figures, surface_figures
+from tireroad.runs.report.page import write_report
+from tireroad.runs.report.sections import search
+from tireroad.runs.search.journal import Trial
+from tireroad.runs.search.settings import CAUSES, Settings
+from tireroad.runs.search.shares import Found
+
+pytestmark = pytest.mark.slow
+
+TITLES = {
+    "static.h5": "Loaded tire and footprint",
+    "contact.h5": "Rolling contact",
+    "spectra.h5": "Spectra of the axle force",
+    "response.h5": "Point forces",
+    "modes.h5": "Modes of the loaded tire",
+    "rotating.h5": "Modes of the rolling tire",
+}
+PICTURES = 11  # of a folder with every file
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    return write_results(tmp_path / "run")
+
+
+@pytest.fixture
+def blank(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures stay unpainted, which is 9/10 of the time: for tests of what the page says."""
+    for module in (figures, surface_figures):
+        monkeypatch.setattr(module, "encode", lambda *_, **__: "data:image/png;base64,iVBORw0KGgo=")
+
+
+def page(directory: Path) -> str:
+    return write_report(directory).read_text(encoding="utf-8")
+
+
+def titles(text: str) -> list[str]:
+    return [unescape(title) for title in re.findall(r"<h2>(.*?)</h2>", text)]
+
+
+class Balance(HTMLParser):
+    """Fails on a tag that is closed out of turn; collects what the page would load."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.loaded: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.loaded += [value or "" for key, value in attrs if key in ("src", "href", "srcset")]
+        if tag not in ("meta", "img", "br", "link"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_every_section_is_there_and_the_page_loads_nothing(results: Path) -> None:
+    text = page(results)
+    assert [title for title in titles(text) if title in TITLES.values()] == list(TITLES.values())
+    parser = Balance()
+    parser.feed(text)
+    assert parser.open == []
+    assert len(parser.loaded) == PICTURES
+    assert all(source.startswith("data:image/") for source in parser.loaded)
+    assert "@import" not in text
+    assert "url(" not in text
+    for source in parser.loaded:
+        kind, data = source.split(";base64,")
+        start = b"\x89PNG" if kind.endswith("png") else b"<?xml"
+        assert b64decode(data).startswith(start)
+
+
+@pytest.mark.usefixtures("blank")
+def test_the_answer_comes_first_then_warnings_and_they_are_escaped(results: Path) -> None:
+    text = page(results)
+    warning = "in 12 steps the tire left the road &amp; the load was &lt;zero&gt;"
+    assert text.count(warning) == 1
+    assert text.index("500 N") < text.index(warning) < text.index("<h2>")
+
+
+@pytest.mark.usefixtures("blank")
+def test_numbers_carry_units(results: Path) -> None:
+    text = page(results)
+    for shown in (">500 N<", ">15 mm<", ">316 mm<", ">200 kPa<", ">48 MPa<", ">50 rad/s<"):
+        assert shown in text, shown
+    assert f">{3.6 * 50 * 0.316:.4g} km/h<" in text
+    assert "of [[force]]" not in text
+    assert "the scene has no [[force]] table" in text
+    assert "same mesh, load and material as before" in text
+
+
+@pytest.mark.parametrize("name", TITLES)
+@pytest.mark.usefixtures("blank")
+def test_an_absent_file_leaves_out_its_section_only(results: Path, name: str) -> None:
+    (results / name).unlink()
+    shown = titles(text := page(results))
+    assert TITLES[name] not in shown
+    assert [title for key, title in TITLES.items() if key != name] == [
+        title for title in shown if title in TITLES.values()
+    ]
+    assert f"section of {name}" in text
+
+
+@pytest.mark.parametrize("name", TITLES)
+@pytest.mark.usefixtures("blank")
+def test_a_truncated_file_is_a_warning(results: Path, name: str) -> None:
+    whole = (results / name).read_bytes()
+    (results / name).write_bytes(whole[: len(whole) // 2])
+    text = page(results)
+    assert f"{name} is damaged and left out" in text
+    left = [title for title in titles(text) if title in TITLES.values()]
+    assert left == [title for key, title in TITLES.items() if key != name]
+
+
+@pytest.mark.parametrize(("name", "content"), [("summary.json", "{"), ("scene.toml", "a = = 1")])
+@pytest.mark.usefixtures("blank")
+def test_an_unreadable_or_absent_text_file_is_a_warning(
+    results: Path, name: str, content: str
+) -> None:
+    (results / name).write_text(content)
+    assert f"{name} cannot be read" in page(results)
+    (results / name).unlink()
+    assert f"There is no {name}" in page(results)
+
+
+@pytest.mark.usefixtures("blank")
+def test_a_summary_of_strange_content_is_a_warning(results: Path) -> None:
+    for content in (
+        "[]",
+        '{"stages": {"static": 3}}',
+        '{"stages": {"static": {"cost": {"a": "b"}}}}',
+        '{"stages": {"static": {"headline": {"load": {}}}}}',
+    ):
+        (results / "summary.json").write_text(content)
+        assert "summary.json cannot be read" in page(results), content
+
+
+@pytest.mark.usefixtures("blank")
+def test_a_missing_dataset_is_named(results: Path) -> None:
+    with sealed(results / "contact.h5", "a") as file:
+        del file["total_force"]
+    assert "contact.h5 holds no dataset total_force" in page(results)
+
+
+@pytest.mark.usefixtures("blank")
+def test_an_unstable_tire_is_a_warning_at_the_top(results: Path) -> None:
+    write_rotating(results / "rotating.h5", 10, unstable=True)
+    text = page(results)
+    assert text.index("The rolling tire is unstable: 2 eigenvalues") < text.index("<h2>")
+    assert "The rolling tire is unstable" not in page(write_results(results.parent / "stable"))
+
+
+def test_a_tire_without_a_road(results: Path) -> None:
+    with sealed(results / "static.h5", "a") as file:
+        del file["contact"]
+        del file.attrs["road_height"]
+    assert "there is no footprint" in page(results)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3])
+def test_short_runs(tmp_path: Path, steps: int) -> None:
+    assert TITLES["contact.h5"] in titles(page(write_results(tmp_path / "run", steps=steps)))
+
+
+def test_not_a_number_in_a_result_does_not_stop_the_report(results: Path) -> None:
+    with sealed(results / "contact.h5", "a") as file:
+        file["normal_force"][5] = np.nan
+    with sealed(results / "spectra.h5", "a") as file:
+        file["axle_force"][7] = np.nan
+        file["third_octave/level"][3] = -np.inf
+    shown = titles(page(results))
+    assert {TITLES["contact.h5"], TITLES["spectra.h5"]} <= set(shown)
+
+
+@pytest.mark.long
+def test_an_earlier_report_is_replaced_whole(results: Path) -> None:
+    first = page(results)
+    assert page(results) == first, "the same results give the same page"
+    assert sorted(path.name for path in results.glob("*report*")) == ["report.html"]
+
+
+@pytest.mark.parametrize("name", ["nowhere", "empty"])
+def test_a_folder_without_results_is_an_input_error(tmp_path: Path, name: str) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="give the result folder of a run"):
+        write_report(tmp_path / name)
+    assert list((tmp_path / "empty").iterdir()) == []
+
+
+@pytest.mark.long
+def test_a_typical_run_takes_seconds_and_a_small_page_without_dolfinx(tmp_path: Path) -> None:
+    directory = write_results(tmp_path / "run", around=120, across=33, steps=10000, modes=60)
+    program = (
+        "import sys; from pathlib import Path; from tireroad.runs.report.page import write_report;"
+        f"write_report(Path({str(directory)!r}));"
+        "sys.exit(any(m.split('.')[0] in ('dolfinx', 'petsc4py', 'pyplot') for m in sys.modules))"
+    )
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    root = Path(__file__).parents[3]
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=root)
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    assert spent < 10.0, "2.6 s where this was written and 4 s is the aim; machines differ"
+    assert (directory / "report.html").stat().st_size < 3e6
+
+
+@pytest.mark.usefixtures("blank")
+def test_stages_come_in_the_order_they_ran(results: Path) -> None:
+    summary = json.loads((results / "summary.json").read_text())
+    summary["stages"] = dict(reversed(summary["stages"].items()))
+    (results / "summary.json").write_text(json.dumps(summary))
+    text = page(results)
+    order = [text.index(f"<tr><td>{name}</td><td>") for name in ("static", "modes", "contact")]
+    assert order == sorted(order)
+
+
+@pytest.mark.long
+def test_a_search_is_drawn_by_cost_and_error(
+    results: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its trials in the order tried; a page without one, or with one that cannot be read, has none."""
+    assert "The search:" not in page(results)
+    settings = Settings((16, 8), 3, 200.0, "static", 0.01, 1e-3, dict.fromkeys(CAUSES, 0))
+    parts = dict.fromkeys(CAUSES, 0.04)
+    found = [
+        Found(parts, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ())),
+        Found(parts | {"mesh": 0.3}, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ())),
+    ]
+    trials = [
+        Trial(settings, {"static": 4.0, "contact": cost}, 3.0, one)
+        for cost, one in zip((9.0, 1.0), found, strict=True)
+    ]
+    text = json.dumps(
+        {
+            "of": "",
+            "trials": [
+                asdict(one) for one in [*trials, Trial(settings, {}, 2.0, failed="no balance")]
+            ],
+        }
+    )
+    (results / "search.json").write_text(text)
+    with (results / "scene.toml").open("a") as file:
+        file.write("[accuracy]\ntarget = 0.1\nup_to = 100.0\n")
+    drawn = []
+    monkeypatch.setattr(
+        search, "trade", lambda *given: drawn.append(given) or "data:image/png;base64,"
+    )
+    text = page(results)
+    assert "10 % of the axle force up to 100 Hz" in text
+    cost, error, causes = drawn[0]
+    assert cost.tolist() == [13.0, 5.0]
+    assert error == pytest.approx([0.8, np.hypot(3.0, 0.4 * 3**0.5)])
+    assert causes.shape == (2, 4) and causes[1, CAUSES.index("mesh")] == pytest.approx(3.0)
+    monkeypatch.undo()
+    assert search.trade(cost, error, causes).startswith("data:image/svg")
+    (results / "search.json").write_text("{")
+    assert "The search:" not in page(results)

@@ -1,0 +1,141 @@
+"""Error bars of a run: companions that are the runs they stand for, and where the bars go."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from tireroad.contact.results.error_bars import CAUSES
+from tireroad.runs.process import observe
+from tireroad.runs.scene.load import load
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.companions import Given, coarser_job, companion
+from tireroad.runs.stages.pipeline import run_scene
+
+SCENE = """
+name = "sure"
+[tire]
+segments = 20
+elements_arc = 8
+footprint_size = 0.4
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 400.0
+error_estimate = false
+[modal]
+count = 30
+[rotation]
+speed = 40.0
+[contact]
+points = { dx = 0.008, dy = 0.008 }
+reach = 0.004
+[road]
+kind = "sine"
+amplitude = 2e-4
+wavelength = 0.1
+run_in = 0.05
+[time]
+duration = 0.03
+step = 1e-4
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A run of the scene with keys changed, up to a stage: its folder and what it leaves."""
+    base = tmp_path_factory.mktemp("accuracy")
+    (base / "scene.toml").write_text(SCENE)
+
+    def started(name: str, until: str | None, *sets: str):
+        scene = load(base / "scene.toml", list(sets))
+        (base / name).mkdir(exist_ok=True)
+        with observe.quiet():
+            return base / name, run_scene(
+                scene, base / name, MPI.COMM_SELF, until=until, fresh=False, petsc_options=[]
+            )
+
+    return started
+
+
+@pytest.fixture(scope="module")
+def whole(run):
+    return run("whole", "spectra")
+
+
+def contact_force(folder) -> np.ndarray:
+    with h5py.File(folder / "contact.h5") as file:
+        return file["total_force"][:]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("cause", "sets"),
+    [
+        ("step", ("time.step=2e-4",)),
+        ("points", ("time.step=2e-4", "contact.points={dx=0.004,dy=0.004}")),
+        ("mesh", ("time.step=2e-4", "tire.segments=10", "tire.elements_arc=4")),
+    ],
+)
+def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
+    given = _given(whole)
+    other, _ = run(cause, "contact", *sets)
+    forces, beside, part = companion(cause, given)
+    assert forces.step == 2e-4 and (beside is None) == (cause == "step")
+    # Elements of order 2 make 3; the footprint is a few points wide, so that finer ones tell.
+    wanted = {"step": 1 / 3, "points": 1 / (1 - 0.5**1.5), "mesh": 1 / 7}
+    assert part == pytest.approx(wanted[cause])
+    found = forces.contact
+    assert found[:, 2] == pytest.approx(contact_force(other)[:, 2], rel=1e-8)
+
+
+def _given(whole) -> Given:
+    _, done = whole
+    return Given(
+        job=done.job,
+        static=done.done["static"],
+        setup=done.setup,
+        response=done.greens.contact,
+        rolling=done.rolling,
+        step=1e-4,
+        steps=300,
+    )
+
+
+def test_bars_are_in_the_summary_and_beside_the_bands(whole):
+    folder, _ = whole
+    stages = json.loads((folder / "summary.json").read_text())["stages"]
+    told = stages["accuracy"]
+    assert set(told["cost"]) == set(CAUSES)
+    assert told["headline"]["error of the mean contact force"]["value"] > 0
+    with h5py.File(folder / "accuracy.h5") as file:
+        assert set(file["contact_force"]) == set(CAUSES)
+    with h5py.File(folder / "spectra.h5") as file:
+        shape = file["third_octave/level"].shape
+        assert file["third_octave/level_error"].shape == shape
+
+
+@pytest.mark.slow
+def test_what_cannot_be_estimated_is_said_not_to_be(run):
+    folder, _ = run("nodes", "accuracy", "contact.points=nodes", "contact.reach=")
+    told = json.loads((folder / "summary.json").read_text())["stages"]["accuracy"]["headline"]
+    assert "take a grid" in told["error by the points"]["value"]
+
+
+def test_it_can_be_left_out(run):
+    folder, _ = run("whole", "spectra", "accuracy.estimate=false")
+    stages = json.loads((folder / "summary.json").read_text())["stages"]
+    assert stages["accuracy"]["status"] == "skipped"
+    with h5py.File(folder / "spectra.h5") as file:
+        assert "third_octave/level_error" not in file
+
+
+def test_the_coarser_tire_turns_as_fast(tmp_path) -> None:
+    """At a travel speed, too, where its own rolling radius would give another speed."""
+    (tmp_path / "scene.toml").write_text(SCENE.replace("speed = 40.0", "travel_speed = 6.0"))
+    job = Job(load(tmp_path / "scene.toml"), tmp_path, MPI.COMM_SELF)
+    job.found["speed"] = 19.0
+    other = coarser_job(job)
+    assert other.speed == 19.0 and other.scene.rotation.travel_speed is None

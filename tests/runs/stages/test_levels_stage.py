@@ -1,0 +1,86 @@
+"""All levels of a run from its history: names, units, shapes, and the same after they were stored."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.stored import levels
+from tireroad.runs.stages.stored.contact_file import ContactHistory
+
+STEP = 1e-4
+
+
+@pytest.fixture(scope="module")
+def history() -> ContactHistory:
+    """A second of 2 N at 100 Hz on the road, the same and moments on the hub, two points that move by 1 um."""
+    time = STEP * np.arange(1, 10_001)
+    sine = np.sin(2 * np.pi * 100 * time)[:, None]
+    return ContactHistory(
+        step=STEP,
+        scheme="linear",
+        time=time,
+        total_force=2.0 * sine * [0.0, 0.0, 1.0],
+        axle_force=2.0 * sine * [1.0, 0.0, 1.0],
+        driven=1e-6 * sine[:, :, None] * np.ones((2, 3)),
+        wheel={"hub_moment": 3.0 * sine * np.ones(3)},
+    )
+
+
+def test_every_quantity_has_its_level_weighted_and_not(history: ContactHistory) -> None:
+    found = levels.levels_of(history, 0, 400.0)
+    band = list(found["third_octave/nominal"]).index(100.0)
+    for name, exact in (
+        ("contact_level", 20 * np.log10(2 / np.sqrt(2))),
+        ("level", 20 * np.log10(2 / np.sqrt(2))),
+        ("hub_moment_level", 20 * np.log10(3 / np.sqrt(2))),
+        ("point_velocity_level", 20 * np.log10(2 * np.pi * 100 * 1e-6 / np.sqrt(2) / 1e-9)),
+    ):
+        plain, weighted = (found[f"third_octave/{name}{end}"][band] for end in ("", "_a_weighted"))
+        assert plain[..., 2] == pytest.approx(exact, abs=0.05), name
+        assert weighted[..., 2] - plain[..., 2] == pytest.approx(-19.1, abs=0.1), name
+    assert found["third_octave/point_velocity_level"].shape[1:] == (2, 3)
+    assert found["density/point_velocity"].shape[1:] == (2, 3)
+    power = found["density/hub_moment"][:, 0].sum() * np.diff(found["density/frequency"])[0]
+    assert power == pytest.approx(4.5, rel=0.02), "Parseval: (3 N m)^2 / 2"
+
+
+def test_nothing_is_beyond_the_limit_and_all_is_of_one_length(history: ContactHistory) -> None:
+    found = levels.levels_of(history, 0, 400.0)
+    assert found["third_octave/centre"][-1] * 10**0.05 <= 400.0
+    assert found["density/frequency"][-1] <= 400.0
+    for name, values in found.items():
+        group, _, what = name.partition("/")
+        if values.ndim > 1:
+            over = "third_octave/centre" if group == "third_octave" else "density/frequency"
+            assert len(values) == len(found[over]), what
+
+
+def test_stored_and_read_again_with_units(history: ContactHistory, tmp_path: Path) -> None:
+    found = levels.levels_of(history, 0, 400.0)
+    with h5py.File(tmp_path / "spectra.h5", "w") as file:
+        levels.write(file, found)
+        assert file["third_octave/point_velocity_level"].attrs["unit"] == "dB re 1 nm/s"
+        assert file["third_octave/level_a_weighted"].attrs["unit"] == "dB(A) re 1 N"
+        assert file["density/hub_moment"].attrs["unit"] == "N2 m2/Hz"
+        again = levels.read(file)
+    assert again.keys() == found.keys()
+    assert all((again[name] == values).all() for name, values in found.items())
+
+
+def test_a_record_too_short_for_bands_says_so(history: ContactHistory) -> None:
+    record = Record()
+    levels.describe(record, levels.levels_of(history, 9500, 200.0))
+    assert record.headline["bands left out, narrower than three lines"][0] == "20 to 160 Hz"
+
+
+def test_sums_have_names_that_do_not_change_with_the_bands(history: ContactHistory) -> None:
+    record = Record()
+    levels.describe(record, levels.levels_of(history, 0, 400.0))
+    assert record.headline["bands"][0].endswith(" to 315 Hz")
+    value, unit = record.headline["level of the vertical contact force"]
+    assert (value, unit) == (pytest.approx(20 * np.log10(2 / np.sqrt(2)), abs=0.05), "dB re 1 N")

@@ -1,0 +1,100 @@
+"""A loop that chatters begins again with forces constant over the step, and is resumed as such."""
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from tireroad.contact.results.chatter import Alternation, Chatter
+from tireroad.runs.files.cache import Cache
+from tireroad.runs.process import observe
+from tireroad.runs.process.signals import Stopped
+from tireroad.runs.scene.load import load
+from tireroad.runs.stages import contact
+from tireroad.runs.stages.pipeline import run_scene
+
+SCENE = """
+name = "again"
+[tire]
+segments = 12
+elements_arc = 4
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 400.0
+error_estimate = false
+[modal]
+count = 12
+[rotation]
+speed = 40.0
+[contact]
+youngs_modulus = 1e7
+[road]
+kind = "sine"
+amplitude = 1e-4
+wavelength = 0.2
+[time]
+duration = 0.02
+step = 2e-4
+"""
+
+
+@pytest.fixture
+def run(tmp_path):
+    (tmp_path / "again.toml").write_text(SCENE)
+
+    def started(folder: str, *sets: str) -> None:
+        scene = load(tmp_path / "again.toml", sets)
+        (tmp_path / folder).mkdir(exist_ok=True)
+        with observe.quiet():
+            run_scene(
+                scene,
+                tmp_path / folder,
+                MPI.COMM_SELF,
+                until="contact",
+                fresh=False,
+                petsc_options=[],
+                cache=Cache(tmp_path / "cache"),
+            )
+
+    return started
+
+
+def history(folder) -> tuple[np.ndarray, str]:
+    with h5py.File(folder / "contact.h5") as file:
+        return file["normal_force"][:], file.attrs["scheme"]
+
+
+def test_chatter_begins_again_and_a_stop_after_it_goes_on_as_begun(run, tmp_path, monkeypatch):
+    run("whole", "time.scheme=constant")
+    chattered = []
+
+    def check(self) -> None:
+        chattered.append(True)
+        raise Chatter("points open and close from step to step")
+
+    class StopsAt60:
+        """Asks to stop after the 60th step of the loop that is begun again, once."""
+
+        asked = False
+
+        def __init__(self, comm, seconds: float) -> None:
+            self.steps = 0
+
+        def __call__(self, signal) -> tuple[str, bool]:
+            self.steps += 1
+            if chattered and self.steps == 60 and not StopsAt60.asked:
+                StopsAt60.asked = True
+                return "SIGTERM", False
+            return "", False
+
+    monkeypatch.setattr(Alternation, "check", check)
+    monkeypatch.setattr(contact, "Watch", StopsAt60)
+    with pytest.raises(Stopped):
+        run("again")
+    run("again")
+    assert chattered == [True]  # the loop that goes on is not tried as linear once more
+    (expected, _), (found, scheme) = (history(tmp_path / name) for name in ("whole", "again"))
+    assert scheme == "constant"
+    assert np.array_equal(found, expected)
+    assert np.ptp(found.sum(axis=1)) > 1.0
