@@ -17,9 +17,9 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.friction.balance import RubbingEquilibrium
 from tireroad.fem.static.friction.sliding import Passing, Standing
 from tireroad.fem.static.path.loading import Loader
-from tireroad.fem.static.state import static_state
 from tireroad.fem.static.path.step import Step
 from tireroad.fem.static.path.stepping import Show
+from tireroad.fem.static.state import static_state
 
 _NEAR, _CLOSE = 1e-4, 1e-8  # of the travel: the first other one tried, and where secants end
 _MOST = 40  # of them
