@@ -230,6 +230,8 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
             tmp_path / "standing",
             STANDING,
             "stiffness.deflections=[0.001]",
+            "static.load=100",
+            "static.friction=0.5",
             "stiffness.which=vertical",
         )
         _run(tmp_path / "full", FULL)
