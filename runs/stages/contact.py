@@ -151,6 +151,7 @@ class ContactStage(Stage[ContactHistory]):
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
         contact_figures.describe(record, totals, loop.solver, chosen, chosen.steps - done)
+        contact_figures.points(record, setup.patch, setup.relief)
         contact_figures.excursion(record, totals.figures.excursion, self.static.product.deflection)
         pattern.describe(record, setup)
         road_file.describe(record, setup)

@@ -10,6 +10,7 @@ import numpy as np
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.diagnosis import with_cause
+from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import load_error
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.press import place
@@ -26,6 +27,7 @@ from tireroad.runs.stages.build.turning import friction_of, rolling_shape, turni
 from tireroad.runs.stages.stored import cords_file, friction_file, static_file
 
 _SPEEDS, _SAME_SPEED = 6, 1e-6  # solutions at a travel speed at most, and when they agree
+_EXTENT = "length", "width", "area"
 COARSE = 0.02  # estimated error of the load above which the user is warned
 
 
@@ -69,22 +71,18 @@ class StaticStage(Computed[StaticState]):
             observe.say(
                 f"  rolling radius {state.rolling_radius():.6g} m: again at {speed:.6g} rad/s"
             )
-        self._conclude(record, state, loader)
-        return state
+        return self._concluded(record, state, loader)
 
-    def _conclude(self, record: Record, state: StaticState, loader: Loader) -> None:
-        """Figures of the state, and the error of its load. Collective."""
-        wanted = self.job.scene.static
-        _describe(record, state, loader)
-        record.headline |= friction_file.headline(state, wanted.friction)
-        self._warn_at_rest(record)
-        if wanted.error_estimate and state.load:
+    def _concluded(self, record: Record, state: StaticState, loader: Loader) -> StaticState:
+        """The state with its footprint as finer elements tell it; figures, and the error of its load. Collective."""
+        if self.job.scene.static.error_estimate and state.load:
             with record.timing("error estimate"):
-                # Of the state without friction: its load errs as that with it does.
-                if state.pull is not None:
-                    loader.equilibrium.solve(loader.equilibrium.road_height)
-                _estimate(record, state, loader)
-        observe.say(f"  {_parts(record.cost)}")
+                state = _estimate(record, state, loader)
+        _describe(record, state, loader)
+        record.headline |= friction_file.headline(state, self.job.scene.static.friction)
+        self._warn_at_rest(record)
+        observe.say(f"  {record.shares}")
+        return state
 
     def _solved(self, record: Record, speed: float) -> tuple[StaticState, Loader]:
         """Load steps up to the state at `speed` rad/s. Collective."""
@@ -157,6 +155,7 @@ class StaticStage(Computed[StaticState]):
             touch_height=float(attributes["touch_height"]),
             road_height=None if road is None else float(road),
             road=road_shape(self.job.scene),
+            told=None if road is None else _extent(attributes),
             inflation=float(attributes["inflation"]),
             rolling=steady_rolling(self.job, float(attributes["rolling_speed"])),
             **cords_file.read(file),
@@ -164,12 +163,18 @@ class StaticStage(Computed[StaticState]):
         )
 
 
-def _estimate(record: Record, state: StaticState, loader: Loader) -> None:
-    """Print and keep how far the load is from that of finer elements. Collective."""
+def _extent(attributes) -> Footprint:
+    return Footprint(*(float(attributes[f"footprint_{name}"]) for name in _EXTENT))
+
+
+def _estimate(record: Record, state: StaticState, loader: Loader) -> StaticState:
+    """Print and keep how far the load is from that of finer elements; the state with their footprint. Collective."""
+    if state.pull is not None:  # of the state without friction: its load errs as that with it does
+        loader.equilibrium.solve(loader.equilibrium.road_height)
     found = load_error(loader, state.rolling)
     if isinstance(found, str):
         observe.say(f"  error of the load not estimated: {found}")
-        return
+        return state
     record.indicators["estimated error of the load"] = (100 * found.relative, "%")
     to = f"ever smaller elements: {found.load:.5g} N" if found.signed else "of unknown sign"
     observe.say(
@@ -181,13 +186,10 @@ def _estimate(record: Record, state: StaticState, loader: Loader) -> None:
             f"the load may be off by {100 * found.relative:.2g} %: take smaller elements "
             "(tire.segments, tire.elements_arc, tire.footprint_size)"
         )
-
-
-def _parts(cost: dict[str, float]) -> str:
-    """Seconds of each part, the largest first."""
-    total = sum(cost.values()) or 1.0
-    parts = sorted(cost.items(), key=lambda part: -part[1])
-    return "time: " + ", ".join(f"{k} {v:.2g} s ({v / total:.0%})" for k, v in parts)
+    for name in _EXTENT[:2]:
+        size = getattr(state.footprint(), name)
+        record.indicators[f"footprint {name} on the elements of the run"] = (size, "m")
+    return state if state.pull is not None else replace(state, told=found.extent)
 
 
 def _show(progress) -> None:

@@ -56,7 +56,8 @@ class Static:
     )
     error_estimate: bool = flag(
         True,
-        "estimate of the load's discretisation error, by finer elements at the footprint and another order of all",
+        "estimate of the load's discretisation error, by finer elements at the footprint, which tell its extent too, and "
+        "another order of all",
     )
 
     @property
