@@ -29,7 +29,12 @@ class System(Protocol):
     @property
     def closing(self) -> Moved: ...
 
-    def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
+    @property
+    def raising(self) -> Moved: ...
+
+    def take(
+        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+    ) -> bool:
         """Factorise; False when the matrix is singular. Collective."""
         ...
 
@@ -37,16 +42,13 @@ class System(Protocol):
         """Motion (m) of the owned dofs under forces (N), and force (N) at the held ones. Collective."""
         ...
 
-    def lift(self) -> tuple[np.ndarray, np.ndarray]:
-        """What `solve` gives for no forces and held dofs that move by one. Collective."""
-        ...
-
 
 class HeldSystem:
     """K du = right, with du given at the held dofs. All methods are collective.
 
     `take` factorises; `solve` then costs two triangular solves, and stays of use as long as the
-    tangent is near the one taken and the same dofs are held. `closing` is the motion given to `take`.
+    tangent is near the one taken and the same dofs are held. `closing` and `raising` are the
+    motions given to `take`.
     """
 
     def __init__(
@@ -56,20 +58,22 @@ class HeldSystem:
         self._ksp = _solver(comm, matrix, factorisation)
         self._right, self._x = matrix.createVecs()
         self._reaction: PETSc.Mat | None = None
-        self._lift: tuple[np.ndarray, np.ndarray] | None = None
 
-    def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
-        """Factorise `matrix` without the owned dofs `held`, which move by `closing` (m) in the next step.
+    def take(
+        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+    ) -> bool:
+        """Factorise `matrix` without the owned dofs `held`, which move by `closing` (m) in the next step,
+        and by `raising` (m per m) as the road rises.
 
         False when it is singular; ConvergenceError when the factorisation fails by other causes. What
         it does to the matrix makes it useless for anything else.
         """
         rows = (held + matrix.getOwnershipRange()[0]).astype(PETSc.IntType)
-        self._held, self._lift = held, None
+        self._held = held
         with self._timing("road"):
             self._keep_reaction(matrix, rows)
             self.closing = self._moved(matrix, closing)
-            self._raising = self._moved(matrix, np.ones(len(held)))
+            self.raising = self._moved(matrix, raising)
             matrix.zeroRowsColumns(rows, 1.0)
         with self._timing("factorisation"):
             self._ksp.setOperators(
@@ -77,12 +81,6 @@ class HeldSystem:
             )  # not always the one it was made with (fem.static.curved)
             self._ksp.getPC().setUp()
         return self._checked()
-
-    def lift(self) -> tuple[np.ndarray, np.ndarray]:
-        """Motion (m) of the owned dofs and force (N) at the held ones, which all move by one; solved once for a factor."""
-        if self._lift is None:
-            self._lift = self.solve(np.zeros_like(self._raising.force), self._raising)
-        return self._lift
 
     def _keep_reaction(self, matrix: PETSc.Mat, rows: np.ndarray) -> None:
         if self._reaction is not None:
@@ -113,7 +111,7 @@ class HeldSystem:
     def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Motion (m) of the owned dofs under forces (N) on them, and force (N) it takes at the held ones.
 
-        The held dofs move as in `moved`, or stay.
+        The held dofs move as in `moved`, `closing` or `raising`, or stay.
         """
         with self._timing("solve"):
             self._right.array[:] = right if moved is None else right - moved.force

@@ -80,6 +80,10 @@ class Loader:
             self.body.u.x.array[:] = before
         return step.converged
 
+    def begin_at(self, other: Loader) -> None:
+        """Take another loader's first touch, and count its steps."""
+        self._touch, self.newton_steps = other.touch, other.newton_steps
+
     def _inflate_in_steps(self, pressure: float) -> None:
         self.march(
             lambda part: self._solve_at(part * pressure),

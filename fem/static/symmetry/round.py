@@ -66,10 +66,12 @@ class RoundSystem:
 
     def __init__(self, turned: sparse.csr_matrix, timing: Timing) -> None:
         self._turned, self._timing = turned, timing
-        self.closing = Moved(np.zeros(turned.shape[0]), np.zeros(turned.shape[0]))
+        self.closing = self.raising = Moved(np.zeros(turned.shape[0]), np.zeros(turned.shape[0]))
         self._factor: SuperLU | None = None
 
-    def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
+    def take(
+        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+    ) -> bool:
         """Factorise; False when the matrix is singular."""
         rows, columns, values = matrix.getValuesCSR()
         whole = sparse.csr_matrix((values, columns, rows), matrix.getSize())
@@ -79,10 +81,6 @@ class RoundSystem:
             except RuntimeError:  # SuperLU: "Factor is exactly singular"
                 return False
         return True
-
-    def lift(self) -> tuple[np.ndarray, np.ndarray]:
-        """No road, no motion."""
-        return self.closing.change, np.zeros(0)
 
     def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Motion (m) of all dofs of the sector under forces (N), and no reactions."""
