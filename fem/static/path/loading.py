@@ -45,6 +45,7 @@ class Loader:
         self.body = equilibrium.body
         self.report = report
         self.newton_steps = 0
+        self.halved: HalfTurnEquilibrium | None = None  # what found the last state, if half did
         self._touch: float | None = None
 
     def inflate(self, pressure: float) -> None:
@@ -146,7 +147,10 @@ class Loader:
         self.newton_steps += half.loader.newton_steps
         half.loader.newton_steps = 0
         self.equilibrium.cost.take(other.cost)
-        return self.equilibrium.resume(*other.on(self.body.lattice), other.road_height).converged
+        state = other.on(self.body.lattice)
+        found = self.equilibrium.resume(*state, other.road_height).converged
+        self.halved = other if found else None
+        return found
 
     def _by_half(self, press: Callable[[Loader], object]) -> bool:
         """Press half of the ring, if that is of use; whether it was. An error leaves the whole in the last state of
