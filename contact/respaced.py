@@ -21,11 +21,10 @@ def ratio(patch: Patch) -> float:
     (cobblestones, 17 mm wide, points 16, 11.3, 8, 5.7 and 4 mm apart: mean 547, 515, 521, 548, 545 N): there only
     finer points tell, and those that touch are few. On a road that is no plane they are always coarser.
     """
-    touching = patch.points[patch.force > 0, :2]
-    if patch.places is None or patch.frames is not None or not len(touching):
+    least = patch.touching.min()
+    if patch.places is None or patch.frames is not None or not least:
         return 2.0
-    count = np.rint(np.ptp(touching, axis=0) / patch.places.spacing) + 1
-    return 2.0 if count.min() >= ACROSS else 0.5
+    return 2.0 if least >= ACROSS else 0.5
 
 
 def thinned(patch: Patch) -> Patch:

@@ -6,6 +6,10 @@ For a quantity Q with an error that goes as h^r, of a run at h and a companion a
 
 the share 1 / |q^r - 1| of the difference of both; of a history the difference is taken line by line of its
 spectrum, with phase. Errors of several causes add up as squares.
+
+What points make wrong is where the edge of the contact falls between them, which is another place on every grid. So
+the errors of both are as good as independent of each other, their mean squares add up, and the share of the root mean
+square is 1 / (1 + q^2r)^(1/2) (`random_share`).
 """
 
 from __future__ import annotations
@@ -15,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.contact.results.spectra import low_part, third_octaves
+from tireroad.contact.results.spectra import deviation, low_part, third_octaves
 
 _NAMES = ("mean", "deviation", "level", "history")
 CAUSES = ("step", "points", "modes", "mesh")
@@ -36,10 +40,16 @@ def share(ratio: float, order: float) -> float:
     return 1 / abs(ratio**order - 1)
 
 
+def random_share(ratio: float, order: float) -> float:
+    """The same where the errors of both have nothing to do with each other but their sizes."""
+    return 1 / float(np.hypot(1.0, ratio**order))
+
+
 @dataclass(frozen=True)
 class Told:
-    """What is told of a force: `mean`, `deviation` (3,) N, `level` (b, 3) dB of the bands at `centre` (b,) Hz,
-    and `low` (f, 3) N, the Fourier coefficients of what varies up to a frequency (contact.results.spectra.low_part)."""
+    """What is told of a force: `mean`, `deviation` (3,) N of what the model answers for, `level` (b, 3) dB of the
+    bands at `centre` (b,) Hz, and `low` (f, 3) N, the Fourier coefficients of what varies up to a frequency
+    (contact.results.spectra.low_part)."""
 
     mean: np.ndarray
     deviation: np.ndarray
@@ -60,12 +70,12 @@ class Bars:
 
 
 def told(force: np.ndarray, step: float, limit: float, up_to: float = np.inf) -> Told:
-    """Of a force (n, 3) N in steps of `step` s, with the bands below `limit` Hz; its history up to `up_to` Hz,
-    if that is lower."""
+    """Of a force (n, 3) N in steps of `step` s, the deviation and the bands below `limit` Hz; its history up to
+    `up_to` Hz, if that is lower."""
     centre, level = third_octaves(force, step, limit)
     mean = force.mean(axis=0)
     low = low_part(force - mean, len(force) * step, min(limit, up_to))
-    return Told(mean, force.std(axis=0), centre, level, low)
+    return Told(mean, deviation(force, step, limit), centre, level, low)
 
 
 def bars(run: Told, companion: Told, share: float) -> Bars:

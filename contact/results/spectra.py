@@ -53,6 +53,14 @@ def third_octaves(
     return centre, 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference**2)
 
 
+def deviation(values: np.ndarray, step: float, up_to: float = np.inf) -> np.ndarray:
+    """Standard deviation (d,) of what of values (n, d) in steps of `step` s lies up to `up_to` Hz, by Parseval."""
+    square = 2 * np.abs(np.fft.rfft(values - values.mean(axis=0), axis=0)) ** 2
+    if len(values) % 2 == 0:
+        square[-1] /= 2  # half the sampling rate has one line only
+    return np.sqrt(square[np.fft.rfftfreq(len(values), step) <= up_to].sum(axis=0)) / len(values)
+
+
 @dataclass(frozen=True)
 class Density:
     """Power spectral `density` (f, d), one-sided, at `frequency` (f,) Hz, by Welch's method: Hann windows of

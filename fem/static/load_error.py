@@ -15,14 +15,12 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices import probe
-from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.split import split_ring
-from tireroad.fem.static.curved.balance import make_equilibrium
-from tireroad.fem.static.path.carried_over import sampled
+from tireroad.fem.static.companion import Balance
+from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.virtual_work import Rolling
-from tireroad.fem.tire.body import Body
-from tireroad.fem.tire.mesh import Lattice
+from tireroad.fem.tire.mesh import Lattice, field_lattice
 
 HIGHEST = 3  # order of elements there is
 CUBIC = 0.1  # error of elements of order 3 over that of order 2 on the same mesh
@@ -32,6 +30,7 @@ CUBIC = 0.1  # error of elements of order 3 over that of order 2 on the same mes
 # Beside order 3 cut in two at the footprint once or twice (known to 0.2 %), 16 x 8, 20 x 8 and 24 x 10 of order 2 at
 # 2, 4 and 12 mm: 0.7 to 2.0 in size; with the wrong sign in two of the nine, in which both parts all but cancel.
 REMAINS = 0.7
+ENOUGH = 1e-4  # of the load: what of it may be out of balance in a companion
 CANCELS = 0.5  # of the larger part: what is left of both, below which its sign is not known
 
 
@@ -39,13 +38,14 @@ CANCELS = 0.5  # of the larger part: what is left of both, below which its sign 
 class LoadError:
     """`load` N of ever smaller elements as estimated, `relative` how far the load is from it; what of
     that is of the `footprint`'s elements and what of all in `bulk` (relative, above 0 where the load is
-    too large); `unknowns` of the finer companion.
+    too large); `extent` of the footprint on the finer companion, of so many `unknowns`.
     """
 
     load: float
     relative: float
     footprint: float
     bulk: float
+    extent: Footprint
     unknowns: int
 
     @property
@@ -59,50 +59,36 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
 
     Collective; the body is left as it is.
     """
-    load = loader.load()
-    if not load:
+    if not loader.load():
         return "nothing touches the road"
+    given = Balance.of(loader, rolling)
     try:
-        finer = at_finer_footprint(loader, rolling)
-        bulk = _bulk(loader, rolling)
+        finer = at_finer_footprint(given)
+        bulk = _bulk(given)
     except ConvergenceError as error:
         return f"on the companion, {error}"
-    edge = 1 - finer.load() / load
+    edge = 1 - finer.load / given.load
     return LoadError(
-        load=load * (1 - edge - bulk),
+        load=given.load * (1 - edge - bulk),
         relative=abs(edge + bulk),
         footprint=edge,
         bulk=bulk,
-        unknowns=3 * finer.body.lattice.size,
+        extent=finer.extent,
+        unknowns=3 * finer.lattice.size,
     )
 
 
-def at_finer_footprint(loader: Loader, rolling: Rolling) -> Loader:
+def at_finer_footprint(given: Balance) -> Balance:
     """The same tire on the same road, elements at the footprint cut in two. Collective."""
-    lattice, force = loader.body.lattice, _force(loader)
+    lattice, force = given.lattice, given.face_force
     around = _touched(np.asarray(force.any(axis=1)), lattice.ring_corners, lattice, closed=True)
     along = _touched(np.asarray(force.any(axis=0)), lattice.arc_corners, lattice, closed=False)
-    finer = _taken_over(loader, split_ring(loader.body.ring, around, along), rolling)
-    step = finer.equilibrium.solve(loader.equilibrium.road_height)
-    if not step.converged:
-        raise ConvergenceError(f"static: elements half as long do not converge ({step.reason})")
-    return finer
+    return given.balanced_on(split_ring(given.ring, around, along), ENOUGH * given.load)
 
 
-def _taken_over(loader: Loader, ring: Ring, rolling: Rolling) -> Loader:
-    """The same tire on other elements in the same state. Collective."""
-    body = loader.body
-    other = Body(body.comm, ring, body.materials, cords=body.plies.cords)
-    other.set_displacement(sampled(body.lattice, body.displacement(), other.lattice))
-    equilibrium = make_equilibrium(other, rolling, loader.equilibrium.shape)
-    companion = Loader(equilibrium, lambda progress: None)
-    companion.equilibrium.pressure.value = loader.equilibrium.pressure.value
-    return companion
-
-
-def _bulk(loader: Loader, rolling: Rolling) -> float:
+def _bulk(given: Balance) -> float:
     """How far the load is too large since the elements are too stiff, relative. Collective."""
-    ring, load = loader.body.ring, loader.load()
+    ring, load = given.ring, given.load
     order = ring.order + 1 if ring.order < HIGHEST else ring.order - 1
     section, corners = ring.section.of_order(order), ring.ring_corners
     half = ring.coarser() if order > ring.order else None
@@ -110,19 +96,19 @@ def _bulk(loader: Loader, rolling: Rolling) -> float:
         # Of the higher order half as many elements around say the same (50 x 16 of order 2: 0.741 % of the load
         # by all of them, 0.747 % by half) at half the cost.
         corners = half.ring_corners
-    companion = _taken_over(loader, replace(ring, ring_corners=corners, section=section), rolling)
-    place, spread = _spot(loader)
-    (sinks, compliance), (other, _) = (
-        one.equilibrium.sinking(probe.spot(one.body.lattice, *place, spread), load)
-        for one in (loader, companion)
+    other = replace(ring, ring_corners=corners, section=section)
+    place, spread = _spot(given)
+    (sinks, compliance), (further, _) = (
+        given.near(one).sinking(probe.spot(field_lattice(one), *place, spread), load)
+        for one in (ring, other)
     )
-    further = REMAINS * (other - sinks) / compliance / load
-    return further if order > ring.order else -CUBIC * further
+    share = REMAINS * (further - sinks) / compliance / load
+    return share if order > ring.order else -CUBIC * share
 
 
-def _spot(loader: Loader) -> tuple[tuple[float, float], tuple[float, float]]:
+def _spot(given: Balance) -> tuple[tuple[float, float], tuple[float, float]]:
     """Middle and half widths (rad, around and along) of where the tire touches, an element at least."""
-    lattice, force = loader.body.lattice, _force(loader)
+    lattice, force = given.lattice, given.face_force
     around = (lattice.ring + np.pi) % (2 * np.pi) - np.pi
     places, spreads = [], []
     for angle, share, corners in (
@@ -134,12 +120,6 @@ def _spot(loader: Loader) -> tuple[tuple[float, float], tuple[float, float]]:
         places.append(middle)
         spreads.append(max(float(np.ptp(angle[share > 0])) / 2, float(least)))
     return (places[0], places[1]), (spreads[0], spreads[1])
-
-
-def _force(loader: Loader) -> np.ndarray:
-    """Forces of the road on the nodes of the outer face, (around, along) N. Collective."""
-    body = loader.body
-    return body.surface(loader.equilibrium.contact_force()).reshape(body.lattice.face_shape)
 
 
 def _touched(nodes: np.ndarray, corners: np.ndarray, lattice: Lattice, closed: bool) -> np.ndarray:

@@ -24,7 +24,10 @@ class StaticState:
     tire along the wheel's z, `area` (s,) m2 that a uniform pressure is shared out by, `half_sizes` (s, 2) m of the deformed rectangle each node stands for (x and y),
     `ring_rate` (s,) m/rad the derivative of the deformed x by the angle around the axle.
     `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are what it was
-    computed for, and travel with it. `cords` by name of the ply; `mass` (kg) of wall and cords.
+    computed for, and travel with it. `cords` by name of the ply; `mass` (kg) of wall and cords. `told`: the extent of the
+    contact on finer elements, where that is known (fem.static.load_error).
+    With friction: `pull` (s, 2) N, the road's horizontal force on the tire, and of a tire that rolls `travel`, m in a
+    radian without the wheel's slip.
     """
 
     displacement: np.ndarray
@@ -42,6 +45,9 @@ class StaticState:
     cords: Mapping[str, CordForce] = field(default_factory=dict)
     mass: float = 0.0
     road: RoadShape = FLAT
+    told: Footprint | None = None
+    pull: np.ndarray | None = None
+    travel: float | None = None
 
     @property
     def load(self) -> float:
@@ -62,9 +68,17 @@ class StaticState:
 
     @property
     def push(self) -> np.ndarray:
-        """Force (s, 3) N of the frictionless road, in the wheel's axes."""
+        """Force (s, 3) N of the road, in the wheel's axes."""
         slopes = self.road.slopes(*self.positions[:, :2].T)
-        return np.stack([*(-self.force * slope for slope in slopes), self.force], axis=-1)
+        push = np.stack([*(-self.force * slope for slope in slopes), self.force], axis=-1)
+        if self.pull is not None:
+            push[:, :2] += self.pull
+        return push
+
+    @property
+    def moment(self) -> np.ndarray:
+        """Moment (3,) N m of the road's forces about the axle's centre."""
+        return np.cross(self.positions, self.push).sum(axis=0)
 
     @property
     def normal_force(self) -> np.ndarray:
@@ -100,8 +114,11 @@ class StaticState:
         """Effective rolling radius, m: material speed over the road per unit speed of rotation.
 
         r_e = dx/dtheta of the deformed surface, averaged over the footprint with the contact force,
-        or at the lowest crown point without a road: the speed at which that material would stick.
+        or at the lowest crown point without a road: the speed at which that material would stick. With friction
+        the travel in a radian that was found with it.
         """
+        if self.travel is not None:
+            return self.travel
         if self.force.any():
             return float(self.ring_rate @ self.force / self.force.sum())
         crown = np.argmin(self.positions[:, 2])
@@ -114,7 +131,9 @@ class StaticState:
         return np.divide(self.force, self.area, out=np.zeros_like(self.force), where=touching)
 
     def footprint(self) -> Footprint:
-        """Extent of the contact; zeros without a road."""
+        """Extent of the contact: as told by finer elements, else of these; zeros without a road."""
+        if self.told is not None:
+            return self.told
         if self.road_height is None:
             return Footprint(0.0, 0.0, 0.0)
         return footprint(self.shape, self.positions, self.pressure, self.gap)
@@ -132,6 +151,7 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         if road_height is not None
         else np.zeros(len(face))
     )
+    pull = equilibrium.road.pulled() if road_height is not None else None
     half_sizes, ring_rate, shape = _surface_metric(body.lattice, points + moved)
     return StaticState(
         displacement=displacement,
@@ -147,6 +167,8 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         inflation=float(equilibrium.pressure.value),
         rolling=equilibrium.rolling,
         road=equilibrium.shape,
+        pull=None if pull is None else body.surface(pull),
+        travel=equilibrium.road.travel,
         cords=cord_forces(body),
         mass=body.comm.allreduce(float(body.nodal_mass()[::3].sum())),
     )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tireroad.contact.results.levels import nominal
+from tireroad.contact.results.spectra import deviation
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.read import Absent, Results
 from tireroad.runs.report.quantities import digits, quantity
@@ -69,9 +70,12 @@ def _rolling(results: Results, given: Given) -> list[Fact]:
         given("accuracy", f"error of the {part} contact force")
         for part in ("mean", "deviation of the")
     )
+    end, step = results.attribute("spectra.h5", "limit"), results.attribute("contact.h5", "step")
+    varies = deviation(force[:, None], float(step or 1.0), float(end or np.inf))[0]
+    what = f"it varies up to {quantity(end, 'Hz')} by (rms)" if end else "it varies by (rms)"
     return [
         ("vertical force, rolling", quantity(float(force.mean()), "N") + _plus_minus(mean, "N")),
-        ("it varies by (rms)", quantity(float(force.std()), "N") + _plus_minus(spread, "N")),
+        (what, quantity(float(varies), "N") + _plus_minus(spread, "N")),
     ]
 
 

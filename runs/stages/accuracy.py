@@ -117,7 +117,7 @@ class AccuracyStage(Computed[Accuracy]):
             by_cause=found,
             absent=absent,
         )
-        _describe(record, product, runs)
+        _describe(record, product, exact, limit)
         return product
 
     def produce(self, key: str, record: Record) -> Accuracy:
@@ -207,16 +207,17 @@ def _told(forces: Forces, start: float, limit: float, up_to: float) -> dict[str,
     return {name: told(values[first:], forces.step, limit, up_to) for name, values in both.items()}
 
 
-def _describe(record: Record, product: Accuracy, runs: Mapping[str, np.ndarray]) -> None:
-    """Of the vertical force: the error of mean and deviation, the largest and the middle one of the bands."""
-    for name, values in runs.items():
+def _describe(record: Record, product: Accuracy, exact: Mapping[str, Told], limit: float) -> None:
+    """Of the vertical force: the error of mean and deviation (up to `limit` Hz), the largest of the bands."""
+    record.indicators["deviations are told up to"] = (limit, "Hz")
+    for name, figures in exact.items():
         bar, what = product.total(name), name.replace("_", " ")
         if bar is None:
             continue
         record.headline |= {
             f"error of the mean {what}": (float(bar.mean[2]), "N"),
             f"error of the deviation of the {what}": (float(bar.deviation[2]), "N"),
-            f"deviation of the {what}": (float(values[:, 2].std()), "N"),
+            f"deviation of the {what}": (float(figures.deviation[2]), "N"),
             f"error of the {what}'s history up to {product.up_to:.4g} Hz": (
                 100 * float(bar.history[2]),
                 "%",

@@ -10,7 +10,7 @@ import numpy as np
 
 from tireroad.contact.respaced import halved, ratio, thinned
 from tireroad.contact.results.chatter import choose, oscillation
-from tireroad.contact.results.error_bars import orders, share
+from tireroad.contact.results.error_bars import orders, random_share, share
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.path.carried_over import carried_over
@@ -245,4 +245,4 @@ def companion(cause: str, given: Given) -> tuple[Forces, Forces | None, float]:
     points = ratio(given.settled.patch) if cause == "points" else 2.0
     size = {"step": 2.0, "points": points, "modes": 1 / FEWER, "mesh": 2.0}[cause]
     order = orders(given.job.tire.section.order)[cause]
-    return found, beside, share(size, order)
+    return found, beside, (random_share if cause == "points" else share)(size, order)

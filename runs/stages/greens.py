@@ -159,7 +159,7 @@ def _share_of_residual(record, where: str, response: Response) -> None:
     """How much of the static flexibility the modes lack: the truncation, were it not for the residual."""
     diagonal = np.diag(response.residual)
     total = diagonal + np.diag(response.static())
-    record.indicators[f"share of the residual in the static flexibility of the {where}"] = (
-        float((diagonal / total).max()),
-        "-",
-    )
+    # A point of a coarse mesh may lie on the rim, which nothing moves.
+    part = np.divide(diagonal, total, out=np.zeros_like(total), where=total != 0)
+    name = f"share of the residual in the static flexibility of the {where}"
+    record.indicators[name] = (float(part.max()), "-")

@@ -4,14 +4,19 @@ Soft torus, 0.2 MPa, road at z = -0.3184244 m, 4 mm above first touch: 30 x 14 e
 footprint cut in two once and twice, carry 531.50, 532.26, 532.59 N, so 532.8 N (0.1 %) in the limit.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from tireroad.fem.sections.split import split_ring
+from tireroad.fem.static import companion
 from tireroad.fem.static.equilibrium import Equilibrium
-from tireroad.fem.static.load_error import LoadError, load_error
+from tireroad.fem.static.footprint import Footprint
+from tireroad.fem.static.load_error import ENOUGH, LoadError, load_error
 from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.state import static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
@@ -49,7 +54,8 @@ def test_the_estimate_lies_between_half_and_twice_the_error(segments, arc, order
 )
 def test_a_sign_is_told_where_the_parts_do_not_cancel(footprint, bulk, known):
     """Measured on 24 x 10 and 16 x 8 elements, whose estimates had the wrong sign, 20 x 8 and 16 x 8, the right one."""
-    found = LoadError(500.0, abs(footprint + bulk), footprint, bulk, 1)
+    extent = Footprint(0.06, 0.02, 1e-3)
+    found = LoadError(500.0, abs(footprint + bulk), footprint, bulk, extent, 1)
     assert found.signed == known
 
 
@@ -74,7 +80,35 @@ def test_the_tire_is_left_as_it_was_and_the_companion_rolls_too():
     )
     other.inflate(2e5)
     other.deflect(HEIGHT - other.touch)
-    assert found.footprint == pytest.approx(1 - other.load() / loader.load(), abs=1e-8)
+    assert found.footprint == pytest.approx(1 - other.load() / loader.load(), abs=2 * ENOUGH)
+    extent = static_state(other.equilibrium, other.touch).footprint()
+    assert found.extent.length == pytest.approx(extent.length, rel=0.01)
+    assert found.extent.area == pytest.approx(extent.area, rel=0.02)
+
+
+def test_half_the_ring_tells_what_the_whole_does(monkeypatch):
+    """Load, traction and its reading are shared out between the halves and their cut faces."""
+    loader = pressed(ring(12, 6))
+    half = load_error(loader, AT_REST)
+    monkeypatch.setattr(companion, "looks_the_same", lambda ring, rolling: False)
+    whole = load_error(loader, AT_REST)
+    assert half.bulk == pytest.approx(whole.bulk, rel=1e-6)
+    assert half.footprint == pytest.approx(whole.footprint, abs=2 * ENOUGH)
+    assert half.extent.length == pytest.approx(whole.extent.length, rel=0.01)
+
+
+def test_a_state_that_half_a_turn_changes_is_taken_whole():
+    loader = pressed(ring(12, 6))
+    given = companion.Balance.of(loader, AT_REST)
+    assert isinstance(given.near(given.ring), companion.HalfTurnEquilibrium)
+    bent = given.displacement.copy()
+    bent[:, 0] += (
+        1e-3
+        * loader.body.ring.thickness
+        * (loader.body.lattice.points(np.arange(len(bent)))[:, 0] > 0)
+    )
+    other = replace(given, displacement=bent)
+    assert not isinstance(other.near(other.ring), companion.HalfTurnEquilibrium)
 
 
 def test_it_says_why_there_is_none():

@@ -51,8 +51,9 @@ class HalfTurnEquilibrium(Equilibrium):
     The state is `body.u` of its own `body`; loads asked for and returned are the whole tire's.
     """
 
-    def __init__(self, whole: Body, rolling: Rolling) -> None:
-        ring = whole.ring
+    def __init__(self, whole: Body, rolling: Rolling, ring: Ring | None = None) -> None:
+        """Of the elements of a `whole` body, or of another `ring` of elements of its tire."""
+        ring = ring or whole.ring
         corners = ring.ring_corners[: ring.segments // 2 + 1]
         half = replace(ring, ring_corners=corners, coarser=lambda: None)
         body = Body(whole.comm, half, whole.materials, cords=whole.plies.cords)
@@ -91,11 +92,18 @@ class HalfTurnEquilibrium(Equilibrium):
 
     def start(self, whole: Equilibrium) -> None:
         """Start from the present state of the whole body, inflated and without a road. Collective."""
-        own, lattice = self.body, whole.body.lattice
-        i, node = np.divmod(own.ids, lattice.shape[1])
-        own.owned(own.u.x.array)[:] = whole.body.displacement()[i * lattice.shape[1] + node]
-        own.u.x.scatter_forward()
+        self.body.set_displacement(whole.body.displacement())  # the half's nodes are its first ones
+        self.road.active[:], self.road.force[:] = False, 0.0
         self.pressure.value = float(whole.pressure.value)
+
+    def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
+        """As of the whole tire, of a traction that half a turn leaves as it is: on the cut faces leaders take what acts on
+        their followers, and either half carries half of what acts on the axis."""
+        face, own = self.body.surface, weights.copy()
+        own[face.place[np.isin(face.local, self._cut.follower)]] = 0.0
+        own[face.place[np.isin(face.local, self._cut.axis)]] /= 2
+        further, compliance = super().sinking(own, load)
+        return 2 * further, 2 * compliance
 
     def on(self, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
         """Displacement (n, 3) m and force of the road (n,) N at the nodes of the whole ring's lattice. Collective."""

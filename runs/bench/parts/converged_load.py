@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
+
+if TYPE_CHECKING:
+    from tireroad.fem.static.load_error import LoadError
 
 HEIGHTS = (0.002, 0.005, 0.010, 0.015, 0.020)  # m above the first touch of the finest
 CUTS = 2  # times that elements at the footprint are cut in two
@@ -17,17 +21,32 @@ QUANTITIES = ("load", "length", "width")
 
 @dataclass(frozen=True)
 class Pressed:
-    """`load` N, `length` and `width` m of the footprint, `estimate` % of the load's error (None: not asked for)."""
+    """`load` N, `length` and `width` m of the footprint as solved."""
 
     load: float
     length: float
     width: float
-    estimate: float | None = None
+
+    @classmethod
+    def of(cls, balance) -> Pressed:
+        """Of a tire in balance (fem.static.companion)."""
+        extent = balance.extent
+        return cls(balance.load, extent.length, extent.width)
 
     @property
     def values(self) -> np.ndarray:
         """Load, length, width."""
         return np.array([self.load, self.length, self.width])
+
+
+@dataclass(frozen=True)
+class Known:
+    """A tire at one height of the road: its `own` state, its estimate `told` (fem.static.load_error), and what it
+    converges to, if that was looked for."""
+
+    own: Pressed
+    told: LoadError
+    limit: Converged | None
 
 
 @dataclass(frozen=True)
@@ -48,32 +67,24 @@ def converged(sequence: list[Pressed]) -> Converged:
     return Converged(last[-1] + closing * step, np.abs(step / last[-1]))
 
 
-def at_heights(loader, heights, cuts: int = 0) -> list[tuple[Pressed, Converged | None]]:
-    """An inflated tire at each height (m, of the road), with the estimate; and what it converges to with its
+def at_heights(loader, heights, cuts: int = 0) -> list[Known]:
+    """An inflated tire at each height (m, of the road), with its estimate; and what it converges to with its
     elements at the footprint cut in two, `cuts` times over. Collective."""
+    from tireroad.fem.static.companion import Balance
     from tireroad.fem.static.load_error import at_finer_footprint, load_error
 
     found = []
     rolling = loader.equilibrium.rolling
     for _ in loader.visit([height - loader.touch for height in heights]):
-        estimate = load_error(loader, rolling)
-        known = None if isinstance(estimate, str) else 100 * estimate.relative
-        own = pressed(loader, known)
-        sequence, finer = [own], loader
+        told = load_error(loader, rolling)
+        assert not isinstance(told, str), told
+        finer = Balance.of(loader, rolling)
+        sequence = [Pressed.of(finer)]
         for _ in range(cuts):
-            finer = at_finer_footprint(finer, rolling)
-            sequence.append(pressed(finer))
-        found.append((own, converged(sequence) if cuts >= 2 else None))
+            finer = at_finer_footprint(finer)
+            sequence.append(Pressed.of(finer))
+        found.append(Known(sequence[0], told, converged(sequence) if cuts >= 2 else None))
     return found
-
-
-def pressed(loader, estimate: float | None = None) -> Pressed:
-    """Load and footprint of a tire on the road. Collective."""
-    from tireroad.fem.static.state import static_state
-
-    # Of a companion the first touch is not known; the footprint does not ask for it.
-    extent = static_state(loader.equilibrium, 0.0).footprint()
-    return Pressed(loader.load(), extent.length, extent.width, estimate)
 
 
 def table(meshes: dict[str, object], reference: str, make) -> Table:
@@ -89,25 +100,31 @@ def table(meshes: dict[str, object], reference: str, make) -> Table:
         found = truth if name == reference else at_heights(make(section), heights)
         seconds = time.process_time() - began
         observe.say(f"  loads: {name}, {seconds:.1f} s")
-        for height, (own, _), (_, limit) in zip(HEIGHTS, found, truth, strict=True):
-            off = 100 * (own.values / limit.values - 1)
-            ratio = own.estimate / abs(float(off[0]))
-            rows.append([name, 1e3 * height, *map(float, off), own.estimate, ratio])
-    sure = max(float(limit.error[0]) for _, limit in truth)
+        for height, one, exact_one in zip(HEIGHTS, found, truth, strict=True):
+            limit = exact_one.limit.values
+            off = 100 * (one.own.values / limit - 1)
+            seen = 100 * (np.array([one.told.extent.length, one.told.extent.width]) / limit[1:] - 1)
+            estimate = 100 * one.told.relative
+            ratio = estimate / abs(float(off[0]))
+            rows.append([name, 1e3 * height, *map(float, [*off, *seen]), estimate, ratio])
+    sure = np.max([one.limit.error for one in truth], axis=0)
     return Table(
         "Load and footprint at given heights of the road",
         [
             ("mesh", ""),
             ("above first touch", "mm"),
             ("error of the load", "%"),
-            ("of the length", "%"),
-            ("of the width", "%"),
+            ("of the length as solved", "%"),
+            ("of the width as solved", "%"),
+            ("of the length as told", "%"),
+            ("of the width as told", "%"),
             ("estimated error of the load", "%"),
             ("estimated over true", "-"),
         ],
         rows,
         [
             f"Against {reference} with its elements at the footprint cut in two {CUTS} times, extrapolated; the last "
-            f"cut changes the load by {100 * sure:.2g} % at most. Asked: load 0.5 %, footprint 3 %, estimate 0.5 to 2.",
+            f"cut changes load, length and width by {', '.join(f'{100 * value:.2g}' for value in sure)} % at most. Footprint as told: of the "
+            "companion with elements half as long there. Asked: load 0.5 %, footprint 3 %, estimate 0.5 to 2.",
         ],
     )

@@ -30,6 +30,13 @@ class Record:
         """Add the seconds spent inside to a part of the stage's cost."""
         return self.cost(part)
 
+    @property
+    def shares(self) -> str:
+        """Seconds of each part, the largest first."""
+        total = sum(self.cost.values()) or 1.0
+        parts = sorted(self.cost.items(), key=lambda part: -part[1])
+        return "time: " + ", ".join(f"{k} {v:.2g} s ({v / total:.0%})" for k, v in parts)
+
 
 def _shown(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)

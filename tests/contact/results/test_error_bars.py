@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.results.error_bars import Bars, Told, bars, told, total
+from tireroad.contact.results.error_bars import Bars, Told, bars, random_share, told, total
 
 
 def at(size: float, rate: float) -> Told:
@@ -60,3 +60,25 @@ def test_figures_of_a_sine():
     assert found.centre.max() < 300.0
     band = np.abs(found.centre - 100.0).argmin()
     assert found.level[band, 2] == pytest.approx(10 * np.log10(amplitude**2 / 2), abs=0.01)
+
+
+def test_the_deviation_ends_where_the_model_does():
+    """100 Hz counts, 400 Hz, beyond the limit, does not."""
+    step, count = 1e-3, 4000
+    time = step * np.arange(count)
+    force = np.zeros((count, 3))
+    force[:, 2] = 3.0 * np.sin(2 * np.pi * 100.0 * time) + 5.0 * np.sin(2 * np.pi * 400.0 * time)
+    assert told(force, step, 300.0).deviation[2] == pytest.approx(3.0 / np.sqrt(2), rel=1e-9)
+    assert told(force, step, np.inf).deviation == pytest.approx(force.std(axis=0), rel=1e-9)
+    assert told(force[:-1], step, np.inf).deviation == pytest.approx(force[:-1].std(axis=0))
+
+
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
+def test_errors_that_fall_anywhere_on_every_grid(ratio):
+    """The edge of a contact lies anywhere in a cell: in the mean square the share of the difference is the error."""
+    rng, order = np.random.default_rng(3), 1.5
+    own, companion = (
+        size**order * np.sin(2 * np.pi * rng.random(200_000)) for size in (1.0, ratio)
+    )
+    share = random_share(ratio, order)
+    assert share * np.std(companion - own) == pytest.approx(np.std(own), rel=0.01)

@@ -1,0 +1,149 @@
+"""A tire in balance on the road, and the same tire on other elements near that state: what tells a mesh's error.
+
+By half of the ring where half a turn leaves the state as it is (fem.static.symmetry.half_turn).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.sections.ring import Ring
+from tireroad.fem.static.curved.balance import make_equilibrium
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
+from tireroad.fem.static.path.carried_over import sampled
+from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.symmetry.half_turn import HalfTurnEquilibrium, looks_the_same
+from tireroad.fem.static.virtual_work import Rolling
+from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.mesh import Lattice, field_lattice
+
+_ROUNDING = 1e-9  # rad
+_SAME = 1e-6  # of the wall: what half a turn may change
+
+
+@dataclass(frozen=True, kw_only=True)
+class Balance:
+    """A tire of the elements of `ring`, rolling steadily, on the road at `height` (m), carrying `load` (N): `displacement` (n, 3) m
+    and `force` (n,) N of the road of all nodes of the whole `lattice`; `solved`, what found it."""
+
+    ring: Ring
+    lattice: Lattice
+    rolling: Rolling
+    height: float
+    load: float
+    displacement: np.ndarray
+    force: np.ndarray
+    solved: Equilibrium
+
+    @classmethod
+    def of(cls, loader: Loader, rolling: Rolling) -> Balance:
+        """The present state of a loader. Collective."""
+        body, solved = loader.body, loader.equilibrium
+        assert solved.road_height is not None, "there is no road"
+        return cls(
+            ring=body.ring,
+            lattice=body.lattice,
+            rolling=rolling,
+            height=solved.road_height,
+            load=loader.load(),
+            displacement=body.displacement(),
+            force=body.everywhere(solved.contact_force()),
+            solved=solved,
+        )
+
+    def near(self, ring: Ring) -> Equilibrium:
+        """The problem of the same tire on the elements of another `ring`, in this state but not in balance. Collective."""
+        return self._problem(ring, self._sampled(ring))
+
+    def balanced_on(self, ring: Ring, allowed: float) -> Balance:
+        """The same tire on the same road in balance on other elements, but for `allowed` N. Collective.
+
+        ConvergenceError where no balance is found.
+        """
+        lattice, displacement = field_lattice(ring), self._sampled(ring)
+        other = self._problem(ring, displacement)
+        other.road.take(self._touching(lattice)[other.body.ids], self.height)
+        step = other.solve(self.height, allowed=allowed)
+        if not step.converged:
+            raise ConvergenceError(f"static: elements half as long do not converge ({step.reason})")
+        found = _nodes(other, lattice)
+        return Balance(
+            ring=ring,
+            lattice=lattice,
+            rolling=self.rolling,
+            height=self.height,
+            load=other.load(),
+            displacement=found[0],
+            force=found[1],
+            solved=other,
+        )
+
+    @property
+    def face_force(self) -> np.ndarray:
+        """Force of the road (around, along) N on the outer face's nodes."""
+        return self.force[self.lattice.face].reshape(self.lattice.face_shape)
+
+    @cached_property
+    def extent(self) -> Footprint:
+        """Of the contact."""
+        face, shape = self.lattice.face, self.solved.shape
+        places = self.lattice.points(face) + self.displacement[face]
+        force, area = self.force[face], nodal_area(self.lattice, places)
+        gap = places[:, 2] - shape.height(*places[:, :2].T) - self.height
+        pressure = np.divide(force, area, out=np.zeros_like(force), where=force > 0)
+        return footprint(self.lattice.face_shape, places, pressure, np.where(force > 0, 0.0, gap))
+
+    def _sampled(self, ring: Ring) -> np.ndarray:
+        if ring is self.ring:
+            return self.displacement
+        return sampled(self.lattice, self.displacement, field_lattice(ring))
+
+    def _problem(self, ring: Ring, displacement: np.ndarray) -> Equilibrium:
+        """In that displacement (n, 3) m of the whole ring's nodes. Collective."""
+        body, shape = self.solved.body, self.solved.shape
+        other: Equilibrium | None = self._half(ring, displacement)
+        if other is None:
+            own = Body(body.comm, ring, body.materials, cords=body.plies.cords)
+            other = make_equilibrium(own, self.rolling, shape)
+            own.set_displacement(displacement)
+        other.pressure.value = float(self.solved.pressure.value)
+        return other
+
+    def _half(self, ring: Ring, displacement: np.ndarray) -> HalfTurnEquilibrium | None:
+        """By half of the ring, where that has all of the state. Collective."""
+        if not (self.solved.shape.flat and looks_the_same(ring, self.rolling)):
+            return None
+        half = HalfTurnEquilibrium(self.solved.body, self.rolling, ring)
+        half.body.set_displacement(displacement)
+        off = np.abs(half.on(field_lattice(ring))[0] - displacement).max()
+        return half if off < _SAME * ring.thickness else None
+
+    def _touching(self, lattice: Lattice) -> np.ndarray:
+        """A force (n,) N above 0 on the nodes of other elements that lie between nodes that are pressed on."""
+        pressed = self.face_force > 0
+        around = _between(np.append(self.lattice.ring, 2 * np.pi), lattice.ring) % len(pressed)
+        along = _between(self.lattice.arc, lattice.arc)
+        inside = pressed[np.ix_(around.ravel(), along.ravel())]
+        inside = inside.reshape(len(lattice.ring), 2, len(lattice.arc), 2).all(axis=(1, 3))
+        force = np.zeros(lattice.size)
+        force[lattice.face] = self.load / max(inside.sum(), 1) * inside.ravel()
+        return force
+
+
+def _between(line: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Indices (n, 2) of the entries of an ascending line on either side of each value (n,), the same two where it is one."""
+    above = np.clip(np.searchsorted(line, values - _ROUNDING), 0, len(line) - 1)
+    below = np.clip(np.searchsorted(line, values + _ROUNDING, side="right") - 1, 0, len(line) - 1)
+    return np.stack([below, above], axis=-1)
+
+
+def _nodes(solved: Equilibrium, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement (n, 3) m and force of the road (n,) N at the nodes of the whole ring. Collective."""
+    if isinstance(solved, HalfTurnEquilibrium):
+        return solved.on(lattice)
+    return solved.body.displacement(), solved.body.everywhere(solved.contact_force())
