@@ -12,7 +12,7 @@ from tireroad.fem.tire.body import Body
 
 
 def with_cause(
-    error: ConvergenceError, loader: Loader, rolling: Rolling, press: Callable[[Loader], None]
+    error: ConvergenceError, loader: Loader, rolling: Rolling, press: Callable[[Loader], object]
 ) -> ConvergenceError:
     """The error with its cause, where that is the speed of rotation.
 

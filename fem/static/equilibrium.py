@@ -1,4 +1,4 @@
-"""Static equilibrium under inflation, steady rolling and a flat, frictionless road.
+"""Static equilibrium under inflation, steady rolling and a flat, frictionless road (friction: fem.static.friction).
 
 F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f, with f >= 0 on the tread dofs,
 z + u_z >= z_road and one of both zero.
@@ -94,7 +94,7 @@ class Equilibrium:
         A tangent serves for as long as each step with it leaves a fifth of the error or less.
         """
         field = self.body.u.x
-        kept = field.array.copy(), self.road.active.copy(), self.road.force.copy()
+        kept = field.array.copy(), self.road.kept()
         self.road.height = -np.inf if road_height is None else road_height
         self._before.x.array[:] = field.array
         error, tangents = 0.0, 0
@@ -113,7 +113,8 @@ class Equilibrium:
             reason = reason or self._move(closing, load)
             if reason:
                 break
-        field.array[:], self.road.active, self.road.force = kept
+        field.array[:] = kept[0]
+        self.road.put_back(kept[1])
         return Step(False, tangents, error, reason)
 
     def _stopped(self, error: float, changed: bool, tangents: int, allowed: float) -> str:
@@ -129,7 +130,7 @@ class Equilibrium:
         """Norm of what is out of balance over the force scale, distance to the road as the dof's force."""
         with self.cost("assembly"):
             out = self._assemble_residual().copy()
-        out[self.road.dofs] -= self.road.force
+        self.road.take_off(out)
         distance = self.road.distance()
         parts = np.array([out @ out + distance @ distance, self.road.force.sum()])
         square, total = self.body.comm.allreduce(parts)
@@ -140,7 +141,7 @@ class Equilibrium:
         """Assemble and factorise at the present state, the held dofs on their way to the road."""
         with self.cost("assembly"):
             self._assemble_tangent()
-        return self._system.take(self.matrix, self.road.held, -self.road.gap()[self.road.active])
+        return self._system.take(self.matrix, self.road.held, *self.road.steps())
 
     def _move(self, closing: Moved | None, load: float | None) -> str:
         """One linearised step to balance, held dofs to the road; with a load, the road to that. Collective.
@@ -149,21 +150,22 @@ class Equilibrium:
         what is out of balance is no force of the road (seen: held dofs let go and caught for ever).
         """
         field, held = self.body.u.x, self.road.held
-        out = self._work.array_r.copy()
+        out = self.road.rows(self._work.array_r.copy())
         change, force = self._system.solve(-out, closing)
         force += out[held]
         if load is not None:
             further, more = self._system.solve(np.zeros_like(out), self._system.raising)
-            total, rate = self.body.comm.allreduce(np.array([force.sum(), more.sum()]))
+            sums = np.array([self.road.upward(part) for part in (force, more)])
+            total, rate = self.body.comm.allreduce(sums)
             if not rate > 0:
                 return "the road meets nothing that resists"
             rise = (load - total) / rate
             self.road.height += rise
             change, force = change + rise * further, force + rise * more
-        self.road.force[self.road.active] = force
         self._before.x.array[:] = field.array
         field.array[: len(change)] += change
         self.road.lay_on()
+        self.road.react(force)
         return ""
 
     def road_stiffness(self) -> float:
@@ -171,9 +173,8 @@ class Equilibrium:
         self._before.x.array[:] = self.body.u.x.array
         if not self._take_tangent():
             return float("nan")
-        nothing = np.zeros(len(self._work.array_r))
-        _, force = self._system.solve(nothing, self._system.raising)
-        return self.body.comm.allreduce(float(force.sum()))
+        _, force = self._system.solve(np.zeros(len(self._work.array_r)), self._system.raising)
+        return self.body.comm.allreduce(self.road.upward(force))
 
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
         """Under a vertical traction in place of the road: the height (m) that the face gains by one step of
@@ -184,7 +185,7 @@ class Equilibrium:
         self._before.x.array[:] = self.body.u.x.array
         out = self._assemble_residual().copy()
         self._assemble_tangent()
-        if not self._system.take(self.matrix, np.zeros(0, np.intp), np.zeros(0)):
+        if not self._system.take(self.matrix, np.zeros(0, np.intp), *np.zeros((2, 0))):
             raise ConvergenceError("static: the tangent without a road is singular")
         face, push = self.body.surface, np.zeros(len(out))
         push[3 * face.local + 2] = weights[face.place]
@@ -223,7 +224,7 @@ class Equilibrium:
         self._assemble_tangent()
         diagonal = self.matrix.getDiagonal()
         typical = diagonal.norm() / np.sqrt(diagonal.size)
-        self.road.stiffness = diagonal.array[self.road.dofs].copy()
+        self.road.weigh(diagonal.array)
         return self.body.ring.thickness * typical
 
     def _assemble_residual(self) -> np.ndarray:

@@ -32,7 +32,9 @@ class System(Protocol):
     @property
     def raising(self) -> Moved: ...
 
-    def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
+    def take(
+        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+    ) -> bool:
         """Factorise; False when the matrix is singular. Collective."""
         ...
 
@@ -45,8 +47,8 @@ class HeldSystem:
     """K du = right, with du given at the held dofs. All methods are collective.
 
     `take` factorises; `solve` then costs two triangular solves, and stays of use as long as the
-    tangent is near the one taken and the same dofs are held. `closing` is the motion given to `take`,
-    `raising` that of all held dofs by one.
+    tangent is near the one taken and the same dofs are held. `closing` and `raising` are the
+    motions given to `take`.
     """
 
     def __init__(
@@ -57,8 +59,11 @@ class HeldSystem:
         self._right, self._x = matrix.createVecs()
         self._reaction: PETSc.Mat | None = None
 
-    def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
-        """Factorise `matrix` without the owned dofs `held`, which move by `closing` (m) in the next step.
+    def take(
+        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+    ) -> bool:
+        """Factorise `matrix` without the owned dofs `held`, which move by `closing` (m) in the next step,
+        and by `raising` (m per m) as the road rises.
 
         False when it is singular; ConvergenceError when the factorisation fails by other causes. What
         it does to the matrix makes it useless for anything else.
@@ -68,7 +73,7 @@ class HeldSystem:
         with self._timing("road"):
             self._keep_reaction(matrix, rows)
             self.closing = self._moved(matrix, closing)
-            self.raising = self._moved(matrix, np.ones(len(held)))
+            self.raising = self._moved(matrix, raising)
             matrix.zeroRowsColumns(rows, 1.0)
         with self._timing("factorisation"):
             self._ksp.setOperators(

@@ -9,6 +9,7 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.model import TireModel
 from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
+from tireroad.fem.static.friction.press import Friction, with_friction
 from tireroad.fem.static.path.loading import Loader, Progress
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
@@ -23,9 +24,11 @@ def press(
     road_height: float | None = None,
     rolling: Rolling = AT_REST,
     road: RoadShape = FLAT,
+    friction: Friction | None = None,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> StaticState:
-    """The tire inflated to `inflation` (Pa) and, with one of the others, on a frictionless `road`.
+    """The tire inflated to `inflation` (Pa) and, with one of the others, on a `road`, with `friction` where it is
+    given.
 
     `load` N on the road, or `deflection` m of the road from first touch, or `road_height` m, z of its
     plane; none of them: no road. `rolling`: inertia and damping of the steadily rolling shape. `report`
@@ -36,14 +39,20 @@ def press(
         raise InputError(f"inflation = {inflation:g} Pa must be 0 or more, and finite")
     loader = Loader(make_equilibrium(tire.body, rolling, road), report)
     loader.inflate(inflation)
-    place(loader, load, deflection, road_height)
+    loader = place(loader, load, deflection, road_height, friction)
     return static_state(loader.equilibrium, loader.touch)
 
 
 def place(
-    loader: Loader, load: float | None, deflection: float | None, road_height: float | None
-) -> None:
-    """Press the inflated tire on the road, as `press` says: load and deflection along its normal. Collective."""
+    loader: Loader,
+    load: float | None,
+    deflection: float | None,
+    road_height: float | None,
+    friction: Friction | None = None,
+) -> Loader:
+    """Press the inflated tire on the road, as `press` says: load and deflection along its normal. The loader of the
+    state found, with friction another one. Collective.
+    """
     given = {"load": load, "deflection": deflection, "road_height": road_height}
     named = [name for name, value in given.items() if value is not None]
     if len(named) > 1:
@@ -51,9 +60,13 @@ def place(
     for name, value in given.items():
         if value is not None and not math.isfinite(value):
             raise InputError(f"{name} = {value:g} must be finite")
+    inflated = loader.body.u.x.array.copy()
     if load is not None:
         loader.carry(load * loader.equilibrium.shape.upright)
     elif deflection is not None:
         loader.deflect(deflection / loader.equilibrium.shape.upright)
     elif road_height is not None:
         loader.deflect(road_height - loader.touch)
+    if friction is None or not named or not loader.load():
+        return loader
+    return with_friction(loader, inflated, load, friction)

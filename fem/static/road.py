@@ -39,6 +39,38 @@ class Road:
         """Of the nodes that touch, to the road, as the unknown's force (N)."""
         return (self.stiffness * self.gap())[self.active]
 
+    def steps(self) -> tuple[np.ndarray, np.ndarray]:
+        """What held unknowns have to move by (m) to where they are to be, and by how much as the road rises (m per m)."""
+        return -self.gap()[self.active], np.ones(int(self.active.sum()))
+
+    def weigh(self, diagonal: np.ndarray) -> None:
+        """Take the stiffness (N/m) of the owned unknowns."""
+        self.stiffness = diagonal[self.dofs].copy()
+
+    def take_off(self, out: np.ndarray) -> None:
+        """Subtract the road's forces from forces (N) at the owned unknowns."""
+        out[self.dofs] -= self.force
+
+    def rows(self, out: np.ndarray) -> np.ndarray:
+        """What of forces out of balance (N) stands at the unknowns that Newton's method solves for."""
+        return out
+
+    def upward(self, reaction: np.ndarray) -> float:
+        """Of the reactions (N) at the held unknowns, the sum of those that carry the load. Not collective."""
+        return float(reaction.sum())
+
+    def react(self, reaction: np.ndarray) -> None:
+        """Take the reactions (N) at the held unknowns. Collective."""
+        self.force[self.active] = reaction
+
+    def kept(self) -> tuple[np.ndarray, ...]:
+        """What `put_back` puts back."""
+        return self.active.copy(), self.force.copy()
+
+    def put_back(self, kept: tuple[np.ndarray, ...]) -> None:
+        """Be as `kept` says."""
+        self.active, self.force = kept
+
     def choose(self) -> bool:
         """Take the active set of the present state; whether it is another one on any process. Collective."""
         wanted = self.force > self.stiffness * self.gap()
@@ -50,7 +82,7 @@ class Road:
     def lay_on(self) -> None:
         """Put what touches on the road to the last bit: rounding would leave a gap or a penetration. Collective."""
         field = self._body.u.x
-        field.array[self.held] = (self.height - self._z)[self.active]
+        field.array[self.dofs[self.active]] = (self.height - self._z)[self.active]
         field.scatter_forward()
 
     def take(self, force: np.ndarray, height: float) -> None:
@@ -64,6 +96,15 @@ class Road:
         force = np.zeros(self._body.nodes)
         force[self._body.tread] = self.force
         return force
+
+    @property
+    def travel(self) -> float | None:
+        """How far a wheel that rolls on it with friction travels in a radian, m; None of any other."""
+        return None
+
+    def pulled(self) -> np.ndarray | None:
+        """Horizontal force (nodes, 2) N on all owned nodes; None without friction."""
+        return None
 
     def load(self) -> float:
         """Total force, N. Collective."""

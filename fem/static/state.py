@@ -26,6 +26,8 @@ class StaticState:
     `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are what it was
     computed for, and travel with it. `cords` by name of the ply; `mass` (kg) of wall and cords. `told`: the extent of the
     contact on finer elements, where that is known (fem.static.load_error).
+    With friction: `pull` (s, 2) N, the road's horizontal force on the tire, and of a tire that rolls `travel`, m in a
+    radian without the wheel's slip.
     """
 
     displacement: np.ndarray
@@ -44,6 +46,8 @@ class StaticState:
     mass: float = 0.0
     road: RoadShape = FLAT
     told: Footprint | None = None
+    pull: np.ndarray | None = None
+    travel: float | None = None
 
     @property
     def load(self) -> float:
@@ -64,9 +68,17 @@ class StaticState:
 
     @property
     def push(self) -> np.ndarray:
-        """Force (s, 3) N of the frictionless road, in the wheel's axes."""
+        """Force (s, 3) N of the road, in the wheel's axes."""
         slopes = self.road.slopes(*self.positions[:, :2].T)
-        return np.stack([*(-self.force * slope for slope in slopes), self.force], axis=-1)
+        push = np.stack([*(-self.force * slope for slope in slopes), self.force], axis=-1)
+        if self.pull is not None:
+            push[:, :2] += self.pull
+        return push
+
+    @property
+    def moment(self) -> np.ndarray:
+        """Moment (3,) N m of the road's forces about the axle's centre."""
+        return np.cross(self.positions, self.push).sum(axis=0)
 
     @property
     def normal_force(self) -> np.ndarray:
@@ -102,8 +114,11 @@ class StaticState:
         """Effective rolling radius, m: material speed over the road per unit speed of rotation.
 
         r_e = dx/dtheta of the deformed surface, averaged over the footprint with the contact force,
-        or at the lowest crown point without a road: the speed at which that material would stick.
+        or at the lowest crown point without a road: the speed at which that material would stick. With friction
+        the travel in a radian that was found with it.
         """
+        if self.travel is not None:
+            return self.travel
         if self.force.any():
             return float(self.ring_rate @ self.force / self.force.sum())
         crown = np.argmin(self.positions[:, 2])
@@ -136,6 +151,7 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         if road_height is not None
         else np.zeros(len(face))
     )
+    pull = equilibrium.road.pulled() if road_height is not None else None
     half_sizes, ring_rate, shape = _surface_metric(body.lattice, points + moved)
     return StaticState(
         displacement=displacement,
@@ -151,6 +167,8 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         inflation=float(equilibrium.pressure.value),
         rolling=equilibrium.rolling,
         road=equilibrium.shape,
+        pull=None if pull is None else body.surface(pull),
+        travel=equilibrium.road.travel,
         cords=cord_forces(body),
         mass=body.comm.allreduce(float(body.nodal_mass()[::3].sum())),
     )

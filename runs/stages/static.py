@@ -8,7 +8,6 @@ from typing import ClassVar
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.model import TireModel
 from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.diagnosis import with_cause
 from tireroad.fem.static.footprint import Footprint
@@ -18,15 +17,14 @@ from tireroad.fem.static.press import place
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
-from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed
 from tireroad.runs.stages.build.tire import road_shape
-from tireroad.runs.stages.build.turning import rolling_shape, turning_of
-from tireroad.runs.stages.stored import cords_file
+from tireroad.runs.stages.build.turning import friction_of, rolling_shape, turning_of, wheel_slip
+from tireroad.runs.stages.stored import cords_file, friction_file, static_file
 
 _SPEEDS, _SAME_SPEED = 6, 1e-6  # solutions at a travel speed at most, and when they agree
 _EXTENT = "length", "width", "area"
@@ -58,6 +56,7 @@ class StaticStage(Computed[StaticState]):
             "static": asdict(scene.static),
             "road": asdict(road_shape(scene)),
             "rolling": asdict(steady_rolling(self.job, rotation.speed if rotation else None)),
+            "slip": wheel_slip(scene) if scene.static.friction is not None else None,
             "travel": [rotation.travel_speed, rotation.rolling_radius] if rotation else None,
         }
 
@@ -80,26 +79,37 @@ class StaticStage(Computed[StaticState]):
             with record.timing("error estimate"):
                 state = _estimate(record, state, loader)
         _describe(record, state, loader)
+        record.headline |= friction_file.headline(state, self.job.scene.static.friction)
         self._warn_at_rest(record)
         observe.say(f"  {record.shares}")
         return state
 
     def _solved(self, record: Record, speed: float) -> tuple[StaticState, Loader]:
         """Load steps up to the state at `speed` rad/s. Collective."""
-        wanted, rolling = self.job.scene.static, steady_rolling(self.job, speed)
+        rolling = steady_rolling(self.job, speed)
         with record.timing("mesh and forms"):
             equilibrium = make_equilibrium(self.job.tire.body, rolling, road_shape(self.job.scene))
         loader = Loader(equilibrium, _show)
         began = Timing.clock()
         try:
-            _press(loader, wanted)
+            pressed = self._press(loader, rolling)
         except ConvergenceError as error:
             kept = self._keep_last(loader)
-            cause = with_cause(error, loader, rolling, lambda other: _press(other, wanted))
+            cause = with_cause(error, loader, rolling, lambda other: self._press(other, rolling))
             raise ConvergenceError(f"{cause}{kept}") from None
+        if pressed is not loader:
+            equilibrium.cost.take(pressed.equilibrium.cost)
+            loader.newton_steps = pressed.newton_steps
         record.cost |= equilibrium.cost
         record.cost["other"] = Timing.clock() - began - sum(equilibrium.cost.values())
-        return static_state(equilibrium, loader.touch), loader
+        return static_state(pressed.equilibrium, loader.touch), loader
+
+    def _press(self, loader: Loader, rolling: Rolling) -> Loader:
+        """Inflate the tire and press it on the road; the loader of the state found. Collective."""
+        wanted = self.job.scene.static
+        loader.inflate(wanted.inflation)
+        placed = wanted.load, wanted.deflection, wanted.road_height
+        return place(loader, *placed, friction_of(self.job.scene, rolling))
 
     def _keep_last(self, loader: Loader) -> str:
         """Write the last state that converged, if any did; a sentence that says where. Collective."""
@@ -127,7 +137,7 @@ class StaticStage(Computed[StaticState]):
 
     def write(self, file, product: StaticState) -> None:
         """Mesh, displacement, the outer face, the footprint."""
-        _fill(file, product, self.job.tire)
+        static_file.fill(file, product, self.job.tire)
 
     def read(self, file) -> StaticState:
         """The state, with what it was computed for."""
@@ -149,6 +159,7 @@ class StaticStage(Computed[StaticState]):
             inflation=float(attributes["inflation"]),
             rolling=steady_rolling(self.job, float(attributes["rolling_speed"])),
             **cords_file.read(file),
+            **friction_file.read(file),
         )
 
 
@@ -156,14 +167,10 @@ def _extent(attributes) -> Footprint:
     return Footprint(*(float(attributes[f"footprint_{name}"]) for name in _EXTENT))
 
 
-def _press(loader: Loader, wanted) -> None:
-    """Inflate the tire and press it on the road. Collective."""
-    loader.inflate(wanted.inflation)
-    place(loader, wanted.load, wanted.deflection, wanted.road_height)
-
-
 def _estimate(record: Record, state: StaticState, loader: Loader) -> StaticState:
     """Print and keep how far the load is from that of finer elements; the state with their footprint. Collective."""
+    if state.pull is not None:  # of the state without friction: its load errs as that with it does
+        loader.equilibrium.solve(loader.equilibrium.road_height)
     found = load_error(loader, state.rolling)
     if isinstance(found, str):
         observe.say(f"  error of the load not estimated: {found}")
@@ -182,7 +189,7 @@ def _estimate(record: Record, state: StaticState, loader: Loader) -> StaticState
     for name in _EXTENT[:2]:
         size = getattr(state.footprint(), name)
         record.indicators[f"footprint {name} on the elements of the run"] = (size, "m")
-    return replace(state, told=found.extent)
+    return state if state.pull is not None else replace(state, told=found.extent)
 
 
 def _show(progress) -> None:
@@ -211,40 +218,3 @@ def _describe(record: Record, state: StaticState, loader: Loader) -> None:
         record.indicators["largest penetration"] = (state.penetration, "m")
     record.headline["rolling radius"] = (state.rolling_radius(), "m")
     record.indicators["Newton steps"] = (loader.newton_steps, "-")
-
-
-def _fill(file, state: StaticState, tire: TireModel) -> None:
-    lattice = tire.lattice
-    put(file, "mesh/points", lattice.points(np.arange(lattice.size)), "m")
-    put(file, "mesh/cells", lattice.cells(), "-")
-    put(file, "displacement", state.displacement, "m")
-    put(file, "surface/points", state.points, "m")
-    put(file, "surface/displacement", state.moved, "m")
-    put(file, "surface/quads", lattice.quads(), "-")
-    put(file, "surface/force", state.force, "N")
-    put(file, "surface/area", state.area, "m2")
-    put(file, "surface/half_sizes", state.half_sizes, "m")
-    put(file, "surface/ring_rate", state.ring_rate, "m/rad")
-    cords_file.fill(file, state)
-    file.attrs["touch_height"] = state.touch_height
-    file.attrs["inflation"] = state.inflation
-    file.attrs["load"] = state.load
-    file.attrs["rolling_speed"] = state.rolling.speed
-    file.attrs["rolling_inertia"] = state.rolling.inertia
-    file.attrs["rolling_radius"] = state.rolling_radius()
-    if state.road_height is None:
-        return
-    file.attrs["camber"] = float(np.degrees(state.road.camber))
-    if state.road.drum_radius is not None:
-        file.attrs["drum_radius"] = state.road.drum_radius
-    near = np.flatnonzero(state.gap < tire.section.thickness)
-    put(file, "contact/index", near, "-")
-    put(file, "contact/points", state.positions[near], "m")
-    put(file, "contact/force", state.push[near], "N")
-    put(file, "contact/gap", state.gap[near], "m")
-    put(file, "contact/area", state.area[near], "m2")
-    put(file, "contact/pressure", state.pressure[near], "Pa")
-    file.attrs["road_height"] = state.road_height
-    file.attrs["deflection"] = state.deflection
-    for name, value in asdict(state.footprint()).items():
-        file.attrs[f"footprint_{name}"] = value

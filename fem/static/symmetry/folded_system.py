@@ -29,11 +29,13 @@ class FoldedSystem:
     def raising(self) -> Moved:
         return self._inner.raising
 
-    def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
+    def take(
+        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+    ) -> bool:
         """Fold and factorise; `matrix` stays as it is. Collective."""
         with self._timing("assembly"):
             self._folding.fill(matrix)
-        return self._inner.take(self._folding.matrix, held, closing)
+        return self._inner.take(self._folding.matrix, held, closing, raising)
 
     def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Motion (m) of all owned dofs under folded forces (N), and force (N) at the held ones. Collective."""

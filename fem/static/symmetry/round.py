@@ -69,7 +69,9 @@ class RoundSystem:
         self.closing = self.raising = Moved(np.zeros(turned.shape[0]), np.zeros(turned.shape[0]))
         self._factor: SuperLU | None = None
 
-    def take(self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray) -> bool:
+    def take(
+        self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
+    ) -> bool:
         """Factorise; False when the matrix is singular."""
         rows, columns, values = matrix.getValuesCSR()
         whole = sparse.csr_matrix((values, columns, rows), matrix.getSize())

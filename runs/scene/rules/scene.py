@@ -150,6 +150,11 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     if not static.on_road:
         raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
     contact = scene.contact
+    if static.friction is not None and contact.rubs:
+        raise error(
+            ("static", "friction"),
+            "and the bristles of contact.brush_stiffness carry the same horizontal forces: keep one of them",
+        )
     standing = scene.rotation is None or scene.rotation.speed == 0
     check_tread(contact, standing, error)
     rotation = scene.rotation

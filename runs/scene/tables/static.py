@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tireroad.runs.scene.schema import flag, number
+from tireroad.runs.scene.schema import flag, integer, number
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,21 @@ class Static:
         "right (-y)",
         least=-20,
         most=20,
+    )
+    friction: float | None = number(
+        None,
+        "-",
+        "coefficient of Coulomb friction between tire and road in the static state, on a level road; absent: none. A "
+        "tire that stands sticks and slips as it is pressed on, one that rolls as its tread passes, its wheel rolling freely "
+        "but for contact.slip and rotation.slip_angle",
+        least=0,
+        most=10,
+    )
+    friction_steps: int = integer(
+        10,
+        "steps in which a standing tire with friction is pressed on the road",
+        least=1,
+        most=1000,
     )
     steady_rolling: bool = flag(
         True,

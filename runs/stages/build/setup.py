@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -21,6 +20,7 @@ from tireroad.runs.stages.base.stage import Done, Shared
 from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.pattern import make_pattern
 from tireroad.runs.stages.build.rolling.stepping import run_time
+from tireroad.runs.stages.build.turning import wheel_slip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,11 +59,8 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
 
 def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup:
     """With the scene's slip and slip angle; of a wheel that is to roll freely with the slip of its static shape too."""
-    rotation, (along, across) = job.scene.rotation, job.scene.contact.slip
-    if rotation is None:
-        return replace(setup, slip=(along, across))
-    slip = along, across + math.tan(math.radians(rotation.slip_angle))
-    if not rotation.free_rolling:
+    rotation, slip = job.scene.rotation, wheel_slip(job.scene)
+    if rotation is None or not rotation.free_rolling:
         return replace(setup, slip=slip)
     given = state.positions, job.tire.lattice.ring, state.shape, rolling_radius(job, state)
     return replace(setup, slip=slip, shape_slip=shape_slip(*given))

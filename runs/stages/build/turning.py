@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
+from tireroad.fem.static.friction.press import Friction
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.turning import Turning
 from tireroad.modal.damping import Damping, Proportional, StrainEnergy
+from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.base.job import Job
 
 
@@ -22,6 +26,25 @@ def rolling_shape(turning: Turning) -> Rolling:
     mass, stiffness = (0.0, 0.0) if isinstance(turning.damping, StrainEnergy) else turning.damping
     return Rolling(
         speed=turning.speed, damping=mass, stiffness_damping=stiffness, inertia=turning.inertia
+    )
+
+
+def wheel_slip(scene: Scene) -> tuple[float, float]:
+    """The scene's slip of the wheel (s_x, s_y), its slip angle included."""
+    along, across = scene.contact.slip if scene.contact else (0.0, 0.0)
+    angle = scene.rotation.slip_angle if scene.rotation else 0.0
+    return along, across + math.tan(math.radians(angle))
+
+
+def friction_of(scene: Scene, rolling: Rolling) -> Friction | None:
+    """Friction of the static state that rolls so; None of a scene without."""
+    static, rotation = scene.static, scene.rotation
+    if static.friction is None:
+        return None
+    if not rolling.speed or rotation is None:
+        return Friction(coefficient=static.friction, steps=static.friction_steps)
+    return Friction(
+        coefficient=static.friction, radius=rotation.rolling_radius, slip=wheel_slip(scene)
     )
 
 

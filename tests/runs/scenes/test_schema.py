@@ -139,6 +139,16 @@ to = 20.0
 step = 10.0
 """
 )
+RUBBING = (
+    TIRE
+    + """
+[static]
+load = 100.0
+friction = 0.5
+[modal]
+count = 4
+"""
+)
 # What a search reads, before and between runs (tests/runs/families/test_search.py).
 UNREAD = {
     f"Accuracy.{name}" for name in ("target", "target_db", "of", "search", "trials", "budget")
@@ -232,6 +242,7 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
             "stiffness.deflections=[0.001]",
             "stiffness.which=vertical",
         )
+        _run(tmp_path / "rubbing", RUBBING)
         _run(tmp_path / "full", FULL)
         (tmp_path / "drawing.toml").write_text(DRAWING)
         for section in ('section = "radial"', 'mesh = "drawing.toml"'):

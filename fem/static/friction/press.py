@@ -1,0 +1,136 @@
+"""Friction in the state of a tire that was found without: along the way to it, or as it rolls on.
+
+What sticks and slips under a tire that stands depends on how it came to stand: it is pressed on the road once more, from
+the inflated tire on, in equal steps. Under one that rolls steadily it does not: the frictionless state is the start of
+Newton's method, and the travel in a radian at which a free wheel's horizontal force vanishes is found by secants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import root_scalar
+
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.static.friction.balance import RubbingEquilibrium
+from tireroad.fem.static.friction.sliding import Passing, Standing
+from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.path.step import Step
+from tireroad.fem.static.path.stepping import Show
+from tireroad.fem.static.state import static_state
+
+_NEAR, _CLOSE = 1e-4, 1e-8  # of the travel: the first other one tried, and where secants end
+_MOST = 40  # of them
+
+
+@dataclass(frozen=True, kw_only=True)
+class Friction:
+    """`coefficient` mu; `steps` in which a standing tire is pressed on the road. Of one that rolls: its `slip` (s_x, s_y),
+    > 0 driving and drifting towards +y, and the `radius` (m) it travels in a radian without slip, None: at which no
+    horizontal force drags on it.
+    """
+
+    coefficient: float
+    steps: int = 10
+    radius: float | None = None
+    slip: tuple[float, float] = (0.0, 0.0)
+
+
+def with_friction(
+    loader: Loader, inflated: np.ndarray, load: float | None, friction: Friction
+) -> Loader:
+    """The `loader`'s state on the road, with friction; `inflated` is its body's `u` before there was a road, `load` (N)
+    what the road has to carry, None: it stays where it is. InputError on roads that are no level plane. Collective.
+    """
+    equilibrium = loader.equilibrium
+    if not equilibrium.shape.flat:
+        raise InputError("static.friction is of a level road: without camber and drum")
+    if equilibrium.rolling.speed:
+        return _rolling(loader, load, friction)
+    return _pressed(loader, inflated, load, friction)
+
+
+def _on(
+    loader: Loader, sliding: Standing | Passing, friction: Friction
+) -> tuple[Loader, RubbingEquilibrium]:
+    old = loader.equilibrium
+    equilibrium = RubbingEquilibrium(loader.body, old.rolling, friction.coefficient, sliding)
+    equilibrium.pressure.value = float(old.pressure.value)
+    other = Loader(equilibrium, loader.report)
+    other.begin_at(loader)
+    return other, equilibrium
+
+
+def _pressed(
+    loader: Loader, inflated: np.ndarray, load: float | None, friction: Friction
+) -> Loader:
+    """Standing: each step slips as much as it does from the last on; the last one carries the load."""
+    deflection, body = loader.deflection, loader.body
+    body.u.x.array[:] = inflated
+    sliding = Standing(body)
+    rubbing, _ = _on(loader, sliding, friction)
+    size, done = deflection / friction.steps, 0.0
+
+    def attempt(reached: float) -> Step:
+        return rubbing.equilibrium.solve(rubbing.touch + reached)
+
+    for number in range(1, friction.steps + 1):
+        sliding.commit()
+        further = deflection * number / friction.steps
+        rubbing.march(attempt, further, size, Show("deflection with friction", 1.0, "m"), done)
+        done = further
+    if load is not None:
+        _checked(rubbing, rubbing.equilibrium.solve(rubbing.touch + deflection, load))
+    return rubbing
+
+
+def _rolling(loader: Loader, load: float | None, friction: Friction) -> Loader:
+    radius = friction.radius
+    if radius is None:
+        radius = static_state(loader.equilibrium, loader.touch).rolling_radius()
+    sliding = Passing(loader.body, radius)
+    height, force = loader.equilibrium.road_height, loader.equilibrium.contact_force()
+    rubbing, problem = _on(loader, sliding, friction)
+    road = problem.road
+    assert height is not None, "there is no road"
+    road.take(force, height)
+
+    def drag(trial: float) -> float:
+        sliding.radius = trial
+        _checked(rubbing, problem.solve(road.height, load))
+        return float(rubbing.body.comm.allreduce(road.pull[:, 0].sum()))
+
+    drag(radius)
+    if friction.radius is None:
+        sliding.radius = _free(drag, radius, rubbing.load())
+    if any(friction.slip):
+        sliding.slip = friction.slip
+        drag(sliding.radius)
+    return rubbing
+
+
+def _free(drag: Callable[[float], float], radius: float, load: float) -> float:
+    """The travel (m) in a radian at which `drag` (N) vanishes."""
+    near = radius * (1 - _NEAR)
+    found = root_scalar(
+        drag, method="secant", x0=radius, x1=near, xtol=_CLOSE * radius, maxiter=_MOST
+    )
+    left = drag(found.root)
+    if not (found.converged and abs(left) < 1e-4 * load):
+        raise ConvergenceError(
+            f"static: no free rolling with friction: at {found.root:.6g} m in a radian {left:.3g} N are left. "
+            "Give rotation.rolling_radius (m), or a smaller static.friction"
+        )
+    return float(found.root)
+
+
+def _checked(rubbing: Loader, step: Step) -> None:
+    rubbing.newton_steps += step.iterations
+    if not step.converged:
+        raise ConvergenceError(
+            f"static: with friction no balance is found ({step.reason}): take a smaller static.friction, "
+            "smaller elements at the footprint (tire.footprint_size), or more static.friction_steps"
+        )
+    rubbing.tell("deflection with friction", rubbing.deflection, "m", step)

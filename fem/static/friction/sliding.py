@@ -1,0 +1,127 @@
+"""How far each node of the tread has slid on the road: since the last load step, or since the node ahead of it.
+
+A tire that stands slides by g = (x - d) - (x - d)_before from one load step to the next, x its place and d the road's.
+One that rolls steadily does so under nodes that stand still: the material at the angle theta comes from the node ahead,
+at theta + D, while the road passes by r D, r the wheel's travel in a radian. It slides meanwhile by
+
+    g = x(theta) - x(theta + D) + D r (1 - s_x, s_y),
+
+s_x > 0 of a wheel that drives, s_y > 0 of one that drifts towards +y (contact.tread.brush). Where it sticks, g = 0: the
+steps along a streamline add up to the convective rate of the stuck displacement, whatever their length.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from tireroad.fem.tire.body import Body
+
+Array = np.ndarray
+
+
+class Sliding(Protocol):
+    """Of the owned tread nodes, n of them in the order of `body.tread`."""
+
+    def slid(self) -> Array:
+        """g (n, 2) m. Collective."""
+        ...
+
+    def commit(self) -> None:
+        """The present state is where the next load step begins. Collective."""
+        ...
+
+    def led(self, sticks: Array) -> tuple[Array, Array, Array]:
+        """Of the nodes that stick (n,) bool those that move with a node ahead of their own: numbers in n (k,), that node's
+        number among all blocks of three unknowns (k,), and how far each lags behind it, (k, 2) m: what g says
+        from node to node. Collective."""
+        ...
+
+    def ahead(self, members: Array) -> Array:
+        """Numbers among all blocks of the nodes ahead of some (indices into n); -1: there is none. Not collective."""
+        ...
+
+
+class Standing:
+    """`place` (2,) m: where the road has moved to, along and across."""
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._points = body.space.tabulate_dof_coordinates()[body.tread, :2]
+        self.place = np.zeros(2)
+        self.commit()
+
+    def _relative(self) -> Array:
+        moved = self._body.owned(self._body.u.x.array)[self._body.tread, :2]
+        return self._points + moved - self.place
+
+    def slid(self) -> Array:
+        return self._relative() - self._before
+
+    def commit(self) -> None:
+        self._before = self._relative()
+
+    def led(self, sticks: Array) -> tuple[Array, Array, Array]:
+        nothing = np.zeros(0, np.intp)
+        return nothing, nothing, np.zeros((0, 2))
+
+    def ahead(self, members: Array) -> Array:
+        return np.full(len(members), -1)
+
+
+class Passing:
+    """`radius` m: how far the wheel travels in a radian; `slip` (s_x, s_y)."""
+
+    def __init__(self, body: Body, radius: float, slip: tuple[float, float] = (0.0, 0.0)) -> None:
+        self._body, lattice = body, body.lattice
+        self.radius, self.slip = radius, slip
+        self._around, self._along = lattice.face_shape
+        self._points = lattice.points(lattice.face)[:, :2]
+        number = body.space.dofmap.index_map.local_range[0] + np.arange(body.nodes)
+        self._number = body.surface(number.astype(float)).astype(np.int64)
+        where = np.zeros(body.nodes, np.intp)
+        where[body.surface.local] = body.surface.place
+        self._own = where[body.tread]
+        i, j = np.divmod(np.arange(len(self._points)), self._along)
+        self._next = (i + 1) % self._around * self._along + j
+        self._angle = (np.roll(lattice.ring, -1) - lattice.ring)[i] % (2 * np.pi)
+
+    def _steps(self) -> Array:
+        """g (s, 2) m of all nodes of the outer face. Collective."""
+        moved = self._body.surface(self._body.owned(self._body.u.x.array))[:, :2]
+        place = self._points + moved
+        travel = self.radius * np.array([1.0 - self.slip[0], self.slip[1]])
+        return place - place[self._next] + self._angle[:, None] * travel
+
+    def slid(self) -> Array:
+        return self._steps()[self._own]
+
+    def commit(self) -> None:
+        """Nothing: a steady state has no past."""
+
+    def led(self, sticks: Array) -> tuple[Array, Array, Array]:
+        body = self._body
+        flags = np.zeros(body.nodes)
+        flags[body.tread] = sticks
+        stuck = (body.surface(flags) > 0).reshape(self._around, self._along)
+        steps = self._steps().reshape(self._around, self._along, 2)
+        if stuck.all(axis=0).any():
+            raise AssertionError("a streamline sticks all round")
+        lead = np.arange(stuck.size).reshape(stuck.shape)
+        lag = np.zeros_like(steps)
+        # Against the way of the material, twice round: from each node to the first one ahead that is free.
+        for i in range(2 * self._around - 1, -1, -1):
+            here, front = i % self._around, (i + 1) % self._around
+            on = stuck[here]
+            lead[here] = np.where(on, lead[front], lead[here])
+            lag[here] = np.where(on[:, None], lag[front] + steps[here], 0.0)
+        own = self._own[sticks]
+        return (
+            np.flatnonzero(sticks),
+            self._number[lead.ravel()[own]],
+            lag.reshape(-1, 2)[own],
+        )
+
+    def ahead(self, members: Array) -> Array:
+        return self._number[self._next[self._own[members]]]

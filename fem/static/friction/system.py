@@ -1,0 +1,115 @@
+"""The linearised equilibrium of a tire that sticks and slips: what `HeldSystem` is without friction.
+
+    (L K + S) P dv = L (- out) - springs,     du = P dv:
+
+L adds to the horizontal rows of nodes that slip -mu n times their vertical one; S are the springs across their way; P
+takes nodes that stick along with the free one ahead of them on their streamline. None of it is symmetric.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
+
+from tireroad.fem.static.friction.road import RubbingRoad
+from tireroad.fem.static.held_system import HeldSystem, Moved
+from tireroad.fem.timing import Timing
+
+Array = np.ndarray
+
+
+class RubbingSystem:
+    """Of the `road`'s present sets at each `take`. All methods are collective."""
+
+    def __init__(self, comm: MPI.Comm, matrix: PETSc.Mat, timing: Timing, road: RubbingRoad):
+        self._comm, self._timing, self._road = comm, timing, road
+        self._inner = HeldSystem(comm, matrix, "lu", timing)
+        self._carried: PETSc.Mat | None = None
+
+    @property
+    def closing(self) -> Moved:
+        """As of a HeldSystem, in dv."""
+        return self._inner.closing
+
+    @property
+    def raising(self) -> Moved:
+        """As of a HeldSystem, in dv."""
+        return self._inner.raising
+
+    def take(self, matrix: PETSc.Mat, held: Array, closing: Array, raising: Array) -> bool:
+        """Factorise; `matrix` is of no use afterwards."""
+        with self._timing("road"):
+            system = self._joined(matrix)
+        found = self._inner.take(system, held, closing, raising)
+        if system is not matrix:
+            system.destroy()
+        return found
+
+    def solve(self, right: Array, moved: Moved | None = None) -> tuple[Array, Array]:
+        """du (m) of the owned dofs, and forces (N) at the held ones; `right` is L's already (`RubbingRoad.rows`)."""
+        change, force = self._inner.solve(right, moved)
+        if self._carried is None:
+            return change, force
+        before, after = self._carried.createVecs()
+        before.array[:] = change
+        self._carried.mult(before, after)
+        change = after.array_r.copy()
+        before.destroy()
+        after.destroy()
+        return change, force
+
+    def _joined(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """(L K + S) P."""
+        self._road.linearise()
+        same = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
+        rows, springs = self._rows_and_springs(matrix)
+        added = rows.matMult(matrix)
+        matrix.axpy(1.0, added, same)
+        matrix.axpy(1.0, springs, same)
+        for part in (rows, springs, added):
+            part.destroy()
+        if self._carried is not None:
+            self._carried.destroy()
+        self._carried = self._along(matrix)
+        return matrix if self._carried is None else matrix.matMult(self._carried)
+
+    def _rows_and_springs(self, matrix: PETSc.Mat) -> tuple[PETSc.Mat, PETSc.Mat]:
+        first = matrix.getOwnershipRange()[0]
+        unknowns, shares, springs, ahead = self._road.couplings()
+        vertical = unknowns[:, :1] - unknowns[:, :1] % 3 + 2 + first
+        rows = _sparse(matrix, unknowns, np.broadcast_to(vertical, unknowns.shape), shares)
+        row = np.broadcast_to(unknowns[:, :, None], springs.shape)
+        own = np.broadcast_to(unknowns[:, None, :] + first, springs.shape)
+        far = np.broadcast_to((3 * ahead[:, None] + np.arange(2))[:, None, :], springs.shape)
+        led = np.broadcast_to((ahead >= 0)[:, None, None], springs.shape)
+        return rows, _sparse(
+            matrix,
+            np.concatenate([row.ravel(), row[led]]),
+            np.concatenate([own.ravel(), far[led]]),
+            np.concatenate([springs.ravel(), -springs[led]]),
+        )
+
+    def _along(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
+        """P; None where nothing is taken along on any process."""
+        road, first = self._road, matrix.getOwnershipRange()[0]
+        members, lead, _ = road.sliding.led(road.sticks)
+        if not self._comm.allreduce(len(members)):
+            return None
+        count = matrix.getLocalSize()[0]
+        own = road.dofs[members, None] - [2, 1]
+        rows = np.concatenate([np.arange(count), own.ravel()])
+        columns = np.concatenate(
+            [np.arange(count) + first, (3 * lead[:, None] + np.arange(2)).ravel()]
+        )
+        return _sparse(matrix, rows, columns, np.ones(len(rows)))
+
+
+def _sparse(matrix: PETSc.Mat, rows: Array, columns: Array, values: Array) -> PETSc.Mat:
+    """A matrix of the shape of another one, from local rows and global columns; entries that meet add up."""
+    (count, whole), _ = matrix.getSizes()
+    entries = np.ravel(values), (np.ravel(rows), np.ravel(columns))
+    local = sparse.csr_matrix(entries, shape=(count, whole))
+    parts = (part.astype(PETSc.IntType) for part in (local.indptr, local.indices))
+    return PETSc.Mat().createAIJ(matrix.getSizes(), csr=(*parts, local.data), comm=matrix.comm)

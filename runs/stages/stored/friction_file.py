@@ -1,0 +1,49 @@
+"""The friction of a static state: in static.h5, and in its headline."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+
+from tireroad.fem.static.state import StaticState
+from tireroad.runs.files.store import put
+
+_SMALL = 1e-6  # of mu f: what a node that slips may be off it
+
+
+def fill(file: h5py.File, state: StaticState) -> None:
+    """Write `surface/pull` (s, 2) N and the travel in a radian; nothing without friction."""
+    if state.pull is None:
+        return
+    put(file, "surface/pull", state.pull, "N")
+    file.attrs["horizontal_force"] = state.pull.sum(axis=0)
+    file.attrs["moment"] = state.moment
+    if state.travel is not None:
+        file.attrs["travel"] = state.travel
+
+
+def read(file: h5py.File) -> dict:
+    """What `fill` wrote, as fields of a static state."""
+    if "pull" not in file["surface"]:
+        return {}
+    travel = file.attrs.get("travel")
+    return {
+        "pull": file["surface/pull"][:],
+        "travel": None if travel is None else float(travel),
+    }
+
+
+def headline(state: StaticState, friction: float | None) -> dict[str, tuple[float, str]]:
+    """Resultant force, torque on the axle, moment about the vertical through the axle, and how much of the load sticks."""
+    if state.pull is None or friction is None:
+        return {}
+    force, size = state.pull.sum(axis=0), np.linalg.norm(state.pull, axis=1)
+    sticks = size < (1 - _SMALL) * friction * state.force
+    share = state.force[sticks].sum() / state.force.sum()
+    return {
+        "horizontal force, forward": (float(force[0]), "N"),
+        "horizontal force, left": (float(force[1]), "N"),
+        "torque on the axle": (float(state.moment[1]), "N m"),
+        "moment about the vertical": (float(state.moment[2]), "N m"),
+        "share of the load that sticks": (float(100 * share), "%"),
+    }
