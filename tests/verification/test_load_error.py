@@ -4,8 +4,6 @@ Soft torus, 0.2 MPa, road at z = -0.3184244 m, 4 mm above first touch: 30 x 14 e
 footprint cut in two once and twice, carry 531.50, 532.26, 532.59 N, so 532.8 N (0.1 %) in the limit.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from mpi4py import MPI
