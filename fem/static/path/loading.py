@@ -46,6 +46,7 @@ class Loader:
         self.report = report
         self.newton_steps = 0
         self._touch: float | None = None
+        self._half_ring: _Half | None = None
 
     def inflate(self, pressure: float) -> None:
         """Inflation from 0 to `pressure` (Pa), without a road; also the steady-rolling loads alone.
@@ -66,6 +67,11 @@ class Loader:
 
         before = self.body.u.x.array.copy()
         self.body.set_displacement(on_root(self.body.comm, shape))
+        half = self._half()
+        if half is not None:  # elements of several lengths are not round to rounding
+            half.loader.newton_steps += half.loader._solve_at(pressure).iterations
+            self._count(half)
+            self.body.set_displacement(half.equilibrium.on(self.body.lattice)[0])
         step = self._solve_at(pressure)
         self.newton_steps += step.iterations
         if step.converged:
@@ -138,19 +144,24 @@ class Loader:
         rolling = self.equilibrium.rolling
         if not (self.equilibrium.shape.flat and looks_the_same(self.body.ring, rolling)):
             return None
-        equilibrium = HalfTurnEquilibrium(self.body, rolling)
-        equilibrium.start(self.equilibrium)
-        loader = Loader(equilibrium, self.report)
-        loader._touch = self._touch
-        return _Half(loader, equilibrium)
+        if self._half_ring is None:
+            equilibrium = HalfTurnEquilibrium(self.body, rolling)
+            self._half_ring = _Half(Loader(equilibrium, self.report), equilibrium)
+        self._half_ring.equilibrium.start(self.equilibrium)
+        self._half_ring.loader._touch = self._touch
+        return self._half_ring
 
     def _taken_over(self, half: _Half) -> bool:
         """Put the state of half the ring on the whole; whether it is balance there too. Collective."""
+        self._count(half)
         other = half.equilibrium
+        return self.equilibrium.resume(*other.on(self.body.lattice), other.road_height).converged
+
+    def _count(self, half: _Half) -> None:
+        """Tangents and seconds of half the ring are the tire's."""
         self.newton_steps += half.loader.newton_steps
         half.loader.newton_steps = 0
-        self.equilibrium.cost.take(other.cost)
-        return self.equilibrium.resume(*other.on(self.body.lattice), other.road_height).converged
+        self.equilibrium.cost.take(half.equilibrium.cost)
 
     def _by_half(self, press: Callable[[Loader], object]) -> bool:
         """Press half of the ring, if that is of use; whether it was. An error leaves the whole in the last state of

@@ -93,6 +93,7 @@ class HalfTurnEquilibrium(Equilibrium):
     def start(self, whole: Equilibrium) -> None:
         """Start from the present state of the whole body, inflated and without a road. Collective."""
         self.body.set_displacement(whole.body.displacement())  # the half's nodes are its first ones
+        self.road.active[:], self.road.force[:] = False, 0.0
         self.pressure.value = float(whole.pressure.value)
 
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tireroad.contact.patch import Patch
-from tireroad.contact.results.chatter import LIMIT, warning
+from tireroad.contact.results.chatter import LIMIT, ROAD, Chosen, warning
 from tireroad.contact.results.totals import Totals
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.build.rolling.stepping import Integration
@@ -32,10 +32,14 @@ def describe(record: Record, counted: Totals, solver, chosen: Integration, taken
         "factorisations": (solver.factorisations, "-"),
         "points that change back from step to step, at worst": (chattering, "-"),
     }
-    if chattering > LIMIT:
-        record.warnings.append(warning(chattering))
     if totals.least == 0:
         record.warnings.append("the tire lost contact with the road for a while")
+
+
+def alternation(record: Record, worst: float, scheme: Chosen) -> None:
+    """A warning where points open and close from step to step, unless that was found to be the road."""
+    if worst > LIMIT and scheme.reason != ROAD:
+        record.warnings.append(warning(worst))
 
 
 def points(record: Record, patch: Patch, relief: float) -> None:

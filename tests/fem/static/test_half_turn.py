@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.held_system import HeldSystem
 from tireroad.fem.static.path import loading
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.symmetry.half_turn import looks_the_same
@@ -39,14 +40,19 @@ def _loaded(body, rolling=AT_REST) -> Loader:
 @pytest.mark.slow
 @pytest.mark.parametrize("rolling", [AT_REST, Rolling(speed=40.0)])
 def test_half_the_ring_finds_the_state_of_the_whole(make_body, monkeypatch, rolling):
-    """Displacement, force of every node and deflection; the whole takes no tangent of its own."""
-    taken = []
+    """Displacement, force of every node and deflection; the whole factorises no tangent of its own, inflated or loaded."""
+    taken, factorised = [], []
+    take = HeldSystem.take
+    monkeypatch.setattr(
+        HeldSystem, "take", lambda *given: factorised.append(given[1].getSize()[0]) or take(*given)
+    )
     resume = Equilibrium.resume
     monkeypatch.setattr(
         Equilibrium, "resume", lambda *state: taken.append(resume(*state)) or taken[-1]
     )
     half = _loaded(_tire(make_body), rolling)
     assert [step.iterations for step in taken] == [0]
+    assert max(factorised) == 3 * _tire(make_body).lattice.shape[1] * 9  # nodes at 9 of 16 angles
     monkeypatch.setattr(loading, "looks_the_same", lambda ring, rolling: False)
     whole = _loaded(_tire(make_body), rolling)
     assert half.load() == pytest.approx(LOAD, rel=1e-9)
