@@ -60,7 +60,9 @@ def _more(cost: np.ndarray, held: np.ndarray) -> float:
 def _run(folder: Path, name: str, duration: float) -> tuple[float, int]:
     """Processor seconds of a run, of whose stages only the contact is not there yet; its points."""
     folder.mkdir(parents=True, exist_ok=True)
-    scene = load(write_scene(folder / "given.toml", MESH, duration=duration, step=STEP), AXLES[name])
+    scene = load(
+        write_scene(folder / "given.toml", MESH, duration=duration, step=STEP), AXLES[name]
+    )
     began = time.process_time()
     run = run_scene(scene, folder, MPI.COMM_WORLD, until="contact", fresh=False, petsc_options=[])
     return time.process_time() - began, len(run.setup.patch.points)
