@@ -7,7 +7,7 @@ import numpy as np
 from tireroad.contact.results.totals import Totals
 from tireroad.runs.measure.synthetic import oval_patch
 from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.stored.contact_figures import excursion
+from tireroad.runs.stages.stored.contact_figures import excursion, points
 
 
 def block(displacement: np.ndarray, **more: np.ndarray) -> dict[str, np.ndarray]:
@@ -41,3 +41,16 @@ def test_beyond_a_third_of_the_deflection_it_is_said() -> None:
     excursion(record, 4e-3, 0.01)
     assert "0.4 of the static deflection of 10 mm" in record.warnings[0]
     excursion(record, 4e-3, None)
+
+
+def test_a_footprint_of_few_points_is_told_where_the_road_has_heights() -> None:
+    few, many = (oval_patch(count, (0.015, 0.02), 500.0) for count in ((9, 5), (9, 9)))
+    assert few.touching.tolist() == [5, 3]
+    record = Record()
+    points(record, few, 0.0)
+    points(record, many, 1e-3)
+    assert not record.warnings
+    points(record, few, 1e-3)
+    assert "5 contact points long and 3 wide" in record.warnings[0]
+    points(record, replace(few, force=0 * few.force), 1e-3)
+    assert len(record.warnings) == 1
