@@ -54,13 +54,18 @@ class Patch:
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
     @property
+    def spacing(self) -> np.ndarray:
+        """From one point to the next along and across (2,), m, where they touch at rest; 0 where none does."""
+        held = self.force > 0
+        return 2 * np.median(self.half_sizes[held], axis=0) if held.any() else np.zeros(2)
+
+    @property
     def touching(self) -> np.ndarray:
         """How many points the footprint at rest is long and wide (2,), by its extent and a point's own; 0 without one."""
         held = self.force > 0
         if not held.any():
             return np.zeros(2)
-        size = 2 * np.median(self.half_sizes[held], axis=0)
-        return np.rint(np.ptp(self.points[held, :2], axis=0) / size) + 1
+        return np.rint(np.ptp(self.points[held, :2], axis=0) / self.spacing) + 1
 
     def check_edge(self, force: np.ndarray, time: np.ndarray, reach: float) -> None:
         """Raise ConvergenceError when a point on the edge touches: those beyond it may touch too.

@@ -149,7 +149,7 @@ class ContactStage(Stage[ContactHistory]):
             file.finish()
         contact_figures.describe(record, totals, loop.solver, chosen, chosen.steps - done)
         contact_figures.alternation(record, totals.alternation.worst, scheme)
-        contact_figures.points(record, setup.patch, setup.relief)
+        contact_figures.points(record, setup.patch, self.static.product.footprint(), setup.relief)
         contact_figures.excursion(record, totals.figures.excursion, self.static.product.deflection)
         pattern.describe(record, setup)
         road_file.describe(record, setup)
