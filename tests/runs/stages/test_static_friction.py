@@ -6,6 +6,9 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.files.read import Results
+from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.sections.tire import friction
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
 
@@ -45,6 +48,10 @@ def test_nothing_moves_on_a_flat_road_and_the_axle_bears_the_side_force(tmp_path
     run_scene(scene, tmp_path, MPI.COMM_SELF, until="contact", fresh=False, petsc_options=[])
     with h5py.File(tmp_path / "static.h5") as static, h5py.File(tmp_path / "contact.h5") as loop:
         side = static.attrs["horizontal_force"]
+        with Results(tmp_path, {}) as results:
+            facts = dict(friction(results))
+        assert facts["to the left"] == quantity(round(side[1], 6), "N")
+        assert len(facts) == 4
         assert np.allclose(static["surface/pull"][:].sum(axis=0), side)
         assert np.allclose(static["contact/force"][:].sum(axis=0), [*side, 800.0], rtol=1e-6)
         assert static.attrs["travel"] == static.attrs["rolling_radius"]
