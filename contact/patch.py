@@ -20,7 +20,8 @@ class Patch:
     (c,) marks its outermost points, which should never touch. `weights` W (c, p) takes nodal values to
     the points; None: the points are the nodes. `places`: where they lie on a regular grid, or None.
     Points of equal `line` (c,) int follow each other in the rolling direction. `frames` (c, 3, 3): unit vectors along,
-    across and normal to the road in the wheel's axes, along which forces and displacements are counted; None: x, y, z.
+    across and normal to the road in the wheel's axes, along which forces and displacements are counted; None: x, y, z. `pull` (c, 2) N: horizontal forces of a static state with
+    friction, which stay as they are; None without.
     """
 
     index: np.ndarray
@@ -33,6 +34,7 @@ class Patch:
     weights: sparse.csr_matrix | None = None
     places: GridPlaces | None = None
     frames: np.ndarray | None = None
+    pull: np.ndarray | None = None
 
     def resultant(self, force: np.ndarray, horizontal: np.ndarray) -> np.ndarray:
         """(3,) N in the wheel's axes of forces normal to the road (c,) and along and across it (c, 2)."""
@@ -52,13 +54,18 @@ class Patch:
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
     @property
+    def spacing(self) -> np.ndarray:
+        """From one point to the next along and across (2,), m, where they touch at rest; 0 where none does."""
+        held = self.force > 0
+        return 2 * np.median(self.half_sizes[held], axis=0) if held.any() else np.zeros(2)
+
+    @property
     def touching(self) -> np.ndarray:
         """How many points the footprint at rest is long and wide (2,), by its extent and a point's own; 0 without one."""
         held = self.force > 0
         if not held.any():
             return np.zeros(2)
-        size = 2 * np.median(self.half_sizes[held], axis=0)
-        return np.rint(np.ptp(self.points[held, :2], axis=0) / size) + 1
+        return np.rint(np.ptp(self.points[held, :2], axis=0) / self.spacing) + 1
 
     def check_edge(self, force: np.ndarray, time: np.ndarray, reach: float) -> None:
         """Raise ConvergenceError when a point on the edge touches: those beyond it may touch too.

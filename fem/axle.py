@@ -61,6 +61,11 @@ class Axle:
         return [k for k, name in enumerate(DIRECTIONS) if name not in self.locked]
 
     @property
+    def taking_part(self) -> list[int]:
+        """Which of the seven motions of rim and body are coordinates."""
+        return self.moving + [6] * self.has_body
+
+    @property
     def has_body(self) -> bool:
         """Whether a body moves beside the wheel."""
         return self.body_mass is not None and _VERTICAL in self.moving

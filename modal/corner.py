@@ -24,7 +24,7 @@ from scipy import linalg, sparse
 from tireroad.fem.axle import DIRECTIONS, Axle
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
-from tireroad.fem.matrices.rim_motion import RimMotion
+from tireroad.fem.matrices.rim_motion import RimMotion, carried_pencil
 
 BODY = 6  # place of the body's height after the rim's six motions
 SEEN = (
@@ -54,7 +54,7 @@ class Corner:
     @property
     def taking_part(self) -> list[int]:
         """Which of the seven motions of rim and body are coordinates."""
-        return self.axle.moving + [BODY] * self.axle.has_body
+        return self.axle.taking_part
 
     @property
     def count(self) -> int:
@@ -75,11 +75,13 @@ class Corner:
 
     def inertia(self, air_mass: float = 0.0) -> np.ndarray:
         """J (7, 7) of tire, wheel, `air_mass` (kg) and body."""
-        out = np.zeros((SEEN, SEEN))
-        out[:BODY, :BODY] = self.own_mass + self.axle.mass
+        out = self._own_pencil(0.0)[0]
         out[range(3), range(3)] += air_mass
-        out[BODY, BODY] = self.axle.body_mass or 1.0
         return out
+
+    def _own_pencil(self, speed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        whole = {name: getattr(self, f"own_{name}") for name in _PER_MODE}
+        return carried_pencil(self.axle, whole, speed)
 
     def change(self, momentum: np.ndarray, air_mass: float = 0.0) -> np.ndarray:
         """T (n + c, n + c) with (eta, xi) = T (q, x), `momentum` as P above."""
@@ -96,13 +98,10 @@ class Corner:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Damping and stiffness (n + c, n + c) in (eta, xi) from those of tire and air (n, n)."""
         part, n, m = self.taking_part, len(drag), len(self.mass)
-        axle = self.axle
         across = np.zeros((2, n, SEEN))
         across[0, :m, :BODY] = 2 * speed * self.gyroscopic
         across[1, :m, :BODY] = self.stiffness + speed**2 * self.convective
-        own = np.stack([axle.joined(axle.damping), axle.joined(axle.stiffness)])
-        own[0, :BODY, :BODY] += speed * (2 * self.own_gyroscopic + axle.gyroscopic)
-        own[1, :BODY, :BODY] += self.own_stiffness + speed**2 * self.own_convective
+        own = np.stack(self._own_pencil(speed)[1:])
         (d, k), (own_d, own_k) = across[:, :, part], own[:, part][:, :, part]
         return (
             np.block([[drag, d], [-d.T, own_d]]),

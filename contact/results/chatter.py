@@ -27,7 +27,7 @@ from tireroad.greens.response import Response
 
 # Steps in the fastest oscillation from which forces are taken as linear: at fewer, undamped modes between impacts
 # gained energy (measured from 2.9 down: contact force a hundred times too large).
-FEWEST = 3.0
+FEWEST = 2.5
 # Points of which the oscillation is found: a second of eigenvalues.
 MOST = 1000
 # Share of the points that touch, of which all but these came back to where they were two steps before.
@@ -36,16 +36,43 @@ LIMIT = 0.05
 WINDOW = 200  # steps over which it is counted
 
 
+ROAD = "points open and close from step to step with constant forces too: that is the road, not chatter"
+
+
 class Chatter(ConvergenceError):
-    """The steps are too long for the contact."""
+    """The steps are too long for the contact: `share` of the points that touch open and close from step to step; inf
+    where the motion grows without bound."""
+
+    def __init__(self, text: str, share: float = math.inf) -> None:
+        super().__init__(text)
+        self.share = share
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """The force's course within a step, "linear" or "constant", and why."""
+    """The force's course within a step, "linear" or "constant", and why; `limit`: the share of points that open and
+    close from step to step beyond which the other is tried, inf where this one is kept."""
 
     scheme: str
     reason: str
+    limit: float = math.inf
+
+    def instead(self, chatter: Chatter) -> Chosen:
+        """What to take after this one has gone beyond its limit; the error itself where nothing is left.
+
+        On a rough road points open and close because it passes under them by more than their distance in a step. Then
+        they do so with constant forces as well, which have no chatter: more than half as many, and linear it stays.
+        """
+        if self.scheme == "linear" and self.limit < math.inf:
+            limit = max(chatter.share / 2, LIMIT)
+            return Chosen(
+                "constant",
+                "forces linear over the step made points open and close from step to step",
+                limit,
+            )
+        if chatter.share < math.inf and self.limit < math.inf:
+            return Chosen("linear", ROAD)
+        raise chatter
 
 
 def choose(steps: float) -> Chosen:
@@ -53,7 +80,7 @@ def choose(steps: float) -> Chosen:
     if steps >= FEWEST:
         why = "resolve" if math.isfinite(steps) else "have none to resolve:"
         count = f" in {steps:.3g} steps" if math.isfinite(steps) else ""
-        return Chosen("linear", f"the steps {why} the contact's fastest oscillation{count}")
+        return Chosen("linear", f"the steps {why} the contact's fastest oscillation{count}", LIMIT)
     return Chosen(
         "constant",
         f"the contact's fastest oscillation takes {steps:.3g} steps, fewer than {FEWEST:g}: forces linear over "
@@ -139,16 +166,24 @@ class Alternation:
         # Windows begin at the first step: they do not depend on how the steps are blocked.
         for now in zip(events.tolist(), active.sum(axis=1).tolist(), strict=True):
             self._window += (1, *now)
-            steps, back_now, touching = self._window.tolist()
-            if steps == WINDOW:
-                self.worst = max(self.worst, back_now / max(touching, steps))
-                self._window[:] = 0
+            if self._window[0] == WINDOW:
+                self._close()
         self._last = rows[-2:]
 
-    def check(self) -> None:
-        """Chatter where more than `LIMIT` of the points change back."""
-        if self.worst > LIMIT:
-            raise Chatter(warning(self.worst))
+    def finish(self) -> None:
+        """Count the window that the end of the loop cuts short, unless it is too short to say anything."""
+        if self._window[0] >= WINDOW // 4:
+            self._close()
+
+    def _close(self) -> None:
+        steps, back, touching = self._window.tolist()
+        self.worst = max(self.worst, back / max(touching, steps))
+        self._window[:] = 0
+
+    def check(self, limit: float) -> None:
+        """Chatter where more than this share of the points change back."""
+        if self.worst > limit:
+            raise Chatter(warning(self.worst), self.worst)
 
     def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint keeps."""

@@ -31,22 +31,21 @@ class Figures:
 @dataclass
 class Totals:
     """Figures and work of the steps so far, whose points at the edge are watched (`reach` in m), and, where
-    it is to end a loop that chatters (`watched`), how they alternate."""
+    more than the share `limit` of them that alternate is to end the loop, how they do."""
 
     patch: Patch
     reach: float
-    watched: bool = False
+    limit: float = np.inf
     figures: Figures = field(default_factory=Figures)
     work: Work = field(default_factory=Work)
     alternation: Alternation = field(default_factory=Alternation)
 
     def add(self, steps: dict[str, np.ndarray]) -> None:
         """Count a block as `ContactFile.flush` hands it over. ConvergenceError at a touching edge, Chatter where
-        the motion grows without bound or, where that is `watched`, points open and close from step to step.
+        the motion grows without bound, or more points than `limit` open and close from step to step.
         """
         self.alternation.add(steps["normal_force"])
-        if self.watched:
-            self.alternation.check()
+        self.alternation.check(self.limit)
         self._check_bounded(steps)
         self.patch.check_edge(steps["normal_force"], steps["time"], self.reach)
         self.work.add(steps["change"], steps["moved"])
@@ -62,6 +61,11 @@ class Totals:
             most_active=max(old.most_active, int(steps["active"].max())),
             excursion=max(old.excursion, float(np.abs(self._beside_wheel(steps)).max())),
         )
+
+    def finish(self) -> None:
+        """After the last step: Chatter as in `add`."""
+        self.alternation.finish()
+        self.alternation.check(self.limit)
 
     def _beside_wheel(self, steps: dict[str, np.ndarray]) -> np.ndarray:
         """Displacements (n, c) m of the points less the wheel's height, of those that touch at rest."""

@@ -7,11 +7,13 @@ turn along; G R = S R = 0 for translations, which do not change what flows throu
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from petsc4py import PETSc
 
+from tireroad.fem.axle import Axle
 from tireroad.fem.collective import summed
 from tireroad.fem.matrices.direct import multiply
 from tireroad.fem.matrices.operators import Operators
@@ -58,6 +60,22 @@ def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> R
         whole[name] = (whole[name] + sign * whole[name].T) / 2
         whole[name][TRANSLATIONS] = whole[name][:, TRANSLATIONS] = 0.0
     return RimMotion(rows, whole)
+
+
+def carried_pencil(
+    axle: Axle, whole: Mapping[str, np.ndarray], speed: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mass, damping and stiffness (7, 7) of the motions of rim and body alone, by the names of `RimMotion.whole`, at `speed`
+    (rad/s): the tire carried along, the wheel, what holds it.
+    """
+    mass = np.zeros((7, 7))
+    mass[:6, :6], mass[6, 6] = whole["mass"] + axle.mass, axle.body_mass or 1.0
+    drag, stiffness = axle.joined(axle.damping), axle.joined(axle.stiffness)
+    stiffness[:6, :6] += whole["stiffness"]
+    if speed:
+        drag[:6, :6] += speed * (2 * whole["gyroscopic"] + axle.gyroscopic)
+        stiffness[:6, :6] += speed**2 * whole["convective"]
+    return mass, drag, stiffness
 
 
 def _still(product: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ By half of the ring where half a turn leaves the state as it is (fem.static.symm
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -43,21 +43,29 @@ class Balance:
     @classmethod
     def of(cls, loader: Loader, rolling: Rolling) -> Balance:
         """The present state of a loader. Collective."""
-        body, solved = loader.body, loader.equilibrium
-        assert solved.road_height is not None, "there is no road"
+        body, whole = loader.body, loader.equilibrium
+        assert whole.road_height is not None, "there is no road"
         return cls(
             ring=body.ring,
             lattice=body.lattice,
             rolling=rolling,
-            height=solved.road_height,
+            height=whole.road_height,
             load=loader.load(),
             displacement=body.displacement(),
-            force=body.everywhere(solved.contact_force()),
-            solved=solved,
-        )
+            force=body.everywhere(whole.contact_force()),
+            solved=whole,
+        )._by(loader.halved)
+
+    def _by(self, half: HalfTurnEquilibrium | None) -> Balance:
+        """The same as found by half of the ring, if that has this state. Collective."""
+        if half is None or not _has_all_of(half, self.lattice, self.displacement):
+            return self
+        return replace(self, solved=half)
 
     def near(self, ring: Ring) -> Equilibrium:
         """The problem of the same tire on the elements of another `ring`, in this state but not in balance. Collective."""
+        if ring is self.ring and isinstance(self.solved, HalfTurnEquilibrium):
+            return self.solved
         return self._problem(ring, self._sampled(ring))
 
     def balanced_on(self, ring: Ring, allowed: float) -> Balance:
@@ -120,8 +128,7 @@ class Balance:
             return None
         half = HalfTurnEquilibrium(self.solved.body, self.rolling, ring)
         half.body.set_displacement(displacement)
-        off = np.abs(half.on(field_lattice(ring))[0] - displacement).max()
-        return half if off < _SAME * ring.thickness else None
+        return half if _has_all_of(half, field_lattice(ring), displacement) else None
 
     def _touching(self, lattice: Lattice) -> np.ndarray:
         """A force (n,) N above 0 on the nodes of other elements that lie between nodes that are pressed on."""
@@ -140,6 +147,12 @@ def _between(line: np.ndarray, values: np.ndarray) -> np.ndarray:
     above = np.clip(np.searchsorted(line, values - _ROUNDING), 0, len(line) - 1)
     below = np.clip(np.searchsorted(line, values + _ROUNDING, side="right") - 1, 0, len(line) - 1)
     return np.stack([below, above], axis=-1)
+
+
+def _has_all_of(half: HalfTurnEquilibrium, lattice: Lattice, displacement: np.ndarray) -> bool:
+    """Whether half of a ring says the displacement (n, 3) m of the whole. Collective."""
+    off = np.abs(half.on(lattice)[0] - displacement).max()
+    return bool(off < _SAME * lattice.tire.thickness)
 
 
 def _nodes(solved: Equilibrium, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:

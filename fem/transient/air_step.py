@@ -61,9 +61,9 @@ class AirStep:
         g = self._inverse @ (air + (self._driven * moved.T).T)
         return np.concatenate([u, g]) if self.mine else u
 
-    def dragged(self, rates: np.ndarray) -> np.ndarray:
-        """The air's own D g' (rows,)."""
-        return self._drag @ rates if self.mine else rates
+    def dragged(self, tire: np.ndarray, rates: np.ndarray) -> tuple[float, np.ndarray]:
+        """Nothing on the tire's rows, and the air's own D g' (rows,)."""
+        return 0.0, self._drag @ rates if self.mine else rates
 
     def momentum(self) -> np.ndarray:
         """(3, rows) kg^1/2 per rate."""

@@ -15,13 +15,17 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.collective import summed
+from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import on_own_rows, rotating_damping, rotating_stiffness
 from tireroad.fem.matrices.direct import factorise, solve_columns
 from tireroad.fem.matrices.operators import Operators, Rotation
+from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.transient.air_step import AirStep
 from tireroad.fem.transient.modal_damping import ModalDamping
+from tireroad.fem.transient.wheel_step import Wheel, WheelStep
 
 # What a step needs of the one before; `balanced` is the mean of two accelerations that balances the
 # forces at the step's end.
@@ -33,7 +37,8 @@ class FullTire:
 
     The interface of greens.recursion.Recursion, so the same contact loop runs on it. `outputs` (r,
     3 s) and `loads` (k, 3 s) weigh the nodes of the outer face; `air` is what fills the cavity, its
-    coordinates after the tire's; `modal` damps mode by mode beside `damping`, (gamma1 1/s, gamma2 s).
+    coordinates after the tire's; `corner`: what holds a wheel that moves, and what its motions meet in the tire, which then
+    has neither air nor `modal`; the unknowns are the tire's whole motion and, after it, the wheel's. `modal` damps mode by mode beside `damping`, (gamma1 1/s, gamma2 s).
     All methods are collective.
     """
 
@@ -51,13 +56,17 @@ class FullTire:
         spectral_radius: float = 0.0,
         air: Column | None = None,
         modal: ModalDamping | None = None,
+        corner: tuple[Axle, RimMotion] | None = None,
     ) -> None:
+        if corner and (air or modal):
+            raise InputError("a full tire on a corner has neither air nor loss factors here")
         self._set_scheme(step, spectral_radius)
         self._operators, self._comm, self._step = operators, operators.body.comm, step
         self._mass, self._carried = operators.mass, operators.carried
         self._outputs = on_own_rows(operators, outputs).T.tocsr()
         self._drag = rotating_damping(operators, rotation, speed, damping, inertia)
         stiffness = rotating_stiffness(operators, rotation, speed, damping, inertia)
+        wheel = Wheel(operators, *corner[::-1], speed, self._drag, stiffness) if corner else None
         system = stiffness.copy()
         different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
         share = self._gamma / (self._beta * step)
@@ -73,17 +82,24 @@ class FullTire:
         # Full motion per unit force at the end of a step: the step's answer is then one product.
         self._answer = self._solved_columns(self._columns)
         self._tire = len(self._mass)
-        self._air = self._with_air(air) if air else None
+        self.wheel, self._air = wheel, None
+        if air or wheel:
+            self._air = self._with(air, wheel)
         self.same_step = summed(self._comm, self._outputs @ self._answer[: self._tire])
         n = len(self._mass)
         self.displacement, self.velocity, self.acceleration, self.balanced = np.zeros((4, n))
         self._vectors = system.createVecs()
 
-    def _with_air(self, air: Column) -> AirStep:
-        """Let the air take part: its unknowns are appended to all that has one row each. Collective."""
+    def _with(self, air: Column | None, wheel: Wheel | None) -> AirStep | WheelStep:
+        """Let air or wheel take part: its unknowns are appended to all that has one row each. Collective."""
         first = self._gamma / (self._beta * self._step)
         second = (1 - self._a) / (self._beta * self._step**2)
-        part = AirStep(air, self._solved_columns, (first, second))
+        part: AirStep | WheelStep
+        if air is not None:
+            part = AirStep(air, self._solved_columns, (first, second))
+        else:
+            assert wheel is not None, "neither air nor wheel"
+            part = WheelStep(wheel, self._solved_columns, (first, second))
         self._answer = part.complete(self._answer, np.zeros((part.count, self._answer.shape[1])))
         self._columns = np.pad(self._columns, ((0, part.rows), (0, 0)))
         self._mass = np.append(self._mass, np.ones(part.rows))
@@ -141,7 +157,10 @@ class FullTire:
         product = x.array_r.copy()
         if self._modal:
             product += self._modal.force(own)
-        return np.concatenate([product, self._air.dragged(air)]) if self._air else product
+        if self._air is None:
+            return product
+        added, dragged = self._air.dragged(own, air)
+        return np.concatenate([product + added, dragged])
 
     def advance(self, force: np.ndarray) -> None:
         """Take the force (k,) N at the end of the step; after `predict`."""
@@ -153,6 +172,11 @@ class FullTire:
         # The scheme's own unknown lags: this is the mean that balances the forces at the step's end.
         self.balanced = (1 - self._a) * acceleration + self._a * self.acceleration
         self.displacement, self.acceleration = new, acceleration
+
+    def wheel_motion(self) -> np.ndarray:
+        """Of rim and body, (7,): three translations m, three rotations rad, the body's height m."""
+        assert self.wheel is not None and self._air is not None, "the wheel is held"
+        return self.wheel.shown @ self._air.shared(self.displacement[self._tire :])
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """The state at all nodes of the lattice, (n, 3) each: m, m/s, m/s2, m/s2. On every process. The

@@ -105,8 +105,8 @@ def make_folder(directory: Path) -> None:
 
 
 @contextmanager
-def claimed(directory: Path, scene_name: str) -> Iterator[None]:
-    """The folder made, checked, and held against a second run while inside. Root process only."""
+def held(directory: Path) -> Iterator[None]:
+    """The folder made, and held against a second command while inside. Root process only."""
     make_folder(directory)
     try:
         handle = os.open(directory, os.O_RDONLY)
@@ -121,6 +121,15 @@ def claimed(directory: Path, scene_name: str) -> Iterator[None]:
             ) from None
         except OSError:
             pass  # a file system without locks
+        yield
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def claimed(directory: Path, scene_name: str) -> Iterator[None]:
+    """The folder of a run, held, checked, and cleared of what dead runs left. Root process only."""
+    with held(directory):
         check_owner(directory, scene_name)
         _check_purpose(directory)
         remove_leftovers(directory)
@@ -129,8 +138,6 @@ def claimed(directory: Path, scene_name: str) -> Iterator[None]:
         except OSError as error:
             raise _unusable(directory, error) from None
         yield
-    finally:
-        os.close(handle)
 
 
 def _check_purpose(directory: Path) -> None:

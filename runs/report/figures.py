@@ -127,6 +127,14 @@ def spectrum(frequency: NDArray, axle: NDArray, of: str = "axle force") -> str:
     return encode(figure)
 
 
+def level_range(level: NDArray) -> tuple[float, float]:
+    """From which level, a multiple of 10 dB, to which the bars of levels in dB are drawn."""
+    heard = level[level > SILENT]
+    top = float(heard.max(initial=0.0))
+    least = max(float(heard.min(initial=top)), top - RANGE_DB)
+    return 10.0 * float(np.floor(least / 10.0)), top
+
+
 @styled
 def third_octaves(
     centre: NDArray, level: NDArray, error: NDArray | None, label: str, few: NDArray
@@ -136,9 +144,7 @@ def third_octaves(
     figure, axes = line_canvas(9.5, 3.2, below=0.62)
     here, place = axes[0, 0], np.arange(len(centre))
     finite = np.where(level > SILENT, level, -np.inf)
-    top = finite.max(initial=0.0)
-    floor = max(finite[np.isfinite(finite)].min(initial=top), top - RANGE_DB)
-    floor = 10.0 * np.floor(floor / 10.0)
+    floor, _ = level_range(level)
     for column, name in enumerate(COMPONENTS):
         height = np.maximum(finite[:, column] - floor, 0.0)
         where = place + 0.28 * (column - 1)

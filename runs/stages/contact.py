@@ -25,7 +25,7 @@ from tireroad.runs.stages.build import pattern
 from tireroad.runs.stages.build.energy import Losses, describe_energy, works
 from tireroad.runs.stages.build.point_forces import shortest_period
 from tireroad.runs.stages.build.rolling.loop import driven_tire, freely_rolling, make_loop
-from tireroad.runs.stages.build.rolling.scheme import WATCHED, chosen_scheme, reported
+from tireroad.runs.stages.build.rolling.scheme import chosen_scheme, reported
 from tireroad.runs.stages.build.rolling.stepping import (
     Planned,
     integration,
@@ -97,15 +97,12 @@ class ContactStage(Stage[ContactHistory]):
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
         observe.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
-        doubtful = self.job.scene.time.scheme == "auto" and chosen.scheme == "linear"
-        try:
-            self._attempt(key, record, setup, slip, plan, chosen.scheme, doubtful)
-        except Chatter:
-            if not doubtful:
-                raise
-            forget_checkpoint(self.job)
-            chosen = reported(record, Chosen(*WATCHED))
-            self._attempt(key, record, setup, slip, plan, chosen.scheme, False)
+        while True:
+            try:
+                return self._attempt(key, record, setup, slip, plan, chosen)
+            except Chatter as chatter:
+                chosen = reported(record, chosen.instead(chatter))
+                forget_checkpoint(self.job)
 
     def _rolling_freely(self, record: Record, setup: ContactSetup, plan: Planned, scheme: str):
         """(setup, slip) of free rolling, where the scene wants that. Collective."""
@@ -123,19 +120,19 @@ class ContactStage(Stage[ContactHistory]):
         setup: ContactSetup,
         slip: float,
         plan: Planned,
-        scheme: str,
-        watched: bool,
+        scheme: Chosen,
     ) -> None:
-        """The time loop, block by block into the file; Chatter ends it where it is `watched`. Collective."""
-        response, chosen = self.greens.product.contact, integration(self.job, plan, scheme)
+        """The time loop, block by block into the file; Chatter beyond the scheme's limit ends it. Collective."""
+        response, chosen = self.greens.product.contact, integration(self.job, plan, scheme.scheme)
         with record.timing("tread and solver"):
             driven = driven_tire(self.job, chosen.tire, chosen.step, chosen.steps)
             loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
-        totals = Totals(setup.patch, setup.reach, watched)
+        totals = Totals(setup.patch, setup.reach, scheme.limit)
         losses = Losses(chosen.tire, response, self.rotating.product, chosen.step)
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
-            attributes["free_slip"] = slip
+            attributes |= {"free_slip": slip, "scheme_reason": scheme.reason}
+            attributes["scheme_limit"] = scheme.limit
             file = ContactFile(self.job, key, setup, attributes)
             kept = file.open(stack, self.job.path(self.name))
             if kept is not None:
@@ -151,7 +148,8 @@ class ContactStage(Stage[ContactHistory]):
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
         contact_figures.describe(record, totals, loop.solver, chosen, chosen.steps - done)
-        contact_figures.points(record, setup.patch, setup.relief)
+        contact_figures.alternation(record, totals.alternation.worst, scheme)
+        contact_figures.points(record, setup.patch, self.static.product.footprint(), setup.relief)
         contact_figures.excursion(record, totals.figures.excursion, self.static.product.deflection)
         pattern.describe(record, setup)
         road_file.describe(record, setup)
@@ -204,6 +202,7 @@ class ContactStage(Stage[ContactHistory]):
                 if stop:
                     raise Stopped(stop)
             file.flush(totals.add)
+            totals.finish()
             losses.flush()
 
     def read(self, file) -> ContactHistory:

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from tireroad.fem.errors import ConvergenceError
+from tireroad.runs.files.folder import held
 from tireroad.runs.files.store import stage_hash
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.scene import Scene
@@ -24,10 +25,15 @@ def sweep(path: Path, out: Path | None, *, at_once: int, batch: bool, only_gathe
     """
     family = read(path)
     folder = out or Path("results") / family.name
-    folder.mkdir(parents=True, exist_ok=True)
-    if batch:
-        _queue(family, folder, path)
-        return
+    with held(folder):
+        if batch:
+            _queue(family, folder, path)
+        else:
+            _run(family, folder, at_once, only_gather)
+
+
+def _run(family: Sweep, folder: Path, at_once: int, only_gather: bool) -> None:
+    """All members here, or none, then the table and the page."""
     failed: list[str] = []
     if not only_gather:
         number, limit = local.at_once(family, at_once)

@@ -48,6 +48,7 @@ fi
 exit "$$status"
 """
 _TABLE = {"template", "task", "submit", "array", "after"}
+_MORE = {"number", "join"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +57,8 @@ class Queue:
 
     `template`: text of a job script with $name, $logs, $processes, $cache, $directives, $warning and
     $body, which starts the run in the background and sets `child`. `task`: the environment variable of
-    the task's number in an array. `submit`: the command; it prints the job's number. `array` with
-    {count}, `after` with {jobs}: its options, the jobs joined by ":".
+    the task's number in an array. `submit`: the command; the group of the pattern `number` finds the job's
+    number in what it prints. `array` with {count}, `after` with {jobs}: its options, the jobs joined by `join`.
     """
 
     template: str = SLURM
@@ -65,6 +66,8 @@ class Queue:
     submit: str = "sbatch --parsable"
     array: str = "--array=1-{count}"
     after: str = "--dependency=afterany:{jobs}"
+    number: str = "([^;\\s]+)"
+    join: str = ":"
     directives: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
@@ -73,15 +76,22 @@ class Queue:
         given = dict(sweep.queue)
         if not given:
             return cls(directives=sweep.slurm)
-        missing, unknown = sorted(_TABLE - given.keys()), sorted(given.keys() - _TABLE)
+        missing, unknown = sorted(_TABLE - given.keys()), sorted(given.keys() - _TABLE - _MORE)
         if missing or unknown:
             wrong = f"needs {missing[0]}" if missing else f"has no key {unknown[0]}"
-            raise InputError(f"sweep: [queue] {wrong}; its keys are {', '.join(sorted(_TABLE))}")
+            raise InputError(
+                f"sweep: [queue] {wrong}; its keys are {', '.join(sorted(_TABLE | _MORE))}"
+            )
         path = sweep.folder / str(given["template"])
         try:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"sweep: queue.template {path} cannot be read: {error}") from None
+        if not _has_group(str(given.get("number", cls.number))):
+            raise InputError(
+                f"sweep: queue.number = {given['number']!r} is no pattern with a group in round brackets, as in "
+                '"Job <([0-9]+)>"'
+            )
         words: dict[str, Any] = {key: str(value) for key, value in given.items()}
         return cls(**words | {"template": text})
 
@@ -91,8 +101,24 @@ class Queue:
         if count is not None:
             line += shlex.split(self.array.format(count=count))
         if before:
-            line += shlex.split(self.after.format(jobs=":".join(before)))
+            line += shlex.split(self.after.format(jobs=self.join.join(before)))
         return [*line, str(script)]
+
+    def numbered(self, said: str) -> str:
+        """The job's number in what `submit` printed. ConvergenceError where there is none."""
+        found = re.search(self.number, said)
+        if found is None:
+            raise ConvergenceError(
+                f"sweep: {self.submit} printed {said.strip()!r}, in which queue.number = {self.number!r} finds no job"
+            )
+        return found.group(1)
+
+
+def _has_group(pattern: str) -> bool:
+    try:
+        return re.compile(pattern).groups > 0
+    except re.error:
+        return False
 
 
 def write_scripts(
@@ -124,7 +150,7 @@ def submit(sweep: Sweep, scripts: Mapping[str, Path], counts: Mapping[str, int])
             ) from None
         if done.returncode:
             raise ConvergenceError(f"sweep: {shlex.join(line)}: {done.stderr.strip()}")
-        jobs[name] = done.stdout.strip().partition(";")[0]
+        jobs[name] = queue.numbered(done.stdout)
     return jobs
 
 

@@ -113,12 +113,16 @@ class Tires:
             few = self.modes.first(count)
             self._rolling[count] = rolling_modes(few, turning_of(self.job), self.job.comm)
         rolling, points = self._rolling[count], self.probes
-        given = points.outputs, points.loads, residual
+        given = points.outputs[points.counted], points.loads[points.counted], residual
         return make_response(lambda: self.wheel, rolling, *given, lambda: rolling.basis).response
 
     def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
         """All degrees of freedom between the same points; step; set-up in s."""
         wheel, points = self.wheel, self.probes
+        nodes = slice(
+            3 * len(self.run.static.points)
+        )  # a corner's probes read its wheel after the outer face
+        axle = self.job.axle
         began = time.perf_counter()
         damping, modal = self._damping()
         tire = FullTire(
@@ -127,11 +131,12 @@ class Tires:
             speed=wheel.speed,
             damping=damping,
             step=step,
-            outputs=points.outputs,
-            loads=points.loads,
+            outputs=points.outputs[points.counted][:, nodes],
+            loads=points.loads[points.counted][:, nodes],
             inertia=wheel.inertia,
             spectral_radius=radius,
             modal=modal,
+            corner=(axle, self.motions.rim_motion) if axle else None,
         )
         return tire, step, time.perf_counter() - began
 

@@ -151,6 +151,11 @@ class Loader:
         self._half_ring.loader._touch = self._touch
         return self._half_ring
 
+    @property
+    def halved(self) -> HalfTurnEquilibrium | None:
+        """Half of the ring, where a state was looked for by it; not always in that of the whole."""
+        return None if self._half_ring is None else self._half_ring.equilibrium
+
     def _taken_over(self, half: _Half) -> bool:
         """Put the state of half the ring on the whole; whether it is balance there too. Collective."""
         self._count(half)

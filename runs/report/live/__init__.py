@@ -89,6 +89,41 @@ def charts(*one: dict[str, Any]) -> dict[str, Any]:
     return {"kind": "charts", "charts": list(one)}
 
 
+def bars(
+    names: Sequence[str],
+    series: Mapping[str, tuple[NDArray, NDArray | None]],
+    labels: tuple[str, str],
+    colours: Sequence[str],
+    *,
+    ends: tuple[float, float],
+    few: NDArray,
+    least: int,
+    height: int = 300,
+) -> dict[str, Any]:
+    """Bars by name, each (values (n,), errors (n,) or None), side by side over named places (n,), from ends[0]
+    to at least ends[1]; room for at `least` so many; pale where `few` (n,). A value that is not finite has no bar."""
+    drawn = [
+        {
+            "name": name,
+            "colour": colour,
+            "y": packed(values, "f4"),
+            "error": None if errors is None else packed(errors, "f4"),
+        }
+        for (name, (values, errors)), colour in zip(series.items(), colours, strict=True)
+    ]
+    return {
+        "kind": "bars",
+        "names": list(names),
+        "series": drawn,
+        "labels": labels,
+        "floor": float(ends[0]),
+        "top": float(ends[1]),
+        "few": [bool(one) for one in few],
+        "least": least,
+        "height": height,
+    }
+
+
 def shapes(
     points: NDArray, quads: NDArray, normal: NDArray, moved: NDArray, titles: Sequence[str]
 ) -> dict[str, Any]:

@@ -72,6 +72,52 @@ function drawCharts(given, box, key) {
   make("p", box, "Drag across to zoom, double-click for all; click a name to hide its curve.").className = "readout";
 }
 
+// Bars of several series side by side over named places, with their errors; uPlot keeps axes, pointer and zoom.
+function drawBars(given, box, key) {
+  box = make("div", box);
+  const wide = 0.84 / given.series.length, count = given.names.length;
+  const errors = given.series.map(s => (s.error ? values(s.error) : []));
+  const at = (u, v, scale) => u.valToPos(v, scale, true);
+  const paint = u => {
+    const ink = u.ctx, { left, top, width, height } = u.bbox;
+    ink.save();
+    ink.beginPath(); ink.rect(left, top, width, height); ink.clip();
+    given.series.forEach((s, k) => u.series[k + 1].show && u.data[k + 1].forEach((v, n) => {
+      if (v == null) return;
+      const from = at(u, n + wide * (k - given.series.length / 2) + 0.01, "x");
+      const to = at(u, n + wide * (k + 1 - given.series.length / 2) - 0.01, "x"), y = at(u, v, "y");
+      ink.globalAlpha = given.few[n] ? 0.45 : 1;
+      ink.fillStyle = s.colour;
+      ink.fillRect(from, y, to - from, top + height - y);
+      ink.globalAlpha = 1;
+      const error = errors[k][n], middle = (from + to) / 2;
+      if (error == null) return;
+      ink.strokeStyle = "#1f2933"; ink.lineWidth = devicePixelRatio;
+      ink.beginPath(); ink.moveTo(middle, at(u, v - error, "y")); ink.lineTo(middle, at(u, v + error, "y")); ink.stroke();
+    }));
+    ink.restore();
+  };
+  const axis = label => ({ label, labelSize: 18, font: "11px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", stroke: "#52606d", grid: { stroke: "#e4e7eb", width: 1 }, ticks: { stroke: "#cbd2d9", width: 1 } });
+  const some = u => { // as many names as have room
+    const each = Math.max(Math.ceil((u.scales.x.max - u.scales.x.min) * 30 / box.clientWidth), 1);
+    return given.names.map((_, n) => n).filter(n => n % each === 0);
+  };
+  const told = (k, v, n) => (v == null ? "–" : digits(v) + (errors[k][n] == null ? "" : " ± " + digits(errors[k][n])));
+  const plot = new uPlot({
+    width: box.clientWidth, height: given.height,
+    scales: { x: { time: false, range: (_, low, high) => [Math.round(low) - 0.6, Math.max(Math.round(high), Math.min(Math.round(low) + given.least, given.least) - 1) + 0.6] }, y: { range: (_, low, high) => [given.floor, Math.max(high, given.top)] } },
+    axes: [
+      { ...axis(given.labels[0]), size: 44, rotate: -45, grid: { show: false }, splits: some, values: (_, places) => places.map(n => given.names[n]) },
+      { ...axis(given.labels[1]), size: 52, values: (_, ticks) => ticks.map(v => (v == null ? "" : digits(v))) },
+    ],
+    series: [{ label: given.labels[0], value: (_, n) => (n == null ? "–" : given.names[n]) },
+      ...given.series.map((s, k) => ({ label: s.name, stroke: s.colour, fill: s.colour, paths: () => null, points: { show: false }, value: (_, v, __, n) => told(k, v, n) }))],
+    cursor: { sync: { key }, drag: { x: true, y: false } }, hooks: { draw: [paint] },
+  }, [given.names.map((_, n) => n), ...given.series.map(s => values(s.y))], box);
+  make("p", box, "Point at a band to read it; drag across to zoom, double-click for all; click a name to hide its bars.").className = "readout";
+  onResize(box, () => { if (box.clientWidth) plot.setSize({ width: box.clientWidth, height: given.height }); });
+}
+
 function saveButtons(figure) {
   const image = figure.querySelector("img"), bar = make("div", figure);
   bar.className = "save";
@@ -98,7 +144,7 @@ function enliven(figure) {
   figure.insertBefore(box, figure.firstChild);
   figure.classList.add("alive");
   try {
-    ({ charts: drawCharts, shapes: drawShapes, footprint: drawFootprint })[given.kind](given, box, figure.id);
+    ({ charts: drawCharts, bars: drawBars, shapes: drawShapes, footprint: drawFootprint })[given.kind](given, box, figure.id);
     figure.dataset.drawn = "yes";
   } catch (error) {
     box.remove(); figure.classList.remove("alive");

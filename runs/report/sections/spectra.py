@@ -71,9 +71,10 @@ def octaves(results: Results, section: Section, of: str) -> None:
     narrow = results.optional(_FILE, "third_octave/too_narrow")
     if narrow is not None and len(narrow):
         first, last = nominal(narrow[[0, -1]])
+        bands = f"The bands from {first:g} to {last:g} Hz hold"
+        bands = f"The band of {first:g} Hz holds" if first == last else bands
         section.notes.append(
-            f"The bands from {first:g} to {last:g} Hz hold fewer than three lines and have no level: "
-            "a longer run (time.duration) has closer lines."
+            f"{bands} fewer than three lines and no level: a longer run (time.duration) has closer lines."
         )
     if centre is None or level is None or not len(centre):
         section.notes.append("No third-octave bands in spectra.h5.")
@@ -81,16 +82,43 @@ def octaves(results: Results, section: Section, of: str) -> None:
     error = results.optional(_FILE, f"third_octave/{name}_error")
     weighted = results.optional(_FILE, f"third_octave/{name}_a_weighted")
     few = few_lines(results, len(centre))
-    picture = figures.third_octaves(centre, level, error, f"{of}, rms, in dB re 1 N", few)
-    section.show(picture, _caption(of, error, few))
+    _show_bands(section, centre, level, error, of, "dB re 1 N", few)
     section.table = _table(results, centre, level, weighted, error)
     for key, what, reference in _MORE:
         more = results.optional(_FILE, f"third_octave/{key}")
         if more is None or key == name:
             continue
         error = results.optional(_FILE, f"third_octave/{key}_error")
-        picture = figures.third_octaves(centre, more, error, f"{what}, rms, in {reference}", few)
-        section.show(picture, _caption(what, error, few))
+        _show_bands(section, centre, more, error, what, reference, few)
+
+
+def _show_bands(
+    section: Section,
+    centre: NDArray,
+    level: NDArray,
+    error: NDArray | None,
+    of: str,
+    reference: str,
+    few: NDArray,
+) -> None:
+    """Adds levels (b, 3) dB over band centres (b,) Hz, with their errors (b, 3) dB."""
+    label = f"{of}, rms, in {reference}"
+    heard = np.where(level > figures.SILENT, level, np.nan)
+    series = {
+        name: (heard[:, n], None if error is None else error[:, n])
+        for n, name in enumerate(figures.COMPONENTS)
+    }
+    drawn = live.bars(
+        [f"{c:g}" for c in nominal(centre)],
+        series,
+        ("third-octave band in Hz", label),
+        figures.COLOURS,
+        ends=figures.level_range(level),
+        few=few,
+        least=figures.LEAST_BANDS,
+    )
+    picture = figures.third_octaves(centre, level, error, label, few)
+    section.show(picture, _caption(of, error, few), drawn)
 
 
 def few_lines(results: Results, count: int) -> NDArray:

@@ -11,6 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from tireroad.contact.results.chatter import Chosen
 from tireroad.contact.rolling import Instant
 from tireroad.contact.setup import ContactSetup
 from tireroad.runs.files import packed, store
@@ -74,15 +75,17 @@ class ContactHistory:
         )
 
 
-def begun_with(job: Job, key: str) -> str | None:
+def begun_with(job: Job, key: str) -> Chosen | None:
     """The scheme of the checkpoint that a loop of these inputs goes on from, or None. Collective."""
 
-    def found() -> str | None:
+    def found() -> Chosen | None:
         path = job.directory / CHECKPOINT
         if job.fresh or store.why_not(path, job.provenance("contact", key).input_hash, "contact"):
             return None
         with store.opened(path) as file:
-            return str(file.attrs["scheme"])
+            given = file.attrs
+            reason, limit = str(given["scheme_reason"]), float(given["scheme_limit"])
+            return Chosen(str(given["scheme"]), reason, limit)
 
     return on_root(job.comm, found)
 
@@ -106,7 +109,7 @@ class ContactFile:
         self._checkpoint = job.directory / CHECKPOINT
         self._stack: list = []
         self._readings: list[np.ndarray] = []
-        self._rubs = job.scene.contact.rubs
+        self._rubs = job.scene.contact.rubs or job.scene.static.friction is not None
         self._layout = dict(_LAYOUT)
         if not job.scene.output.axle_force:
             del self._layout["axle_force"]

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from tireroad.contact.results.totals import Totals
+from tireroad.fem.static.footprint import Footprint
 from tireroad.runs.measure.synthetic import oval_patch
 from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.stored.contact_figures import excursion
+from tireroad.runs.stages.stored.contact_figures import excursion, points
 
 
 def block(displacement: np.ndarray, **more: np.ndarray) -> dict[str, np.ndarray]:
@@ -41,3 +42,17 @@ def test_beyond_a_third_of_the_deflection_it_is_said() -> None:
     excursion(record, 4e-3, 0.01)
     assert "0.4 of the static deflection of 10 mm" in record.warnings[0]
     excursion(record, 4e-3, None)
+
+
+def test_a_footprint_of_few_points_is_told_where_the_road_has_heights() -> None:
+    """Points 15 x 20 mm apart."""
+    patch, record = oval_patch((9, 5), (0.015, 0.02), 500.0), Record()
+    assert patch.touching.tolist() == [5, 3]
+    few, many = (Footprint(0.08, width, 1e-3) for width in (0.04, 0.05))
+    points(record, patch, few, 0.0)
+    points(record, patch, many, 1e-3)
+    assert not record.warnings
+    points(record, patch, few, 1e-3)
+    assert "15 × 20 mm apart on a footprint of 80 × 40 mm" in record.warnings[0]
+    points(record, replace(patch, force=0 * patch.force), few, 1e-3)
+    assert len(record.warnings) == 1

@@ -12,6 +12,8 @@ from one_node import ended, slurm
 from started import environment
 
 import tireroad
+from tireroad.fem.errors import ConvergenceError
+from tireroad.runs.sweep.queue import Queue
 
 pytestmark = pytest.mark.slow
 
@@ -117,29 +119,51 @@ submit = "./qsub -V"
 array = "-J 1-{count}"
 after = "-W depend=afterany:{jobs}"
 """
-QSUB = """#!/bin/sh
-echo "$*" >> qsub.txt
-echo "$(wc -l < qsub.txt).server"
+LSF = """
+[queue]
+template = "pbs.sh"
+task = "LSB_JOBINDEX"
+submit = "./bsub -W 2:00"
+number = "Job <([0-9]+)>"
+array = "-J tires[1-{count}]"
+after = "-w 'ended({jobs})'"
+join = ") && ended("
 """
+SUBMIT = """#!/bin/sh
+echo "$*" >> submitted.txt
+"""
+PRINTS = {
+    "qsub": 'echo "$(wc -l < submitted.txt).server"',
+    "bsub": 'echo "Job <$(wc -l < submitted.txt)> is submitted to queue <normal>."',
+}
+WANTED = {
+    "qsub": [
+        "-V -J 1-1 out/jobs/first.sh",
+        "-V -J 1-2 -W depend=afterany:1.server out/jobs/rest.sh",
+        "-V -W depend=afterany:1.server:2.server out/jobs/gather.sh",
+    ],
+    "bsub": [
+        "-W 2:00 -J tires[1-1] out/jobs/first.sh",
+        "-W 2:00 -J tires[1-2] -w ended(1) out/jobs/rest.sh",
+        "-W 2:00 -w ended(1) && ended(2) out/jobs/gather.sh",
+    ],
+}
 
 
-def test_another_queue_by_a_template(tmp_path: Path, launch) -> None:
+@pytest.mark.parametrize(("table", "name"), [(QUEUE, "qsub"), (LSF, "bsub")])
+def test_another_queue_by_a_template(tmp_path: Path, launch, table: str, name: str) -> None:
     sweep = family(tmp_path, 0.01)
-    sweep.write_text(sweep.read_text().partition("[slurm]")[0] + QUEUE)
+    sweep.write_text(sweep.read_text().partition("[slurm]")[0] + table)
     (tmp_path / "pbs.sh").write_text(TEMPLATE)
-    (tmp_path / "qsub").write_text(QSUB)
-    (tmp_path / "qsub").chmod(0o755)
+    (tmp_path / name).write_text(SUBMIT + PRINTS[name])
+    (tmp_path / name).chmod(0o755)
     done = launch("-m", "runs", "sweep", sweep, "--out", "out", "--slurm", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    jobs = "out/jobs"
-    assert (tmp_path / "qsub.txt").read_text().splitlines() == [
-        f"-V -J 1-1 {jobs}/first.sh",
-        f"-V -J 1-2 -W depend=afterany:1.server {jobs}/rest.sh",
-        f"-V -W depend=afterany:1.server:2.server {jobs}/gather.sh",
-    ]
-    script = (tmp_path / jobs / "rest.sh").read_text()
-    assert "#PBS -N family-rest" in script and "PBS_ARRAY_INDEX" in script
-    assert subprocess.run(["sh", "-n", str(tmp_path / jobs / "rest.sh")]).returncode == 0
+    assert (tmp_path / "submitted.txt").read_text().splitlines() == WANTED[name]
+    script = (tmp_path / "out/jobs/rest.sh").read_text()
+    task = {"qsub": "PBS_ARRAY_INDEX", "bsub": "LSB_JOBINDEX"}[name]
+    assert "#PBS -N family-rest" in script and task in script
+    assert subprocess.run(["sh", "-n", str(tmp_path / "out/jobs/rest.sh")]).returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -147,6 +171,7 @@ def test_another_queue_by_a_template(tmp_path: Path, launch) -> None:
     [
         (("task", "tasks"), "[queue] needs task"),
         (('"pbs.sh"', '"other.sh"'), "queue.template"),
+        (("array", 'number = "[0-9]+"\narray'), "queue.number"),
     ],
 )
 def test_mistakes_in_a_queue(tmp_path: Path, launch, change, words) -> None:
@@ -155,6 +180,12 @@ def test_mistakes_in_a_queue(tmp_path: Path, launch, change, words) -> None:
     (tmp_path / "pbs.sh").write_text("$nothing")
     done = launch("-m", "runs", "sweep", sweep, "--out", tmp_path / "out", "--slurm")
     assert done.returncode == 2 and words in done.stderr
+
+
+def test_a_queue_that_prints_no_number() -> None:
+    assert Queue().numbered("31;cluster\n") == "31"
+    with pytest.raises(ConvergenceError, match="finds no job"):
+        Queue(number="Job <([0-9]+)>").numbered("out of licences")
 
 
 def _said(out: Path) -> str:

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.files.folder import held
+from tireroad.runs.sweep.command import sweep as run_sweep
 from tireroad.runs.sweep.definition import read
 
 pytestmark = pytest.mark.slow
@@ -102,6 +104,13 @@ def test_mistakes_are_named(folder: Path, text: str, wanted: str) -> None:
 
 
 @pytest.mark.long
+def test_a_second_sweep_into_the_same_folder_is_refused(folder: Path) -> None:
+    sweep_of(folder, '[[axis]]\nkey = "static.load"\nvalues = [100.0]\n')
+    with held(folder / "out"), pytest.raises(InputError, match="another run is writing here"):
+        run_sweep(folder / "family.toml", folder / "out", at_once=1, batch=False, only_gather=False)
+    assert list((folder / "out").iterdir()) == []
+
+
 def test_a_sweep_runs_gathers_and_shares(folder: Path, launch) -> None:
     path = folder / "family.toml"
     members = {"light": "250.0", "same": "250.0", "crushed": "1e7"}

@@ -108,4 +108,4 @@ def test_a_stiff_tread_on_long_steps_chatters_where_forces_are_linear(run, schem
     else:
         assert not failed
         assert abs(found["energy that the scheme takes"]) > 1e-3 * moved
-    assert ("chatter" in found["reason for the scheme"]) == (scheme == "auto")
+    assert ("open and close" in found["reason for the scheme"]) == (scheme == "auto")

@@ -65,36 +65,53 @@ def history(folder) -> tuple[np.ndarray, str]:
         return file["normal_force"][:], file.attrs["scheme"]
 
 
-def test_chatter_begins_again_and_a_stop_after_it_goes_on_as_begun(run, tmp_path, monkeypatch):
-    run("whole", "time.scheme=constant")
-    chattered = []
+@pytest.fixture
+def attempts(monkeypatch):
+    """Ends so many loops as chattering, and asks the one after them to stop after its 60th step, once."""
+    ended: list[float] = []
 
-    def check(self) -> None:
-        chattered.append(True)
-        raise Chatter("points open and close from step to step")
+    def arrange(count: int) -> list[float]:
+        def check(self, limit: float) -> None:
+            if len(ended) < count:
+                ended.append(limit)
+                raise Chatter("points open and close from step to step", 0.2)
 
-    class StopsAt60:
-        """Asks to stop after the 60th step of the loop that is begun again, once."""
+        class StopsAt60:
+            asked = False
 
-        asked = False
+            def __init__(self, comm, seconds: float) -> None:
+                self.steps = 0
 
-        def __init__(self, comm, seconds: float) -> None:
-            self.steps = 0
+            def __call__(self, signal) -> tuple[str, bool]:
+                self.steps += 1
+                if len(ended) == count and self.steps == 60 and not StopsAt60.asked:
+                    StopsAt60.asked = True
+                    return "SIGTERM", False
+                return "", False
 
-        def __call__(self, signal) -> tuple[str, bool]:
-            self.steps += 1
-            if chattered and self.steps == 60 and not StopsAt60.asked:
-                StopsAt60.asked = True
-                return "SIGTERM", False
-            return "", False
+        monkeypatch.setattr(Alternation, "check", check)
+        monkeypatch.setattr(contact, "Watch", StopsAt60)
+        return ended
 
-    monkeypatch.setattr(Alternation, "check", check)
-    monkeypatch.setattr(contact, "Watch", StopsAt60)
+    return arrange
+
+
+@pytest.mark.parametrize(
+    ("ended", "limits", "scheme"),
+    [(1, [0.05], "constant"), (2, [0.05, 0.1], "linear")],
+    ids=["chatter", "a rough road"],
+)
+def test_the_other_scheme_is_tried_and_a_stop_after_it_goes_on_as_begun(
+    run, tmp_path, attempts, ended: int, limits: list[float], scheme: str
+) -> None:
+    """With constant forces where linear ones alternate, and with linear ones again where both do."""
+    run("whole", f"time.scheme={scheme}")
+    tried = attempts(ended)
     with pytest.raises(Stopped):
         run("again")
     run("again")
-    assert chattered == [True]  # the loop that goes on is not tried as linear once more
-    (expected, _), (found, scheme) = (history(tmp_path / name) for name in ("whole", "again"))
-    assert scheme == "constant"
+    assert tried == limits  # the loop that goes on is not tried once more
+    (expected, _), (found, name) = (history(tmp_path / folder) for folder in ("whole", "again"))
+    assert name == scheme
     assert np.array_equal(found, expected)
     assert np.ptp(found.sum(axis=1)) > 1.0

@@ -11,26 +11,20 @@ from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.build.rolling.stepping import Planned
 
-WATCHED = "constant", "forces linear over the step made points open and close from step to step"
-
 
 def chosen_scheme(
-    job: Job, record: Record, setup: ContactSetup, plan: Planned, begun: str | None
+    job: Job, record: Record, setup: ContactSetup, plan: Planned, begun: Chosen | None
 ) -> Chosen:
     """What to take, and why; shown, and kept in the record.
 
-    `begun`: the scheme of the checkpoint from which the loop goes on, or None.
+    `begun`: what was chosen for the checkpoint from which the loop goes on, or None.
     """
     wanted = job.scene.time.scheme
     steps = oscillation(job.scene.contact, setup.patch, plan.response, plan.step)
     if math.isfinite(steps):
         record.indicators["steps in the fastest oscillation of the contact"] = (steps, "-")
-    chosen = choose(steps)
-    if wanted != "auto":
-        chosen = Chosen(wanted, f'time.scheme = "{wanted}"')
-    elif begun == "constant" and chosen.scheme != begun:
-        chosen = Chosen(*WATCHED)
-    return reported(record, chosen)
+    given = Chosen(wanted, f'time.scheme = "{wanted}"')
+    return reported(record, begun or (choose(steps) if wanted == "auto" else given))
 
 
 def reported(record: Record, chosen: Chosen) -> Chosen:
