@@ -14,6 +14,7 @@ from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
+from tireroad.fem.static.linear_contact import LinearContact, held_step
 from tireroad.fem.static.path.step import Step
 from tireroad.fem.static.road import Road
 from tireroad.fem.static.shape_damping import ShapeDamping
@@ -62,18 +63,23 @@ class Equilibrium:
         self._local_tangent = fem.petsc.create_matrix(self._tangent)
         self.matrix = self._local_tangent
         self._work = fem.petsc.create_vector(self._residual)
-        rim = body.rim[body.rim < body.nodes]
-        self._rim = (3 * rim[:, None] + np.arange(3)).ravel()
+        self._rim = (3 * body.rim[body.rim < body.nodes, None] + np.arange(3)).ravel()
         self.road = self._make_road()
         self._scale = self._yardsticks()
-        damped = rolling.speed * (rolling.damping + rolling.stiffness_damping)
-        self._system = self._make_system("lu" if damped else "cholesky")
+        self._damped = bool(rolling.speed * (rolling.damping + rolling.stiffness_damping))
+        self._system = self._make_system("lu" if self._damped else "cholesky")
+        self._contact: LinearContact | None = None
 
     def _make_road(self) -> Road:
         return Road(self.body)
 
     def _make_system(self, kind: str) -> System:
         return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
+
+    def _make_contact(self) -> LinearContact | None:
+        """What settles the sets of contact within a step; None where the tangent is not symmetric, or depends on them."""
+        road = self.road
+        return None if self._damped else LinearContact(self.body.comm, self._system, road)
 
     @property
     def rounding(self) -> float:
@@ -86,15 +92,14 @@ class Equilibrium:
         """Equilibrium with the road plane at the given height (m), or without a road. Collective.
 
         With a `load` (N) the road is moved, from the given height on, until it carries that. `allowed`
-        N may stay out of balance in a state that is only on the way to another.
-        Newton's method and the active set of the road in one loop: a dof is held where
-        f - c gap > 0, with c the dof's own stiffness; that is the complementarity condition for any
-        c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Held dofs are put on
-        the road by the linearised step: lifting them first strains the wall beyond any sense.
+        N may stay out of balance in a state that is only on the way to another. Newton's method and the
+        active set of the road in one loop: a dof is held where f - c gap > 0, with c the dof's own stiffness,
+        which is complementarity for any c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558);
+        a new tangent settles its sets (LinearContact). Held dofs are put on the road by the linearised step.
         A tangent serves for as long as each step with it leaves a fifth of the error or less.
         """
         field = self.body.u.x
-        kept = field.array.copy(), self.road.kept()
+        kept, self._contact = (field.array.copy(), self.road.kept()), None
         self.road.height = -np.inf if road_height is None else road_height
         self._before.x.array[:] = field.array
         error, tangents = 0.0, 0
@@ -106,6 +111,7 @@ class Equilibrium:
                 self.road_height = None if road_height is None else self.road.height
                 return Step(True, tangents, error, reason)
             closing = None
+            changed = changed or bool(self._contact and self._contact.changed)
             if not reason and (changed or not error < _SERVES * last):
                 tangents += 1
                 reason = "" if self._take_tangent() else "the tangent is singular"
@@ -141,31 +147,25 @@ class Equilibrium:
         """Assemble and factorise at the present state, the held dofs on their way to the road."""
         with self.cost("assembly"):
             self._assemble_tangent()
-        return self._system.take(self.matrix, self.road.held, *self.road.steps())
+        if not self._system.take(self.matrix, self.road.held, *self.road.steps()):
+            return False
+        self._contact = self._make_contact() if self.road.height > -np.inf else None
+        return True
 
     def _move(self, closing: Moved | None, load: float | None) -> str:
-        """One linearised step to balance, held dofs to the road; with a load, the road to that. Collective.
-
-        Why it cannot be taken, or nothing. The road's force is the reaction of the linearised problem;
-        what is out of balance is no force of the road (seen: held dofs let go and caught for ever).
-        """
-        field, held = self.body.u.x, self.road.held
-        out = self.road.rows(self._work.array_r.copy())
-        change, force = self._system.solve(-out, closing)
-        force += out[held]
-        if load is not None:
-            further, more = self._system.solve(np.zeros_like(out), self._system.raising)
-            sums = np.array([self.road.upward(part) for part in (force, more)])
-            total, rate = self.body.comm.allreduce(sums)
-            if not rate > 0:
-                return "the road meets nothing that resists"
-            rise = (load - total) / rate
-            self.road.height += rise
-            change, force = change + rise * further, force + rise * more
+        """One linearised step to balance. Why it cannot be taken, or nothing. Collective."""
+        given = self.road.rows(self._work.array_r.copy()), closing, load
+        if self._contact is None:
+            step = held_step(self.body.comm, self._system, self.road, given)
+        else:
+            step = self._contact.step(*given)
+        if step is None:
+            return "the road meets nothing that resists"
+        (change, reaction), field = step, self.body.u.x
         self._before.x.array[:] = field.array
         field.array[: len(change)] += change
         self.road.lay_on()
-        self.road.react(force)
+        self.road.react(reaction)
         return ""
 
     def road_stiffness(self) -> float:

@@ -43,6 +43,20 @@ class System(Protocol):
         ...
 
 
+class Columns(System, Protocol):
+    """A system whose factor serves when other dofs are held."""
+
+    def columns(
+        self, numbers: np.ndarray, dofs: np.ndarray, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As `HeldSystem` says. Collective."""
+        ...
+
+    def spread(self, motion: np.ndarray) -> np.ndarray:
+        """The motion of all owned dofs, those included that follow others. Collective."""
+        ...
+
+
 class HeldSystem:
     """K du = right, with du given at the held dofs. All methods are collective.
 
@@ -127,6 +141,53 @@ class HeldSystem:
         at_held = force.array_r.copy()
         force.destroy()
         return change, at_held
+
+    def columns(
+        self, numbers: np.ndarray, dofs: np.ndarray, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Motion (m) of the owned dofs and force (N) at the held ones, by a unit force on each of some dofs, or by a unit
+        motion of those that are held: (owned, count), (held, count).
+
+        `numbers` (k,) of this process's `dofs` (k,) among the `count` of all. The matrix is taken for symmetric.
+        """
+        assert self._reaction is not None, "columns() before take()"
+        with self._timing("columns"):
+            right, x = self._dense(count), self._dense(count)
+            self._fill(right, numbers, dofs)
+            factors = self._ksp.getPC().getFactorMatrix()
+            factors.matSolve(right, x)
+            factors.destroy()
+            held = np.isin(dofs, self._held)
+            x.getDenseArray()[dofs[held], numbers[held]] = 1.0
+            forces = self._reaction.matMult(x)
+            found = x.getDenseArray().copy(), forces.getDenseArray().copy()
+            for part in (right, x, forces):
+                part.destroy()
+        return found
+
+    def _fill(self, right: PETSc.Mat, numbers: np.ndarray, dofs: np.ndarray) -> None:
+        """Unit forces, and of held dofs what their unit motion takes at the free ones."""
+        assert self._reaction is not None, "columns() before take()"
+        begin, first = self._x.getOwnershipRange()[0], self._reaction.getOwnershipRange()[0]
+        for number, dof in zip(numbers.tolist(), dofs.tolist(), strict=True):
+            row = int(np.searchsorted(self._held, dof))
+            if row < len(self._held) and self._held[row] == dof:
+                where, values = self._reaction.getRow(first + row)
+                right.setValues(where, number, -values)
+            else:
+                right.setValue(begin + dof, number, 1.0)
+        right.assemble()
+        right.getDenseArray()[self._held] = 0.0
+
+    def spread(self, motion: np.ndarray) -> np.ndarray:
+        """The motion of all owned dofs, those included that follow others."""
+        return motion
+
+    def _dense(self, count: int) -> PETSc.Mat:
+        rows = self._x.getSizes()
+        matrix = PETSc.Mat().createDense((rows, (None, count)), comm=self._comm)
+        matrix.setUp()
+        return matrix
 
 
 def _solver(comm: MPI.Comm, matrix: PETSc.Mat, factorisation: str) -> PETSc.KSP:

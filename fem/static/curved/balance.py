@@ -74,6 +74,9 @@ class CurvedEquilibrium(Equilibrium):
     def _make_road(self) -> CurvedRoad:
         return CurvedRoad(self.body, self.shape)
 
+    def _make_contact(self) -> None:
+        """None: T depends on what is held."""
+
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
         """As on a level road: without one in its linearised step."""
         kept, self.road.active = self.road.active, np.zeros_like(self.road.active)

@@ -24,3 +24,6 @@ class RubbingEquilibrium(Equilibrium):
 
     def _make_system(self, kind: str) -> RubbingSystem:
         return RubbingSystem(self.body.comm, self.matrix, self.cost, self.road)
+
+    def _make_contact(self) -> None:
+        """None: the tangent is not symmetric."""

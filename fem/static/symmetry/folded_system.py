@@ -43,6 +43,17 @@ class FoldedSystem:
         self._cut.unfold(change)
         return change, force
 
+    def columns(
+        self, numbers: np.ndarray, dofs: np.ndarray, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As of a HeldSystem, without the motion of followers. Collective."""
+        return self._inner.columns(numbers, dofs, count)
+
+    def spread(self, motion: np.ndarray) -> np.ndarray:
+        """The motion with that of followers. Collective."""
+        self._cut.unfold(motion)
+        return motion
+
 
 class _Folding:
     """`matrix`, P^T K P, and how its entries add up from those of K: the pattern once, the values at each `fill`."""

@@ -1,0 +1,191 @@
+"""What the road holds after a linearised step: a linear complementarity problem on the tread's nodes.
+
+With K du = right solved for the nodes that were held when K was factorised, a node that is held since adds a force, one
+that is free since a motion, each times a column of K's inverse:
+
+    gap = gap_0 + C z + gap_l rise,    force = force_0 + D z + force_l rise,
+
+z such that gap = 0 where the road holds and force = 0 where it does not, rise such that it carries the load. A node is
+held where force > c gap, as in `Equilibrium.solve`; sets are changed until they stay. Columns cost a
+seventh of a solve each, as they are solved for together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from mpi4py import MPI
+
+from tireroad.fem.static.held_system import Columns, Moved, System
+from tireroad.fem.static.road import Road
+
+_ROUNDS = 10  # changes of the sets in one step
+_MOST = 400  # columns of one factor
+
+Array = np.ndarray
+
+
+def held_step(
+    comm: MPI.Comm, system: System, road: Road, given: tuple[Array, Moved | None, float | None]
+) -> tuple[Array, Array] | None:
+    """The linearised step (m) of the owned dofs to balance from forces (N), and the reactions (N) at the held ones,
+    which move as told; with a load (N) the road is raised to that. `given`: these three.
+
+    None where nothing resists the road. The road's force is the reaction of the linearised problem; what is out of
+    balance is no force of the road (seen: held dofs let go and caught for ever). Collective.
+    """
+    out, closing, load = given
+    change, force = system.solve(-out, closing)
+    force += out[road.held]
+    if load is None:
+        return change, force
+    further, more = system.solve(np.zeros_like(out), system.raising)
+    sums = np.array([road.upward(part) for part in (force, more)])
+    total, rate = comm.allreduce(sums)
+    if not rate > 0:
+        return None
+    rise = (load - total) / rate
+    road.height += rise
+    return change + rise * further, force + rise * more
+
+
+@dataclass(frozen=True)
+class _Found:
+    """z and rise; which nodes are to be held, and the road's force (N) on all."""
+
+    parts: tuple[Array, float]
+    wanted: Array
+    force: Array
+
+
+@dataclass
+class _Answer:
+    """Motion (m) of the owned dofs; of all processes' tread nodes gap (m) and force (N)."""
+
+    motion: Array
+    gap: Array
+    force: Array
+
+
+class LinearContact:
+    """Of the factor that a system has. All methods are collective."""
+
+    def __init__(self, comm: MPI.Comm, system: System, road: Road) -> None:
+        self._comm, self._system, self._road = comm, cast(Columns, system), road
+        counts = comm.allgather(len(road.dofs))
+        first = sum(counts[: comm.rank])
+        self._own = slice(first, first + len(road.dofs))
+        self._stiffness = self._gathered(road.stiffness)
+        self._base = self._gathered(road.active)  # held in the factor
+        self._number = np.full(len(self._base), -1)  # of each node's column
+        none = np.empty((len(self._base), 0))
+        self._columns = _Answer(np.empty((system.closing.change.size, 0)), none, none)
+        self._lift: _Answer | None = None
+        self.changed = False  # whether other nodes are held than in the factor
+
+    def step(
+        self, out: Array, closing: Moved | None, load: float | None
+    ) -> tuple[Array, Array] | None:
+        """As `held_step`, but the road first gets the nodes that it holds after the step."""
+        road = self._road
+        free = self._answer(*self._system.solve(-out, closing), out)
+        free.gap += self._gathered(road.gap())
+        lift = self._lifted() if load is not None else None
+        if lift is not None and not lift.force.sum() > 0:
+            return None
+        held = self._gathered(road.active)
+        found = self._solved(free, lift, held, load)
+        if closing is not None:  # of an old tangent the sets are not believed
+            held, found = self._settled(
+                held, found, lambda held: self._solved(free, lift, held, load)
+            )
+        z, rise = found.parts
+        self.changed = bool((held != self._base).any())
+        motion = free.motion + self._columns.motion[:, self._number[held ^ self._base]] @ z
+        road.height += rise
+        road.active, road.force = held[self._own].copy(), np.zeros(len(road.dofs))
+        motion = motion if lift is None else motion + rise * lift.motion
+        return self._system.spread(motion), found.force[self._own][road.active]
+
+    def _settled(
+        self, held: Array, found: _Found, solved: Callable[[Array], _Found]
+    ) -> tuple[Array, _Found]:
+        """The sets that stay, or those that were given where none do."""
+        first = held, found
+        for _ in range(_ROUNDS):
+            if (found.wanted == held).all():
+                return held, found
+            if np.count_nonzero(found.wanted ^ self._base) > _MOST:
+                break
+            held = found.wanted
+            found = solved(held)
+        return first
+
+    def _solved(
+        self, free: _Answer, lift: _Answer | None, held: Array, load: float | None
+    ) -> _Found:
+        """z, rise, and gap and force of the tread's nodes, for the nodes that the road is to hold."""
+        changed = np.flatnonzero(held ^ self._base)
+        self._add_columns(changed)
+        use = self._number[changed]
+        gap, force = self._columns.gap[:, use], self._columns.force[:, use]
+        rest = free.gap, free.force
+        if lift is not None:
+            gap, force = (np.column_stack(p) for p in ((gap, lift.gap), (force, lift.force)))
+        on, own = held[changed], self._stiffness[changed]
+        rows = np.where(on[:, None], own[:, None] * gap[changed], force[changed])
+        right = -np.where(on, own * rest[0][changed], rest[1][changed])
+        unit = np.where(on, 1.0, 1 / own)  # of each unknown: all in N
+        if lift is not None:
+            rows, right = (
+                np.vstack([rows, force.sum(axis=0)]),
+                np.append(right, load - rest[1].sum()),
+            )
+            unit = np.append(unit, 1 / self._stiffness.max())
+        z = unit * np.linalg.lstsq(rows * unit, right, rcond=None)[0] if len(right) else right
+        parts = z[: len(changed)], float(z[-1]) if lift is not None else 0.0
+        gaps = np.where(held, 0.0, rest[0] + gap @ z)
+        return _Found(
+            parts,
+            np.where(held, rest[1] + force @ z, 0.0) > self._stiffness * gaps,
+            np.where(held, rest[1] + force @ z, 0.0),
+        )
+
+    def _add_columns(self, nodes: Array) -> None:
+        """Those of the nodes that have none yet."""
+        new = nodes[self._number[nodes] < 0]
+        if not len(new):
+            return
+        mine = new[(new >= self._own.start) & (new < self._own.stop)] - self._own.start
+        dofs = self._road.dofs[mine]
+        order = np.flatnonzero((new >= self._own.start) & (new < self._own.stop))
+        motion, reaction = self._system.columns(order, dofs, len(new))
+        force = np.zeros((len(self._road.dofs), len(new)))
+        force[self._base[self._own]] = reaction
+        pressed = ~self._base[self._own][mine]
+        force[mine[pressed], order[pressed]] = 1.0
+        added = motion, self._gathered(motion[self._road.dofs]), self._gathered(force)
+        kept = self._columns
+        parts = zip((kept.motion, kept.gap, kept.force), added, strict=True)
+        self._columns = _Answer(*(np.hstack(pair) for pair in parts))
+        self._number[new] = np.arange(len(new)) + (self._number.max() + 1)
+
+    def _lifted(self) -> _Answer:
+        """By a road that rises by one and stays where it is held."""
+        if self._lift is None:
+            nothing = np.zeros_like(self._system.closing.force)
+            self._lift = self._answer(*self._system.solve(nothing, self._system.raising), nothing)
+            self._lift.gap -= 1.0
+        return self._lift
+
+    def _answer(self, motion: Array, reaction: Array, out: Array) -> _Answer:
+        held = self._road.dofs[self._base[self._own]]
+        force = np.zeros(len(self._road.dofs))
+        force[self._base[self._own]] = reaction + out[held]
+        return _Answer(motion, self._gathered(motion[self._road.dofs]), self._gathered(force))
+
+    def _gathered(self, values: Array) -> Array:
+        return np.concatenate(self._comm.allgather(values))

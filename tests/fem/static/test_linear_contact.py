@@ -1,0 +1,90 @@
+"""What the road holds after a linearised step, by columns of a factor that was made with other nodes held."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from tireroad.fem.static import linear_contact
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.linear_contact import LinearContact, held_step
+from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.tire.material import compound
+
+SOFT = compound("neo-hookean", 1100.0, youngs_modulus=5e6, poisson_ratio=0.49)
+
+
+def inflated(make_body, comm=MPI.COMM_SELF):
+    loader = Loader(Equilibrium(make_body(segments=9, material=SOFT, comm=comm)), lambda _: None)
+    loader.inflate(1.5e5)
+    return loader
+
+
+def taken(equilibrium, active):
+    """The tangent of the present state, factorised with some nodes held; how they close on the road."""
+    equilibrium.road.active, equilibrium.road.force[:] = active.copy(), 0.0
+    assert equilibrium._take_tangent()
+    return equilibrium._system
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+@pytest.mark.parametrize("load", [None, 300.0])
+def test_columns_are_as_good_as_a_factorisation(make_body, monkeypatch, load):
+    """Nodes added and nodes let go, with and without a load: the step, forces and height of a fresh factor."""
+    loader = inflated(make_body, MPI.COMM_WORLD)
+    problem, road = loader.equilibrium, loader.equilibrium.road
+    height = loader.touch + 4e-3
+    road.height = height
+    gap = road.gap()
+    level = np.unique(np.round(np.concatenate(problem.body.comm.allgather(gap)), 9)) + 1e-8
+    some, others = gap < level[5], (gap > level[1]) & (gap < level[9])  # in the factor, in the step
+    out = problem._assemble_residual().copy()
+    system = taken(problem, others)
+    wanted = held_step(problem.body.comm, system, road, (out, system.closing, load))
+    reaction, rise, road.height = wanted[1], road.height - height, height
+    monkeypatch.setattr(linear_contact, "_ROUNDS", 0)
+    system = taken(problem, some)
+    contact = LinearContact(problem.body.comm, system, road)
+    road.active = others.copy()
+    found = contact.step(out, system.closing, load)
+    everywhere = problem.body.comm.allreduce(abs(wanted[0]).max(), op=MPI.MAX)
+    np.testing.assert_allclose(found[0], wanted[0], atol=1e-9 * everywhere)
+    np.testing.assert_allclose(found[1], reaction, rtol=1e-7, atol=1e-6)
+    assert road.height - height == pytest.approx(rise, abs=1e-12)
+    both = (int((some & ~others).sum()), int((others & ~some).sum()))
+    assert min(problem.body.comm.allreduce(np.array(both))) > 0
+
+
+@pytest.mark.slow
+def test_the_step_leaves_no_node_pulled_and_none_below_the_road(make_body):
+    """Complementarity of the linearised problem itself: forces only push, gaps are open, one of both is 0."""
+    loader = inflated(make_body)
+    problem, road = loader.equilibrium, loader.equilibrium.road
+    road.height = loader.touch + 15e-3
+    out = problem._assemble_residual().copy()
+    system = taken(problem, road.gap() < 0)
+    before = int(road.active.sum())
+    motion, reaction = LinearContact(problem.body.comm, system, road).step(
+        out, system.closing, None
+    )
+    gap = road.gap() + motion[road.dofs]
+    assert 0 < road.active.sum() < before  # what penetrates is more than what will touch
+    assert reaction.min() > 0
+    assert abs(gap[road.active]).max() < 1e-12 and gap[~road.active].min() > 0
+
+
+@pytest.mark.slow
+def test_the_same_state_with_no_more_tangents(make_body, monkeypatch):
+    """As where each change of the sets costs a tangent."""
+    ways = []
+    for settle in (True, False):
+        if not settle:
+            monkeypatch.setattr(Equilibrium, "_make_contact", lambda self: None)
+        loader = inflated(make_body)
+        loader.carry(400.0)
+        ways.append(loader)
+    settled, plain = ways
+    assert settled.newton_steps <= plain.newton_steps
+    assert settled.deflection == pytest.approx(plain.deflection, rel=1e-9)
+    found, wanted = (one.body.displacement() for one in ways)
+    np.testing.assert_allclose(found, wanted, atol=1e-9 * abs(wanted).max())
