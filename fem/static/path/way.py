@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
 _REACH = 1.9  # times the largest deflection so far: a load is sought no further away
-_NEAR = 0.01  # of a wanted load: what may be out of balance on the way to it (12 tangents in place of 21)
+_NEAR = 0.01  # of a wanted load: what may be out of balance on the way to it
 
 
 @dataclass(frozen=True)
