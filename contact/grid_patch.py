@@ -155,6 +155,20 @@ def settle(
     return replace(patch, force=force, gap=gap), rise
 
 
+def spread_pull(patch: Patch, pull: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Horizontal forces (c, 2) N of the points of a settled grid from those of the nodes that carry it, `pull` (p, 2) N beside
+    their normal `force` (p,): in the ratio of the nodes around, their sum kept.
+    """
+    touching = (force > 0).astype(float)
+    ratio = pull / np.where(force > 0, force, 1.0)[:, None]
+    near = patch.weights @ touching
+    share = (patch.weights @ (ratio * touching[:, None])) / np.maximum(near, 1e-12)[:, None]
+    found = patch.force[:, None] * share
+    return (
+        found + (pull.sum(axis=0) - found.sum(axis=0)) * (patch.force / patch.force.sum())[:, None]
+    )
+
+
 def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, float]:
     """Rises (m) with too much and too little load."""
     low, high = 0.0, 0.0

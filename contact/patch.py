@@ -20,7 +20,8 @@ class Patch:
     (c,) marks its outermost points, which should never touch. `weights` W (c, p) takes nodal values to
     the points; None: the points are the nodes. `places`: where they lie on a regular grid, or None.
     Points of equal `line` (c,) int follow each other in the rolling direction. `frames` (c, 3, 3): unit vectors along,
-    across and normal to the road in the wheel's axes, along which forces and displacements are counted; None: x, y, z.
+    across and normal to the road in the wheel's axes, along which forces and displacements are counted; None: x, y, z. `pull` (c, 2) N: horizontal forces of a static state with
+    friction, which stay as they are; None without.
     """
 
     index: np.ndarray
@@ -33,6 +34,7 @@ class Patch:
     weights: sparse.csr_matrix | None = None
     places: GridPlaces | None = None
     frames: np.ndarray | None = None
+    pull: np.ndarray | None = None
 
     def resultant(self, force: np.ndarray, horizontal: np.ndarray) -> np.ndarray:
         """(3,) N in the wheel's axes of forces normal to the road (c,) and along and across it (c, 2)."""

@@ -129,7 +129,7 @@ def roll(
     whose part within the step the solver knows.
     """
     count = len(patch.points)
-    horizontal = np.zeros((count, 2))
+    horizontal = np.zeros((count, 2)) if patch.pull is None else patch.pull
     # The first step starts from the static contact set, the others from the solver's last one.
     touching = None if done else patch.force > 0
     answer = (

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tireroad.contact.grid_patch import make_grid_patch, settle
+from tireroad.contact.grid_patch import make_grid_patch, settle, spread_pull
 from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
@@ -45,6 +45,8 @@ class OuterFace(Protocol):
     def seen(self) -> np.ndarray: ...
     @property
     def road(self) -> RoadShape: ...
+    @property
+    def pull(self) -> np.ndarray | None: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +69,7 @@ class Rolled:
 class ContactSetup:
     """The `patch` of points whose static gap is within `reach` (m), the strip of `road` under it, and the `slip`
     (s_x, s_y) of the wheel, as contact.tread.brush has it, with that of the static shape at the outer face's nodes,
-    `shape_slip` (s, 2), where bristles feel it."""
+    `shape_slip` (s, 2), where bristles feel it; `pull` (s, 2) N: horizontal forces of a static state with friction."""
 
     patch: Patch
     reach: float
@@ -76,6 +78,7 @@ class ContactSetup:
     pattern: Pattern | None = None
     slip: tuple[float, float] = (0.0, 0.0)
     shape_slip: np.ndarray | None = None
+    pull: np.ndarray | None = None
 
     @property
     def drive(self) -> Drive:
@@ -142,13 +145,17 @@ class ContactSetup:
         nodes, `nodal_force` (s,) N of the outer face; points at the nodes have it already."""
         patch = self.patch
         if patch.weights is None:
-            return self, 0.0
+            held = None if self.pull is None else self.pull[patch.index]
+            return replace(self, patch=replace(patch, pull=held)), 0.0
         if self.pattern is not None:
             patch = replace(patch, gap=patch.gap + self.begun)
         p = len(patch.index)
         flexibility = (response.static() + response.residual)[:p, :p]
         solver = static_solver(spec, patch, flexibility, self.rolled.speed)
         settled, rise = settle(patch, solver, flexibility, nodal_force[patch.index])
+        if self.pull is not None:
+            share = spread_pull(settled, self.pull[patch.index], nodal_force[patch.index])
+            settled = replace(settled, pull=share)
         return replace(self, patch=settled), rise
 
 
@@ -179,7 +186,9 @@ def contact_setup(
     if pattern is not None:
         pattern.land(patch.points[~patch.edge, 1])
     under = _under(road, patch, rolled)
-    return ContactSetup(patch=patch, reach=reach, road=under, rolled=rolled, pattern=pattern)
+    return ContactSetup(
+        patch=patch, reach=reach, road=under, rolled=rolled, pattern=pattern, pull=face.pull
+    )
 
 
 def _nodes(face: OuterFace, reach: float) -> Patch:

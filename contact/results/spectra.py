@@ -54,7 +54,10 @@ def third_octaves(
 
 
 def deviation(values: np.ndarray, step: float, up_to: float = np.inf) -> np.ndarray:
-    """Standard deviation (d,) of what of values (n, d) in steps of `step` s lies up to `up_to` Hz, by Parseval."""
+    """Standard deviation (d,) of what of values (n, d) in steps of `step` s lies up to `up_to` Hz, by Parseval; of all,
+    where the record is shorter than a period of that."""
+    if up_to * len(values) * step < 1:
+        up_to = np.inf
     square = 2 * np.abs(np.fft.rfft(values - values.mean(axis=0), axis=0)) ** 2
     if len(values) % 2 == 0:
         square[-1] /= 2  # half the sampling rate has one line only

@@ -23,6 +23,7 @@ from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.greens.recursion import Recursion
 from tireroad.runs.bench.parts.contact_points import large, rough
 from tireroad.runs.bench.parts.contact_steps import convolution, orders
+from tireroad.runs.bench.parts.corner_step import corner
 from tireroad.runs.measure.synthetic import Strip, oval_patch
 from tireroad.runs.measure.tabulate import Table
 
@@ -35,11 +36,11 @@ BLOCK = 20  # steps between two looks at the floor
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def run() -> list[Table]:
     """The tables; ratios are of times measured in one run, in turns, with one BLAS thread as in a run."""
-    tables = [_step(), _friction(), convolution(), orders(), large(), rough()]
+    tables = [_step(), _friction(), convolution(), orders(), large(), rough(), corner()]
     return [_asked(*tables), *tables]
 
 
-def _asked(step, friction, convolved, order, many, static) -> Table:
+def _asked(step, friction, convolved, order, many, static, moving) -> Table:
     """What was asked for beside what the other tables measured."""
     limits = [row[-1] for row in convolved.rows if row[-1] != ""]
     rows = [
@@ -52,6 +53,8 @@ def _asked(step, friction, convolved, order, many, static) -> Table:
         ["4,000 steps, faster than convolution", "at least", 300.0, convolved.rows[-1][3], "times"],
         ["difference from it in the limit of the step", "at most", 1e-6, limits[-1], ""],
         ["100 x 100 points, a step", "at most", 60.0, float(many.rows[-1][-1]), "ms"],
+        ["a step of a wheel on its corner over one that is held", "at most", 10.0,
+         moving.rows[-1][-1], "% more"],
         ["order, linear force", "at least", 1.9, order.rows[-1][2], ""],
         ["order, constant force", "at least", 0.9, order.rows[-1][4], ""],
     ]  # fmt: skip

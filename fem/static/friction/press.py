@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import root_scalar
 
-from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.errors import ConvergenceError, InputError, LoadingStopped
 from tireroad.fem.static.friction.balance import RubbingEquilibrium
 from tireroad.fem.static.friction.sliding import Passing, Standing
 from tireroad.fem.static.path.loading import Loader
@@ -23,6 +23,10 @@ from tireroad.fem.static.state import static_state
 
 _NEAR, _CLOSE = 1e-4, 1e-8  # of the travel: the first other one tried, and where secants end
 _MOST = 40  # of them
+_ADVICE = (
+    "Take a smaller static.friction or slip, smaller elements at the footprint (tire.footprint_size), or more "
+    "static.friction_steps"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,18 +101,35 @@ def _rolling(loader: Loader, load: float | None, friction: Friction) -> Loader:
     assert height is not None, "there is no road"
     road.take(force, height)
 
+    def attempt(friction_so_far: float) -> Step:
+        road.friction = friction_so_far
+        return problem.solve(problem.road_height or height, load)
+
     def drag(trial: float) -> float:
         sliding.radius = trial
-        _checked(rubbing, problem.solve(road.height, load))
+        _checked(rubbing, problem.solve(problem.road_height, load))
         return float(rubbing.body.comm.allreduce(road.pull[:, 0].sum()))
 
-    drag(radius)
+    _march(rubbing, attempt, friction.coefficient, Show("static.friction", 1.0, ""))
     if friction.radius is None:
         sliding.radius = _free(drag, radius, rubbing.load())
     if any(friction.slip):
-        sliding.slip = friction.slip
-        drag(sliding.radius)
+
+        def slide(part: float) -> Step:
+            sliding.slip = part * friction.slip[0], part * friction.slip[1]
+            return problem.solve(problem.road_height, load)
+
+        size = float(np.hypot(*friction.slip))
+        _march(rubbing, slide, 1.0, Show("slip with friction", size, ""))
     return rubbing
+
+
+def _march(rubbing: Loader, attempt: Callable[[float], Step], end: float, show: Show) -> None:
+    """From nothing to `end` at once, or in as many steps as it takes. Collective."""
+    try:
+        rubbing.march(attempt, end, end, show)
+    except LoadingStopped as error:
+        raise ConvergenceError(f"{error}. {_ADVICE}") from None
 
 
 def _free(drag: Callable[[float], float], radius: float, load: float) -> float:
@@ -130,7 +151,6 @@ def _checked(rubbing: Loader, step: Step) -> None:
     rubbing.newton_steps += step.iterations
     if not step.converged:
         raise ConvergenceError(
-            f"static: with friction no balance is found ({step.reason}): take a smaller static.friction, "
-            "smaller elements at the footprint (tire.footprint_size), or more static.friction_steps"
+            f"static: with friction no balance is found ({step.reason}). {_ADVICE}"
         )
     rubbing.tell("deflection with friction", rubbing.deflection, "m", step)

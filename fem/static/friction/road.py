@@ -132,11 +132,11 @@ class RubbingRoad(Road):
         self.pull[self._slips] = normal[:, None] * self._way - self._led_by(self.sliding.slid())
 
     def kept(self) -> tuple[Array, ...]:
-        return *super().kept(), self.sticks.copy(), self.pull.copy()
+        return *super().kept(), self.sticks.copy(), self.pull.copy(), self._slips, self._way
 
     def put_back(self, kept: tuple[Array, ...]) -> None:
         super().put_back(kept[:2])
-        self.sticks, self.pull = kept[2:]
+        self.sticks, self.pull, self._slips, self._way = kept[2:]
 
     @property
     def travel(self) -> float | None:

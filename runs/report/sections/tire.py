@@ -37,6 +37,7 @@ def static(results: Results) -> Section:
     if speed and radius:
         pace = quantity(3.6 * speed * radius, "km/h")
         section.facts.append(("travelling speed", pace))
+    section.facts += friction(results)
     points, quads = results.array(name, "surface/points"), results.array(name, "surface/quads")
     moved, road = (
         results.array(name, "surface/displacement"),
@@ -50,6 +51,24 @@ def static(results: Results) -> Section:
     footprint(results, section)
     cords(results, section)
     return section
+
+
+def friction(results: Results) -> list[tuple[str, str]]:
+    """Resultants of a static state with friction; nothing of one without."""
+    force, moment = (
+        results.attribute("static.h5", name) for name in ("horizontal_force", "moment")
+    )
+    if not (isinstance(force, list) and isinstance(moment, list)):
+        return []
+    named = zip(
+        ("horizontal force of the road, forward", "to the left"),
+        force,
+        strict=True,
+    )
+    turning = zip(("torque on the axle", "moment about the vertical"), moment[1:], strict=True)
+    return [(name, quantity(round(value, 6), "N")) for name, value in named] + [
+        (name, quantity(round(value, 6), "N m")) for name, value in turning
+    ]
 
 
 def cords(results: Results, section: Section) -> None:

@@ -156,10 +156,11 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             "and the bristles of contact.brush_stiffness carry the same horizontal forces: keep one of them",
         )
     standing = scene.rotation is None or scene.rotation.speed == 0
-    check_tread(contact, standing, error)
+    rubs = static.friction is not None
+    check_tread(contact, standing, error, rubs)
     rotation = scene.rotation
-    for key in ("free_rolling", "slip_angle"):
-        if rotation is not None and getattr(rotation, key) and (not contact.rubs or standing):
+    for key, pulls in (("free_rolling", contact.rubs), ("slip_angle", contact.rubs or rubs)):
+        if rotation is not None and getattr(rotation, key) and (not pulls or standing):
             raise error(
                 ("rotation", key),
                 "needs contact.brush_stiffness_per_area (N/m³), without which no road pulls on the tire, and a "

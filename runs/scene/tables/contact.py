@@ -68,8 +68,8 @@ class Contact(Variants):
         return (self.brush_stiffness, self.brush_stiffness_per_area) != (None, None)
 
 
-def check_tread(contact: Contact, standing: bool, error: Where) -> None:
-    """Raise InputError for treads and brushes that cannot be."""
+def check_tread(contact: Contact, standing: bool, error: Where, rubs: bool) -> None:
+    """Raise InputError for treads and brushes that cannot be; `rubs`: the static state has friction."""
     if contact.law.creep is not None and contact.points == "nodes":
         raise error(
             ("contact", "tread"),
@@ -83,8 +83,11 @@ def check_tread(contact: Contact, standing: bool, error: Where) -> None:
         raise error(
             ("contact", "friction"), "needs brush_stiffness_per_area (N/m³), which carries it"
         )
-    if any(contact.slip) and (not contact.rubs or standing):
-        raise error(("contact", "slip"), "needs brush_stiffness_per_area (N/m³) and a rolling tire")
+    if any(contact.slip) and (not (contact.rubs or rubs) or standing):
+        raise error(
+            ("contact", "slip"),
+            "needs brush_stiffness_per_area (N/m³), or static.friction, and a rolling tire",
+        )
 
 
 @dataclass(frozen=True)

@@ -60,8 +60,10 @@ def widened(probes: sparse.csr_matrix) -> sparse.csr_matrix:
 def standing_moment(patch: Patch) -> np.ndarray:
     """Moment (3,) N m of the static contact forces about the axle's centre."""
     up = np.array([0.0, 0.0, 1.0]) if patch.frames is None else patch.frames[:, 2]
-    up = patch.force[:, None] * up
-    return np.cross(patch.points, up).sum(axis=0)
+    push = patch.force[:, None] * up
+    if patch.pull is not None:
+        push[:, :2] += patch.pull
+    return np.cross(patch.points, push).sum(axis=0)
 
 
 def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:

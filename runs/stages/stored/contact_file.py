@@ -109,7 +109,7 @@ class ContactFile:
         self._checkpoint = job.directory / CHECKPOINT
         self._stack: list = []
         self._readings: list[np.ndarray] = []
-        self._rubs = job.scene.contact.rubs
+        self._rubs = job.scene.contact.rubs or job.scene.static.friction is not None
         self._layout = dict(_LAYOUT)
         if not job.scene.output.axle_force:
             del self._layout["axle_force"]

@@ -40,10 +40,11 @@ def headline(state: StaticState, friction: float | None) -> dict[str, tuple[floa
     force, size = state.pull.sum(axis=0), np.linalg.norm(state.pull, axis=1)
     sticks = size < (1 - _SMALL) * friction * state.force
     share = state.force[sticks].sum() / state.force.sum()
+    forward, left, torque, upright = np.round([*force, *state.moment[1:]], 6)
     return {
-        "horizontal force, forward": (float(force[0]), "N"),
-        "horizontal force, left": (float(force[1]), "N"),
-        "torque on the axle": (float(state.moment[1]), "N m"),
-        "moment about the vertical": (float(state.moment[2]), "N m"),
+        "horizontal force, forward": (float(forward), "N"),
+        "horizontal force, left": (float(left), "N"),
+        "torque on the axle": (float(torque), "N m"),
+        "moment about the vertical": (float(upright), "N m"),
         "share of the load that sticks": (float(100 * share), "%"),
     }

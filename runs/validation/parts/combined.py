@@ -29,6 +29,7 @@ youngs_modulus = 48e6
 load = 800.0
 error_estimate = false
 camber = {camber}
+{static}
 [modal]
 count = 40
 [damping]
@@ -85,6 +86,7 @@ class Combination:
     rotation: str = ""
     contact: str = ""
     pattern: str = ""
+    static: str = ""
 
 
 COMBINATIONS = {
@@ -101,6 +103,16 @@ COMBINATIONS = {
     ),
     "held, inside a drum, over a bar": Combination(axle="fixed", road=_BAR + _INSIDE),
     "corner, springs, drum, into a hole": Combination(tread="winkler", road=_HOLE + _DRUM),
+    "corner, friction in the static state, rolling freely, rough": Combination(
+        static="friction = 0.8\n",
+    ),
+    "held, friction in the static state at a slip angle and driven, pattern, over a bar": Combination(
+        axle="fixed", static="friction = 0.6\n", rotation="slip_angle = 2.0", pattern=_GROOVES, road=_BAR,
+        contact="slip = [0.01, 0.0]\n",
+    ),
+    "free wheel, friction in the static state, braked by 20 %, creeping tread": Combination(
+        axle="free", static="friction = 1.0\n", tread="viscoelastic", contact=_CREEPS + "slip = [-0.2, 0.0]\n",
+    ),
     "corner, bristles that never slip, braked by 10 %": Combination(
         contact="brush_stiffness_per_area = 1e8\nslip = [-0.1, 0.0]\n"
     ),

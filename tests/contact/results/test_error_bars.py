@@ -71,6 +71,7 @@ def test_the_deviation_ends_where_the_model_does():
     assert told(force, step, 300.0).deviation[2] == pytest.approx(3.0 / np.sqrt(2), rel=1e-9)
     assert told(force, step, np.inf).deviation == pytest.approx(force.std(axis=0), rel=1e-9)
     assert told(force[:-1], step, np.inf).deviation == pytest.approx(force[:-1].std(axis=0))
+    assert told(force[:3], step, 300.0).deviation == pytest.approx(force[:3].std(axis=0))
 
 
 @pytest.mark.parametrize("ratio", [0.5, 2.0])
