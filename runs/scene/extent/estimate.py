@@ -13,6 +13,8 @@ PROGRAM = 2.1e8
 """Bytes of one process with all libraries loaded and the mesh made (measured)."""
 MATRICES = 10
 """Sparse matrices held at the highest: K, its scaled copy and parts, four of rotation, the rolling two."""
+TANGENTS = 4
+"""Of them in the static state: the whole ring's tangent, half of it with its fold, and where its entries go."""
 BASES = 3
 """Copies of all modes held at the highest: slices, the sorted vectors, their products."""
 DENSE = 1000
@@ -78,15 +80,19 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
     """The factor of the stiffness is that of nested dissection on a surface: 31/4 N log2 N entries for
     N columns of nodes (George 1973, doi 10.1137/0710032), each a dense block as large as the
     unknowns of one column, kept in one triangle. MUMPS took 84 MB for 27,225 and 194 MB for 59,697
-    unknowns of second order, this gives 88 MB and 211 MB. A turning tire's has both triangles.
+    unknowns of second order, this gives 88 MB and 211 MB. What it is for a turning tire's responses has both triangles.
     """
     tire, free, count = scene.tire, size.free, size.modes
     block = _column(scene)
     columns = max(free / block, 2.0)
     parts = {
         "program": PROGRAM,
-        "matrices": 12.0 * MATRICES * free * block * _columns_coupled(tire.order),
-        "factor of the stiffness": (8.0 if turning(scene) else 4.0)
+        "matrices": 12.0
+        * (TANGENTS if "modes" in left_out else MATRICES)
+        * (3 * free)
+        * _layers_coupled(tire.proportions().through, tire.order)
+        * _columns_coupled(tire.order),
+        "factor of the stiffness": (8.0 if turning(scene) and "greens" not in left_out else 4.0)
         * 7.75
         * columns
         * math.log2(columns)
@@ -189,3 +195,9 @@ def _columns_coupled(order: int) -> float:
     own = np.full(order, order + 1.0)  # inside an element
     own[0] = 2 * order + 1  # between two
     return float(np.outer(own, own).mean())
+
+
+def _layers_coupled(through: int, order: int) -> float:
+    """Nodes of one column that share an element with one of them, on average."""
+    inside = through * (order - 1) * (order + 1)
+    return (inside + 2 * (order + 1) + (through - 1) * (2 * order + 1)) / (through * order + 1)
