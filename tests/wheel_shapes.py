@@ -15,17 +15,19 @@ from tireroad.fem.tire.plies import Laid, Plies
 def cylinder(cords, laid, *, radius, height, width, counts=(8, 2, 1), sector=2 * np.pi, order=2):
     """A wall of `height` under `radius`, `width` along the axle, over a `sector` around it; reference axes:
     around, outwards, along the axle. `counts` elements; `laid` (number, side) the plies' faces of all cells."""
+    reference = compat.geometry_nodes(order)
+    edge = np.unique(reference[:, 0].round(12))  # not thirds in every version
+    ends = (0, sector), (radius - height, radius), (-width / 2, width / 2)
     lines = [
-        np.linspace(0, sector, order * counts[0] + 1),
-        np.linspace(radius - height, radius, order * counts[1] + 1),
-        np.linspace(-width / 2, width / 2, order * counts[2] + 1),
+        low + (high - low) / n * np.append((np.arange(n)[:, None] + edge[:-1]).ravel(), n)
+        for (low, high), n in zip(ends, counts, strict=True)
     ]
     closed = sector == 2 * np.pi
     around = len(lines[0]) - closed
     shape = around, len(lines[1]), len(lines[2])
     angle, reach, along = np.meshgrid(lines[0][:around], *lines[1:], indexing="ij")
     points = np.stack([reach * np.sin(angle), along, -reach * np.cos(angle)], axis=-1)
-    nodes = np.rint(compat.geometry_nodes(order) * order).astype(int)
+    nodes = np.rint(reference * order).astype(int)
     first = np.stack(np.meshgrid(*(order * np.arange(n) for n in counts), indexing="ij"), axis=-1)
     index = first.reshape(-1, 1, 3) + nodes
     cells = np.ravel_multi_index((index[..., 0] % around, index[..., 1], index[..., 2]), shape)

@@ -35,6 +35,7 @@ def keep_factors_on_disk(folder: Path) -> None:
     for prefix in _PREFIXES:
         if not options.hasName(f"{prefix}mat_mumps_icntl_22"):
             options[f"{prefix}mat_mumps_icntl_22"] = 1
+            options.getInt(f"{prefix}mat_mumps_icntl_22")  # read once: else PETSc calls it unused
 
 
 def available_memory() -> float:
