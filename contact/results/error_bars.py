@@ -46,8 +46,8 @@ def random_share(ratio: float, order: float) -> float:
 
 
 @dataclass(frozen=True)
-class Told:
-    """What is told of a force: `mean`, `deviation` (3,) N of what the model answers for, `level` (b, 3) dB of the
+class Measured:
+    """What is measured of a force: `mean`, `deviation` (3,) N of what the model answers for, `level` (b, 3) dB of the
     bands at `centre` (b,) Hz, and `low` (f, 3) N, the Fourier coefficients of what varies up to a frequency
     (contact.results.spectra.low_part)."""
 
@@ -69,16 +69,16 @@ class Bars:
     history: np.ndarray
 
 
-def told(force: np.ndarray, step: float, limit: float, up_to: float = np.inf) -> Told:
+def measured(force: np.ndarray, step: float, limit: float, up_to: float = np.inf) -> Measured:
     """Of a force (n, 3) N in steps of `step` s, the deviation and the bands below `limit` Hz; its history up to
     `up_to` Hz, if that is lower."""
     centre, level = third_octaves(force, step, limit)
     mean = force.mean(axis=0)
     low = low_part(force - mean, len(force) * step, min(limit, up_to))
-    return Told(mean, deviation(force, step, limit), centre, level, low)
+    return Measured(mean, deviation(force, step, limit), centre, level, low)
 
 
-def bars(run: Told, companion: Told, share: float) -> Bars:
+def bars(run: Measured, companion: Measured, share: float) -> Bars:
     """The error of the run: the `share` of its difference to the companion, without sign."""
     level = np.full(run.level.shape, np.nan)
     for k, centre in enumerate(run.centre):

@@ -24,7 +24,7 @@ class StaticState:
     tire along the wheel's z, `area` (s,) m2 that a uniform pressure is shared out by, `half_sizes` (s, 2) m of the deformed rectangle each node stands for (x and y),
     `ring_rate` (s,) m/rad the derivative of the deformed x by the angle around the axle.
     `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are what it was
-    computed for, and travel with it. `cords` by name of the ply; `mass` (kg) of wall and cords. `told`: the extent of the
+    computed for, and travel with it. `cords` by name of the ply; `mass` (kg) of wall and cords. `fine_extent`: the extent of the
     contact on finer elements, where that is known (fem.static.load_error).
     With friction: `pull` (s, 2) N, the road's horizontal force on the tire, and of a tire that rolls `travel`, m in a
     radian without the wheel's slip.
@@ -45,7 +45,7 @@ class StaticState:
     cords: Mapping[str, CordForce] = field(default_factory=dict)
     mass: float = 0.0
     road: RoadShape = FLAT
-    told: Footprint | None = None
+    fine_extent: Footprint | None = None
     pull: np.ndarray | None = None
     travel: float | None = None
 
@@ -132,8 +132,8 @@ class StaticState:
 
     def footprint(self) -> Footprint:
         """Extent of the contact: as told by finer elements, else of these; zeros without a road."""
-        if self.told is not None:
-            return self.told
+        if self.fine_extent is not None:
+            return self.fine_extent
         if self.road_height is None:
             return Footprint(0.0, 0.0, 0.0)
         return footprint(self.shape, self.positions, self.pressure, self.gap)

@@ -40,7 +40,7 @@ SETTLED = 0.15  # of the run, left out: the road's heights grow from flat
 
 
 @dataclass(frozen=True)
-class Told:
+class Outcome:
     """Contact force (n,) N of a model every STEP, the processor time (s) of its loop, and whether it follows the
     road itself or its statistics alone."""
 
@@ -72,17 +72,17 @@ def run() -> list[Table]:
     return [_table(models, stiffness)]
 
 
-def _law(name: str, given: Prepared, tread: str, **keys: float) -> Told:
+def _law(name: str, given: Prepared, tread: str, **keys: float) -> Outcome:
     """The time loop with that tread law."""
     run = given.run
     spec = replace(given.run.job.scene.contact, tread=tread, law=TREADS.make(tread, **keys))
     setup, _ = run.setup.settled(run.greens.contact, run.static.normal_force, spec)
     trial = Trial(spec, setup, DURATION)
     history = modal(Prepared(run, trial), run.greens.contact, STEP)
-    return Told(name, history.values["contact force"][:, 2], history.seconds)
+    return Outcome(name, history.values["contact force"][:, 2], history.seconds)
 
 
-def _wedges(given: Prepared, states: list[StaticState]) -> Told:
+def _wedges(given: Prepared, states: list[StaticState]) -> Outcome:
     """The look-up is made first and not counted, as the tire's matrices of the others are not."""
     table, tire = _look_up(given, states), _unloaded(given, states[0])
     setup, load = given.trial.setup, given.run.static.load
@@ -94,7 +94,7 @@ def _wedges(given: Prepared, states: list[StaticState]) -> Told:
         road = setup.road.height(np.asarray(places + setup.rolled.speed * STEP * k), tire.y)
         force.append(tire.force(road + rise, table))
     name = f"Mancosu and Minen: wedges, look-up within {100 * table.scatter:.2g} %"
-    return Told(name, np.array(force), time.process_time() - began)
+    return Outcome(name, np.array(force), time.process_time() - began)
 
 
 def _pressed(given: Prepared) -> list[StaticState]:
@@ -154,7 +154,7 @@ def _look_up(given: Prepared, states: list[StaticState]) -> LookUp:
     return look_up(np.concatenate(inside), np.concatenate(carried))
 
 
-def _asperities(given: Prepared) -> Told:
+def _asperities(given: Prepared) -> Outcome:
     """By the statistics of the road's own middle line."""
     setup, static = given.trial.setup, given.run.static
     pitch = 0.25 * setup.road.spacing
@@ -181,10 +181,10 @@ def _asperities(given: Prepared) -> Told:
         f"Fujikawa: asperities {1e3 * road.spacing:.2g} mm apart, of {1e3 * road.radius:.2g} mm radius, "
         f"{1e3 * road.unevenness:.2g} mm uneven"
     )
-    return Told(name, force, time.process_time() - began, follows=False)
+    return Outcome(name, force, time.process_time() - began, follows=False)
 
 
-def _table(models: list[Told], stiffness: float) -> Table:
+def _table(models: list[Outcome], stiffness: float) -> Table:
     first = round(SETTLED * DURATION / STEP)
     reference = models[0].force[first:]
     centre, level = third_octaves(reference[:, None], STEP, BAND)

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tireroad.contact.results.error_bars import CAUSES, Bars, Told, bars, told, total
+from tireroad.contact.results.error_bars import CAUSES, Bars, Measured, bars, measured, total
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.state import StaticState
@@ -95,7 +95,9 @@ class AccuracyStage(Computed[Accuracy]):
         given = self._given(steps)
         runs = {"contact_force": history.total_force, "axle_force": history.axle_force}
         runs = {name: values[start:steps] for name, values in runs.items() if values is not None}
-        exact = {name: told(values, history.step, limit, up_to) for name, values in runs.items()}
+        exact = {
+            name: measured(values, history.step, limit, up_to) for name, values in runs.items()
+        }
         found: dict[str, dict[str, Bars]] = {name: {} for name in exact}
         absent: dict[str, str] = {}
         for cause in CAUSES:
@@ -105,8 +107,8 @@ class AccuracyStage(Computed[Accuracy]):
             except (ConvergenceError, InputError) as error:
                 absent[cause] = str(error)
                 continue
-            off = _told(forces, start * history.step, limit, up_to)
-            other = _told(beside, start * history.step, limit, up_to) if beside else exact
+            off = _measured(forces, start * history.step, limit, up_to)
+            other = _measured(beside, start * history.step, limit, up_to) if beside else exact
             for name in exact:
                 found[name][cause] = bars(other[name], off[name], share)
         product = Accuracy(
@@ -200,16 +202,20 @@ class AccuracyStage(Computed[Accuracy]):
         )
 
 
-def _told(forces: Forces, start: float, limit: float, up_to: float) -> dict[str, Told]:
+def _measured(forces: Forces, start: float, limit: float, up_to: float) -> dict[str, Measured]:
     """The figures of the forces of a companion after `start` s."""
     first = round(start / forces.step)
     both = {"contact_force": forces.contact, "axle_force": forces.axle}
-    return {name: told(values[first:], forces.step, limit, up_to) for name, values in both.items()}
+    return {
+        name: measured(values[first:], forces.step, limit, up_to) for name, values in both.items()
+    }
 
 
-def _describe(record: Record, product: Accuracy, exact: Mapping[str, Told], limit: float) -> None:
+def _describe(
+    record: Record, product: Accuracy, exact: Mapping[str, Measured], limit: float
+) -> None:
     """Of the vertical force: the error of mean and deviation (up to `limit` Hz), the largest of the bands."""
-    record.indicators["deviations are told up to"] = (limit, "Hz")
+    record.indicators["deviations are taken up to"] = (limit, "Hz")
     for name, figures in exact.items():
         bar, what = product.total(name), name.replace("_", " ")
         if bar is None:

@@ -155,7 +155,7 @@ class StaticStage(Computed[StaticState]):
             touch_height=float(attributes["touch_height"]),
             road_height=None if road is None else float(road),
             road=road_shape(self.job.scene),
-            told=None if road is None else _extent(attributes),
+            fine_extent=None if road is None else _extent(attributes),
             inflation=float(attributes["inflation"]),
             rolling=steady_rolling(self.job, float(attributes["rolling_speed"])),
             **cords_file.read(file),
@@ -189,7 +189,7 @@ def _estimate(record: Record, state: StaticState, loader: Loader) -> StaticState
     for name in _EXTENT[:2]:
         size = getattr(state.footprint(), name)
         record.indicators[f"footprint {name} on the elements of the run"] = (size, "m")
-    return state if state.pull is not None else replace(state, told=found.extent)
+    return state if state.pull is not None else replace(state, fine_extent=found.extent)
 
 
 def _show(progress) -> None:

@@ -66,8 +66,8 @@ def gather(sweep: Sweep, folder: Path) -> Gathered:
 def _figures(run: RunResults) -> dict[tuple[str, str], float]:
     """Headline numbers of all stages, third-octave levels and their errors, by (name, unit)."""
     found: dict[tuple[str, str], float] = {}
-    for stage, told in run.summary.items():
-        for name, entry in (told.get("headline") or {}).items():
+    for stage, entries in run.summary.items():
+        for name, entry in (entries.get("headline") or {}).items():
             value = entry.get("value")
             if isinstance(value, int | float) and not isinstance(value, bool):
                 found[f"{stage}: {name}", entry.get("unit", "-")] = float(value)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.contact.results.error_bars import Told, bars, told
+from tireroad.contact.results.error_bars import Measured, bars, measured
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import by_processor
 from tireroad.runs.bench.parts.kept import read_kept, write_kept
@@ -169,15 +169,15 @@ def _spent(trials: list[Trial]) -> float:
 
 def _true(exact: Recorded, run: Recorded) -> float:
     """The error that is asked for: of the history and of the mean, relative, the larger one."""
-    one, other = _told(exact), _told(run)
+    one, other = _measured(exact), _measured(run)
     far = bars(one, other, 1.0)
     return float(max(far.history[2], far.mean[2] / abs(one.mean[2])))
 
 
-def _told(run: Recorded) -> Told:
+def _measured(run: Recorded) -> Measured:
     """Of the axle force after the first quarter, in which all roads have begun."""
     force = run.forces["axle_force"]
-    return told(force[len(force) // 4 :], run.step, UP_TO, UP_TO)
+    return measured(force[len(force) // 4 :], run.step, UP_TO, UP_TO)
 
 
 def _summary(found: list[Outcome]) -> Table:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.contact.results.error_bars import told
+from tireroad.contact.results.error_bars import measured
 from tireroad.contact.results.spectra import distance
 from tireroad.runs.bench.accuracy.rough_road import Mesh, Rolled, rolled
 from tireroad.runs.measure.tabulate import Table
@@ -58,7 +58,7 @@ def apart(exact: Rolled, found: Rolled, force: str, duration: float) -> Apart:
     steps = [run.figure("contact", "step") for run in (exact, found)]
     top = 0.5 * min(run.figure("modes", "highest") for run in (exact, found))
     values = [run.forces[force][:, 2:] for run in (exact, found)]
-    one, other = (told(v, step, top) for v, step in zip(values, steps, strict=True))
+    one, other = (measured(v, step, top) for v, step in zip(values, steps, strict=True))
     same = [k for k, centre in enumerate(one.centre) if np.isclose(other.centre, centre).any()]
     same = [k for k in same if BANDS[0] <= one.centre[k] <= BANDS[1]]
     off = [

@@ -159,9 +159,9 @@ def _meshes(answers: dict, exact: np.ndarray) -> Table:
     rows = []
     for (order, segments, arc, thick, grading, size), answer in answers.items():
         error = _errors(answer, exact)
-        told = [f"order {order}, {grading}", f"{segments} x {arc} x {thick}", size]
-        told += [answer.unknowns, answer.seconds]
-        rows.append([*told, float(error[0]), float(error[-1]), float(error.max()), False])
+        row = [f"order {order}, {grading}", f"{segments} x {arc} x {thick}", size]
+        row += [answer.unknowns, answer.seconds]
+        rows.append([*row, float(error[0]), float(error[-1]), float(error.max()), False])
     for row in rows:
         row[-1] = not any(r[4] < row[4] and r[-2] < row[-2] for r in rows)
     best = ", ".join(f"{r[0]} {r[1]} ({r[4]:.1f} s, {r[-2]:.2g} %)" for r in rows if r[-1])

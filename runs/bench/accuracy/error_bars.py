@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tireroad.contact.results.error_bars import Bars, bars, told
+from tireroad.contact.results.error_bars import Bars, bars, measured
 from tireroad.runs.bench.parts.effectivity import (
     ALL,
     FORCES,
@@ -129,7 +129,7 @@ def _compared(
     """Every figure of the vertical force, after the run-in."""
     spectra, accuracy = (own.done.done[stage].product for stage in ("spectra", "accuracy"))
     one, other = (
-        told(
+        measured(
             run.forces[FORCES[force]][round(spectra.left_out / run.step) :],
             run.step,
             spectra.limit.frequency,

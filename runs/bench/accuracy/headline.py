@@ -44,8 +44,8 @@ def table(folder: Path, mesh: Mesh, modes: int, duration: float, choices) -> Tab
         kept -= found.figure("contact", "states moved to the residual")
         points = found.figure("greens", "contact points")
         busy = 1e-6 * found.figure("contact", "processor time a step") * rate
-        told = [points, modes, RESIDUAL, kept, step, *off, found.loop, found.loop / duration, busy]
-        rows.append(told)
+        row = [points, modes, RESIDUAL, kept, step, *off, found.loop, found.loop / duration, busy]
+        rows.append(row)
     return _told(exact, rows, exact.loop / duration)
 
 

@@ -41,11 +41,11 @@ class Pressed:
 
 @dataclass(frozen=True)
 class Known:
-    """A tire at one height of the road: its `own` state, its estimate `told` (fem.static.load_error), and what it
+    """A tire at one height of the road: its `own` state, its `estimate` (fem.static.load_error), and what it
     converges to, if that was looked for."""
 
     own: Pressed
-    told: LoadError
+    estimate: LoadError
     limit: Converged | None
 
 
@@ -103,8 +103,10 @@ def table(meshes: dict[str, object], reference: str, make) -> Table:
         for height, one, exact_one in zip(HEIGHTS, found, truth, strict=True):
             limit = exact_one.limit.values
             off = 100 * (one.own.values / limit - 1)
-            seen = 100 * (np.array([one.told.extent.length, one.told.extent.width]) / limit[1:] - 1)
-            estimate = 100 * one.told.relative
+            seen = 100 * (
+                np.array([one.estimate.extent.length, one.estimate.extent.width]) / limit[1:] - 1
+            )
+            estimate = 100 * one.estimate.relative
             ratio = estimate / abs(float(off[0]))
             rows.append([name, 1e3 * height, *map(float, [*off, *seen]), estimate, ratio])
     sure = np.max([one.limit.error for one in truth], axis=0)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.results.error_bars import Bars, Told, bars, random_share, told, total
+from tireroad.contact.results.error_bars import Bars, Measured, bars, random_share, measured, total
 
 
-def at(size: float, rate: float) -> Told:
+def at(size: float, rate: float) -> Measured:
     """Figures whose error is known: 0.3 N, 0.2 N and 0.1 dB at size 1."""
     off = size**rate
-    return Told(
+    return Measured(
         np.full(3, 7.0 + 0.3 * off),
         np.full(3, 2.0 - 0.2 * off),
         np.array([100.0, 200.0]),
@@ -29,7 +29,7 @@ def test_the_error_of_a_known_order_is_told_exactly(rate):
 
 def test_a_band_that_the_companion_lacks_is_unknown():
     companion = at(2.0, 2.0)
-    companion = Told(
+    companion = Measured(
         companion.mean,
         companion.deviation,
         companion.centre[1:],
@@ -54,7 +54,7 @@ def test_figures_of_a_sine():
     step, amplitude = 1e-3, 2.0
     time = step * np.arange(4000)
     force = np.outer(amplitude * np.sin(2 * np.pi * 100.0 * time) + 5.0, [0.0, 0.0, 1.0])
-    found = told(force, step, 300.0)
+    found = measured(force, step, 300.0)
     assert found.mean[2] == pytest.approx(5.0)
     assert found.deviation[2] == pytest.approx(amplitude / np.sqrt(2))
     assert found.centre.max() < 300.0
@@ -68,10 +68,10 @@ def test_the_deviation_ends_where_the_model_does():
     time = step * np.arange(count)
     force = np.zeros((count, 3))
     force[:, 2] = 3.0 * np.sin(2 * np.pi * 100.0 * time) + 5.0 * np.sin(2 * np.pi * 400.0 * time)
-    assert told(force, step, 300.0).deviation[2] == pytest.approx(3.0 / np.sqrt(2), rel=1e-9)
-    assert told(force, step, np.inf).deviation == pytest.approx(force.std(axis=0), rel=1e-9)
-    assert told(force[:-1], step, np.inf).deviation == pytest.approx(force[:-1].std(axis=0))
-    assert told(force[:3], step, 300.0).deviation == pytest.approx(force[:3].std(axis=0))
+    assert measured(force, step, 300.0).deviation[2] == pytest.approx(3.0 / np.sqrt(2), rel=1e-9)
+    assert measured(force, step, np.inf).deviation == pytest.approx(force.std(axis=0), rel=1e-9)
+    assert measured(force[:-1], step, np.inf).deviation == pytest.approx(force[:-1].std(axis=0))
+    assert measured(force[:3], step, 300.0).deviation == pytest.approx(force[:3].std(axis=0))
 
 
 @pytest.mark.parametrize("ratio", [0.5, 2.0])
