@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -67,6 +68,12 @@ def test_no_circle_of_imports() -> None:
         TopologicalSorter(graph).prepare()
     except CycleError as circle:
         pytest.fail(" -> ".join(circle.args[1]))
+
+
+def test_files_of_tests_differ_in_name() -> None:
+    """Two of one name in different folders are collected one by one, and not together."""
+    count = Counter(file.name for file in (ROOT / "tests").rglob("test_*.py"))
+    assert {name for name, number in count.items() if number > 1} == set()
 
 
 def test_files_stay_short() -> None:
