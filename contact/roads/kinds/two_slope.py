@@ -29,7 +29,7 @@ class TwoSlope(Levelled):
         "the width; shorter ones of the texture, isotropic", least=0.02, most=10,
     )  # fmt: skip
     stone_size: float = number(
-        0.004, "m", "shortest wavelength: the spectrum is cut there", least=1e-4, most=1
+        0.004, "m", "shortest wavelength: the spectrum is cut there", least=1e-3, most=1
     )
     wavelengths: tuple[float, ...] = numbers(
         "wavelengths of the levels; between them straight lines over their logarithm, beyond them constant",
