@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 from started import ROOT, environment
 
+import tireroad  # noqa: F401 - before numpy: it chooses the kernels of BLAS
+
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 os.environ["TIREROAD_CACHE"] = "off"  # the user's has stages of earlier runs
 
