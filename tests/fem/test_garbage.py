@@ -15,7 +15,18 @@ class _Heap(ctypes.Structure):
 
     _fields_ = [
         (name, ctypes.c_size_t)
-        for name in "arena free fast maps mapped most fast_free used unused top".split()
+        for name in [
+            "arena",
+            "free",
+            "fast",
+            "maps",
+            "mapped",
+            "most",
+            "fast_free",
+            "used",
+            "unused",
+            "top",
+        ]
     ]
 
 
