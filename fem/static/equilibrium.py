@@ -220,9 +220,8 @@ class Equilibrium:
         self._before.x.array[:] = self.body.u.x.array
         self._assemble_tangent()
         diagonal = self.matrix.getDiagonal()
-        typical = diagonal.norm() / np.sqrt(diagonal.size)
         self.road.weigh(diagonal.array)
-        return self.body.ring.thickness * typical
+        return self.body.ring.thickness * diagonal.norm() / np.sqrt(diagonal.size)
 
     def _assemble_residual(self) -> np.ndarray:
         """Forces out of balance at the owned dofs, N; on the rim 0, where the wheel takes them."""
