@@ -11,6 +11,8 @@ from typing import Any
 
 __path__ = [str(Path(__file__).resolve().parent)]
 
+import_module("tireroad.runs.process.kernels").choose_kernels()  # before anything loads BLAS
+
 # Where each public name lives; imported when it is first asked for, so that `import tireroad` costs
 # nothing and reading results needs no finite elements.
 _HOMES = {

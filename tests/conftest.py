@@ -2,6 +2,7 @@
 
 import ctypes
 import gc
+import json
 import os
 import signal
 import subprocess
@@ -12,6 +13,8 @@ from pathlib import Path
 
 import pytest
 from started import ROOT, environment
+
+import tireroad  # noqa: F401 - before numpy: it chooses the kernels of BLAS
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 os.environ["TIREROAD_CACHE"] = "off"  # the user's has stages of earlier runs
@@ -66,5 +69,19 @@ def launch() -> Callable[..., subprocess.CompletedProcess]:
             command = ["mpirun", "-n", str(processes), *command]
         options.setdefault("env", environment())
         return subprocess.run(command, capture_output=True, text=True, timeout=1200, **options)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def ran(launch) -> Callable[..., tuple[str, dict]]:
+    """Run a scene file into a folder, with options; what was printed and the stages of the summary."""
+
+    def run(scene: Path, out: Path, *options: str, processes: int = 1, status: int = 0):
+        start = "-m", "runs", "run", scene, "--out", out, *options
+        done = launch(*start, processes=processes)
+        assert done.returncode == status, done.stderr + done.stdout
+        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+        return done.stdout + done.stderr, summary["stages"]
 
     return run

@@ -1,6 +1,6 @@
 """Static equilibrium under inflation, steady rolling and a flat, frictionless road (friction: fem.static.friction).
 
-F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f, with f >= 0 on the tread dofs,
+F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f, f >= 0 on the tread dofs,
 z + u_z >= z_road and one of both zero.
 """
 
@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
+from tireroad.fem.static.drag import Drag
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.linear_contact import LinearContact, held_step
 from tireroad.fem.static.path.step import Step
@@ -40,7 +41,8 @@ class Equilibrium:
 
     `inflation` (Pa) may be changed between solves; `solve` starts from the body's displacement and
     puts it back when it does not converge. `road_height` (m) is that of the last state that did;
-    `cost`: seconds by part; the road's `shape` is a level plane here (fem.static.curved has others).
+    `cost`: seconds by part; the road's `shape` is a level plane here (fem.static.curved has others); `force_scale`: N,
+    by which residuals are measured; `drag`: what holds the body back on its fall through a snap.
     """
 
     shape: RoadShape = FLAT
@@ -49,6 +51,7 @@ class Equilibrium:
         self.body, self.rolling = body, rolling
         self.cost = Timing()
         self.road_height: float | None = None
+        self.drag: Drag | None = None
         self.pressure = fem.Constant(body.mesh, 0.0)
         self._before = fem.Function(body.space)
         residual = static_residual(body, self.pressure, rolling)
@@ -65,7 +68,7 @@ class Equilibrium:
         self._work = fem.petsc.create_vector(self._residual)
         self._rim = (3 * body.rim[body.rim < body.nodes, None] + np.arange(3)).ravel()
         self.road = self._make_road()
-        self._scale = self._yardsticks()
+        self.force_scale = self._yardsticks()
         self._damped = bool(rolling.speed * (rolling.damping + rolling.stiffness_damping))
         self._system = self._make_system("lu" if self._damped else "cholesky")
         self._contact: LinearContact | None = None
@@ -77,26 +80,24 @@ class Equilibrium:
         return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
 
     def _make_contact(self) -> LinearContact | None:
-        """What settles the sets of contact within a step; None where the tangent is not symmetric, or depends on them."""
-        road = self.road
-        return None if self._damped else LinearContact(self.body.comm, self._system, road)
+        """Settles the sets of contact within a step; None where the tangent is not symmetric, or depends on them."""
+        return None if self._damped else LinearContact(self.body.comm, self._system, self.road)
 
     @property
     def rounding(self) -> float:
         """Force below which nothing is balanced, N."""
-        return TOLERANCE * self._scale
+        return TOLERANCE * self.force_scale
 
     def solve(
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
     ) -> Step:
         """Equilibrium with the road plane at the given height (m), or without a road. Collective.
 
-        With a `load` (N) the road is moved, from the given height on, until it carries that. `allowed`
-        N may stay out of balance in a state that is only on the way to another. Newton's method and the
-        active set of the road in one loop: a dof is held where f - c gap > 0, with c the dof's own stiffness,
-        which is complementarity for any c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558);
-        a new tangent settles its sets (LinearContact). Held dofs are put on the road by the linearised step.
-        A tangent serves for as long as each step with it leaves a fifth of the error or less.
+        With a `load` (N) the road is moved, from the given height on, until it carries that. `allowed` N may stay
+        out of balance in a state that is only on the way to another. Newton's method and the active set of the
+        road in one loop: a dof is held where f - c gap > 0, with c the dof's own stiffness, which is complementarity
+        for any c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558); a new tangent settles its
+        sets (LinearContact), and serves while each step with it leaves a fifth of the error or less.
         """
         field = self.body.u.x
         kept, self._contact = (field.array.copy(), self.road.kept()), None
@@ -106,7 +107,7 @@ class Equilibrium:
         while True:
             changed, last = self.road.choose(), error
             error = self._error(load)
-            reason = self._stopped(error, changed, tangents, allowed / self._scale)
+            reason = self._stopped(error, changed, tangents, allowed / self.force_scale)
             if reason == "converged":
                 self.road_height = None if road_height is None else self.road.height
                 return Step(True, tangents, error, reason)
@@ -141,16 +142,15 @@ class Equilibrium:
         parts = np.array([out @ out + distance @ distance, self.road.force.sum()])
         square, total = self.body.comm.allreduce(parts)
         missing = 0.0 if load is None else load - total
-        return float(np.hypot(np.sqrt(square), missing)) / self._scale
+        return float(np.hypot(np.sqrt(square), missing)) / self.force_scale
 
     def _take_tangent(self) -> bool:
         """Assemble and factorise at the present state, the held dofs on their way to the road."""
         with self.cost("assembly"):
             self._assemble_tangent()
-        if not self._system.take(self.matrix, self.road.held, *self.road.steps()):
-            return False
-        self._contact = self._make_contact() if self.road.height > -np.inf else None
-        return True
+        taken = self._system.take(self.matrix, self.road.held, *self.road.steps())
+        self._contact = self._make_contact() if taken and self.road.height > -np.inf else None
+        return taken
 
     def _move(self, closing: Moved | None, load: float | None) -> str:
         """One linearised step to balance. Why it cannot be taken, or nothing. Collective."""
@@ -173,13 +173,12 @@ class Equilibrium:
         self._before.x.array[:] = self.body.u.x.array
         if not self._take_tangent():
             return float("nan")
-        _, force = self._system.solve(np.zeros(len(self._work.array_r)), self._system.raising)
+        force = self._system.solve(np.zeros(len(self._work.array_r)), self._system.raising)[1]
         return self.body.comm.allreduce(self.road.upward(force))
 
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
         """Under a vertical traction in place of the road: the height (m) that the face gains by one step of
         Newton's method from the present state, and that by a newton more. Collective.
-
         `weights` (s,) of the outer face's nodes, of sum 1, say where the `load` (N) acts and the height is read.
         """
         self._before.x.array[:] = self.body.u.x.array
@@ -215,17 +214,14 @@ class Equilibrium:
         return self.solve(height)
 
     def _yardsticks(self) -> float:
-        """Force scale, N, of the undeformed body, which scales the road's stiffness.
-
-        The scale is the typical stiffness of a dof times the wall, so that 1e-12 of it is far below
-        any load of interest.
+        """Force scale (N): the undeformed body's typical stiffness of a dof times the wall, so that 1e-12 of it is far
+        below any load of interest. The road's stiffness is that of its dofs.
         """
         self._before.x.array[:] = self.body.u.x.array
         self._assemble_tangent()
         diagonal = self.matrix.getDiagonal()
-        typical = diagonal.norm() / np.sqrt(diagonal.size)
         self.road.weigh(diagonal.array)
-        return self.body.ring.thickness * typical
+        return self.body.ring.thickness * diagonal.norm() / np.sqrt(diagonal.size)
 
     def _assemble_residual(self) -> np.ndarray:
         """Forces out of balance at the owned dofs, N; on the rim 0, where the wheel takes them."""
@@ -235,6 +231,8 @@ class Equilibrium:
             local.set(0.0)
         fem.petsc.assemble_vector(self._work, self._residual)
         self._work.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        if self.drag:
+            self.drag.add_to(self._work.array)
         self._work.array[self._rim] = 0.0
         return self._work.array_r
 
@@ -242,6 +240,8 @@ class Equilibrium:
         self._local_tangent.zeroEntries()
         fem.petsc.assemble_matrix(self._local_tangent, self._tangent, bcs=self._clamp)
         self._local_tangent.assemble()
+        if self.drag:
+            self.drag.stiffen(self._local_tangent)
         if self._damping:
             self.matrix = self._damping.added_to(self._local_tangent)
 

@@ -27,8 +27,9 @@ class Body:
     """A ring and what it is made of, with its displacement `u` about the undeformed shape.
 
     A `Ring` comes with the materials of its section's regions by name; a `Torus` with the one of its
-    wall, and regions that have others; `cords` lie on its section's plies, by name. Collective to make. `ids` are the lattice ids of this process's owned nodes; `rim` and `tread`
-    its blocked dofs there (ghosts included in `rim`, as boundary conditions want them).
+    wall, and regions that have others; `cords` lie on its section's plies, by name. Collective to make. `ids` are the
+    lattice ids of this process's owned nodes; `rim` and `tread` its blocked dofs there (ghosts included in `rim`, as
+    boundary conditions want them); `beads` those of the outer face on the rim.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class Body:
         self.rim = self._face_dofs(RIM)
         tread = self._face_dofs(TREAD)
         self.tread = np.setdiff1d(tread[tread < self.nodes], self.rim)
+        self.beads = np.intersect1d(tread, self.rim)
         # 2 x order integrates the quadratic form of an affine element exactly: full integration.
         measure = {"metadata": {"quadrature_degree": 2 * order}}
         self.dx = ufl.Measure("dx", domain=self.mesh, **measure)

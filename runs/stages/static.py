@@ -197,6 +197,7 @@ def _show(progress) -> None:
     observe.say(
         f"  {progress.what} {progress.value:.6g} {progress.unit}: load {progress.load:.6g} N on "
         f"{progress.active} points, {step.iterations} Newton steps, residual {step.residual:.1e}"
+        + ("" if step.reason == "converged" else f"; {step.reason}")
     )
 
 

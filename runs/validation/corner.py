@@ -8,20 +8,13 @@ from pathlib import Path
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import compare, verdicts
 from tireroad.runs.validation.rolling import ROADS
-from tireroad.runs.validation.tires import Choice, Tires
+from tireroad.runs.validation.tires import LOADED, Choice, Tires
 
 ABOUT = "a wheel on its corner: modes against full finite elements of the same mesh, standing and rolling"
 
-SCENE = """
-name = "validate"
-[tire]
-segments = {segments}
-elements_arc = {elements_arc}
-footprint_size = 0.35
-[tire.material]
-youngs_modulus = 48e6
-[static]
-load = 500.0
+SCENE = (
+    LOADED
+    + """
 [damping]
 mass = 100.0
 [rotation]
@@ -44,6 +37,7 @@ youngs_modulus = 1e7
 duration = {duration}
 step = 1e-4
 """
+)
 MOVED = 'kind = "flat"\nmotion = { kind = "sine", amplitude = 5e-4, frequency = 30.0 }'
 CASES = {
     "standing, road moved by 0.5 mm at 30 Hz": (0.0, MOVED),

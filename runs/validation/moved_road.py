@@ -10,20 +10,13 @@ from tireroad.contact.results.spectra import distance
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import compare, digits, percent, verdicts
 from tireroad.runs.validation.histories import follow
-from tireroad.runs.validation.tires import Choice, Tires
+from tireroad.runs.validation.tires import LOADED, Choice, Tires
 
 ABOUT = "a standing tire on a flat road that moves: modes against full finite elements"
 
-SCENE = """
-name = "validate"
-[tire]
-segments = {segments}
-elements_arc = {elements_arc}
-footprint_size = 0.35
-[tire.material]
-youngs_modulus = 48e6
-[static]
-load = 500.0
+SCENE = (
+    LOADED
+    + """
 [damping]
 mass = 500.0
 [modal]
@@ -37,6 +30,7 @@ motion = {{ kind = "sine", amplitude = {amplitude}, frequency = 50.0 }}
 duration = {duration}
 step = 1e-4
 """
+)
 AMPLITUDES = (1e-4, 2e-3)  # m: the thesis's, and one at which the contact changes
 CHOICES = (
     Choice(50, "none", 1e-4),

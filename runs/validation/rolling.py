@@ -11,20 +11,13 @@ import numpy as np
 from tireroad.contact.results.spectra import BAND
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import Comparison, compare, verdicts
-from tireroad.runs.validation.tires import Choice, Tires
+from tireroad.runs.validation.tires import LOADED, Choice, Tires
 
 ABOUT = "contact and axle force while rolling, modes against full finite elements of the same mesh"
 
-SCENE = """
-name = "validate"
-[tire]
-segments = {segments}
-elements_arc = {elements_arc}
-footprint_size = 0.35
-[tire.material]
-youngs_modulus = 48e6
-[static]
-load = 500.0
+SCENE = (
+    LOADED
+    + """
 [damping]
 mass = 300.0
 [rotation]
@@ -39,6 +32,7 @@ youngs_modulus = 1e7
 duration = 0.1
 step = 1e-4
 """
+)
 
 
 ROADS = {

@@ -28,6 +28,18 @@ from tireroad.runs.validation.histories import Trial
 # Of the full finite elements' scheme. Axle force on a cleat at steps of 1e-4 s with 0, 0.5 and 0.8: 5.4, 2.8
 # and 2.1 % off; contact force on cobblestones at 2.5e-5 s: 0 and 0.5 are 0.08 % apart, 0.8 is 0.2 % off.
 RADIUS = 0.5
+LOADED = """
+name = "validate"
+[tire]
+segments = {segments}
+elements_arc = {elements_arc}
+footprint_size = 0.35
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 500.0
+"""
+"""A scene's beginning: the soft torus that carries 500 N, of elements still to be named."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """The stages greens and response through the program: what they store, reuse and say."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -38,17 +36,14 @@ receptance = { to = 80.0, step = 20.0, direct = 2 }
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, launch):
+def run(tmp_path_factory, ran):
     """Run the scene with more options, in one folder; its path and the summary's stages."""
     folder = tmp_path_factory.mktemp("stages")
     scene = folder / "scene.toml"
     scene.write_text(f'name = "stages"\n{SCENE}')
 
     def started(*options: str):
-        out = folder / "out"
-        done = launch("-m", "runs", "run", scene, "--out", out, *options)
-        assert done.returncode == 0, done.stderr + done.stdout
-        return out, json.loads((out / "summary.json").read_text())["stages"]
+        return folder / "out", ran(scene, folder / "out", *options)[1]
 
     return started
 

@@ -1,7 +1,5 @@
 """Stages of one number of processes, reused on another: the answer is that of a fresh run."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -33,17 +31,14 @@ FREQUENCY = np.linspace(20.0, 190.0, 18)
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, launch):
+def run(tmp_path_factory, ran):
     """Run the scene on some processes in the folder of a name: its summary's stages, its receptances."""
     base = tmp_path_factory.mktemp("reuse")
     scene = base / "scene.toml"
     scene.write_text(SCENE)
 
     def started(name: str, processes: int, *options: str):
-        arguments = ("-m", "runs", "run", scene, "--out", base / name, *options)
-        done = launch(*arguments, processes=processes)
-        assert done.returncode == 0, done.stderr + done.stdout
-        stages = json.loads((base / name / "summary.json").read_text())["stages"]
+        stages = ran(scene, base / name, *options, processes=processes)[1]
         return stages, receptance(base / name) if (base / name / "greens.h5").exists() else None
 
     return started

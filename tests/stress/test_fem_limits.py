@@ -95,6 +95,13 @@ def test_a_load_out_of_reach_is_refused():
     assert 0 < found.state.load < 1e7
 
 
+def test_a_road_above_the_rim_is_refused():
+    """The wheel is in the way, and is no part of the model."""
+    found = ended(inflation=2e4, deflection=0.16, youngs_modulus=4.8e6, mesh=(8, 4, 2))
+    assert "at 0.1529 m" in found.message and "the road is at the rim" in found.message
+    assert found.state.road_height is None
+
+
 def test_a_speed_beyond_what_the_wall_holds():
     """Centrifugal forces alone burst a soft tire: nothing was reached."""
     found = result(Attempt("", speed=900.0, youngs_modulus=2e6))

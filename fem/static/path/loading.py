@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.parallel import on_root
@@ -120,8 +121,24 @@ class Loader:
         places[:, 2] -= self.equilibrium.shape.height(*places[:, :2].T)
         return TreadSurface(lattice, places).lowest()
 
+    @property
+    def farthest(self) -> float:
+        """Deflection at which the road reaches the rim where the outer face meets it, m. Collective."""
+        places = self.body.space.tabulate_dof_coordinates()[self.body.beads]
+        height = places[:, 2] - self.equilibrium.shape.height(*places[:, :2].T)
+        lowest = self.body.comm.allreduce(float(height.min(initial=np.inf)), op=MPI.MIN)
+        return lowest - self.touch
+
+    def _check_reach(self, deflection: float) -> None:
+        if deflection > self.farthest:
+            raise ConvergenceError(
+                f"static: {deflection:.4g} m of deflection are out of reach: at {self.farthest:.4g} m the road is at "
+                "the rim"
+            )
+
     def deflect(self, deflection: float) -> None:
         """Raise the road by `deflection` (m) from first touch of the inflated tire."""
+        self._check_reach(deflection)
         if not self._by_half(lambda half: Way(half).climb(deflection)):
             Way(self).climb(deflection)
 
@@ -130,6 +147,7 @@ class Loader:
         half, own = self._half(), Way(self)
         way = None if half is None else Way(half.loader)
         for deflection in deflections:
+            self._check_reach(deflection)
             if half is None or way is None:
                 own.to(deflection)
             else:
@@ -201,16 +219,27 @@ class Loader:
         return self.equilibrium.load()
 
     def march(
-        self, attempt: Attempt, end: float, first: float, show: Show, start: float = 0.0
+        self,
+        attempt: Attempt,
+        end: float,
+        first: float,
+        show: Show,
+        start: float = 0.0,
+        fall: Attempt | None = None,
     ) -> None:
-        def tried(target: float) -> Step:
-            step = attempt(target)
-            self.newton_steps += step.iterations
-            if step.converged:
-                self.tell(show.what, target * show.scale, show.unit, step)
-            return step
+        """As `path.stepping.march`, with every step counted and those that converge reported."""
 
-        march(tried, start, end, first, show)
+        def seen(attempt: Attempt) -> Attempt:
+            def tried(target: float) -> Step:
+                step = attempt(target)
+                self.newton_steps += step.iterations
+                if step.converged:
+                    self.tell(show.what, target * show.scale, show.unit, step)
+                return step
+
+            return tried
+
+        march(seen(attempt), start, end, first, show, fall and seen(fall))
 
     def tell(self, what: str, value: float, unit: str, step: Step) -> None:
         loads = self.equilibrium.load(), self.equilibrium.points()

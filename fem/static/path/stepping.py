@@ -13,6 +13,7 @@ from tireroad.fem.static.equilibrium import Step
 
 _SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
 _LARGEST = 4  # times the first step
+_STUCK = 3  # failures in a row after which a fall is tried, once
 _EASY = 6  # tangents up to which the next load step may grow
 
 Attempt = Callable[[float], Step]
@@ -27,17 +28,28 @@ class Show:
     unit: str
 
 
-def march(attempt: Attempt, start: float, end: float, first: float, show: Show) -> None:
+def march(
+    attempt: Attempt,
+    start: float,
+    end: float,
+    first: float,
+    show: Show,
+    fall: Attempt | None = None,
+) -> None:
     """From a converged `start` to `end` in steps from `first` on. Collective.
 
-    LoadingStopped where a ten-thousandth of the first step does not converge either.
+    Where steps keep failing, `fall` is to find a state that is not near the last one (path.snap). LoadingStopped
+    where a ten-thousandth of the first step does not converge either.
     """
-    done, size = start, first
+    done, size, failures = start, first, 0
     while True:
         target = end if abs(end - done) <= size * (1 + 1e-12) else done + size
         step = attempt(target)
+        failures = 0 if step.converged else failures + 1
+        if fall is not None and failures == _STUCK:
+            step = fall(target)
         if step.converged:
-            done = target
+            done, failures = target, 0
             if done == end:
                 return
             size = min(_LARGEST * first, 2 * size) if step.iterations <= _EASY else size

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.static.path.snap import fall
 from tireroad.fem.static.path.step import Step
 from tireroad.fem.static.path.stepping import Show
 
@@ -122,25 +123,33 @@ class Way:
         if above:
             low, high = below.deflection, min(above)
             return secant if low < secant < high else (low + high) / 2
-        if below.deflection > self._body.ring.height:
+        farthest = self._loader.farthest
+        if below.deflection >= farthest:
             raise ConvergenceError(
-                f"static: the tire carries {below.load:.4g} N at {below.deflection:.4g} m of "
-                f"deflection, beyond its section; {load:g} N is out of reach. Lower static.load or "
-                "raise static.inflation."
+                f"static: the tire carries {below.load:.4g} N at {below.deflection:.4g} m of deflection, where the "
+                f"road reaches the rim; {load:g} N is out of reach. Lower static.load or raise static.inflation."
             )
         # Beyond what was tried the curve is not known: at most double the deflection.
-        return float(np.clip(secant, 1.01 * below.deflection, 2 * below.deflection))
+        least, most = np.minimum(np.array([1.01, 2]) * below.deflection, farthest)
+        return float(np.clip(secant, least, most))
 
     def _raise_road(self, start: float, end: float, allowed: float) -> None:
         """In steps, each of which is known from then on."""
 
-        def attempt(deflection: float) -> Step:
-            step = self._equilibrium.solve(self._loader.touch + deflection, allowed=allowed)
+        def found(step: Step, deflection: float) -> Step:
             if step.converged:
                 self._known.append(
                     _Known(deflection, self._loader.load(), self._body.u.x.array.copy())
                 )
             return step
 
+        def attempt(deflection: float) -> Step:
+            height = self._loader.touch + deflection
+            return found(self._equilibrium.solve(height, allowed=allowed), deflection)
+
+        def let_go(deflection: float) -> Step:
+            height = self._loader.touch + deflection
+            return found(fall(self._equilibrium, height, allowed), deflection)
+
         largest = 0.25 * self._body.ring.thickness
-        self._loader.march(attempt, end, largest, Show("deflection", 1.0, "m"), start)
+        self._loader.march(attempt, end, largest, Show("deflection", 1.0, "m"), start, let_go)

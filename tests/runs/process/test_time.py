@@ -1,7 +1,5 @@
 """What the scene says of time: steps that do not fit the duration, one step, the run-in, the axle."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -40,7 +38,7 @@ step = 3e-5
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, launch):
+def run(tmp_path_factory, ran):
     """Run the scene with some settings, in one folder; the folder, the summary's stages, what was printed."""
     folder = tmp_path_factory.mktemp("time")
     scene = folder / "scene.toml"
@@ -48,10 +46,8 @@ def run(tmp_path_factory, launch):
 
     def started(*settings: str):
         options = [part for setting in settings for part in ("--set", setting)]
-        done = launch("-m", "runs", "run", scene, "--out", folder / "out", *options)
-        assert done.returncode == 0, done.stderr + done.stdout
-        stages = json.loads((folder / "out" / "summary.json").read_text())["stages"]
-        return folder / "out", stages, done.stdout + done.stderr
+        printed, stages = ran(scene, folder / "out", *options)
+        return folder / "out", stages, printed
 
     return started
 

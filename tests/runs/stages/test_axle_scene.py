@@ -1,7 +1,5 @@
 """A wheel that moves through all stages: limits, what is written and told, what is reused and refused."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -43,16 +41,14 @@ body_mass = 300.0
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, launch):
+def run(tmp_path_factory, ran):
     base = tmp_path_factory.mktemp("axle")
     folder = base / "wheel"
 
     def started(text, *options, status=0):
         scene = base / "wheel.toml"
         scene.write_text(f'name = "wheel"\n{text}')
-        done = launch("-m", "runs", "run", scene, "--out", folder, *options)
-        assert done.returncode == status, done.stderr + done.stdout
-        summary = json.loads((folder / "summary.json").read_text())["stages"]
+        summary = ran(scene, folder, *options, status=status)[1]
         with h5py.File(folder / "contact.h5") as file:
             names: list[str] = []
             file.visit(names.append)

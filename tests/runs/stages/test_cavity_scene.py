@@ -1,7 +1,5 @@
 """A tire with air through all stages: what joins, what is reused, and what is refused."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -29,16 +27,13 @@ receptance = { to = 300.0, step = 100.0, direct = 2 }
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, launch):
+def run(tmp_path_factory, ran):
     base = tmp_path_factory.mktemp("cavity")
 
     def started(name, text, *options):
         scene = base / f"{name}.toml"
         scene.write_text(f'name = "{name}"\n{text}')
-        folder = base / name
-        done = launch("-m", "runs", "run", scene, "--out", folder, *options)
-        assert done.returncode == 0, done.stderr + done.stdout
-        return folder, json.loads((folder / "summary.json").read_text())["stages"]
+        return base / name, ran(scene, base / name, *options)[1]
 
     return started
 

@@ -1,7 +1,5 @@
 """A belted tire of lossy compounds through all stages: its files, its headline and its report."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -48,15 +46,13 @@ step = 2e-4
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, launch):
+def run(tmp_path_factory, ran):
     folder = tmp_path_factory.mktemp("belted")
 
     def started(*options):
         scene = folder / "belted.toml"
         scene.write_text(SCENE)
-        done = launch("-m", "runs", "run", scene, "--out", folder / "out", *options)
-        assert done.returncode == 0, done.stderr + done.stdout
-        return folder / "out", json.loads((folder / "out" / "summary.json").read_text())["stages"]
+        return folder / "out", ran(scene, folder / "out", *options)[1]
 
     return started
 

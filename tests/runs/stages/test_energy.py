@@ -1,7 +1,5 @@
 """The energy balance of a run: every term counted, standing and rolling."""
 
-import json
-
 import pytest
 
 SCENE = """
@@ -34,7 +32,7 @@ spectra = false
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, launch):
+def run(tmp_path_factory, ran):
     """The indicators and warnings of the contact stage, with more of a scene."""
     folder = tmp_path_factory.mktemp("energy")
 
@@ -42,10 +40,7 @@ def run(tmp_path_factory, launch):
         scene = folder / f"{name}.toml"
         scene.write_text(SCENE + more)
         options = [part for one in sets for part in ("--set", one)]
-        start = "-m", "runs", "run", scene, "--out", folder / name, "--until", "contact"
-        done = launch(*start, *options)
-        assert done.returncode == 0, done.stderr + done.stdout
-        entry = json.loads((folder / name / "summary.json").read_text())["stages"]["contact"]
+        entry = ran(scene, folder / name, "--until", "contact", *options)[1]["contact"]
         return {k: v["value"] for k, v in entry["indicators"].items()}, entry["warnings"]
 
     return started

@@ -1,7 +1,5 @@
 """Scenes through all their stages: what runs, what is reused, and what must come out exactly."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -28,16 +26,13 @@ def base(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def run(base, launch):
+def run(base, ran):
     """Run a scene text in a folder of its own; the folder and its summary's stages."""
 
     def started(name, text, *options):
         scene = base / f"{name}.toml"
         scene.write_text(f'name = "{name}"\n{text}')
-        folder = base / name
-        done = launch("-m", "runs", "run", scene, "--out", folder, *options)
-        assert done.returncode == 0, done.stderr + done.stdout
-        return folder, json.loads((folder / "summary.json").read_text())["stages"]
+        return base / name, ran(scene, base / name, *options)[1]
 
     return started
 

@@ -1,7 +1,5 @@
 """[stiffness]: its file, its figures, what is reused, and what is refused."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -23,16 +21,13 @@ count = 10
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, launch):
+def run(tmp_path_factory, ran):
     base = tmp_path_factory.mktemp("stiffness")
 
     def started(name, text, *options):
         scene = base / f"{name}.toml"
         scene.write_text(f'name = "{name}"\n{TIRE}{text}')
-        folder = base / name
-        done = launch("-m", "runs", "run", scene, "--out", folder, *options)
-        assert done.returncode == 0, done.stderr + done.stdout
-        return folder, json.loads((folder / "summary.json").read_text())["stages"]
+        return base / name, ran(scene, base / name, *options)[1]
 
     return started
 
