@@ -12,6 +12,7 @@ from tireroad.contact.solver.grid_compliance import Compliance, SpreadCompliance
 from tireroad.contact.tread.creep import TreadMemory, steady
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
+from tireroad.contact.tread.shear import KernelShear, MatrixShear, Shear
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
@@ -37,6 +38,10 @@ class Spec(Protocol):
     @property
     def solver(self) -> str:
         """Its name, or "auto"."""
+
+    @property
+    def sheared(self) -> bool:
+        """Whether the tread gives way to horizontal forces."""
 
 
 def solver_name(spec: Spec, patch: Patch) -> str:
@@ -75,8 +80,25 @@ def tread_memory(spec: Spec, patch: Patch, speed: float, step: float) -> TreadMe
     if spec.law.creep is None:
         return None
     check_creeps(patch)
-    influence = spec.law.influence(_farthest(patch))
-    return TreadMemory(spec.law.creep, influence, patch, speed, step)
+    farthest = _farthest(patch)
+    shear = spec.law.shear(farthest) if spec.sheared else None
+    return TreadMemory(
+        spec.law.creep, spec.law.influence(farthest), patch, speed, step, shear=shear
+    )
+
+
+def tread_shear(spec: Spec, patch: Patch, at_once: float = 1.0) -> Shear | None:
+    """What the tread gives way to horizontal forces between the points, times `at_once`; None where it is rigid to them."""
+    if not spec.sheared:
+        return None
+    plain = spec.law.shear(_farthest(patch))
+
+    def influence(x: Array, y: Array, a: Array, b: Array) -> Array:
+        return at_once * plain(x, y, a, b)
+
+    if patch.places is not None:
+        return KernelShear(patch.places, influence)
+    return MatrixShear(patch.points[:, :2], patch.half_sizes, influence)
 
 
 def _spread(patch: Patch, tire: Array) -> Array:

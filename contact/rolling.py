@@ -138,15 +138,17 @@ def roll(
     settle = tire.settle if isinstance(tire, NonlinearTire) else None
     for time, road in _roads(drive, patch, step, steps, done):
         free = tire.predict()
-        past_tread = memory.predict() if memory else 0.0
+        tread = memory.predict() if memory else np.zeros((1, count))
+        beside = tread[1:].ravel() if len(tread) > 1 else 0.0
         past = friction.state() if friction and settle else {}
         while True:
-            q = patch.gap + free[:count] + past_tread - road
+            q = patch.gap + free[:count] + tread[0] - road
             if friction is None:
                 force = solver.solve(q, touching, reference=patch.force)
                 change = force - patch.force
             else:
-                force, horizontal = friction.solve(solver, q, touching, patch.force, free[count:])
+                given = q, touching, patch.force, free[count:] + beside
+                force, horizontal = friction.solve(solver, *given)
                 change = np.concatenate([force - patch.force, *horizontal.T])
             touching = None
             again = settle(change) if settle else None
@@ -157,7 +159,7 @@ def roll(
                 friction.set_state(past)
         tire.advance(change)
         if memory:
-            memory.advance(change[:count])
+            memory.advance(change)
         moved = free + answer @ change
         axle = -tire.inertia_force()
         axle += patch.resultant(force, horizontal)

@@ -64,6 +64,7 @@ class _Spec:
     law: TreadLaw
     solver: str = "auto"
     rubs: bool = False
+    sheared: bool = False
 
 
 def drive(

@@ -1,7 +1,8 @@
 """One step with horizontal forces: the normal problem and stick/slip in turn, until both hold.
 
 Normal: f >= 0, g = A_zz (f - f_static) + A_zh t + q >= 0, f . g = 0. Horizontal, at the touching
-points: t = -K_b (share u + past) cut to |t| <= mu f, u = u_free + A_hz (f - f_static) + A_hh t.
+points: t = -K_b (share u + past) cut to |t| <= mu f, u = u_free + A_hz (f - f_static) + A_hh t. With a tread that shears
+(contact.tread.shear), A has its part as well; its rubber is then in series with the bristles, or alone, K_b infinite.
 Without slip this is block Gauss-Seidel on a positive definite problem and converges always; with
 slip it is sure for mu ||A_zz^-1 A_zh|| < 1, where the answer is unique too.
 """
@@ -15,6 +16,7 @@ from scipy import sparse
 from tireroad.contact.solver.conditions import ContactSolver, Mask
 from tireroad.contact.solver.tangential import Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush
+from tireroad.contact.tread.shear import Shear
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 
@@ -27,15 +29,23 @@ TOLERANCE = 1e-8  # change of a turn, of the largest normal force
 class Friction:
     """The brush on a tire with same-step response `tire` (3p, 3p) m/N, ordered z, x, y of the nodes.
 
-    `weights` W (c, p) takes nodes to points (None: they are the same). `horizontal` (c, 2) N is the
-    last answer, `turns` its number of rounds.
+    `weights` W (c, p) takes nodes to points (None: they are the same). `shear` of the tread, None: the tread is rigid to
+    horizontal forces; `pressed` (c,) N, the forces from which it is sheared by pressure, None: the static ones.
+    `horizontal` (c, 2) N is the last answer, `turns` its number of rounds.
     """
 
-    def __init__(self, brush: Brush, tire: Array, weights: sparse.csr_matrix | None) -> None:
+    def __init__(
+        self,
+        brush: Brush,
+        tire: Array,
+        weights: sparse.csr_matrix | None,
+        shear: Shear | None = None,
+        pressed: Array | None = None,
+    ) -> None:
         p = len(tire) // 3
         self._nodal = weights is None
         w = sparse.identity(p, format="csr") if weights is None else weights
-        self._brush = brush
+        self._brush, self._shear, self._pressed = brush, shear, pressed
         self._w, self._w2 = w, sparse.block_diag([w, w], format="csr")
         self._down, self._down2 = self._w.T.tocsr(), self._w2.T.tocsr()
         self._zh, self._hz = LoadedColumns(tire[:p, p:]), LoadedColumns(tire[p:, :p])
@@ -50,7 +60,10 @@ class Friction:
         count = len(touching)
         own = normal.block(index)
         w, w2 = self._w[index], self._w2[np.concatenate([index, index + count])]
-        coupling = np.linalg.solve(own, w @ (w2 @ self._zh.columns).T)
+        lifted = w @ (w2 @ self._zh.columns).T
+        if self._shear is not None and self._shear.coupled:
+            lifted = lifted + self._shear.lifted(index)
+        coupling = np.linalg.solve(own, lifted)
         return 1.0 / max(float(np.linalg.norm(coupling, 2)), 1e-300)
 
     def state(self) -> dict[str, Array]:
@@ -73,11 +86,9 @@ class Friction:
         share, past = self._brush.offer()
         horizontal = 2.0 * self.horizontal - self._before  # carried on linearly: a turn less
         for self.turns in range(1, TURNS + 1):
-            pulled = self._w @ (self._zh @ (self._down2 @ horizontal.T.ravel()))
-            force = normal.solve(q + pulled, guess, reference=static)
+            force = normal.solve(q + self._lift(horizontal), guess, reference=static)
             guess = None
-            pushed = self._w2 @ (self._hz @ (self._down @ (force - static)))
-            moved = (free + pushed).reshape(2, -1).T
+            moved = free.reshape(2, -1).T + self._pushed(force, static)
             new = self._stick_slip(force, moved, (share, past), horizontal)
             change = np.abs(new - horizontal).max()
             horizontal = new
@@ -90,10 +101,29 @@ class Friction:
             "time.step"
         )
 
+    def _lift(self, horizontal: Array) -> Array:
+        """A_zh t (c,) m for t (c, 2) N."""
+        lifted = self._w @ (self._zh @ (self._down2 @ horizontal.T.ravel()))
+        if self._shear is not None and self._shear.coupled:
+            lifted += self._shear.lift(_complex(horizontal))
+        return lifted
+
+    def _pushed(self, force: Array, static: Array) -> Array:
+        """A_hz (f - f_static) (c, 2) m for f (c,) N."""
+        pushed = self._w2 @ (self._hz @ (self._down @ (force - static)))
+        moved = pushed.reshape(2, -1).T
+        if self._shear is not None and self._shear.coupled:
+            before = static if self._pressed is None else self._pressed
+            moved = moved + _real(self._shear.drag(force - before))
+        return moved
+
     def _finish(self, force: Array, moved: Array, horizontal: Array) -> None:
         answer = self._w2 @ (self._hh @ (self._down2 @ horizontal.T.ravel()))
+        moved = moved + answer.reshape(2, -1).T
+        if self._shear is not None:
+            moved = moved + _real(self._shear.spread(_complex(horizontal)))
         self._before, self.horizontal = self.horizontal, horizontal
-        self._brush.take(horizontal, moved + answer.reshape(2, -1).T, force > 0)
+        self._brush.take(horizontal, moved, force > 0)
 
     def _stick_slip(
         self, force: Array, moved: Array, bristles: tuple[Array, Array], guess: Array
@@ -106,7 +136,8 @@ class Friction:
         if len(index) == 0:
             return out
         springs = np.broadcast_to(law.stiffness, share.shape)[index] * share[index]
-        stiffness = Stiffness(*self._between(index), 1.0 / springs)
+        tread = None if self._shear is None else self._shear.between(index)
+        stiffness = Stiffness(*self._between(index), 1.0 / springs, tread)
         constant = moved[index] + past[index] / share[index, None]
         bound = np.full(len(index), np.inf)
         if law.friction is not None:
@@ -124,3 +155,13 @@ class Friction:
             own = None if self._nodal else own[:, nodes].toarray()
             self._carried, self._key = (self._hh.between(both, both), own), key
         return self._carried
+
+
+def _complex(plane: Array) -> NDArray[np.complex128]:
+    """(c, 2) as x + iy."""
+    return np.ascontiguousarray(plane).view(complex)[:, 0]
+
+
+def _real(plane: NDArray[np.complex128]) -> Array:
+    """x + iy as (c, 2)."""
+    return np.ascontiguousarray(plane).view(float).reshape(-1, 2)

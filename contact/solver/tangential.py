@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.solver.krylov import gmres
+from tireroad.contact.tread.shear import Between
 from tireroad.fem.errors import ConvergenceError
 
 Array = NDArray[np.float64]
@@ -21,15 +22,19 @@ INNER = 1e-3  # reduction of a Newton step's own residual: the points that slip 
 
 
 class Stiffness:
-    """B = W A W^T + diag(spring): `matrix` A (2n, 2n) m/N, x and y of each node beside each other,
+    """B = W A W^T + diag(spring), and + S of the `tread` between the points: `matrix` A (2n, 2n) m/N, x and y of each node beside each other,
     `weights` W (a, n) from nodes to points, None where they are the same, and `spring` (a,) m/N.
     Forces and displacements in the plane are complex, x + iy.
     """
 
     def __init__(
-        self, matrix: Array, weights: Array | None = None, spring: Array | float = 0.0
+        self,
+        matrix: Array,
+        weights: Array | None = None,
+        spring: Array | float = 0.0,
+        tread: Between | None = None,
     ) -> None:
-        self._matrix, self._weights = matrix, weights
+        self._matrix, self._weights, self._tread = matrix, weights, tread
         # What a force gives way to at its own point, the mean of both directions (a,).
         if weights is None:
             own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
@@ -37,22 +42,27 @@ class Stiffness:
             mean = 0.5 * (matrix[::2, ::2] + matrix[1::2, 1::2])
             own = (weights @ mean * weights).sum(axis=1)
         self._spring = np.broadcast_to(np.asarray(spring, dtype=float), own.shape)
-        self.inverse = 1.0 / (own + self._spring)
+        self.inverse = 1.0 / (own + self._spring + (tread.own if tread else 0.0))
 
     def __call__(self, force: Plane) -> Plane:
         """B t (a,) m for t (a,) N."""
+        moved = self._carcass(force) + self._spring * force
+        return moved + self._tread.apply(force) if self._tread else moved
+
+    def _carcass(self, force: Plane) -> Plane:
+        """W A W^T t."""
         if self._weights is None:
-            return (self._matrix @ force.view(float)).view(complex) + self._spring * force
+            return (self._matrix @ force.view(float)).view(complex)
         nodal = self._weights.T @ force.view(float).reshape(-1, 2)
         moved = self._weights @ (self._matrix @ nodal.ravel()).reshape(-1, 2)
-        return moved.view(complex)[:, 0] + self._spring * force
+        return moved.view(complex)[:, 0]
 
     def norm(self) -> float:
         """A bound of the largest singular value, m/N."""
         largest = float(np.linalg.norm(self._matrix, 2))
         if self._weights is not None:
             largest *= float(np.linalg.norm(self._weights, 2)) ** 2
-        return largest + float(self._spring.max())
+        return largest + float(self._spring.max()) + (self._tread.bound if self._tread else 0.0)
 
 
 def stick_slip(stiffness: Stiffness, constant: Array, bound: Array, guess: Array) -> Array:

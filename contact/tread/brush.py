@@ -27,7 +27,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class BrushLaw:
-    """`stiffness` N/m a point, or (c,) of each; `friction` mu, None: never slips; `slip` (s_x, s_y), or (c, 2); `kind`:
+    """`stiffness` N/m a point, or (c,) of each, inf: none give way; `friction` mu, None: never slips; `slip` (s_x, s_y), or (c, 2); `kind`:
     "rolling", or "spring", the thesis's spring to the point's own displacement, e = u.
     """
 
@@ -52,9 +52,11 @@ class Brush:
         self._moved = np.zeros((len(x), 2))
         self._touched: Mask = np.zeros(len(x), dtype=bool)
 
-    def begin(self, touching: Mask) -> None:
-        """The points that touch in the static state, their bristles at rest."""
+    def begin(self, touching: Mask, moved: Array | None = None) -> None:
+        """The points that touch in the static state, their bristles at rest; `moved` (c, 2) m there, None: not at all."""
         self._touched = touching.copy()
+        if moved is not None:
+            self._moved = moved
 
     def offer(self) -> tuple[Array, Array]:
         """(share (c,), past (c, 2) m) of the next step: e = share u + past."""

@@ -14,6 +14,7 @@ from tireroad.fem.errors import InputError
 Array = NDArray[np.float64]
 # m/N at offsets x, y (m) from rectangles of half sizes a, b (m), under a unit force.
 Influence = Callable[[Array, Array, Array, Array], Array]
+Kernel = Callable[[Array, Array], Array]
 
 # Love's primitive cancels as eps * (r / half size)^2, a 6-point Gauss rule errs as (half size /
 # r)^12: they cross near r = 10 half sizes, where both are below 1e-12.
@@ -90,46 +91,47 @@ def rectangle_potential(x: ArrayLike, y: ArrayLike, a: ArrayLike, b: ArrayLike) 
 
     x, y, a, b broadcast against each other, all in m. Relative error below 1e-11 at any distance.
     """
+
+    def primitive(p: Array, q: Array) -> Array:
+        return primitive_product(p, q) + primitive_product(q, p)
+
+    return over_rectangle(x, y, a, b, primitive, lambda p, q: 1.0 / np.hypot(p, q))
+
+
+def over_rectangle(
+    x: ArrayLike, y: ArrayLike, a: ArrayLike, b: ArrayLike, primitive: Kernel, kernel: Kernel
+) -> Array:
+    """Integral of kernel(x - s, y - t) over |s| < a, |t| < b; d2 primitive/dxdy = kernel.
+
+    Near the rectangle four values of the primitive; far off a product Gauss rule, where nothing cancels.
+    """
     x, y, a, b = np.broadcast_arrays(x, y, a, b)
     far = np.hypot(x, y) > FAR * np.maximum(a, b)
     result = np.empty(x.shape)
-    result[far] = _far_potential(x[far], y[far], a[far], b[far])
+    result[far] = _by_gauss(x[far], y[far], a[far], b[far], kernel)
     near = ~far
-    result[near] = _near_potential(x[near], y[near], a[near], b[near])
+    result[near] = _by_corners(x[near], y[near], a[near], b[near], primitive)
     return result
 
 
-def _near_potential(x: Array, y: Array, a: Array, b: Array) -> Array:
-    """Love's four logarithms as differences of one primitive over the rectangle's corners."""
-    return (
-        _primitive(x + a, y + b)
-        - _primitive(x - a, y + b)
-        - _primitive(x + a, y - b)
-        + _primitive(x - a, y - b)
-    )
+def primitive_product(p: Array, q: Array) -> Array:
+    """p asinh(q/|p|), 0 where p is: asinh keeps the digits that ln(q + r) loses for q < 0."""
+    size = np.abs(p)
+    safe = np.where(size > 0.0, size, 1.0)
+    return np.where(size > 0.0, p * np.arcsinh(q / safe), 0.0)
 
 
-def _primitive(x: Array, y: Array) -> Array:
-    """F with d2F/dxdy = 1/r: x asinh(y/|x|) + y asinh(x/|y|), 0 where the factor is 0.
-
-    asinh keeps the digits that ln(y + r) loses for y < 0.
-    """
-
-    def term(p: Array, q: Array) -> Array:
-        size = np.abs(p)
-        safe = np.where(size > 0.0, size, 1.0)
-        return np.where(size > 0.0, p * np.arcsinh(q / safe), 0.0)
-
-    return term(x, y) + term(y, x)
+def _by_corners(x: Array, y: Array, a: Array, b: Array, primitive: Kernel) -> Array:
+    above = primitive(x + a, y + b) - primitive(x - a, y + b)
+    return above - primitive(x + a, y - b) + primitive(x - a, y - b)
 
 
-def _far_potential(x: Array, y: Array, a: Array, b: Array) -> Array:
-    """The same integral by a product Gauss rule: smooth out there, and nothing cancels."""
+def _by_gauss(x: Array, y: Array, a: Array, b: Array, kernel: Kernel) -> Array:
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     total = np.zeros_like(x)
     for s, ws in zip(nodes, weights, strict=True):
         for t, wt in zip(nodes, weights, strict=True):
-            total += ws * wt / np.hypot(x - s * a, y - t * b)
+            total += ws * wt * kernel(x - s * a, y - t * b)
     return total * a * b
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from tireroad.contact.patch import Patch
 from tireroad.contact.tread.compliance import Influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
+from tireroad.contact.tread.shear import KernelShear
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
@@ -88,9 +89,10 @@ def steady(creep: tuple[Array, Array], patch: Patch, speed: float) -> Array:
 class TreadMemory:
     """The past of a creeping tread under c points of a regular grid that rolls over the road.
 
-    `creep` (c_k, l_k); `influence` of the tread at once; `speed` m/s, `step` s. `predict` gives the
-    displacement (c,) m at the end of a step by pressure of the past alone, `advance` takes the change of the
-    forces (c,) N from the static ones; `at_once` is what new forces see of C~, as a factor.
+    `creep` (c_k, l_k); `influence` of the tread at once, and where it shears (contact.tread.shear) `shear`; `speed` m/s, `step`
+    s. `predict` gives the displacements (1, c) m at the end of a step by pressure of the past alone, or (3, c) with `shear`, z
+    before x and y; `advance` takes the change of the forces (c,) or (3 c,) N from the static ones; `at_once` is what new forces
+    see of C~, as a factor.
     """
 
     def __init__(
@@ -100,6 +102,7 @@ class TreadMemory:
         patch: Patch,
         speed: float,
         step: float,
+        shear: Influence | None = None,
     ) -> None:
         if patch.places is None:
             raise InputError(
@@ -110,32 +113,46 @@ class TreadMemory:
         self._decay, self._old, self._new = weights(lag, step)
         self.at_once = 1.0 + float(self._size @ self._new)
         every = np.arange(np.prod(self._shape))
-        self._tread = KernelTread(GridPlaces(self._shape, patch.places.spacing, every), influence)
+        grid = GridPlaces(self._shape, patch.places.spacing, every)
+        self._tread = KernelTread(grid, influence)
+        self._shear = None if shear is None else KernelShear(grid, shear)
+        parts = 1 if shear is None else 3
         self._way = speed * step / patch.places.spacing[0]
         self._offset = 0.0
-        self._kept = np.zeros((len(lag), *self._shape))
-        self._force = np.zeros(self._shape)
+        self._kept = np.zeros((len(lag), parts, *self._shape))
+        self._force = np.zeros((parts, *self._shape))
 
     def predict(self) -> Array:
-        """Displacement (c,) m at the end of the next step with no new force."""
+        """Displacements (1 or 3, c) m at the end of the next step with no new force."""
         offset = self._offset + self._way
         jump = int(offset)
-        kept = self._decay[:, None, None] * self._kept + self._old[:, None, None] * self._force
+        kept = _each(self._decay) * self._kept + _each(self._old) * self._force
         self._ahead, self._next = _shifted(kept, jump), offset - jump
         field = np.asarray(np.tensordot(self._size, self._ahead, 1), dtype=float)
         here = (1.0 - self._next) * field + self._next * _shifted(field, 1)
-        return self._tread.apply(here.ravel())[self._place]
+        return self._moved(here.reshape(len(here), -1))[:, self._place]
+
+    def _moved(self, pressed: Array) -> Array:
+        """(1 or 3, n) m of filtered forces (1 or 3, n) N on the whole grid."""
+        down = self._tread.apply(pressed[0])
+        if self._shear is None:
+            return down[None]
+        sideways = pressed[1] + 1j * pressed[2]
+        moved = self._shear.spread(sideways) + self._shear.drag(pressed[0])
+        return np.stack([down + self._shear.lift(sideways), moved.real, moved.imag])
 
     def advance(self, change: Array) -> None:
-        """Take the change (c,) N of the forces at the end of the step; after `predict`."""
-        force = np.zeros(np.prod(self._shape))
-        force[self._place] = change
-        force = force.reshape(self._shape)
+        """Take the change (c,) or (3 c,) N of the forces at the end of the step, what is beyond its own parts left out; after
+        `predict`."""
+        parts = len(self._force)
+        force = np.zeros((parts, int(np.prod(self._shape))))
+        force[:, self._place] = change.reshape(-1, len(self._place))[:parts]
+        force = force.reshape(self._force.shape)
         behind = np.zeros_like(force)
-        behind[1:] = force[:-1]
+        behind[:, 1:] = force[:, :-1]
         self._offset = self._next
         self._force = (1.0 - self._offset) * force + self._offset * behind
-        self._kept = self._ahead + self._new[:, None, None] * self._force
+        self._kept = self._ahead + _each(self._new) * self._force
 
     def state(self) -> dict[str, Array]:
         """What a checkpoint keeps."""
@@ -149,6 +166,11 @@ class TreadMemory:
         """Go on from `state`."""
         self._kept, self._force = kept["creep"], kept["creep_force"]
         self._offset = float(kept["creep_offset"])
+
+
+def _each(factor: Array) -> Array:
+    """(k,) for fields (k, parts, nx, ny)."""
+    return factor[:, None, None, None]
 
 
 def _shifted(field: Array, jump: int) -> Array:

@@ -29,12 +29,7 @@ class KernelTread:
 
     def __init__(self, grid: GridPlaces, influence: Influence) -> None:
         self._grid = grid
-        self._size = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in grid.shape)
-        offsets = [
-            d * np.concatenate([np.arange(n), np.zeros(size - 2 * n + 1), np.arange(1 - n, 0)])
-            for n, d, size in zip(grid.shape, grid.spacing, self._size, strict=True)
-        ]
-        x, y = np.meshgrid(*offsets, indexing="ij")
+        self._size, x, y = doubled(grid)
         a, b = (np.full(x.shape, d / 2) for d in grid.spacing)
         kernel = influence(x, y, a, b)
         # Between the two ends nothing is read; a smooth bridge keeps the periodic kernel positive.
@@ -67,6 +62,18 @@ class KernelTread:
         spectrum = fft.rfft2(field.reshape(nx, ny), self._size)
         spectrum *= transform
         return fft.irfft2(spectrum, self._size)[:nx, :ny].ravel()[self._grid.place]
+
+
+def doubled(grid: GridPlaces) -> tuple[tuple[int, ...], Array, Array]:
+    """Size of the grid on which convolutions do not wrap around, and the offsets x, y (m) there; between both ends, which
+    nothing reads, 0."""
+    size = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in grid.shape)
+    offsets = [
+        d * np.concatenate([np.arange(n), np.zeros(whole - 2 * n + 1), np.arange(1 - n, 0)])
+        for n, d, whole in zip(grid.shape, grid.spacing, size, strict=True)
+    ]
+    x, y = np.meshgrid(*offsets, indexing="ij")
+    return size, x, y
 
 
 def _bridged(kernel: Array, axis: int, n: int) -> Array:

@@ -17,11 +17,13 @@ class TreadLaw(Parameters):
 
     A derived class gives `influence`; `matrix` where the law is not one of distances alone. A law
     without compliance of its own (`compliant` False) serves on the nodes of the mesh only: a grid of
-    points, of which there are more than nodes, would leave the contact problem singular.
+    points, of which there are more than nodes, would leave the contact problem singular. One that
+    gives way to forces in the plane of the road (`shears`) gives `shear`.
     """
 
     owner = "contact"
     compliant = True
+    shears = False
 
     @property
     def creep(self) -> tuple[Array, Array] | None:
@@ -33,6 +35,10 @@ class TreadLaw(Parameters):
 
         `farthest` (m): the largest distance that will be asked for.
         """
+        raise NotImplementedError
+
+    def shear(self, farthest: float) -> Influence:
+        """Displacements (5, ...) m/N under unit forces in the plane of the road (contact.tread.shear), where it `shears`."""
         raise NotImplementedError
 
     def matrix(self, points: Array, half_sizes: Array, farthest: float) -> Array:

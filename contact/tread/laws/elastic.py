@@ -19,6 +19,7 @@ class Elastic(TreadLaw):
     youngs_modulus: float = number(
         3.4e8, "Pa", "Young's modulus of the tread; rubber has about 1e7", least=1e3, most=1e13
     )
+    shears = True
     poisson_ratio: float = number(0.49, "-", "Poisson's ratio of the tread", least=-0.99, most=0.5)
 
 
@@ -34,6 +35,16 @@ class HalfSpace(Elastic):
 
         return of
 
+    def shear(self, farthest: float) -> Influence:
+        """Cerruti's formulas; see contact.tread.shear."""
+        # scipy, not needed to read a scene
+        from tireroad.contact.tread.shear import half_space_shear
+
+        def of(x: Array, y: Array, a: Array, b: Array) -> Array:
+            return half_space_shear(x, y, a, b, self.youngs_modulus, self.poisson_ratio)
+
+        return of
+
 
 @tread_law("layer", "elastic layer bonded to a stiff base")
 class Layer(Elastic):
@@ -46,3 +57,9 @@ class Layer(Elastic):
         from tireroad.contact.tread.layer import LayerInfluence  # scipy, not needed to read a scene
 
         return LayerInfluence(self.youngs_modulus, self.poisson_ratio, self.thickness)
+
+    def shear(self, farthest: float) -> Influence:
+        """The half-space's with a correction; see contact.tread.layer_shear."""
+        from tireroad.contact.tread.layer_shear import LayerShear
+
+        return LayerShear(self.youngs_modulus, self.poisson_ratio, self.thickness)

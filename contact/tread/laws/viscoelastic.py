@@ -49,6 +49,12 @@ class Viscoelastic(Elastic):
 
     def influence(self, farthest: float) -> Influence:
         """Of the modulus at once: the half-space's, or the layer's."""
+        return self._at_once().influence(farthest)
+
+    def shear(self, farthest: float) -> Influence:
+        """Of the modulus at once."""
+        return self._at_once().shear(farthest)
+
+    def _at_once(self) -> Elastic:
         rubber = {"youngs_modulus": self.youngs_modulus, "poisson_ratio": self.poisson_ratio}
-        law = Layer(thickness=self.thickness, **rubber) if self.thickness else HalfSpace(**rubber)
-        return law.influence(farthest)
+        return Layer(thickness=self.thickness, **rubber) if self.thickness else HalfSpace(**rubber)

@@ -153,7 +153,8 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     if static.friction is not None and contact.rubs:
         raise error(
             ("static", "friction"),
-            "and the bristles of contact.brush_stiffness carry the same horizontal forces: keep one of them",
+            "and contact.friction or the bristles of contact.brush_stiffness carry the same horizontal forces: keep one of "
+            "them",
         )
     standing = scene.rotation is None or scene.rotation.speed == 0
     rubs = static.friction is not None
@@ -163,8 +164,8 @@ def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         if rotation is not None and getattr(rotation, key) and (not pulls or standing):
             raise error(
                 ("rotation", key),
-                "needs contact.brush_stiffness_per_area (N/m³), without which no road pulls on the tire, and a "
-                "wheel that turns",
+                "needs contact.friction or contact.brush_stiffness_per_area (N/m³), without which no road pulls on the "
+                "tire, and a wheel that turns",
             )
     if rotation is not None and rotation.free_rolling and contact.friction == 0:
         raise error(

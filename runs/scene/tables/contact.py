@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import choice, number, vector
+from tireroad.fem.parameters import choice, flag, number, vector
 from tireroad.runs.scene.schema import Pitch, Variants, points, registered, variant
 
 Where = Callable[[tuple[str, ...], str], InputError]
@@ -30,7 +30,7 @@ class Contact(Variants):
         None,
         "N/m³",
         "tangential stiffness of the bristles, instead of brush_stiffness: the same on every grid; a tread of shear "
-        "modulus G and thickness h has about G/h",
+        "modulus G and thickness h has about G/h, which contact.shear counts already",
         least=1e-3,
         most=1e15,
     )
@@ -42,9 +42,15 @@ class Contact(Variants):
     friction: float | None = number(
         None,
         "-",
-        "coefficient of Coulomb friction; absent: the bristles never slip",
+        "coefficient of Coulomb friction; absent: the bristles never slip. Without bristles the tread alone gives way "
+        "(shear)",
         least=0,
         most=10,
+    )
+    shear: bool = flag(
+        True,
+        "with friction, an elastic or creeping tread gives way to horizontal forces too, and pressure moves it sideways; "
+        'bristles are in series with it. Not with brush = "spring"',
     )
     slip: tuple[float, float] = vector(
         (0.0, 0.0), "-", "slip of the tire: longitudinal (> 0 drives), lateral", least=-1, most=1
@@ -64,8 +70,16 @@ class Contact(Variants):
 
     @property
     def rubs(self) -> bool:
-        """Whether bristles carry horizontal forces."""
-        return (self.brush_stiffness, self.brush_stiffness_per_area) != (None, None)
+        """Whether the road pulls on the tire horizontally."""
+        bristles = (self.brush_stiffness, self.brush_stiffness_per_area) != (None, None)
+        return bristles or self.sheared
+
+    @property
+    def sheared(self) -> bool:
+        """Whether the tread gives way to horizontal forces."""
+        return (
+            self.shear and self.friction is not None and self.brush == "rolling" and self.law.shears
+        )
 
 
 def check_tread(contact: Contact, standing: bool, error: Where, rubs: bool) -> None:
@@ -81,12 +95,13 @@ def check_tread(contact: Contact, standing: bool, error: Where, rubs: bool) -> N
         )
     if not contact.rubs and contact.friction is not None:
         raise error(
-            ("contact", "friction"), "needs brush_stiffness_per_area (N/m³), which carries it"
+            ("contact", "friction"),
+            "needs a tread that shears, or brush_stiffness_per_area (N/m³), to carry it",
         )
     if any(contact.slip) and (not (contact.rubs or rubs) or standing):
         raise error(
             ("contact", "slip"),
-            "needs brush_stiffness_per_area (N/m³), or static.friction, and a rolling tire",
+            "needs contact.friction, brush_stiffness_per_area (N/m³) or static.friction, and a rolling tire",
         )
 
 

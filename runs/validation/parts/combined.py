@@ -113,6 +113,18 @@ COMBINATIONS = {
     "free wheel, friction in the static state, braked by 20 %, creeping tread": Combination(
         axle="free", static="friction = 1.0\n", tread="viscoelastic", contact=_CREEPS + "slip = [-0.2, 0.0]\n",
     ),
+    "corner, friction on a half-space without bristles, rolling freely, rough": Combination(
+        rotation="free_rolling = true", contact="friction = 0.8\n",
+    ),
+    "free wheel, friction on a layer without bristles, braked by 10 %, pattern, over a bar": Combination(
+        axle="free", tread="layer", contact="friction = 1.2\nslip = [-0.1, 0.0]\n", pattern=_GROOVES, road=_BAR,
+    ),
+    "corner, camber, friction on creeping tread without bristles, at a slip angle, into a hole": Combination(
+        camber=3.0, tread="viscoelastic", rotation="slip_angle = 2.0", contact="friction = 0.8\n" + _CREEPS, road=_HOLE,
+    ),
+    "held, friction on a half-space that pressure moves sideways, driven by 5 %, rough": Combination(
+        axle="fixed", contact="friction = 0.8\npoisson_ratio = 0.2\nslip = [0.05, 0.0]\n",
+    ),
     "corner, bristles that never slip, braked by 10 %": Combination(
         contact="brush_stiffness_per_area = 1e8\nslip = [-0.1, 0.0]\n"
     ),

@@ -24,6 +24,7 @@ from tireroad.contact.tread.compliance import (
     winkler_compliance,
 )
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
+from tireroad.contact.tread.shear import MatrixShear, half_space_shear
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.recursion import Recursion
 from tireroad.runs.measure.synthetic import Strip, oval_patch
@@ -31,6 +32,11 @@ from tireroad.runs.measure.tabulate import Table
 
 PATCH = oval_patch((9, 7), (0.015, 0.02), 500.0)
 HALF_SPACE = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
+SHEAR = MatrixShear(
+    PATCH.points[:, :2],
+    PATCH.half_sizes,
+    lambda x, y, a, b: half_space_shear(x, y, a, b, 5e6, 0.45),
+)
 CRITICAL = 60.0  # m/s: the wave speed of the strip
 SHORTEST = 0.06  # s: the road's waves are full grown after 15 ms
 
@@ -47,6 +53,7 @@ class Case:
     steps: int = 2000
     scheme: str = "linear"
     friction: float | None = None
+    shear: bool = False
 
 
 @dataclass(frozen=True)
@@ -155,6 +162,12 @@ def cases() -> Iterator[Case]:
         Flat().height, lambda t: -0.1 if 0.01 < t < 0.03 else 0.0, 20.0))  # fmt: skip
     for friction in (0.0, 0.5, 1.0, 2.0):
         yield Case(f"friction {friction:g}", drive=waves, friction=friction)
+        yield Case(
+            f"friction {friction:g} on a half-space without bristles",
+            drive=waves,
+            friction=friction,
+            shear=True,
+        )
 
 
 def outcome(case: Case) -> Ended:
@@ -179,10 +192,10 @@ def _loop(case: Case, count: int):
     )
     solver = ActiveSet(tire.same_step[:count, :count] + case.tread)
     if case.friction is not None:
-        law = BrushLaw(1e5, case.friction, (0.05, 0.02))
+        law = BrushLaw(np.inf if case.shear else 1e5, case.friction, (0.05, 0.02))
         brush = Brush(law, PATCH.points[:, 0], PATCH.line, case.drive.speed, case.step)
         brush.begin(PATCH.force > 0)
-        friction = Friction(brush, tire.same_step, None)
+        friction = Friction(brush, tire.same_step, None, SHEAR if case.shear else None)
     return roll(tire, solver, PATCH, case.drive, case.step, case.steps, friction)
 
 

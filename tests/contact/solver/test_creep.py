@@ -82,7 +82,7 @@ def test_rolled_in_time_it_comes_to_the_steady_state(share) -> None:
     memory = TreadMemory(creep, influence, patch, SPEED, step)
     solver = ActiveSet(matrix(patch) * memory.at_once)
     for k in range(int(0.06 / step)):
-        past = memory.predict()
+        past = memory.predict()[0]
         pressure = pressed(solver, patch.gap + past)
         memory.advance(pressure * DX * DY * 1e6)
         if k == 40:
@@ -96,7 +96,7 @@ def test_standing_it_creeps_to_its_relaxed_modulus() -> None:
     patch, creep = cylinder(), (np.array([0.5]), np.array([0.01]))
     memory, force = TreadMemory(creep, influence, patch, 0.0, 1e-3), patch.gap[::-1] * 1e6
     for _ in range(100):
-        past = memory.predict()
+        past = memory.predict()[0]
         memory.advance(force)
     whole = past + memory.at_once * matrix(patch) @ force
     grown = 1.0 + 0.5 * (1.0 - np.exp(-10.0))

@@ -152,7 +152,7 @@ def test_a_travel_speed_is_the_speed_over_the_road(tmp_path, launch):
         ('tread = "viscoelastic"', "needs a grid"),
         ('tread = "viscoelastic"\nrelaxation = [0.6, 0.5]', "sum below 1"),
         ("brush_stiffness = 1e4\nbrush_stiffness_per_area = 1e7", "two brushes"),
-        ("friction = 0.5", "needs brush_stiffness_per_area"),
+        ("friction = 0.5\nshear = false", "needs a tread that shears"),
     ],
 )
 def test_treads_and_brushes_that_cannot_be(tmp_path, contact, told):

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from tireroad.contact.driven import Driven
 from tireroad.contact.grid_patch import OnPoints
-from tireroad.contact.model import step_solver, tread_memory
+from tireroad.contact.model import step_solver, tread_memory, tread_shear
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.friction import Friction
@@ -38,20 +38,29 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
     at_once = memory.at_once if memory else 1.0
     solver, friction = step_solver(spec, patch, tire.same_step[:p, :p], at_once), None
     if spec.rubs:
-        friction = _friction(spec, setup, tire, step)
+        friction = _friction(spec, setup, tire, step, at_once)
     if patch.weights is not None:
         tire = OnPoints(tire, patch.weights, 1 if friction is None else 3)
     return Loop(tire, solver, friction, memory)
 
 
-def _friction(spec, setup: ContactSetup, tire, step: float) -> Friction:
-    """The brush of the scene, at rest."""
-    patch = setup.patch
-    stiffness = spec.brush_stiffness or spec.brush_stiffness_per_area * patch.area
+def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> Friction:
+    """The brush of the scene, at rest.
+
+    What pressure does to the tread sideways counts from the static state on, as all motion does; where the slip of the
+    static shape counts (free rolling), that of its tread does too, but of one that creeps.
+    """
+    patch, stiffness = setup.patch, spec.brush_stiffness or np.inf
+    if spec.brush_stiffness_per_area is not None:
+        stiffness = spec.brush_stiffness_per_area * patch.area
+    shear, pressed, moved = tread_shear(spec, patch, at_once), None, None
+    if shear is not None and setup.shape_slip is not None and spec.law.creep is None:
+        drag = shear.drag(patch.force)
+        pressed, moved = np.zeros(len(patch.points)), np.stack([drag.real, drag.imag], axis=-1)
     law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
-    brush.begin(patch.force > 0)
-    return Friction(brush, tire.same_step, patch.weights)
+    brush.begin(patch.force > 0, moved)
+    return Friction(brush, tire.same_step, patch.weights, shear, pressed)
 
 
 def freely_rolling(

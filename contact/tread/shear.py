@@ -1,0 +1,206 @@
+"""Horizontal displacements of an elastic half-space, and their coupling with pressure (Boussinesq and Cerruti).
+
+With z into the body, G the shear modulus, r the distance in the surface from a force t (in the surface) and f (along z),
+
+    2 pi G u_x = (1 - nu) t_x/r + nu (x^2 t_x + x y t_y)/r^3 - (1 - 2 nu)/2 x f/r^2,
+    2 pi G u_z = (1 - nu) f/r + (1 - 2 nu)/2 (x t_x + y t_y)/r^2,
+
+u_y as u_x with x and y exchanged. Forces are spread evenly over rectangles. Of an incompressible body, nu = 1/2, pressure moves
+nothing sideways. Source: Johnson, Contact Mechanics, (3.75) and (3.76).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from tireroad.contact.tread.compliance import (
+    Influence,
+    over_rectangle,
+    primitive_product,
+    rectangle_potential,
+)
+from tireroad.contact.tread.kernel import GridPlaces, doubled
+
+Array = NDArray[np.float64]
+Plane = NDArray[np.complex128]
+Index = NDArray[np.intp]
+
+
+def half_space_shear(
+    x: Array, y: Array, a: Array, b: Array, youngs_modulus: float, poisson_ratio: float
+) -> Array:
+    """(5, ...) m/N at offsets x, y (m) from a rectangle 2a x 2b (m) under a unit force spread over it: u_x by t_x, u_x by t_y
+    (and u_y by t_x), u_y by t_y, u_z by t_x, u_z by t_y. The displacement u_x by f is that of u_z by t_x with its sign changed.
+    """
+    nu = poisson_ratio
+    shear = youngs_modulus / (2.0 * (1.0 + nu))
+    whole = rectangle_potential(x, y, a, b)
+    along = over_rectangle(x, y, a, b, _along, lambda p, q: p**2 / np.hypot(p, q) ** 3)
+    mixed = over_rectangle(x, y, a, b, _mixed, lambda p, q: p * q / np.hypot(p, q) ** 3)
+    lift = [
+        over_rectangle(x, y, a, b, _lift, lambda p, q: p / (p**2 + q**2)),
+        over_rectangle(y, x, b, a, _lift, lambda p, q: p / (p**2 + q**2)),
+    ]
+    across = whole - along
+    parts = [
+        (1 - nu) * whole + nu * along,
+        nu * mixed,
+        (1 - nu) * whole + nu * across,
+        *(0.5 * (1 - 2 * nu) * part for part in lift),
+    ]
+    return np.stack(parts) / (2.0 * np.pi * shear * 4.0 * np.asarray(a) * np.asarray(b))
+
+
+def _along(x: Array, y: Array) -> Array:
+    """F with d2F/dxdy = x^2/r^3: y asinh(x/|y|)."""
+    return primitive_product(y, x)
+
+
+def _mixed(x: Array, y: Array) -> Array:
+    """F with d2F/dxdy = x y/r^3: -r."""
+    return -np.hypot(x, y)
+
+
+def _lift(x: Array, y: Array) -> Array:
+    """F with d2F/dxdy = x/r^2: x atan(y/x) + y ln r."""
+    square = x**2 + y**2
+    safe = np.where(x != 0.0, x, 1.0)
+    turned = np.where(x != 0.0, x * np.arctan(y / safe), 0.0)
+    return turned + 0.5 * y * np.log(np.where(square > 0.0, square, 1.0))
+
+
+class Shear(Protocol):
+    """What a tread adds in the plane of the road, between all points: displacements of the tread's surface. Forces and
+    displacements in the plane are complex, x + iy. `coupled`: whether pressure moves it sideways."""
+
+    coupled: bool
+
+    def spread(self, force: Plane) -> Plane:
+        """In the plane (c,) m under forces in the plane (c,) N."""
+
+    def lift(self, force: Plane) -> Array:
+        """Away from the road (c,) m under forces in the plane (c,) N."""
+
+    def drag(self, force: Array) -> Plane:
+        """In the plane (c,) m under forces normal to it (c,) N."""
+
+    def lifted(self, index: Index) -> Array:
+        """`lift` between the points `index` as a matrix (a, 2a): of all forces along x, then of those along y."""
+
+    def between(self, index: Index) -> Between:
+        """`spread` between the points `index`."""
+
+
+class Between:
+    """(a,) m of (a,) N, complex: `apply`; `own` m/N, the mean of what a point's two forces move itself; `bound` m/N of the
+    largest singular value."""
+
+    def __init__(self, apply: Callable[[Plane], Plane], own: float | Array, bound: float) -> None:
+        self.apply, self.own, self.bound = apply, own, bound
+
+
+class MatrixShear:
+    """Between points (c, 2) m with rectangles of half sizes (c, 2) m, wherever they lie."""
+
+    def __init__(self, points: Array, half_sizes: Array, influence: Influence) -> None:
+        x, y = (points[:, None, k] - points[None, :, k] for k in (0, 1))
+        xx, xy, yy, zx, zy = influence(x, y, half_sizes[None, :, 0], half_sizes[None, :, 1])
+        # As a matrix of real and imaginary parts beside each other.
+        count = len(points)
+        both = np.block([[xx, xy], [xy, yy]])
+        both = 0.5 * (both + both.T)
+        order = np.arange(2 * count).reshape(2, -1).T.ravel()
+        self._matrix = both[np.ix_(order, order)]
+        self._lift = 0.5 * (zx - zx.T) - 0.5j * (zy - zy.T)
+        self.coupled = bool(self._lift.any())
+
+    def spread(self, force: Plane) -> Plane:
+        """In the plane (c,) m under forces in the plane (c,) N."""
+        return (self._matrix @ force.view(float)).view(complex)
+
+    def lift(self, force: Plane) -> Array:
+        """Away from the road (c,) m under forces in the plane (c,) N."""
+        return (self._lift @ force).real
+
+    def drag(self, force: Array) -> Plane:
+        """In the plane (c,) m under forces normal to it (c,) N: the transposed of `lift`."""
+        return self._lift.T.conj() @ force
+
+    def lifted(self, index: Index) -> Array:
+        """`lift` between the points `index` as a matrix (a, 2a)."""
+        some = self._lift[np.ix_(index, index)]
+        return np.hstack([some.real, -some.imag])
+
+    def between(self, index: Index) -> Between:
+        """`spread` between the points `index`."""
+        some = np.stack([2 * index, 2 * index + 1], axis=-1).ravel()
+        matrix = self._matrix[np.ix_(some, some)]
+
+        def apply(force: Plane) -> Plane:
+            return (matrix @ force.view(float)).view(complex)
+
+        own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
+        return Between(apply, own, float(np.abs(matrix).sum(axis=1).max(initial=0.0)))
+
+
+class KernelShear:
+    """The same by FFT over twice a regular grid."""
+
+    def __init__(self, grid: GridPlaces, influence: Influence) -> None:
+        self._grid = grid
+        self._size, x, y = doubled(grid)
+        kernels = influence(x, y, *(np.full(x.shape, d / 2) for d in grid.spacing))
+        self.coupled = bool(kernels[3:].any())
+        self._own = float(kernels[0, 0, 0] + kernels[2, 0, 0]) / 2
+        # Of both components of `spread` no row sums to more than these.
+        self._bound = float(np.abs(kernels[:3]).sum(axis=0).sum())
+        self._kernels = kernels[3:]
+        self._xx, self._xy, self._yy, *self._lift = fft.rfft2(kernels)
+
+    def spread(self, force: Plane) -> Plane:
+        """In the plane (c,) m under forces in the plane (c,) N."""
+        return self._spread(force, self._grid.place)
+
+    def lift(self, force: Plane) -> Array:
+        """Away from the road (c,) m under forces in the plane (c,) N."""
+        x, y = self._forward(np.stack([force.real, force.imag]), self._grid.place)
+        return self._back(self._lift[0] * x + self._lift[1] * y, self._grid.place)
+
+    def drag(self, force: Array) -> Plane:
+        """In the plane (c,) m under forces normal to it (c,) N: the transposed of `lift`."""
+        spectrum = self._forward(force, self._grid.place)
+        x, y = self._back(-np.stack(self._lift) * spectrum, self._grid.place)
+        return x + 1j * y
+
+    def lifted(self, index: Index) -> Array:
+        """`lift` between the points `index` as a matrix (a, 2a)."""
+        i, j = np.divmod(self._grid.place[index], self._grid.shape[1])
+        both = self._kernels[:, i[:, None] - i, j[:, None] - j]
+        return np.hstack([*both])
+
+    def between(self, index: Index) -> Between:
+        """`spread` between the points `index`."""
+        place = self._grid.place[index]
+        return Between(lambda force: self._spread(force, place), self._own, self._bound)
+
+    def _spread(self, force: Plane, place: Index) -> Plane:
+        x, y = self._forward(np.stack([force.real, force.imag]), place)
+        moved = np.stack([self._xx * x + self._xy * y, self._xy * x + self._yy * y])
+        u, v = self._back(moved, place)
+        return u + 1j * v
+
+    def _forward(self, values: Array, place: Index) -> Plane:
+        nx, ny = self._grid.shape
+        field = np.zeros((*values.shape[:-1], nx * ny))
+        field[..., place] = values
+        return fft.rfft2(field.reshape(*values.shape[:-1], nx, ny), self._size)
+
+    def _back(self, spectrum: Plane, place: Index) -> Array:
+        nx, ny = self._grid.shape
+        field = fft.irfft2(spectrum, self._size)[..., :nx, :ny]
+        return field.reshape(*field.shape[:-2], -1)[..., place]
