@@ -48,6 +48,15 @@ function nearest(u, readout, given) {
   if (best) readout.textContent = `${u.series[best].label}: ${digits(u.data[best][idx])} at ${digits(u.data[0][idx])} (${given.labels.join(", ")})`;
 }
 
+// 1, 2 and 5 of each decade: uPlot counts on from the least value, 13.14, 23.14 to 103.14.
+function round(_, __, low, high) {
+  const ticks = [];
+  for (let p = Math.floor(Math.log10(low)); p <= Math.log10(high); p++) {
+    for (const m of [1, 2, 5]) if (m * 10 ** p >= low && m * 10 ** p <= high) ticks.push(m * 10 ** p);
+  }
+  return ticks;
+}
+
 function drawChart(given, box, key) {
   const readout = given.legend ? null : make("p", null);
   const series = given.series.map(s => ({
@@ -58,7 +67,7 @@ function drawChart(given, box, key) {
   const plot = new uPlot({
     width: box.clientWidth, height: given.height,
     scales: { x: { time: false, distr: given.log ? 3 : 1, range: given.log ? (_, low, high) => [low, high] : undefined } },
-    axes: [{ ...axis(given.labels[0]), size: 34 }, { ...axis(given.labels[1]), size: 52 }],
+    axes: [{ ...axis(given.labels[0]), size: 34, ...(given.log ? { splits: round, filter: (_, ticks) => ticks } : {}) }, { ...axis(given.labels[1]), size: 52 }],
     series: [{ label: given.labels[0], value: (_, v) => digits(v) }, ...series],
     legend: { show: given.legend }, cursor: { sync: { key }, drag: { x: true, y: false } },
     hooks: readout ? { setCursor: [u => nearest(u, readout, given)] } : {},
@@ -102,10 +111,14 @@ function drawBars(given, box, key) {
     const each = Math.max(Math.ceil((u.scales.x.max - u.scales.x.min) * 30 / box.clientWidth), 1);
     return given.names.map((_, n) => n).filter(n => n % each === 0);
   };
+  const shown = (_, low, high) => { // of one bar alone uPlot makes a range of a hundred
+    const first = Math.max(Math.round(low), 0), last = Math.min(Math.round(high), count - 1);
+    return [first - 0.6, Math.max(last, Math.min(first + given.least, given.least) - 1) + 0.6];
+  };
   const told = (k, v, n) => (v == null ? "–" : digits(v) + (errors[k][n] == null ? "" : " ± " + digits(errors[k][n])));
   const plot = new uPlot({
     width: box.clientWidth, height: given.height,
-    scales: { x: { time: false, range: (_, low, high) => [Math.round(low) - 0.6, Math.max(Math.round(high), Math.min(Math.round(low) + given.least, given.least) - 1) + 0.6] }, y: { range: (_, low, high) => [given.floor, Math.max(high, given.top)] } },
+    scales: { x: { time: false, range: shown }, y: { range: (_, low, high) => [given.floor, Math.max(high, given.top)] } },
     axes: [
       { ...axis(given.labels[0]), size: 44, rotate: -45, grid: { show: false }, splits: some, values: (_, places) => places.map(n => given.names[n]) },
       { ...axis(given.labels[1]), size: 52, values: (_, ticks) => ticks.map(v => (v == null ? "" : digits(v))) },
