@@ -142,13 +142,7 @@ class MatrixShear:
     def between(self, index: Index) -> Between:
         """`spread` between the points `index`."""
         some = np.stack([2 * index, 2 * index + 1], axis=-1).ravel()
-        matrix = self._matrix[np.ix_(some, some)]
-
-        def apply(force: Plane) -> Plane:
-            return (matrix @ force.view(float)).view(complex)
-
-        own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
-        return Between(apply, own, float(np.abs(matrix).sum(axis=1).max(initial=0.0)))
+        return _product(self._matrix[np.ix_(some, some)])
 
 
 class KernelShear:
@@ -197,7 +191,11 @@ def _dense(kernels: Array) -> Between:
     """Of kernels (3 or more, a, a) of `spread`."""
     xx, xy, yy = kernels[:3]
     matrix = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=1)
-    matrix = matrix.reshape(2 * len(xx), -1)
+    return _product(matrix.reshape(2 * len(xx), -1))
+
+
+def _product(matrix: Array) -> Between:
+    """Of (2a, 2a), x and y of each point beside each other."""
 
     def apply(force: Plane) -> Plane:
         return (matrix @ force.view(float)).view(complex)
