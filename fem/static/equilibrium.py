@@ -7,71 +7,46 @@ z + u_z >= z_road and one of both zero.
 from __future__ import annotations
 
 import numpy as np
-from dolfinx import fem
-from petsc4py import PETSc
+from mpi4py import MPI
 
-from tireroad.fem import compat
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
-from tireroad.fem.static.drag import Drag
+from tireroad.fem.static.forces import Forces
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.linear_contact import LinearContact, held_step
 from tireroad.fem.static.path.step import Step
 from tireroad.fem.static.road import Road
-from tireroad.fem.static.shape_damping import ShapeDamping
-from tireroad.fem.static.virtual_work import (
-    AT_REST,
-    Rolling,
-    inverted_volume,
-    static_residual,
-    stress_prediction,
-    tangent,
-)
-from tireroad.fem.timing import Timing
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.body import Body
 
 MOST_STEPS = 25  # tangents; a load step that needs more is better halved
 TOLERANCE = 1e-12  # of the force scale
 _SERVES = 0.2  # a step with an old tangent costs a twentieth of one with a new tangent
+_STAYS = (
+    1e-10  # of the wall: rounding, as a state is carried from half the ring to the whole and back
+)
 _DIVERGED = 1e8  # times the force scale: nothing comes back from there
 
 
-class Equilibrium:
-    """The nonlinear problem of one body. Forms, matrix and solver are made once. Collective.
+class Equilibrium(Forces):
+    """The nonlinear problem of one body. Its solver is made once. Collective.
 
-    `inflation` (Pa) may be changed between solves; `solve` starts from the body's displacement and
-    puts it back when it does not converge. `road_height` (m) is that of the last state that did;
-    `cost`: seconds by part; the road's `shape` is a level plane here (fem.static.curved has others); `force_scale`: N,
-    by which residuals are measured; `drag`: what holds the body back on its fall through a snap.
+    `solve` starts from the body's displacement and puts it back when it does not converge. `road_height` (m) is that
+    of the last state that did; the road's `shape` is a level plane here (fem.static.curved has others);
+    `force_scale`: N, by which residuals are measured.
     """
 
     shape: RoadShape = FLAT
 
     def __init__(self, body: Body, rolling: Rolling = AT_REST) -> None:
-        self.body, self.rolling = body, rolling
-        self.cost = Timing()
+        super().__init__(body, rolling)
         self.road_height: float | None = None
-        self.drag: Drag | None = None
-        self.pressure = fem.Constant(body.mesh, 0.0)
-        self._before = fem.Function(body.space)
-        residual = static_residual(body, self.pressure, rolling)
-        self._damping: ShapeDamping | None = None
-        if rolling.speed * rolling.stiffness_damping:
-            self._damping = ShapeDamping(body, self.pressure, rolling)
-            residual += self._damping.work
-        self._residual = compat.form(residual)
-        self._tangent = compat.form(tangent(body, residual) + stress_prediction(body, self._before))
-        self._inverted = compat.form(inverted_volume(body))
-        self._clamp = [body.clamp()]
-        self._local_tangent = fem.petsc.create_matrix(self._tangent)
-        self.matrix = self._local_tangent
-        self._work = fem.petsc.create_vector(self._residual)
-        self._rim = (3 * body.rim[body.rim < body.nodes, None] + np.arange(3)).ravel()
         self.road = self._make_road()
         self.force_scale = self._yardsticks()
         self._damped = bool(rolling.speed * (rolling.damping + rolling.stiffness_damping))
         self._system = self._make_system("lu" if self._damped else "cholesky")
         self._contact: LinearContact | None = None
+        self._solved = body.u.x.array.copy()
 
     def _make_road(self) -> Road:
         return Road(self.body)
@@ -109,6 +84,7 @@ class Equilibrium:
             error = self._error(load)
             reason = self._stopped(error, changed, tangents, allowed / self.force_scale)
             if reason == "converged":
+                self._solved = field.array.copy()
                 self.road_height = None if road_height is None else self.road.height
                 return Step(True, tangents, error, reason)
             closing = None
@@ -120,9 +96,24 @@ class Equilibrium:
             reason = reason or self._move(closing, load)
             if reason:
                 break
-        field.array[:] = kept[0]
+        field.array[:], self._contact = kept[0], None
         self.road.put_back(kept[1])
         return Step(False, tangents, error, reason)
+
+    def predict(self, road_height: float) -> bool:
+        """Go from the state that was solved for last to near that on a road at `road_height` (m) by its last tangent, which
+        settles the sets of contact; whether there is such a tangent, and the body still in that state. Collective.
+        """
+        moved = np.abs(self._solved - self.body.u.x.array).max(initial=0.0)
+        stays = bool(moved <= _STAYS * self.body.ring.thickness)
+        if self._contact is None or not self.body.comm.allreduce(stays, op=MPI.LAND):
+            return False
+        self._assemble_residual()
+        on_road = self.road.height > -np.inf
+        rise = road_height - self.road.height if on_road else 0.0
+        if not on_road:  # nothing touches it yet, so nothing is raised by it
+            self.road.height = road_height
+        return not self._move(None, None, rise)
 
     def _stopped(self, error: float, changed: bool, tangents: int, allowed: float) -> str:
         """Why not to go on; empty while there is hope. Collective."""
@@ -149,16 +140,16 @@ class Equilibrium:
         with self.cost("assembly"):
             self._assemble_tangent()
         taken = self._system.take(self.matrix, self.road.held, *self.road.steps())
-        self._contact = self._make_contact() if taken and self.road.height > -np.inf else None
+        self._contact = self._make_contact() if taken else None
         return taken
 
-    def _move(self, closing: Moved | None, load: float | None) -> str:
-        """One linearised step to balance. Why it cannot be taken, or nothing. Collective."""
+    def _move(self, closing: Moved | None, load: float | None, rise: float | None = None) -> str:
+        """One linearised step to balance, of a road that may `rise` (m). Why it cannot be taken, or nothing. Collective."""
         given = self.road.rows(self._work.array_r.copy()), closing, load
-        if self._contact is None:
+        if self._contact is None or self.road.height == -np.inf:
             step = held_step(self.body.comm, self._system, self.road, given)
         else:
-            step = self._contact.step(*given)
+            step = self._contact.step(*given, rise)
         if step is None:
             return "the road meets nothing that resists"
         (change, reaction), field = step, self.body.u.x
@@ -181,7 +172,7 @@ class Equilibrium:
         Newton's method from the present state, and that by a newton more. Collective.
         `weights` (s,) of the outer face's nodes, of sum 1, say where the `load` (N) acts and the height is read.
         """
-        self._before.x.array[:] = self.body.u.x.array
+        self._before.x.array[:], self._contact = self.body.u.x.array, None
         out = self._assemble_residual().copy()
         self._assemble_tangent()
         if not self._system.take(self.matrix, np.zeros(0, np.intp), *np.zeros((2, 0))):
@@ -222,29 +213,3 @@ class Equilibrium:
         diagonal = self.matrix.getDiagonal()
         self.road.weigh(diagonal.array)
         return self.body.ring.thickness * diagonal.norm() / np.sqrt(diagonal.size)
-
-    def _assemble_residual(self) -> np.ndarray:
-        """Forces out of balance at the owned dofs, N; on the rim 0, where the wheel takes them."""
-        if self._damping:
-            self._damping.update()
-        with self._work.localForm() as local:
-            local.set(0.0)
-        fem.petsc.assemble_vector(self._work, self._residual)
-        self._work.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        if self.drag:
-            self.drag.add_to(self._work.array)
-        self._work.array[self._rim] = 0.0
-        return self._work.array_r
-
-    def _assemble_tangent(self) -> None:
-        self._local_tangent.zeroEntries()
-        fem.petsc.assemble_matrix(self._local_tangent, self._tangent, bcs=self._clamp)
-        self._local_tangent.assemble()
-        if self.drag:
-            self.drag.stiffen(self._local_tangent)
-        if self._damping:
-            self.matrix = self._damping.added_to(self._local_tangent)
-
-    def _inside_out(self) -> bool:
-        """Whether the wall is turned inside out in some Gauss point; no energy tells J from -J."""
-        return self.body.comm.allreduce(fem.assemble_scalar(self._inverted)) > 0

@@ -24,6 +24,7 @@ from tireroad.fem.static.road import Road
 
 _ROUNDS = 10  # changes of the sets in one step
 _MOST = 400  # columns of one factor
+_OFF = 1e-12  # m off the road: rounding leaves less
 
 Array = np.ndarray
 
@@ -54,8 +55,9 @@ def held_step(
 
 @dataclass(frozen=True)
 class _Found:
-    """z and rise; which nodes are to be held, and the road's force (N) on all."""
+    """z of which nodes, and rise; which nodes are to be held, and the road's force (N) on all."""
 
+    nodes: Array
     parts: tuple[Array, float]
     wanted: Array
     force: Array
@@ -68,6 +70,14 @@ class _Answer:
     motion: Array
     gap: Array
     force: Array
+
+    def plus(self, times: float, other: _Answer) -> _Answer:
+        """With so many times another one."""
+        return _Answer(
+            self.motion + times * other.motion,
+            self.gap + times * other.gap,
+            self.force + times * other.force,
+        )
 
 
 class LinearContact:
@@ -87,25 +97,29 @@ class LinearContact:
         self.changed = False  # whether other nodes are held than in the factor
 
     def step(
-        self, out: Array, closing: Moved | None, load: float | None
+        self, out: Array, closing: Moved | None, load: float | None, given: float | None = None
     ) -> tuple[Array, Array] | None:
-        """As `held_step`, but the road first gets the nodes that it holds after the step."""
+        """As `held_step`, but the road first gets the nodes that it holds after the step, and rises by a `given` m."""
         road = self._road
         free = self._answer(*self._system.solve(-out, closing), out)
         free.gap += self._gathered(road.gap())
+        if given:
+            free = free.plus(given, self._lifted())
         lift = self._lifted() if load is not None else None
         if lift is not None and not lift.force.sum() > 0:
             return None
         held = self._gathered(road.active)
         found = self._solved(free, lift, held, load)
-        if closing is not None:  # of an old tangent the sets are not believed
+        if (
+            closing is not None or given is not None
+        ):  # nearer to balance, of an old tangent, sets are not believed
             held, found = self._settled(
                 held, found, lambda held: self._solved(free, lift, held, load)
             )
         z, rise = found.parts
         self.changed = bool((held != self._base).any())
-        motion = free.motion + self._columns.motion[:, self._number[held ^ self._base]] @ z
-        road.height += rise
+        motion = free.motion + self._columns.motion[:, self._number[found.nodes]] @ z
+        road.height += rise + (given or 0.0)
         road.active, road.force = held[self._own].copy(), np.zeros(len(road.dofs))
         motion = motion if lift is None else motion + rise * lift.motion
         return self._system.spread(motion), found.force[self._own][road.active]
@@ -128,7 +142,10 @@ class LinearContact:
         self, free: _Answer, lift: _Answer | None, held: Array, load: float | None
     ) -> _Found:
         """z, rise, and gap and force of the tread's nodes, for the nodes that the road is to hold."""
-        changed = np.flatnonzero(held ^ self._base)
+        off = (
+            held & self._base & (np.abs(free.gap) > _OFF)
+        )  # it left the road since, and comes back
+        changed = np.flatnonzero((held ^ self._base) | off)
         self._add_columns(changed)
         use = self._number[changed]
         gap, force = self._columns.gap[:, use], self._columns.force[:, use]
@@ -138,7 +155,7 @@ class LinearContact:
         on, own = held[changed], self._stiffness[changed]
         rows = np.where(on[:, None], own[:, None] * gap[changed], force[changed])
         right = -np.where(on, own * rest[0][changed], rest[1][changed])
-        unit = np.where(on, 1.0, 1 / own)  # of each unknown: all in N
+        unit = np.where(self._base[changed], 1 / own, 1.0)  # of each unknown: all in N
         if lift is not None:
             rows, right = (
                 np.vstack([rows, force.sum(axis=0)]),
@@ -149,6 +166,7 @@ class LinearContact:
         parts = z[: len(changed)], float(z[-1]) if lift is not None else 0.0
         gaps = np.where(held, 0.0, rest[0] + gap @ z)
         return _Found(
+            changed,
             parts,
             np.where(held, rest[1] + force @ z, 0.0) > self._stiffness * gaps,
             np.where(held, rest[1] + force @ z, 0.0),

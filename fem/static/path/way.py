@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from tireroad.fem.static.path.loading import Loader
 
 LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
-_REACH = 1.9  # times the largest deflection so far: a load is sought no further away
-_NEAR = 0.01  # of a wanted load: what may be out of balance on the way to it
+_REACH = 2.2  # times the largest deflection so far: no state is sought further away
+_NEAR = 0.1  # of a wanted load: what may be out of balance on the way to it
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Way:
         """That deflection, with states on the way `allowed` (N) out of balance."""
         self._known = self._known[:1]
         self._body.u.x.array[:] = self._known[0].displacement
-        trial = 0.1 * self._body.ring.thickness
+        trial = 0.4 * self._body.ring.thickness
         for _ in range(60):
             self.to(trial, allowed)
             rounding = self._equilibrium.rounding
@@ -66,7 +66,7 @@ class Way:
             ):
                 return trial
             trial = self._next_deflection(load)
-            if trial < _REACH * max(k.deflection for k in self._known):
+            if trial < 0.99 * _REACH * max(k.deflection for k in self._known):
                 if self._meet(load, trial):
                     return self._loader.deflection
                 if allowed:  # from here on a bracket has to close
@@ -79,12 +79,16 @@ class Way:
 
     def _meet(self, load: float, trial: float) -> bool:
         """Solve for the load and the road's height at once, from the state guessed at a deflection."""
-        self._guess(trial)
+        self._near(trial)
         step = self._equilibrium.solve(self._loader.touch + trial, load)
         self._loader.newton_steps += step.iterations
         if step.converged:
             self._loader.tell("deflection", self._loader.deflection, "m", step)
         return step.converged
+
+    def _near(self, trial: float) -> bool:
+        """Put the body near the state at a deflection, by the last tangent or else by known states; whether it is."""
+        return self._equilibrium.predict(self._loader.touch + trial) or self._guess(trial)
 
     def _guess(self, trial: float) -> bool:
         """Put the body on a line through the two states nearest to a deflection, if there are two."""
@@ -97,11 +101,11 @@ class Way:
         return True
 
     def to(self, trial: float, allowed: float = 0.0) -> None:
-        """Solve at the trial deflection from a line through the two nearest states, else by steps.
+        """Solve at the trial deflection from near it, else by steps.
 
         What converges on the way is known from then on, `allowed` (N) out of balance.
         """
-        if self._guess(trial):
+        if self._near(trial):
             step = self._equilibrium.solve(self._loader.touch + trial, allowed=allowed)
             self._loader.newton_steps += step.iterations
             if step.converged:
@@ -129,8 +133,8 @@ class Way:
                 f"static: the tire carries {below.load:.4g} N at {below.deflection:.4g} m of deflection, where the "
                 f"road reaches the rim; {load:g} N is out of reach. Lower static.load or raise static.inflation."
             )
-        # Beyond what was tried the curve is not known: at most double the deflection.
-        least, most = np.minimum(np.array([1.01, 2]) * below.deflection, farthest)
+        # Beyond what was tried the curve is not known.
+        least, most = np.minimum(np.array([1.01, _REACH]) * below.deflection, farthest)
         return float(np.clip(secant, least, most))
 
     def _raise_road(self, start: float, end: float, allowed: float) -> None:
@@ -144,8 +148,18 @@ class Way:
             return step
 
         def attempt(deflection: float) -> Step:
-            height = self._loader.touch + deflection
-            return found(self._equilibrium.solve(height, allowed=allowed), deflection)
+            height, field, road = (
+                self._loader.touch + deflection,
+                self._body.u.x,
+                self._equilibrium.road,
+            )
+            kept = field.array.copy(), road.kept()
+            self._equilibrium.predict(height)
+            step = self._equilibrium.solve(height, allowed=allowed)
+            if not step.converged:  # put back to where it was predicted
+                field.array[:] = kept[0]
+                road.put_back(kept[1])
+            return found(step, deflection)
 
         def let_go(deflection: float) -> Step:
             height = self._loader.touch + deflection

@@ -88,3 +88,40 @@ def test_the_same_state_with_no_more_tangents(make_body, monkeypatch):
     assert settled.deflection == pytest.approx(plain.deflection, rel=1e-9)
     found, wanted = (one.body.displacement() for one in ways)
     np.testing.assert_allclose(found, wanted, atol=1e-9 * abs(wanted).max())
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+def test_the_predicted_state_errs_by_the_square_of_the_rise(make_body):
+    """From a state in balance to another height of the road by its tangent, as long as no node comes or goes."""
+    loader = inflated(make_body, MPI.COMM_WORLD)
+    problem = loader.equilibrium
+    loader.deflect(5e-3)
+    assert problem.road_stiffness() > 0  # the tangent of the state itself
+    start, kept, height = problem.body.u.x.array.copy(), problem.road.kept(), problem.road.height
+    sizes, errors = (2e-6, 1e-6), []
+    for size in sizes:
+        problem.body.u.x.array[:] = start
+        problem.road.put_back(kept)
+        problem.road.height = height
+        assert problem.predict(height + size)
+        assert problem.road.height == pytest.approx(height + size, abs=1e-15)
+        errors.append(problem._error(None))
+    assert 3.5 < errors[0] / errors[1] < 4.5
+    problem.body.u.x.array[:] += 1e-6
+    assert not problem.predict(height)  # of another state the tangent is not
+
+
+@pytest.mark.slow
+def test_a_node_that_left_the_road_comes_back_to_it(make_body):
+    """One that the factor holds, was lifted since, and is held again: it moves by its gap."""
+    loader = inflated(make_body)
+    problem, road = loader.equilibrium, loader.equilibrium.road
+    loader.deflect(5e-3)
+    problem.road_stiffness()
+    node = np.flatnonzero(road.active)[road.force[road.active].argmax()]
+    contact = LinearContact(problem.body.comm, problem._system, road)
+    lifted = 1e-5
+    problem.body.u.x.array[road.dofs[node]] += lifted
+    motion, _ = contact.step(problem._assemble_residual().copy(), None, None)
+    assert motion[road.dofs[node]] == pytest.approx(-lifted, rel=1e-9)

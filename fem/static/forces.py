@@ -1,0 +1,73 @@
+"""The forces out of balance in one body at its present displacement, and their tangent, as assembled vectors and matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+
+from tireroad.fem import compat
+from tireroad.fem.static.drag import Drag
+from tireroad.fem.static.shape_damping import ShapeDamping
+from tireroad.fem.static.virtual_work import (
+    Rolling,
+    inverted_volume,
+    static_residual,
+    stress_prediction,
+    tangent,
+)
+from tireroad.fem.timing import Timing
+from tireroad.fem.tire.body import Body
+
+
+class Forces:
+    """Everything but the road. Forms and matrix are made once. Collective.
+
+    `pressure` (Pa) may be changed; `cost`: seconds by part; `drag`: what holds the body back on its fall through a snap.
+    """
+
+    def __init__(self, body: Body, rolling: Rolling) -> None:
+        self.body, self.rolling = body, rolling
+        self.cost = Timing()
+        self.drag: Drag | None = None
+        self.pressure = fem.Constant(body.mesh, 0.0)
+        self._before = fem.Function(body.space)
+        residual = static_residual(body, self.pressure, rolling)
+        self._damping: ShapeDamping | None = None
+        if rolling.speed * rolling.stiffness_damping:
+            self._damping = ShapeDamping(body, self.pressure, rolling)
+            residual += self._damping.work
+        self._residual = compat.form(residual)
+        self._tangent = compat.form(tangent(body, residual) + stress_prediction(body, self._before))
+        self._inverted = compat.form(inverted_volume(body))
+        self._clamp = [body.clamp()]
+        self._local_tangent = fem.petsc.create_matrix(self._tangent)
+        self.matrix = self._local_tangent
+        self._work = fem.petsc.create_vector(self._residual)
+        self._rim = (3 * body.rim[body.rim < body.nodes, None] + np.arange(3)).ravel()
+
+    def _assemble_residual(self) -> np.ndarray:
+        """Forces out of balance at the owned dofs, N; on the rim 0, where the wheel takes them."""
+        if self._damping:
+            self._damping.update()
+        with self._work.localForm() as local:
+            local.set(0.0)
+        fem.petsc.assemble_vector(self._work, self._residual)
+        self._work.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        if self.drag:
+            self.drag.add_to(self._work.array)
+        self._work.array[self._rim] = 0.0
+        return self._work.array_r
+
+    def _assemble_tangent(self) -> None:
+        self._local_tangent.zeroEntries()
+        fem.petsc.assemble_matrix(self._local_tangent, self._tangent, bcs=self._clamp)
+        self._local_tangent.assemble()
+        if self.drag:
+            self.drag.stiffen(self._local_tangent)
+        if self._damping:
+            self.matrix = self._damping.added_to(self._local_tangent)
+
+    def _inside_out(self) -> bool:
+        """Whether the wall is turned inside out in some Gauss point; no energy tells J from -J."""
+        return self.body.comm.allreduce(fem.assemble_scalar(self._inverted)) > 0
