@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from mpi4py import MPI
 
@@ -63,13 +65,13 @@ class Road:
         """Take the reactions (N) at the held unknowns. Collective."""
         self.force[self.active] = reaction
 
-    def kept(self) -> tuple[np.ndarray, ...]:
+    def kept(self) -> tuple[Any, ...]:
         """What `put_back` puts back."""
-        return self.active.copy(), self.force.copy()
+        return self.active.copy(), self.force.copy(), self.height
 
-    def put_back(self, kept: tuple[np.ndarray, ...]) -> None:
+    def put_back(self, kept: tuple[Any, ...]) -> None:
         """Be as `kept` says."""
-        self.active, self.force = kept
+        self.active, self.force, self.height = kept
 
     def choose(self) -> bool:
         """Take the active set of the present state; whether it is another one on any process. Collective."""

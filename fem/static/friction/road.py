@@ -15,6 +15,8 @@ slides is led by its friction as by a spring across its way, and along it only b
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from mpi4py import MPI
 
@@ -131,12 +133,12 @@ class RubbingRoad(Road):
         normal = self.friction * self.force[self._slips]
         self.pull[self._slips] = normal[:, None] * self._way - self._led_by(self.sliding.slid())
 
-    def kept(self) -> tuple[Array, ...]:
+    def kept(self) -> tuple[Any, ...]:
         return *super().kept(), self.sticks.copy(), self.pull.copy(), self._slips, self._way
 
-    def put_back(self, kept: tuple[Array, ...]) -> None:
-        super().put_back(kept[:2])
-        self.sticks, self.pull, self._slips, self._way = kept[2:]
+    def put_back(self, kept: tuple[Any, ...]) -> None:
+        super().put_back(kept[:3])
+        self.sticks, self.pull, self._slips, self._way = kept[3:]
 
     @property
     def travel(self) -> float | None:

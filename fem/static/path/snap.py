@@ -30,7 +30,7 @@ def fall(equilibrium: Equilibrium, road_height: float, allowed: float = 0.0) -> 
     As `Equilibrium.solve`; where none is found the body, and the road, are put back.
     """
     field, road = equilibrium.body.u.x, equilibrium.road
-    kept, before = (field.array.copy(), road.kept()), (road.height, equilibrium.road_height)
+    kept = field.array.copy(), road.kept(), equilibrium.road_height
     typical = equilibrium.force_scale / equilibrium.body.ring.thickness
     equilibrium.drag = drag = Drag(equilibrium.body, _FIRST * typical)
     share, tangents = 1.0, 0
@@ -45,7 +45,6 @@ def fall(equilibrium: Equilibrium, road_height: float, allowed: float = 0.0) -> 
         drag.stiffness *= factor
         equilibrium.drag = drag if share > _LAST else None
     equilibrium.drag = None
-    field.array[:] = kept[0]
+    field.array[:], equilibrium.road_height = kept[0], kept[2]
     road.put_back(kept[1])
-    road.height, equilibrium.road_height = before
     return Step(False, tangents, step.residual, "neither does a fall against a drag come to rest")

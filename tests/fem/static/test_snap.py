@@ -70,3 +70,16 @@ def test_a_march_falls_where_small_steps_fail_and_goes_on_by_steps():
     march(attempt, 0.0, 1.0, 0.3, Show("deflection", 1.0, "m"), fall)
     assert len(fallen) == 1 and 0.4 <= fallen[0] < 0.5
     assert asked[-1] == 1.0 and max(asked[: asked.index(fallen[0])]) >= 0.4
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+def test_a_load_that_is_not_met_leaves_the_road_where_it_was(loader):
+    """In load control the road's height is an unknown too."""
+    problem = loader.equilibrium
+    loader.deflect(0.005)
+    before, height = loader.body.u.x.array.copy(), problem.road.height
+    assert not problem.solve(height, load=1e7).converged
+    assert problem.road.height == problem.road_height == height
+    np.testing.assert_array_equal(loader.body.u.x.array, before)
+    assert problem.solve(height).iterations == 0
