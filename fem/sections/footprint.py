@@ -10,9 +10,6 @@ from tireroad.fem.sections.grid import corners
 # of 20 mm reaches 0.35 rad along a ring of 0.32 m and 0.6 rad along a section of 0.1 m.
 RING_NEAR = (0.15, 1.2)
 ARC_NEAR = (0.2, 1.2)
-# Power of the footprint's size that elements along the section take: as small as around the ring, those elsewhere would
-# be too long for the lowest frequency, 0.42 % high on 30 x 14 of order 3 where this gives 0.2 %.
-ARC_POWER = 0.7
 
 
 def near_road(distance: np.ndarray, footprint_size: float, near: tuple[float, float]) -> np.ndarray:

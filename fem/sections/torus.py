@@ -10,7 +10,7 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections import bead
-from tireroad.fem.sections.footprint import ARC_NEAR, ARC_POWER, near_road, ring_corners
+from tireroad.fem.sections.footprint import ARC_NEAR, near_road, ring_corners
 from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.ring import Ring
@@ -24,8 +24,7 @@ class Torus:
 
     Lengths in m, `half_angle` in rad: the arc from the crown to each bead. `segments` elements
     around, `elements_arc` along the arc, `elements_thickness` through the wall, all of `order`;
-    elements where the road touches are `footprint_size` times as long as they would be otherwise, along
-    the arc its power ARC_POWER.
+    elements where the road touches are `footprint_size` times as long as they would be otherwise.
     """
 
     outer_radius: float
@@ -75,7 +74,7 @@ class Torus:
 
     def _size(self, arc: np.ndarray) -> np.ndarray:
         """Relative size of the elements at a section angle."""
-        near = near_road(np.abs(arc), self.footprint_size**ARC_POWER, ARC_NEAR)
+        near = near_road(np.abs(arc), self.footprint_size, ARC_NEAR)
         if self.grading != "bead":
             return near
         edge = self.half_angle - np.abs(arc)

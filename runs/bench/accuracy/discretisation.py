@@ -19,7 +19,7 @@ YOUNGS_MODULUS, INFLATION = 48e6, 2e5  # Pa
 COUNT = 28  # modes
 RATIOS = (0.45, 0.49, 0.499, 0.4995)
 NAMES = "order", "segments", "elements_arc", "elements_thickness", "grading", "footprint_size"
-DEFAULT = (3, 30, 14, 1, "bead", 0.2)
+DEFAULT = (3, 28, 16, 1, "bead", 0.2)
 MESHES = (
     (2, 20, 8, 1, "bead", 0.25),
     (2, 30, 12, 1, "bead", 0.25),

@@ -134,8 +134,7 @@ class Tire(Variants):
     footprint_size: float | None = number(
         None,
         "-",
-        "element length at the footprint relative to that elsewhere, around the axle; along a torus's section its power of 0.7; "
-        "absent: 0.2 with a road, else 1",
+        "element length at the footprint relative to that elsewhere; absent: 0.2 with a road, else 1",
         least=0.05,
         most=1,
     )

@@ -17,11 +17,11 @@ def scene(tmp_path, text, *overrides):
 @pytest.mark.parametrize(
     ("given", "expected"),
     [
-        ((), (3, 30, 14, 1.0)),
+        ((), (3, 28, 16, 1.0)),
         (("tire.order=2",), (2, 100, 16, 1.0)),
         (("tire.segments=24",), (2, 24, 16, 1.0)),
-        (("static.load=500",), (3, 30, 14, 0.2)),
-        (("static.load=500", "tire.footprint_size=1"), (3, 30, 14, 1.0)),
+        (("static.load=500",), (3, 28, 16, 0.2)),
+        (("static.load=500", "tire.footprint_size=1"), (3, 28, 16, 1.0)),
         (('tire.section="radial"',), (2, 30, 26, 1.0)),
     ],
 )
