@@ -82,6 +82,7 @@ class Grid:
         self._sides = float(y[0]), float(y[-1])
         self.filled = 0
         self.notes: tuple[str, ...] = ()  # what was done to the measurement, for the user
+        self.making = 0.0  # bytes that were taken to make it
 
     def _over(self, rows: slice, columns: slice) -> Window:
         place = rows.start, columns

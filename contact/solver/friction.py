@@ -16,7 +16,7 @@ from scipy import sparse
 from tireroad.contact.solver.conditions import ContactSolver, Mask
 from tireroad.contact.solver.tangential import Stiffness, stick_slip
 from tireroad.contact.tread.brush import Brush
-from tireroad.contact.tread.shear import Shear
+from tireroad.contact.tread.shear import Between, Shear
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 
@@ -136,8 +136,8 @@ class Friction:
         if len(index) == 0:
             return out
         springs = np.broadcast_to(law.stiffness, share.shape)[index] * share[index]
-        tread = None if self._shear is None else self._shear.between(index)
-        stiffness = Stiffness(*self._between(index), 1.0 / springs, tread)
+        matrix, weights, tread = self._between(index)
+        stiffness = Stiffness(matrix, weights, 1.0 / springs, tread)
         constant = moved[index] + past[index] / share[index, None]
         bound = np.full(len(index), np.inf)
         if law.friction is not None:
@@ -145,15 +145,16 @@ class Friction:
         out[index] = stick_slip(stiffness, constant, bound, guess[index])
         return out
 
-    def _between(self, index: NDArray[np.intp]) -> tuple[Array, Array | None]:
-        """A_hh between the points, through the nodes that carry them."""
+    def _between(self, index: NDArray[np.intp]) -> tuple[Array, Array | None, Between | None]:
+        """A_hh between the points, through the nodes that carry them, and the tread's part."""
         key = index.tobytes()
         if key != self._key:
             own, p = self._w[index], self._w.shape[1]
             nodes = np.unique(own.indices)
             both = np.stack([nodes, nodes + p], axis=-1).ravel()
             own = None if self._nodal else own[:, nodes].toarray()
-            self._carried, self._key = (self._hh.between(both, both), own), key
+            tread = None if self._shear is None else self._shear.between(index)
+            self._carried, self._key = (self._hh.between(both, both), own, tread), key
         return self._carried
 
 

@@ -11,6 +11,14 @@ s_x > 0 driving, s_y > 0 the wheel drifting towards +y. Over one step, seen at t
     past_i = sum_j T_ij m_j (e_j - u_j) + share_i v h (-s_x, s_y),
 
 T the interpolation at the place a step upstream, m_j = 1 where point j touched. Slip cuts e back.
+
+The foremost point that touches stands for a cell whose front edge, half a pitch ahead, is where bristles enter: there
+e = 0, and u is the mean of the point's and that of the one ahead. With w pitches a step, w <= 1, it so has
+
+    e+ = u+ + (1 - 2w) (e - u) - 2w u_edge + v h (-s_x, s_y)   for w <= 1/2,   u+ - u_edge + v h (-s_x, s_y) / 2w   beyond.
+
+A body that rolls and sticks has errors in its force of 2.7, 1.6 and 0.6 % with 6, 12 and 24 points along its contact (Kalker's
+C11); entering at a point, it had 18, 8 and 4 %.
 """
 
 from __future__ import annotations
@@ -47,6 +55,8 @@ class Brush:
         self.law = law
         self._way = speed * step
         self._upstream = upstream(x, line, self._way)
+        self._ahead, pitch = next_ahead(x, line)
+        self._pitches = np.where(pitch > 0, self._way / np.where(pitch > 0, pitch, 1.0), np.inf)
         self._slip = self._way * np.array([-1.0, 1.0]) * np.asarray(law.slip)
         self.deflection = np.zeros((len(x), 2))
         self._moved = np.zeros((len(x), 2))
@@ -64,7 +74,21 @@ class Brush:
             return np.ones(len(self._touched)), np.zeros_like(self.deflection)
         share = self._upstream @ self._touched.astype(float)
         anchor = np.where(self._touched[:, None], self.deflection - self._moved, 0.0)
-        return share, self._upstream @ anchor + share[:, None] * self._slip
+        past = self._upstream @ anchor + share[:, None] * self._slip
+        self._enter(share, past)
+        return share, past
+
+    def _enter(self, share: Array, past: Array) -> None:
+        """Those of the points that were foremost."""
+        foremost = self._touched & ~self._touched[self._ahead] & (self._pitches <= 1.0 + 1e-9)
+        some = np.flatnonzero(foremost & (self._way > 0))
+        inside = np.minimum(2.0 * self._pitches[some, None], 1.0)  # how far towards the edge it was
+        edge = 0.5 * (self._moved[some] + self._moved[self._ahead[some]])
+        own = self.deflection[some] - self._moved[some]
+        slip = np.broadcast_to(self._slip, past.shape)[some]
+        share[some] = 1.0
+        travelled = np.minimum(0.5 / self._pitches[some, None], 1.0)
+        past[some] = (1.0 - inside) * own - inside * edge + travelled * slip
 
     def take(self, force: Array, moved: Array, touching: Mask) -> None:
         """The step's horizontal forces (c, 2) N, displacements (c, 2) m and touching points."""
@@ -79,6 +103,16 @@ class Brush:
         """Go on from `state`."""
         self.deflection, self._moved = kept["deflection"], kept["moved"]
         self._touched = np.asarray(kept["touched"], dtype=bool)
+
+
+def next_ahead(x: Array, line: Array) -> tuple[NDArray[np.intp], Array]:
+    """The next point ahead of each on its line (c,), and how far (m); a line's first has itself, 0."""
+    ahead, pitch = np.arange(len(x)), np.zeros(len(x))
+    for one in np.unique(line):
+        members = np.flatnonzero(line == one)
+        members = members[np.argsort(x[members], kind="stable")]
+        ahead[members[:-1]], pitch[members[:-1]] = members[1:], np.diff(x[members])
+    return ahead, pitch
 
 
 def upstream(x: Array, line: Array, way: float) -> sparse.csr_matrix:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation import closed_contact, closed_tire
-from tireroad.runs.validation.parts import static_friction
+from tireroad.runs.validation.parts import shear, static_friction
 
-ABOUT = "tube, rings, oscillator, Hertz, punch, friction, static friction and brush against closed forms"
+ABOUT = "tube, rings, oscillator, Hertz, punch, friction, creep of rolling, static friction and brush against closed forms"
 
 
 def run() -> list[Table]:
     """One table."""
     rows = [
         [case, found, exact, unit, 100 * abs(found / exact - 1)]
-        for package in (closed_tire, closed_contact, static_friction)
+        for package in (closed_tire, closed_contact, shear, static_friction)
         for case, unit, found, exact in package.rows()
     ]
     columns = [("case", ""), ("computed", "-"), ("exact", "-"), ("unit", ""), ("error", "%")]

@@ -19,11 +19,12 @@ from pathlib import Path
 
 from fuzz_scenes import run_scene_file
 from in_child import judged, warm
-from scene_makers import BASES, SIZES, needed, write_deck
+from scene_makers import BASES, SIZES, needed, write_files
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
+from tireroad.runs.scene.rules.road import made
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.walk import walk
 
@@ -48,6 +49,7 @@ def ends(name: str, key) -> Iterator[str]:
 def accepted(folder: Path, changed: list[str]) -> str | None:
     """The first scene that goes with the values, written to the folder; None where none does."""
     path = folder / "run.toml"
+    made.cache_clear()  # a road kept here would count as the run's memory
     for name, (text, _) in BASES.items():
         path.write_text(text)
         with suppress(InputError):
@@ -66,7 +68,7 @@ def main() -> int:
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_deck(folder)
+        write_files(folder)
         for dotted, of, _, key in walk(Scene):
             key_name = dotted.replace("[]", ".0")
             if key.is_file or not key_name.startswith(given.only):

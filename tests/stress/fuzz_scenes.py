@@ -25,7 +25,7 @@ import numpy as np
 from damaged_roads import LIMIT, fuzz_road, road_files
 from in_child import forked, warm
 from in_child import judged as ended
-from scene_makers import BASES, damaged, overrides, write_deck
+from scene_makers import BASES, damaged, overrides, write_files
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.process.mpi import judged
@@ -70,7 +70,7 @@ def fuzz_check(folder: Path, seed: int, number: int) -> tuple[str, str]:
     """(end, what was tried) of one scene through `check`."""
     rng = np.random.default_rng([seed, 1, number])
     name, text, focus = _base(rng)
-    write_deck(folder)
+    write_files(folder)
     path, changed = folder / "check.toml", []
     if rng.random() < 0.25:
         path.write_bytes(damaged(rng, text))
@@ -90,7 +90,7 @@ def fuzz_check(folder: Path, seed: int, number: int) -> tuple[str, str]:
 def fuzz_run(folder: Path, seed: int, number: int, limit: float) -> tuple[str, str]:
     """(end, what was tried) of one scene that `check` accepts, through `run` on a small mesh, in `limit` s."""
     rng = np.random.default_rng([seed, 2, number])
-    write_deck(folder)
+    write_files(folder)
     path = folder / "run.toml"
     for _ in range(100):
         name, text, focus = _base(rng)
@@ -122,7 +122,7 @@ def run_scene_file(folder: Path, changed: list[str], limit: float) -> tuple[int 
 
 def run_bases(folder: Path) -> None:
     """Every scene to start from, unchanged: it must run, and its forms are compiled from then on."""
-    write_deck(folder)
+    write_files(folder)
     for name, (text, _) in BASES.items():
         (folder / "run.toml").write_text(text)
         status, said, memory = run_scene_file(folder, [], 20 * LIMIT)

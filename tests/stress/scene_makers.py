@@ -14,7 +14,9 @@ from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.walk import walk
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fem" / "decks"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "contact" / "roads"))
 
+from test_opencrg import crg
 from torus_decks import CORDS, HALF_ANGLE, Torus, membranes, plain
 
 TIRE = """
@@ -93,6 +95,17 @@ error_estimate = false
 [modal]
 count = 8
 """
+ON_GRID = "[contact]\npoints = { dx = 0.006, dy = 0.006 }\n"
+CREEPS = ON_GRID + 'tread = "viscoelastic"\n'
+BRUSH = ON_GRID + "friction = 0.8\nslip = [0.01, 0.0]\nbrush_stiffness_per_area = 2e8\n"
+
+
+def measured(kind: str, file: str) -> str:
+    """A rolling scene on the road of a file that `write_files` writes."""
+    road = f'[road]\nkind = "{kind}"\nfile = "{file}"\nend = "mirror"\n'
+    return BASE.replace("[road]\n", road)
+
+
 BASES = {  # text, tables whose keys are changed more often than others
     "rolling": (BASE, ""),
     "forces": (FORCES, "force.|output."),
@@ -102,6 +115,11 @@ BASES = {  # text, tables whose keys are changed more often than others
     "corner": (TIRE + PRESSED + CORNER + ROLLING, "axle|road.motion"),
     "deck": (DECK + ROLLING, "tire.|static"),
     "radial": (RADIAL, "tire.cavity|static|tire.footprint"),
+    "laser": (measured("laser", "line.csv"), "road."),
+    "grid": (measured("grid", "grid.npz"), "road."),
+    "crg": (measured("crg", "road.crg"), "road."),
+    "creeps": (BASE.replace("[contact]\n", CREEPS), "contact."),
+    "brush": (BASE.replace("[contact]\n", BRUSH), "contact."),
 }
 NASTY = ["nan", "inf", "-inf", "true", '"text"', '""', "[]", "[1]", "[1, 2, 3]", "{}", "{a = 1}", "0",
          "-0.0", "-1", "1e308", "-1e308", "5e-324", "1" + "0" * 400, "2147483648", "1979-05-27",
@@ -117,11 +135,18 @@ SIZES = (
 )
 
 
-def write_deck(folder: Path) -> None:
-    """The file of the scene "deck": a small torus with a slanted ply."""
+def write_files(folder: Path) -> None:
+    """The files of the scenes: a small torus with a slanted ply as a deck, and a rough road by line, grid and OpenCRG."""
     arcs = np.linspace(-HALF_ANGLE, HALF_ANGLE, 33)
     belt = membranes("B", 0.006, arcs, 9001, 9001, True, 70.0)
     (folder / "tire.inp").write_text(plain(Torus(arcs=8, wall=1)) + belt + CORDS)
+    x, y = 0.005 * np.arange(601), 0.005 * np.arange(-40, 41)
+    z = 5e-4 * np.sin(x[:, None] / 0.03) * np.cos(y / 0.05) + 2e-4 * np.cos(x[:, None] / 0.011)
+    np.savez(folder / "grid.npz", x=x, y=y, z=z)
+    x = 0.0005 * np.arange(6001)
+    line = np.column_stack([x, 5e-4 * np.sin(x / 0.03) + 2e-4 * np.cos(x / 0.011)])
+    np.savetxt(folder / "line.csv", 1e3 * line, delimiter=",")
+    (folder / "road.crg").write_bytes(crg("KDBI", z[::2, ::10]))
 
 
 def value(rng: np.random.Generator, key, legal: bool) -> str:

@@ -12,7 +12,7 @@ from tireroad.contact.roads.grid import Grid
 from tireroad.contact.roads.kind import Levelled, road_kind
 from tireroad.contact.roads.rows import check_count
 from tireroad.contact.roads.texture.cleaning import cleaned
-from tireroad.contact.roads.texture.widened import widened
+from tireroad.contact.roads.texture.widened import memory, widened
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import ParameterError, choice, filename, integer, number
 
@@ -83,6 +83,7 @@ class LaserFile(Levelled):
             how = f"across an isotropic random surface as rough as the line, which is its middle (seed {self.seed})"
         x: Array = np.float64(pitch) * np.arange(len(profile))
         road = Grid(x, y, z, end=self.end, source=source)
+        road.making = 0.0 if self.across == "ruts" else memory(len(profile), pitch, self.width)
         road.notes = (sound.summary, f"extended to {self.width:g} m: {how}")
         return road
 

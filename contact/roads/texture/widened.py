@@ -27,13 +27,11 @@ def widened(profile: Array, pitch: float, width: float, seed: int) -> tuple[Arra
     """
     from scipy import fft  # not needed to read a scene
 
-    half = int(np.ceil(0.5 * width / pitch))
+    half, longest, shape = _sizes(len(profile), pitch, width)
     across = 2 * half + 1
-    longest = min(len(profile) * pitch / _LONGEST, 2.0 * width)
     smooth, rough = _split(profile, pitch, longest)
     edges = bands(2 * pitch, longest)
     power = _band_power(rough, pitch, edges)
-    shape = _padded(len(profile), longest, pitch), fft.next_fast_len(2 * across)
     amplitude = _amplitude(edges, power, shape, pitch)
     middle = np.fft.rfft(np.pad(rough, (0, shape[0] - len(profile)), mode="reflect"))
     rho = _decay(amplitude)
@@ -44,6 +42,21 @@ def widened(profile: Array, pitch: float, width: float, seed: int) -> tuple[Arra
     z = fft.irfft(field, shape[0], axis=0)[: len(profile)]
     y: Array = np.float64(pitch) * np.arange(-half, half + 1)
     return y, z + smooth[:, None]
+
+
+def memory(count: int, pitch: float, width: float) -> float:
+    """Bytes that `widened` takes at the most: 37 for each height of the periodic surface (seen)."""
+    _, _, shape = _sizes(count, pitch, width)
+    return 37.0 * shape[0] * shape[1]
+
+
+def _sizes(count: int, pitch: float, width: float) -> tuple[int, float, tuple[int, int]]:
+    """Heights on either side of the profile, longest wave (m) of the surface, its heights along and across."""
+    from scipy.fft import next_fast_len  # not needed to read a scene
+
+    half = int(np.ceil(0.5 * width / pitch))
+    longest = min(count * pitch / _LONGEST, 2.0 * width)
+    return half, longest, (_padded(count, longest, pitch), next_fast_len(2 * (2 * half + 1)))
 
 
 def _split(profile: Array, pitch: float, longest: float) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.runs.scene.extent.sizes import Sizes, sizes
+from tireroad.runs.scene.extent.sizes import Sizes, road_memory, sizes
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.tables.scene import Scene
 
@@ -104,6 +104,7 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
         parts["rotating pencil"] = 16.0 * 4 * (2 * count) ** 2
     if "contact" not in left_out:
         parts |= _contact_memory(scene, size)
+        parts |= road_memory(scene)
     if "response" not in left_out:
         k = max(size.driven, 1)
         parts["receptances"] = 16.0 * 5 * size.frequencies * k**2

@@ -128,6 +128,15 @@ def road_height(scene: Scene) -> float:
     return max(high - level + scene.road.offset, 0.0) + lift
 
 
+def road_memory(scene: Scene) -> dict[str, float]:
+    """Bytes that are taken to make the road, where they count."""
+    try:
+        taken = getattr(made(scene.road.surface), "making", 0.0)
+    except InputError:
+        return {}
+    return {"making the road": taken} if taken else {}
+
+
 def _points(scene: Scene, free: int) -> tuple[int, int]:
     """Nodes and points of the patch: where the tire is within reach of the road."""
     if scene.contact is None:

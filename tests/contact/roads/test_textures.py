@@ -1,5 +1,7 @@
 """Textures: what a profile says, surfaces with a given spectrum, and lines that a laser measured."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from tireroad.contact.roads.road import make_road
 from tireroad.contact.roads.texture.isotropic import bands, profile_power, surface_density
 from tireroad.contact.roads.texture.layered import Skewed, band_power
 from tireroad.contact.roads.texture.levels import mean_profile_depth, texture_of, third_octaves
+from tireroad.contact.roads.texture.widened import memory, widened
 from tireroad.fem.errors import InputError
 
 PITCH = 5e-4
@@ -157,6 +160,19 @@ def test_a_laser_profile_is_widened_by_isotropy(tmp_path) -> None:
     grid = road.height(*np.broadcast_arrays(s[:, None], y[None, :]))
     along, across = (np.diff(grid, axis=axis).std() for axis in (0, 1))
     assert across == pytest.approx(along, rel=0.1)
+
+
+def test_memory_of_widening_is_foreseen() -> None:
+    """Of numpy's arrays while the surface is made."""
+    profile = 1e-3 * np.random.default_rng(0).standard_normal(3000)
+    widened(profile[:100], 1e-3, 0.1, 0)  # what is imported does not count
+    tracemalloc.start()
+    try:
+        widened(profile, 1e-3, 0.4, 0)
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert 0.8 < most / memory(len(profile), 1e-3, 0.4) < 1.1
 
 
 def all_lost(mm, rng) -> None:

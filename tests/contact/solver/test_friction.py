@@ -216,8 +216,9 @@ def test_a_loop_goes_on_with_the_same_bits(iterative: bool, pulse: bool) -> None
 
 @pytest.mark.slow
 def test_a_brush_by_area_is_the_same_on_every_grid() -> None:
-    """Sticking on a rigid tire: k_A s int (way from the entry) dA, for an ellipse k_A s 8/3 a^2 b; by points it grows."""
-    slip, per_area, forces = 2e-3, 5e7, {"area": [], "point": []}
+    """Sticking on a rigid tire: k_A s int (way from the entry) dA, k_A s b (n p)^2/2 on each line of n points
+    p long and b wide, for an ellipse k_A s 8/3 a^2 b; by points it grows."""
+    slip, per_area, forces, lines = 2e-3, 5e7, {"area": [], "point": []}, []
     for fine in (1, 4, 8):
         patch = oval_patch((9 * fine, 7 * fine), (0.015 / fine, 0.02 / fine), 500.0)
         touching = patch.force > 0
@@ -233,6 +234,9 @@ def test_a_brush_by_area_is_the_same_on_every_grid() -> None:
             a, b = 0.6 * patch.points[:, :2].max(axis=0)
             exact = per_area * slip * 8 / 3 * a**2 * b
             forces[kind].append(abs(float(force[0])) / exact)
-    assert forces["area"][0] == pytest.approx(1.0, abs=0.1)
-    assert forces["area"][-1] == pytest.approx(1.0, abs=0.015)
+        long, wide = 2 * patch.half_sizes[0]
+        own = sum((long * touching[patch.line == k].sum()) ** 2 / 2 for k in np.unique(patch.line))
+        lines.append(per_area * slip * wide * own / exact)
+    assert forces["area"] == pytest.approx(lines, rel=1e-6)
+    assert forces["area"][-1] == pytest.approx(1.0, abs=0.02)
     assert forces["point"][-1] / forces["point"][0] > 30.0
