@@ -1,9 +1,9 @@
-"""Full finite elements in time with large motions, the wheel at rest: what linearising leaves out.
+"""Full finite elements in time with large motions, standing or rolling: what linearising leaves out.
 
-    M u'' + D u' + F(u) = W^T f + f_static,   D = gamma1 M + gamma2 K,
+    M u'' + (D + 2 Omega G) u' + F(u) = W^T f + f_static,   D = gamma1 M + gamma2 K,
 
-F the forces of the hyperelastic wall, of its cords and of the follower pressure at the total displacement, K their
-tangent at the static state, by the same method of Wood, Bossak and Zienkiewicz as `fem.transient.linear`: the
+F the forces of the hyperelastic wall, of its cords and of the follower pressure at the total displacement, and of a wheel that
+turns those of steady rolling (fem.static.virtual_work), K their tangent at the static state, by the same method of Wood, Bossak and Zienkiewicz as `fem.transient.linear`: the
 two differ in F alone. Each step is solved by iterations on the one factorisation of the linear step,
 which inertia keeps near the true one; contact is solved anew in each.
 """
@@ -21,8 +21,14 @@ from ufl.core.expr import Expr
 from tireroad.fem import compat, kinematics
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.matrices.operators import Operators
-from tireroad.fem.static.virtual_work import AT_REST, added_energy, added_stress, static_residual
+from tireroad.fem.matrices.operators import Operators, Rotation
+from tireroad.fem.static.virtual_work import (
+    AT_REST,
+    Rolling,
+    added_energy,
+    added_stress,
+    static_residual,
+)
 from tireroad.fem.tire.body import Body
 from tireroad.fem.transient.linear import FullTire
 from tireroad.fem.transient.modal_damping import ModalDamping
@@ -37,7 +43,8 @@ class NonlinearTire(FullTire):
 
     The interface of FullTire and one call more: after each contact solve `settle` says whether the
     motion balances, or for which free displacement to solve the contact again. `operators` are those
-    of the static state, at `inflation` (Pa). `turns`: iterations so far. All methods are collective.
+    of the static state, at `inflation` (Pa); `turning` the matrices of rotation and the rolling of that state, None: it stands.
+    `turns`: iterations so far. All methods are collective.
     """
 
     def __init__(
@@ -51,13 +58,15 @@ class NonlinearTire(FullTire):
         loads: sparse.csr_matrix,
         spectral_radius: float = 0.0,
         modal: ModalDamping | None = None,
+        turning: tuple[Rotation, Rolling] | None = None,
     ) -> None:
         if operators.unknowns.rim:
             raise InputError('nonlinear tire in time: modal.rim = "free" is linear; take "fixed"')
+        rolling = turning[1] if turning else AT_REST
         super().__init__(
             operators=operators,
-            rotation=None,
-            speed=0.0,
+            rotation=turning[0] if turning else None,
+            speed=rolling.speed,
             damping=damping,
             step=step,
             outputs=outputs,
@@ -69,7 +78,7 @@ class NonlinearTire(FullTire):
         self._body, self._small = body, _FLOOR * body.ring.thickness
         self._static = body.u.x.array.copy()
         pressure = fem.Constant(body.mesh, float(inflation))
-        work, potential = static_residual(body, pressure, AT_REST), _potential(body, pressure)
+        work, potential = static_residual(body, pressure, rolling), _potential(body, pressure)
         if body.wall.stiffens:
             before, share = fem.Function(body.space), body.wall.stiffening()
             before.x.array[:] = self._static
@@ -153,7 +162,7 @@ class NonlinearTire(FullTire):
         self._elastic = self._at(self.displacement, self._forces) - self._rest
 
     def energy(self) -> float:
-        """Kinetic energy and what wall and inflation have stored since the static state, J."""
+        """Kinetic energy and what wall and inflation have stored since the static state, J, of a standing wheel."""
         kinetic = self._comm.allreduce(self._mass @ self.velocity**2) / 2
         return kinetic + self._at(self.displacement, self._stored) - self._rest_potential
 

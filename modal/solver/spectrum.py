@@ -24,7 +24,10 @@ from tireroad.modal.solver.team import Team
 T = TypeVar("T")
 
 ZERO = 1e-12  # of the matrix norm: eigenvalues nearer to zero are rigid modes, rounding is 1e-16
-_SLICE = 64  # eigenvalues a slice and matrix: the basis stays small, factorisations few
+_SLICE = (
+    64,
+    160,
+)  # eigenvalues a slice and matrix, at least where teams wait for work, and at most: the basis stays small
 _PROBES = 8
 _FINEST = 1e-9  # relative width below which a crowded interval counts as one cluster
 _CROWDED = 1.6  # times the wanted number in a step: then a boundary below costs less
@@ -131,7 +134,10 @@ class Spectrum:
         """
         limit = min(limit, self.bound)
         done = [(-bottom.zero, np.zeros(len(self.parts), int))]
-        largest = _SLICE * len(self.parts)
+        # Two factorisations a slice: as few slices as leave none of the teams without.
+        rounds = -(-len(self.team.roots) // len(self.parts))
+        each = count / (len(self.parts) * rounds) if rounds > 1 else np.inf
+        largest = float(np.clip(each, *_SLICE)) * len(self.parts)
         # The density of modes in frequency changes slowly: the last slice tells the next one's width.
         density = len(bottom.near) / np.sqrt(np.abs(bottom.near).max())
         ceiling = None  # a value with too many below: the next boundary lies under it
@@ -139,7 +145,7 @@ class Spectrum:
             low, known = done[-1]
             remaining = count - known.sum()
             if remaining <= 0 or low >= limit:
-                return done
+                return _merged(done, largest)
             # Two per cent and two more: a little too far costs less than one step more.
             goal = min(1.02 * remaining + 2, largest)
             trial = _next(max(low, 0.0), goal / density)
@@ -195,6 +201,15 @@ class Spectrum:
         ]
 
 
+def _merged(steps: list[tuple[float, np.ndarray]], most: float) -> list[tuple[float, np.ndarray]]:
+    """Fewer steps, of at most so many eigenvalues where none had more: the first ones were careful."""
+    kept = steps[:1]
+    for one, following in zip(steps[1:], [*steps[2:], None], strict=True):
+        if following is None or (following[1] - kept[-1][1]).sum() > most:
+            kept.append(one)
+    return kept
+
+
 def _near(shifted: Shifted) -> np.ndarray:
     """Rough eigenvalues nearest to the shift, relative to it, by three steps of inverse iteration."""
     width, team = min(_PROBES, shifted.size), shifted.team
@@ -225,5 +240,5 @@ def _owners(counts: list[int], teams: int) -> list[int]:
     load, owners = np.zeros(teams), [0] * len(counts)
     for task in sorted(range(len(counts)), key=lambda k: -counts[k]):
         owners[task] = int(np.argmin(load))
-        load[owners[task]] += counts[task] + _SLICE / 4  # the factorisation counts too
+        load[owners[task]] += counts[task] + _SLICE[0] / 4  # the factorisation counts too
     return owners

@@ -163,8 +163,8 @@ class Tires:
         return uniform, ModalDamping(wheel.operators, modes.modes.vectors, excess, *turning)
 
     def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
-        """The full finite elements with large motions, standing; step; set-up in s."""
-        points, static = self.probes, self.run.static
+        """The full finite elements with large motions; step; set-up in s."""
+        points, static, wheel = self.probes, self.run.static, self.wheel
         began = time.perf_counter()
         damping, modal = self._damping()
         tire = NonlinearTire(
@@ -176,5 +176,6 @@ class Tires:
             loads=points.loads,
             spectral_radius=RADIUS,
             modal=modal,
+            turning=(wheel.rotation, static.rolling) if wheel.speed else None,
         )
         return tire, step, time.perf_counter() - began

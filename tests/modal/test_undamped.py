@@ -10,6 +10,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.solver.modes import Modes
+from tireroad.modal.solver.spectrum import _merged
 from tireroad.modal.solver.symmetry import Sites
 
 COMM = MPI.COMM_WORLD
@@ -35,13 +36,34 @@ def checked(matrix, mass, modes: Modes) -> None:
 @pytest.mark.mpi
 @pytest.mark.parametrize("count", [1, 7, 150, 400])
 def test_chain(count):
-    """From one mode to all of them; a slice holds 64, so this crosses slices and fills the space."""
+    """From one mode to all of them; a slice holds 160, so this crosses slices and fills the space."""
     stiffness, exact = chain(400)
     matrix, mass = distributed(stiffness), ones(400)
     modes = undamped.solve(matrix, mass, count)
     np.testing.assert_allclose(modes.squares, exact[:count], rtol=ROUNDING)
     assert modes.inertia_count == (exact < modes.counted_below).sum() >= count
     checked(matrix, mass, modes)
+
+
+@pytest.mark.mpi
+def test_careful_first_steps_become_one_slice():
+    """Two factorisations a slice: 150 modes take one where no team waits for work, none larger than it may be."""
+    stiffness, exact = chain(3000)
+    modes = undamped.solve(distributed(stiffness), ones(3000), 150)
+    np.testing.assert_allclose(modes.squares, exact[:150], rtol=1e-7)
+    assert modes.slices == 1 if COMM.size == 1 else modes.slices > 1
+
+
+@pytest.mark.parametrize("most", [10, 25, 1000])
+def test_steps_that_are_merged(most):
+    """No step above `most` unless it was; both ends stay, and every end is one of the counted values."""
+    below = np.cumsum([[0, 0], [3, 4], [1, 0], [30, 9], [2, 2], [5, 5], [0, 1]], axis=0)
+    steps = [(float(k), one) for k, one in enumerate(below)]
+    merged = _merged(steps, most)
+    ends = [int(value) for value, _ in merged]
+    assert ends[0] == 0 and ends[-1] == 6
+    each = np.diff([one.sum() for _, one in merged])
+    assert {10: [8, 39, 4, 10, 1], 25: [8, 39, 15], 1000: [62]}[most] == each.tolist()
 
 
 @pytest.mark.mpi

@@ -136,3 +136,19 @@ def test_a_road_that_has_risen_carries_the_static_load():
     further = pressed(0.002 + RISE)
     assert risen(full, patch) == pytest.approx(further.load(), rel=1e-4)
     assert abs(risen(straight, patch) / further.load() - 1) > 0.01
+
+
+@pytest.mark.slow
+def test_rolling_it_tends_to_the_linear_tire(tmp_path):
+    """Waves of 0.05 and 0.5 mm at 100 rad/s: what is off grows with them, from nearly none."""
+    from tireroad.runs.validation.excursion import _SINE, beside, scene_of
+    from tireroad.runs.validation.tires import Tires
+
+    mesh, found = {"segments": 16, "elements_arc": 6}, []
+    tires = Tires(scene_of(_SINE.format(height=5e-5), mesh, 0.01), tmp_path)
+    for height in (5e-5, 5e-4):
+        tires.change(scene_of(_SINE.format(height=height), mesh, 0.01))
+        found.append(beside(tires))
+    assert found[0][0] < 0.2
+    assert found[1][0] / found[0][0] == pytest.approx(10.0, rel=0.3)
+    assert found[1][3] < 10

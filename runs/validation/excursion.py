@@ -1,0 +1,65 @@
+"""What a tire that is linear about its static state leaves out: rolling finite elements with large motions beside it."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.validation.histories import follow
+from tireroad.runs.validation.rolling import SCENE
+from tireroad.runs.validation.tires import Tires
+
+ABOUT = "rolling over bumps up to several static deflections: linear against nonlinear finite elements in time"
+
+_SINE = 'kind = "sine"\nwavelength = 0.2\namplitude = {height:g}'
+_CLEAT = 'kind = "cleat"\nlength = 0.02\nramp = 5e-3\nposition = 0.3\nheight = {height:g}'
+ROADS = (
+    ("sine, 0.2 m long", _SINE, 1e-4),
+    ("sine, 0.2 m long", _SINE, 1e-3),
+    ("cleat, 20 mm long", _CLEAT, 3e-3),
+    ("cleat, 20 mm long", _CLEAT, 1e-2),
+)
+MESH = {"segments": 20, "elements_arc": 8}
+STEP, DURATION = 1e-4, 0.04  # s
+
+
+def run() -> list[Table]:
+    """One table."""
+    with tempfile.TemporaryDirectory() as folder:
+        tires, rows = None, []
+        for name, road, height in ROADS:
+            scene = scene_of(road.format(height=height))
+            if tires is None:
+                tires = Tires(scene, Path(folder))
+            tires.change(scene)
+            rows.append([name, 1e3 * height, height / tires.run.static.deflection, *beside(tires)])
+        setting = tires.setting if tires else ""
+    columns = [("road", ""), ("height", "mm"), ("of the static deflection", "-"), ("off", "%"),
+               ("largest force, linear", "N"), ("nonlinear", "N"), ("iterations a step", "-"),
+               ("times slower", "-")]  # fmt: skip
+    notes = [
+        f"{setting}; 100 rad/s, 500 N, {DURATION:g} s in steps of {STEP:g} s. Off: contact force of the linear elements, rms of "
+        "the difference over the rms of what is beyond the static load. Both take the same mesh, points, step and contact solver.",
+    ]
+    return [Table("Large motions of a rolling tire", columns, rows, notes)]
+
+
+def scene_of(road: str, mesh: dict[str, int] | None = None, duration: float = DURATION) -> str:
+    """The scene of `validate rolling` on this road."""
+    scene = SCENE.format(road=road, modes=60, **(mesh or MESH))
+    return scene.replace("duration = 0.1", f"duration = {duration:g}")
+
+
+def beside(tires: Tires) -> tuple[float, float, float, float, float]:
+    """Error %, largest forces N, iterations a step, ratio of run times. Collective."""
+    linear = follow(tires.trial, *tires.full(STEP))
+    tire, *given = tires.nonlinear(STEP)
+    found = follow(tires.trial, tire, *given)
+    one, other = (h.values["contact force"][:, 2] for h in (linear, found))
+    rest = float(tires.run.static.normal_force.sum())
+    off = 100 * float(np.linalg.norm(one - other) / np.linalg.norm(other - rest))
+    turns = tire.turns / len(one)
+    return off, float(one.max()), float(other.max()), turns, found.seconds / linear.seconds
