@@ -73,6 +73,8 @@ CHOICES = (
     Choice(200, "second-order", 1e-4),
     Choice(200, "attachment", 1e-4),
     Choice(200, "attachment", 5e-5),
+    Choice(400, "attachment", 5e-5),
+    Choice(800, "attachment", 5e-5),
 )
 TARGETS = ((0.01, 30.0),)  # error, ratio of run times
 MESH = {"segments": 20, "elements_arc": 10}

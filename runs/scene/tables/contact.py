@@ -22,7 +22,7 @@ class Contact(Variants):
         None,
         "N/m",
         "tangential stiffness of a point's bristle, whatever its area: the force depends on the grid; absent, and "
-        "brush_stiffness_per_area too: no horizontal forces",
+        "brush_stiffness_per_area too: no horizontal forces, but with friction on a tread that shears (shear)",
         least=1e-3,
         most=1e12,
     )
