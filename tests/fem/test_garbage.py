@@ -2,6 +2,7 @@
 
 import ctypes
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -44,7 +45,7 @@ def _memory() -> float:
 @pytest.mark.mpi
 @pytest.mark.skipif(_heap is None, reason="not glibc 2.33 or later")
 def test_a_tire_that_is_let_go_takes_its_matrices_with_it() -> None:
-    """Static state and matrices of one: 45 MB on one process. Four more must not add a tenth of one."""
+    """Static state and matrices of one: 45 MB on one process. Another must not add a fortieth of one."""
 
     def one() -> None:
         tire = tireroad.torus(youngs_modulus=48e6, segments=12, elements_arc=6, order=2)
@@ -56,4 +57,5 @@ def test_a_tire_that_is_let_go_takes_its_matrices_with_it() -> None:
         one()
         collect(MPI.COMM_WORLD)
         seen.append(_memory())
-    assert seen[-1] - seen[1] < 4.0 / MPI.COMM_WORLD.size, seen
+    # The median: tables of Python and buffers of MPI double now and then, 2 MB at once.
+    assert np.median(np.diff(seen)) < 1.0 / MPI.COMM_WORLD.size, seen
