@@ -20,14 +20,15 @@ from tireroad.fem.collective import joined
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 from tireroad.greens.response import Response
 
-SHARED_FROM = 8e6  # bytes of both matrices: a pass over less takes no longer than a few messages
+SHARED_FROM = 100e6  # bytes of both matrices: less is in reach of the caches, and processes only wait for each other
 
 
 def sharers(response: Response, comm: MPI.Comm) -> MPI.Comm:
     """The processes that a loop by this response is worth spreading over: all of `comm`, or each one by itself.
 
-    Half of the 6.4 MB of 484 points and 410 states takes 84 us in place of 232 us, of a step of 290 us; two
-    processes that share their cores with others wait for each other a hundred times as long.
+    A step of 625 points and 410 states (8 MB) took 1.18 times as long on two processes as on one, of 1,296 and 1,010
+    (42 MB) 1.09 times, of 2,500 and 2,010 (161 MB) 0.77 times (bench contact_processes, quiet): the contact's solver
+    is on each process, and so are the matrices' columns of points that touch.
     """
     size = response.output.nbytes + response.input.nbytes
     return comm if size >= SHARED_FROM else MPI.COMM_SELF

@@ -52,7 +52,7 @@ def run() -> list[Table]:
     ]
     notes = [
         "Medians over blocks of steps on a wavy road; one BLAS thread a process. The states are spread where the two "
-        "matrices between points and states have 8 MB or more: below, processes do not wait for each other."
+        "matrices between points and states have 100 MB or more: below, processes do not wait for each other."
     ]
     return [Table("The contact loop on several processes", columns, rows, notes)]
 
