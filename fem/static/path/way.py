@@ -108,9 +108,8 @@ class Way:
         if self._near(trial):
             step = self._equilibrium.solve(self._loader.touch + trial, allowed=allowed)
             self._loader.newton_steps += step.iterations
-            if step.converged:
+            if self._learnt(step, trial).converged:
                 self._loader.tell("deflection", trial, "m", step)
-                self._known.append(_Known(trial, self._loader.load(), self._body.u.x.array.copy()))
                 return
         below = max((k for k in self._known if k.deflection <= trial), key=lambda k: k.deflection)
         self._body.u.x.array[:] = below.displacement
@@ -137,33 +136,31 @@ class Way:
         least, most = np.minimum(np.array([1.01, _REACH]) * below.deflection, farthest)
         return float(np.clip(secant, least, most))
 
+    def _learnt(self, step: Step, deflection: float) -> Step:
+        """The step; where it converged, its state is known from then on. Collective."""
+        if step.converged:
+            load, field = self._loader.load(), self._body.u.x.array
+            self._known.append(_Known(deflection, load, field.copy()))
+        return step
+
     def _raise_road(self, start: float, end: float, allowed: float) -> None:
         """In steps, each of which is known from then on."""
 
-        def found(step: Step, deflection: float) -> Step:
-            if step.converged:
-                self._known.append(
-                    _Known(deflection, self._loader.load(), self._body.u.x.array.copy())
-                )
-            return step
+        field, road = self._body.u.x, self._equilibrium.road
 
         def attempt(deflection: float) -> Step:
-            height, field, road = (
-                self._loader.touch + deflection,
-                self._body.u.x,
-                self._equilibrium.road,
-            )
+            height = self._loader.touch + deflection
             kept = field.array.copy(), road.kept()
             self._equilibrium.predict(height)
             step = self._equilibrium.solve(height, allowed=allowed)
             if not step.converged:  # put back to where it was predicted
                 field.array[:] = kept[0]
                 road.put_back(kept[1])
-            return found(step, deflection)
+            return self._learnt(step, deflection)
 
         def let_go(deflection: float) -> Step:
             height = self._loader.touch + deflection
-            return found(fall(self._equilibrium, height, allowed), deflection)
+            return self._learnt(fall(self._equilibrium, height, allowed), deflection)
 
         largest = 0.25 * self._body.ring.thickness
         self._loader.march(attempt, end, largest, Show("deflection", 1.0, "m"), start, let_go)
