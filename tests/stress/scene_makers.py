@@ -158,7 +158,8 @@ def write_files(folder: Path) -> None:
     line = np.column_stack([x, 5e-4 * np.sin(x / 0.03) + 2e-4 * np.cos(x / 0.011)])
     np.savetxt(folder / "line.csv", 1e3 * line, delimiter=",")
     (folder / "road.crg").write_bytes(crg("KDBI", z[::2, ::10]))
-    imsave(folder / "tread.png", 1.0 - (np.add.outer(np.arange(64), np.arange(400)) % 40 < 6), cmap="gray")
+    ink = np.add.outer(np.arange(64), np.arange(400)) % 40 < 6
+    imsave(folder / "tread.png", 1.0 - ink, cmap="gray")
 
 
 def value(rng: np.random.Generator, key, legal: bool) -> str:
