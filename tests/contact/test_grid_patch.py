@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from tireroad.contact import model
 from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle
@@ -112,6 +113,7 @@ def test_nodes_and_points_exchange_the_same_work(tread) -> None:
     _, _, patch = patches(tread, 2e-3, 0.004)
 
     class Tire:
+        comm = MPI.COMM_SELF
         same_step = 1e-5 * np.eye(len(patch.index))
         force = None
 
