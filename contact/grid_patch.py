@@ -196,7 +196,8 @@ class OnPoints:
         self._tire = tire
         self._weights = sparse.block_diag([weights] * components, format="csr")
         self._transposed = self._weights.T.tocsr()
-        self.comm, self.same_step = tire.comm, self._same_step()
+        self.comm = tire.comm
+        self.same_step = self._same_step()
         self.inertia_force = tire.inertia_force
         self.snapshot, self.restore = tire.snapshot, tire.restore
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact import model
+from tireroad.contact import grid_patch, model
 from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle
 from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
@@ -109,7 +109,8 @@ def test_settled_state_keeps_the_load(tread, pitch: float) -> None:
     assert np.array_equal(again, settled.force)
 
 
-def test_nodes_and_points_exchange_the_same_work(tread) -> None:
+@pytest.mark.parametrize("most", [0, 100_000])  # a product, a matrix
+def test_nodes_and_points_exchange_the_same_work(tread, most, monkeypatch) -> None:
     _, _, patch = patches(tread, 2e-3, 0.004)
 
     class Tire:
@@ -133,6 +134,7 @@ def test_nodes_and_points_exchange_the_same_work(tread) -> None:
             pass
 
     tire = Tire()
+    monkeypatch.setattr(grid_patch, "MOST_DENSE", most)
     on = OnPoints(tire, patch.weights)
     force = np.random.default_rng(0).random(len(patch.points))
     on.advance(force)
