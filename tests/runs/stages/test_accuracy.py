@@ -119,7 +119,7 @@ def test_bars_are_in_the_summary_and_beside_the_bands(whole):
         assert file["third_octave/level_error"].shape == shape
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_cannot_be_estimated_is_said_not_to_be(run):
     folder, _ = run("nodes", "accuracy", "contact.points=nodes", "contact.reach=")
     told = json.loads((folder / "summary.json").read_text())["stages"]["accuracy"]["headline"]

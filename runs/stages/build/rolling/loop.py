@@ -36,7 +36,8 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
     p = len(patch.index)
     memory = tread_memory(spec, patch, setup.rolled.speed, step)
     at_once = memory.at_once if memory else 1.0
-    solver, friction = step_solver(spec, patch, tire.same_step[:p, :p], at_once), None
+    solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once, tire.comm)
+    friction = None
     if spec.rubs:
         friction = _friction(spec, setup, tire, step, at_once)
     if patch.weights is not None:
@@ -60,7 +61,7 @@ def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> F
     law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0, moved)
-    return Friction(brush, tire.same_step, patch.weights, shear, pressed)
+    return Friction(brush, tire.same_step, patch.weights, shear, pressed, tire.comm)
 
 
 def freely_rolling(
