@@ -26,6 +26,7 @@ from tireroad.fem.static.virtual_work import (
     added_stress,
     body_rate_form,
     convection_form,
+    convective_form,
     static_residual,
     tangent,
 )
@@ -103,11 +104,10 @@ class Operators:
         body = self.body
         u, v = body.trial, body.test
         w = kinematics.wheel_velocity(body.mesh)
-        convect = kinematics.convective
         rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
         forms = (
             convection_form(body),
-            body.inertia(-ufl.inner(convect(v, w), convect(u, w))),
+            convective_form(body),
             body_rate_form(body),
             body.inertia(-ufl.inner(test_rate, rate)),
         )
