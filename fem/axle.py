@@ -58,9 +58,13 @@ class Axle:
     @classmethod
     def held(cls) -> Axle:
         """One that does not move at all."""
-        none = np.zeros(6)
-        given = {"wheel_mass": 1.0, "wheel_inertia": (1.0, 1.0, 1.0), "locked": DIRECTIONS}
-        return cls(stiffness=none, damping=none, **given)
+        return cls(
+            wheel_mass=1.0,
+            wheel_inertia=(1.0, 1.0, 1.0),
+            stiffness=np.zeros(6),
+            damping=np.zeros(6),
+            locked=DIRECTIONS,
+        )
 
     @property
     def moving(self) -> list[int]:

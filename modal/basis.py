@@ -17,7 +17,7 @@ from tireroad.fem.matrices.operators import Rotation
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.modal.air import Air
 from tireroad.modal.corner import Corner, meeting
-from tireroad.modal.solver.fields import CHUNK, multiply, projected
+from tireroad.modal.solver.fields import loss_factors, projected
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import Labels
 
@@ -200,7 +200,8 @@ def project(
     fem.operators, or None. Collective.
     """
     moved = comm.allreduce(carried @ modes.vectors)
-    losing = None if loss is None else _loss_factors(modes, loss, comm, known)
+    done = None if known is None else known.loss_factor
+    losing = None if loss is None else loss_factors(modes, loss, comm, done)
     if rotation is None:
         return Projection(squares=modes.squares, momentum=moved, loss_factor=losing)
 
@@ -238,18 +239,4 @@ def with_corner(
 
 def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projection:
     """The projection on the modes (all rows), joined by the air where there is any. Collective."""
-    return replace(projection, air=air and Air(air.duct, air.coupling(modes.vectors)))
-
-
-def _loss_factors(
-    modes: Modes, loss: PETSc.Mat, comm: MPI.Comm, known: Projection | None
-) -> np.ndarray:
-    """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of modes of unit mass; 0 of rigid ones. Collective."""
-    done = np.zeros(0) if known is None or known.loss_factor is None else known.loss_factor
-    lost = np.empty(modes.vectors.shape[1] - len(done))
-    for start in range(0, len(lost), CHUNK):
-        some = modes.vectors[:, len(done) + start : len(done) + start + CHUNK]
-        lost[start : start + CHUNK] = (some * multiply(loss, some)).sum(axis=0)
-    squares = modes.squares[len(done) :]
-    eta = np.divide(comm.allreduce(lost), squares, out=np.zeros(len(squares)), where=squares > 0)
-    return np.concatenate([done, eta])
+    return replace(projection, air=Air(air.duct, air.coupling(modes.vectors)) if air else None)
