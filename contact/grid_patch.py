@@ -196,6 +196,7 @@ class OnPoints:
         self._tire = tire
         self._weights = sparse.block_diag([weights] * components, format="csr")
         self._transposed = self._weights.T.tocsr()
+        self.comm = tire.comm
         self.same_step = self._same_step()
         self.inertia_force = tire.inertia_force
         self.snapshot, self.restore = tire.snapshot, tire.restore
@@ -217,7 +218,7 @@ class OnPoints:
         weights, tire = self._weights, self._tire.same_step
         count = weights.shape[0]
         if count > MOST_DENSE:
-            self._answers = LoadedColumns(tire)
+            self._answers = LoadedColumns(tire, self.comm)
             return LinearOperator((count, count), matvec=self._answer, dtype=float)
         return weights @ (weights @ tire.T).T
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from mpi4py import MPI
 
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
@@ -27,8 +28,11 @@ _POINTS_AHEAD, _STEPS_AHEAD = 20_000, 64
 
 
 class Tire(Protocol):
-    """A linear tire between the patch's forces and displacements (greens.recursion, .convolution)."""
+    """A linear tire between the patch's forces and displacements (greens.recursion, .convolution), taken over the
+    steps by the processes of `comm` together.
+    """
 
+    comm: MPI.Comm
     same_step: np.ndarray
 
     def start(self, force: np.ndarray) -> None: ...
@@ -123,8 +127,8 @@ def roll(
 
     `done` of them were taken before, and tire, solver and friction are as they were then.
 
-    The solver was made for A + C~. Every process solves the same small contact problem on the same
-    bits, so no process has to wait for another's answer. With `friction`, the tire's forces and
+    The solver was made for A + C~. Every process solves the same small contact problem on the same bits; the rows of the
+    products in it are shared by the processes of `tire.comm`. With `friction`, the tire's forces and
     displacements are three times as many: z, then x, then y of all points. `memory`: of a tread that creeps,
     whose part within the step the solver knows.
     """
@@ -132,9 +136,7 @@ def roll(
     horizontal = np.zeros((count, 2)) if patch.pull is None else patch.pull
     # The first step starts from the static contact set, the others from the solver's last one.
     touching = None if done else patch.force > 0
-    answer = (
-        LoadedColumns(tire.same_step) if isinstance(tire.same_step, np.ndarray) else tire.same_step
-    )
+    answer = LoadedColumns.of(tire.same_step, tire.comm)
     settle = tire.settle if isinstance(tire, NonlinearTire) else None
     for time, road in _roads(drive, patch, step, steps, done):
         free = tire.predict()

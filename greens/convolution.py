@@ -9,6 +9,7 @@ with the number of steps: n r k multiplications in step n.
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 
 from tireroad.fem.errors import InputError
 from tireroad.greens.response import Response
@@ -34,7 +35,7 @@ class Convolution:
         self._direct = response.direct_momentum_rate()
         self._history = np.zeros((steps + 1, forces))
         self._n = 0
-        self.same_step = response.residual
+        self.same_step, self.comm = response.residual, MPI.COMM_SELF
 
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N that is already there at t = 0."""

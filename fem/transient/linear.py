@@ -61,7 +61,7 @@ class FullTire:
         if corner and (air or modal):
             raise InputError("a full tire on a corner has neither air nor loss factors here")
         self._set_scheme(step, spectral_radius)
-        self._operators, self._comm, self._step = operators, operators.body.comm, step
+        self._operators, self.comm, self._step = operators, operators.body.comm, step
         self._mass, self._carried = operators.mass, operators.carried
         self._outputs = on_own_rows(operators, outputs).T.tocsr()
         self._drag = rotating_damping(operators, rotation, speed, damping, inertia)
@@ -85,7 +85,7 @@ class FullTire:
         self.wheel, self._air = wheel, None
         if air or wheel:
             self._air = self._with(air, wheel)
-        self.same_step = summed(self._comm, self._outputs @ self._answer[: self._tire])
+        self.same_step = summed(self.comm, self._outputs @ self._answer[: self._tire])
         n = len(self._mass)
         self.displacement, self.velocity, self.acceleration, self.balanced = np.zeros((4, n))
         self._vectors = system.createVecs()
@@ -123,7 +123,7 @@ class FullTire:
         rate = gamma / (beta * h) * moved - self.velocity
         rate += h * (gamma * kept - (1 - gamma) * self.acceleration)
         self._free = self._solved(self._mass * right + self._product(rate))
-        return summed(self._comm, self._outputs @ self._free[: self._tire])
+        return summed(self.comm, self._outputs @ self._free[: self._tire])
 
     def _by_factors(self, right: np.ndarray) -> np.ndarray:
         """Own rows (n, k) of the sparse system^-1 right, checked."""
@@ -199,4 +199,4 @@ class FullTire:
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the momentum (3,) of tire and air, N: the convective parts cancel around the ring."""
-        return summed(self._comm, self._carried @ self.balanced)
+        return summed(self.comm, self._carried @ self.balanced)

@@ -109,7 +109,7 @@ class NonlinearTire(FullTire):
         defect = self._dynamic(new) + elastic - self._columns @ force
         change = self._solved(defect)
         largest = (float(abs(v).max(initial=0.0)) for v in (change, new))
-        off, size = (self._comm.allreduce(v, op=MPI.MAX) for v in largest)
+        off, size = (self.comm.allreduce(v, op=MPI.MAX) for v in largest)
         self.turns += 1
         if off <= TOLERANCE * size + self._small:
             self._elastic = elastic
@@ -125,7 +125,7 @@ class NonlinearTire(FullTire):
 
     def _freed(self, free: np.ndarray) -> np.ndarray:
         self._free = free
-        return summed(self._comm, self._outputs @ free)
+        return summed(self.comm, self._outputs @ free)
 
     def _dynamic(self, new: np.ndarray) -> np.ndarray:
         """Forces of inertia and damping, N, when the step ends at a displacement (own rows)."""
@@ -154,7 +154,7 @@ class NonlinearTire(FullTire):
         return self._assembled.array_r[self._operators.unknowns.free]
 
     def _stored(self) -> float:
-        return self._comm.allreduce(fem.assemble_scalar(self._potential_form))
+        return self.comm.allreduce(fem.assemble_scalar(self._potential_form))
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from a snapshot, between `advance` and `predict`; written on any number of processes."""
@@ -163,7 +163,7 @@ class NonlinearTire(FullTire):
 
     def energy(self) -> float:
         """Kinetic energy and what wall and inflation have stored since the static state, J, of a standing wheel."""
-        kinetic = self._comm.allreduce(self._mass @ self.velocity**2) / 2
+        kinetic = self.comm.allreduce(self._mass @ self.velocity**2) / 2
         return kinetic + self._at(self.displacement, self._stored) - self._rest_potential
 
 

@@ -3,50 +3,71 @@
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy.sparse.linalg import LinearOperator
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Picking rows costs half a read of them: beyond this share all of them are read at once.
-FEW = 0.6
+# Loaded entries in a run, on average, from which each run is a product of its own: it costs as much as copying so many
+# columns of a thousand numbers less one.
+LONG = 3
+
+
+class SharedRows:
+    """The rows `mine` of `count` rows that this process of `comm` computes; `gathered` joins them on all."""
+
+    def __init__(self, count: int, comm: MPI.Comm) -> None:
+        ends = count * np.arange(comm.size + 1) // comm.size
+        self.comm = comm
+        self.mine = slice(int(ends[comm.rank]), int(ends[comm.rank + 1]))
+        self._count, self._shares = count, (np.diff(ends), ends[:-1])
+
+    def gathered(self, own: Array) -> Array:
+        """The numbers (count,) of all processes, the same bits on each, from this one's. Collective."""
+        if self.comm.size == 1:
+            return own
+        every = np.empty(self._count)
+        self.comm.Allgatherv(np.ascontiguousarray(own), [every, self._shares, MPI.DOUBLE])
+        return every
 
 
 class LoadedColumns:
-    """A (n, k), kept by `columns` (k, n); those of the loaded entries are laid side by side and kept.
+    """A (n, k), kept by `columns` (k, n), whose products with forces read the columns of the loaded entries.
 
-    In contact the same points stay loaded for several steps: a product with a of k columns then
-    reads 8 a n bytes instead of 8 k n. The sum's order depends on the loaded entries alone, not on
-    what was loaded before: a run that goes on from a checkpoint finds the same bits.
+    Loaded entries that follow each other, as the touching points of a line do, are read as they lie: copying them side
+    by side first takes twice as long. The sum's order depends on the loaded entries alone, so that a run that goes on
+    from a checkpoint finds the same bits. With a `comm` of several processes, each computes its share of the n rows.
     """
 
-    def __init__(self, matrix: Array) -> None:
+    def __init__(self, matrix: Array, comm: MPI.Comm = MPI.COMM_SELF) -> None:
         self.columns = np.ascontiguousarray(matrix.T)
-        self._buffer = np.empty_like(self.columns[: int(FEW * len(self.columns))])
-        self._key = b""
-        self._taken = self._buffer[:0]
+        self._rows = SharedRows(len(matrix), comm)
+        self._own = self.columns[:, self._rows.mine]
+
+    @staticmethod
+    def of(matrix: Array | LinearOperator, comm: MPI.Comm) -> LoadedColumns | LinearOperator:
+        """The matrix for such products; a product stays what it is."""
+        return LoadedColumns(matrix, comm) if isinstance(matrix, np.ndarray) else matrix
 
     def __matmul__(self, force: Array) -> Array:
-        """A f (n,) for f (k,)."""
-        index = force.nonzero()[0]
-        if len(index) > len(self._buffer):
-            return force @ self.columns
-        return force[index] @ self.take(index)
+        """A f (n,) for f (k,). Collective where the rows are shared."""
+        return self._rows.gathered(self._product(force))
 
-    def take(self, index: Index) -> Array:
-        """The columns `index` as rows (a, n); valid until others are asked for."""
-        key = index.tobytes()
-        if key != self._key or len(self._taken) != len(index):
-            if len(index) > len(self._buffer):
-                self._taken = self.columns[index]
-            else:
-                self._taken = self._buffer[: len(index)]
-                # Unlike the default, "clip" writes without a copy; the indices are in range.
-                np.take(self.columns, index, axis=0, out=self._taken, mode="clip")
-            self._key = key
-        return self._taken
+    def _product(self, force: Array) -> Array:
+        index = force.nonzero()[0]
+        breaks = np.flatnonzero(index[1:] - index[:-1] > 1)
+        if len(index) < LONG * (len(breaks) + 1):
+            return force[index] @ self._own[index]
+        begins = [index[0], *index[breaks + 1].tolist()]
+        ends = [*(index[breaks] + 1).tolist(), index[-1] + 1]
+        out = np.zeros(self._own.shape[1])
+        for begin, end in zip(begins, ends, strict=True):
+            out += force[begin:end] @ self._own[begin:end]
+        return out
 
     def between(self, rows: Index, columns: Index) -> Array:
         """A (a, b) between `rows` (a,) and `columns` (b,), column-major."""
         # By whole columns first: a third of the time of picking entry by entry.
-        return self.take(columns).take(rows, axis=1).T
+        return self.columns.take(columns, axis=0).take(rows, axis=1).T

@@ -1,4 +1,4 @@
-"""The contact loop on several processes: states spread over them, points and solver on each."""
+"""The contact loop on several processes: states and the rows of the solver's products spread over them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from tireroad.contact.rolling import Drive, roll
-from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.choose import make_solver
 from tireroad.contact.tread.compliance import half_space_compliance
 from tireroad.fem.errors import ConvergenceError
-from tireroad.greens.recursion import Recursion, sharers
+from tireroad.greens.recursion import SHARED_FROM, Recursion, sharers
 from tireroad.runs.measure.synthetic import Strip, oval_patch
 from tireroad.runs.measure.tabulate import Table
 
@@ -51,8 +51,9 @@ def run() -> list[Table]:
         ("difference of the mean load", "-"),
     ]
     notes = [
-        "Medians over blocks of steps on a wavy road; one BLAS thread a process. The states are spread where the two "
-        "matrices between points and states have 100 MB or more: below, processes do not wait for each other."
+        "Medians over blocks of steps on a wavy road; one BLAS thread a process. States and rows are spread where the "
+        f"two matrices between points and states have {SHARED_FROM / 1e6:.0f} MB or more: below, processes do not wait "
+        "for each other."
     ]
     return [Table("The contact loop on several processes", columns, rows, notes)]
 
@@ -77,7 +78,8 @@ def measured(states: int, side: int, comm: MPI.Comm) -> dict:
     tire = Recursion(response=response, step=STEP, scheme="linear", comm=sharing)
     tread = half_space_compliance(patch.points[:, :2], patch.half_sizes, 5e6, 0.45)
     drive = Drive(_wavy, lambda t: 0.0, SPEED)
-    instants = roll(tire, ActiveSet(tire.same_step + tread), patch, drive, STEP, STEPS)
+    solver = make_solver("active-set", tire.same_step + tread, sharing)
+    instants = roll(tire, solver, patch, drive, STEP, STEPS)
     blocks, load = [], 0.0
     for _ in range(STEPS // BLOCK):
         began = time.perf_counter()

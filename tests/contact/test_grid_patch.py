@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
-from tireroad.contact import model
+from tireroad.contact import grid_patch, model
 from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle
 from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
@@ -108,10 +109,12 @@ def test_settled_state_keeps_the_load(tread, pitch: float) -> None:
     assert np.array_equal(again, settled.force)
 
 
-def test_nodes_and_points_exchange_the_same_work(tread) -> None:
+@pytest.mark.parametrize("most", [0, 100_000])  # a product, a matrix
+def test_nodes_and_points_exchange_the_same_work(tread, most, monkeypatch) -> None:
     _, _, patch = patches(tread, 2e-3, 0.004)
 
     class Tire:
+        comm = MPI.COMM_SELF
         same_step = 1e-5 * np.eye(len(patch.index))
         force = None
 
@@ -131,6 +134,7 @@ def test_nodes_and_points_exchange_the_same_work(tread) -> None:
             pass
 
     tire = Tire()
+    monkeypatch.setattr(grid_patch, "MOST_DENSE", most)
     on = OnPoints(tire, patch.weights)
     force = np.random.default_rng(0).random(len(patch.points))
     on.advance(force)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.factor import ActiveFactor
@@ -65,13 +66,19 @@ def test_goes_on_from_a_checkpoint_with_the_same_bits() -> None:
             second.set_state({name: value.copy() for name, value in first.state().items()})
 
 
-@pytest.mark.parametrize("loaded", [0, 1, 7, 40])
-def test_loaded_columns_are_the_whole_product(loaded: int) -> None:
+@pytest.mark.mpi
+@pytest.mark.parametrize(("loaded", "run"), [(0, 1), (1, 1), (7, 1), (40, 1), (1, 9), (4, 5)])
+def test_loaded_columns_are_the_whole_product(loaded: int, run: int) -> None:
+    """`loaded` runs of `run` points, on all processes together and on each alone; more processes than rows too."""
     rng = np.random.default_rng(loaded)
-    matrix, force = rng.standard_normal((13, 40)), np.zeros(40)
-    columns = LoadedColumns(matrix)
-    for _ in range(3):
-        force[:] = 0.0
-        force[rng.choice(40, loaded, replace=False)] = rng.standard_normal(loaded)
-        assert np.allclose(columns @ force, matrix @ force, atol=1e-13)
-        assert np.array_equal(columns @ force, LoadedColumns(matrix) @ force)
+    for rows in (13, 2):
+        matrix, force = rng.standard_normal((rows, 40)), np.zeros(40)
+        alone, shared = LoadedColumns(matrix), LoadedColumns(matrix, MPI.COMM_WORLD)
+        for _ in range(3):
+            force[:] = 0.0
+            begins = rng.choice(40, loaded, replace=False)
+            index = (begins[:, None] + np.arange(run)) % 40
+            force[index] = rng.standard_normal(index.shape)
+            assert np.allclose(alone @ force, matrix @ force, atol=1e-13)
+            assert np.allclose(shared @ force, matrix @ force, atol=1e-13)
+            assert np.array_equal(alone @ force, LoadedColumns(matrix) @ force)

@@ -49,6 +49,8 @@ def run(law, steps, speed=20.0, motion=lambda t: 0.0, tire=None, height=None):
 class Rigid:
     """A tire that does not give way."""
 
+    comm = MPI.COMM_SELF
+
     def __init__(self, count: int) -> None:
         self.same_step = np.zeros((3 * count, 3 * count))
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.rolling import roll
@@ -22,6 +23,8 @@ AROUND = 2.0  # m
 
 class Rigid:
     """A tire that does not give way."""
+
+    comm = MPI.COMM_SELF
 
     def __init__(self, count: int) -> None:
         self.same_step = np.zeros((count, count))

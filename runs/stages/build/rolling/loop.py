@@ -37,7 +37,8 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
     p = len(patch.index)
     memory = tread_memory(spec, patch, setup.rolled.speed, step)
     at_once = memory.at_once if memory else 1.0
-    solver, friction = step_solver(spec, patch, tire.same_step[:p, :p], at_once), None
+    solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once, tire.comm)
+    friction = None
     if spec.rubs:
         friction = _friction(spec, setup, tire, step, at_once)
     if patch.weights is not None:
@@ -61,7 +62,7 @@ def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> F
     law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0, moved)
-    return Friction(brush, tire.same_step, patch.weights, shear, pressed)
+    return Friction(brush, tire.same_step, patch.weights, shear, pressed, tire.comm)
 
 
 def freely_rolling(
@@ -90,24 +91,32 @@ class Forces(NamedTuple):
 
 
 def forces(
-    job: Job, setup: ContactSetup, response: Response, step: float, steps: int, scheme: str
+    job: Job,
+    setup: ContactSetup,
+    response: Response,
+    step: float,
+    steps: int,
+    scheme: str,
+    contact=None,
 ) -> Forces:
     """The loop of the job's scene by another response, step or setup (settled), kept in memory. Collective.
 
-    `scheme` "linear" or "constant". ConvergenceError where the road touches beyond the patch.
+    `scheme` "linear" or "constant"; `contact`, in place of the scene's table. ConvergenceError where the road touches
+    beyond the patch.
     """
     kept = response.resolved(step)
     comm = sharers(kept, job.comm)
     tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm)
-    loop = make_loop(job.scene.contact, setup, driven_tire(job, tire, step, steps) or tire, step)
-    contact, axle = np.zeros((2, steps, 3))
+    spec = contact or job.scene.contact
+    loop = make_loop(spec, setup, driven_tire(job, tire, step, steps) or tire, step)
+    total, axle = np.zeros((2, steps, 3))
     given = setup.patch, setup.drive, step, steps
     with threadpool_limits(1, "blas"):
         for k, instant in enumerate(
             roll(loop.tire, loop.solver, *given, loop.friction, 0, loop.memory)
         ):
-            contact[k, :2] = instant.horizontal.sum(axis=0)
-            contact[k, 2], axle[k] = instant.force.sum(), instant.axle_force
+            total[k, :2] = instant.horizontal.sum(axis=0)
+            total[k, 2], axle[k] = instant.force.sum(), instant.axle_force
             if instant.force[setup.patch.edge].any():
                 setup.patch.check_edge(instant.force[None], np.array([instant.time]), setup.reach)
-    return Forces(contact, axle, step)
+    return Forces(total, axle, step)

@@ -1,0 +1,70 @@
+"""A loop that processes take together: states and rows spread, one answer, the same bits on each."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from tireroad.contact.rolling import Drive, roll
+from tireroad.contact.solver.choose import make_solver
+from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.grid_compliance import MatrixCompliance
+from tireroad.contact.tread.brush import Brush, BrushLaw
+from tireroad.contact.tread.compliance import half_space_compliance
+from tireroad.greens.recursion import Recursion
+from tireroad.runs.measure.synthetic import Strip, oval_patch
+
+PATCH = oval_patch((13, 9), (0.012, 0.012), 500.0)
+COUNT = len(PATCH.points)
+STEP, STEPS, SPEED = 2e-4, 40, 20.0
+
+
+def rolled(comm: MPI.Comm, solver: str, rubs: bool) -> np.ndarray:
+    """Forces, horizontal forces, motions and axle force of each step, (STEPS, n)."""
+    strip = Strip(speed=SPEED)
+    response = strip.response(PATCH.points, 6, 4, 4)
+    if rubs:
+        response = strip.horizontal_response(PATCH.points, 6, 4, 3.0)
+    tire = Recursion(response=response, step=STEP, scheme="linear", comm=comm)
+    tread = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
+    normal = make_solver(solver, tire.same_step[:COUNT, :COUNT] + tread, comm)
+    friction = None
+    if rubs:
+        brush = Brush(BrushLaw(3e4, 0.6, (0.02, 0.01)), PATCH.points[:, 0], PATCH.line, SPEED, STEP)
+        brush.begin(PATCH.force > 0)
+        friction = Friction(brush, tire.same_step, None, comm=comm)
+    drive = Drive(lambda x, y: 1e-4 * np.sin(80 * x + 10 * y), lambda t: 0.0, SPEED)
+    steps = roll(tire, normal, PATCH, drive, STEP, STEPS, friction)
+    parts = ([s.force, s.horizontal.ravel(), s.moved, s.gap, s.axle_force] for s in steps)
+    return np.array([np.concatenate(part) for part in parts])
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("solver", "rubs"), [("active-set", False), ("active-set", True), ("projected-cg", False)]
+)
+def test_processes_find_together_what_each_finds_alone(solver: str, rubs: bool) -> None:
+    comm = MPI.COMM_WORLD
+    alone, together = (rolled(c, solver, rubs) for c in (MPI.COMM_SELF, comm))
+    # Conjugate gradients end at 1e-10 of the scale, the turns of friction at 1e-8.
+    tolerance = 1e-10 if solver == "active-set" and not rubs else 1e-6
+    forces = np.abs(alone[:, :COUNT]).max()
+    assert np.abs(together[:, :COUNT] - alone[:, :COUNT]).max() < tolerance * forces
+    np.testing.assert_allclose(together, alone, atol=tolerance * forces, rtol=1e-5)
+    first = comm.bcast(together)
+    assert np.array_equal(first, together)  # or processes would take different decisions
+
+
+@pytest.mark.mpi
+def test_the_parts_of_a_shared_matrix_are_those_of_the_whole() -> None:
+    """Rows or columns, whichever are fewer, are picked first."""
+    rng = np.random.default_rng(3)
+    matrix = rng.standard_normal((12, 12))
+    compliance = MatrixCompliance(matrix, MPI.COMM_WORLD)
+    few, many = np.array([1, 7]), np.array([0, 3, 4, 9, 11])
+    for rows, columns in ((few, many), (many, few), (many, many), (few[:0], many)):
+        block = compliance.block(rows, columns)
+        assert np.array_equal(block, matrix[np.ix_(rows, columns)])
+        assert block.flags.f_contiguous
+    force = rng.standard_normal(12)
+    assert np.allclose(compliance.apply(force), matrix @ force, rtol=1e-12)
+    assert np.allclose(compliance.spread(force), matrix @ force, rtol=1e-12)
