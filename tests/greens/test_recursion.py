@@ -183,6 +183,18 @@ def test_a_small_loop_is_not_shared_out(monkeypatch: pytest.MonkeyPatch) -> None
     np.testing.assert_allclose(found[1][2][1], 2 * found[1][1], rtol=1e-13)
 
 
+@pytest.mark.mpi
+def test_processes_that_round_otherwise_do_not_share_a_loop(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nodes of two kinds: each process would go on by its own rounding, and wait for messages that never come."""
+    response = make(speed=60.0).response()
+    monkeypatch.setattr(recursion, "SHARED_FROM", 0.0)
+    assert sharers(response, MPI.COMM_WORLD).size == MPI.COMM_WORLD.size
+    monkeypatch.setattr(recursion, "_kernels", lambda: f"kernels of {MPI.COMM_WORLD.rank}")
+    assert sharers(response, MPI.COMM_WORLD).size == 1
+
+
 def test_dirac_residual_answers_with_a_pulse_of_one_step() -> None:
     """Thesis (C.4): G_res / step for one step is the mean force over it; in the end the same."""
     system = make(damping=80.0)
