@@ -50,8 +50,9 @@ def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> R
     if turns:
         rotation = operators.rotation()
         for name in ("gyroscopic", "convective"):
-            products[name] = _still(multiply(getattr(rotation, name), motions))
-        _destroy(*vars(rotation).values())
+            matrix = getattr(rotation, name)
+            products[name] = _still(multiply(matrix, motions))
+            _destroy(matrix)
     rows = {name: product[: len(unknowns.free)] for name, product in products.items()}
     comm = body.comm
     whole = {name: summed(comm, motions.T @ product) for name, product in products.items()}
