@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -101,7 +102,7 @@ def _apart(run: np.ndarray, companion: np.ndarray) -> np.ndarray:
     return np.divide(off, size, out=np.full(size.shape, np.nan), where=size > 0)
 
 
-def total(causes: Mapping[str, Bars]) -> Bars:
+def total(causes: Mapping[Any, Bars]) -> Bars:
     """Of all causes at once: the root of the sum of squares, NaN where a cause is unknown."""
     parts = [np.sqrt(sum(getattr(bar, name) ** 2 for bar in causes.values())) for name in _NAMES]
     return Bars(*parts)

@@ -27,6 +27,7 @@ from tireroad.fem.static.virtual_work import (
     added_stress,
     body_rate_form,
     convection_form,
+    convective_form,
     static_residual,
     tangent,
 )
@@ -42,7 +43,6 @@ class Rotation:
 
     def __init__(self, body: Body, assemble: Callable[[ufl.Form], PETSc.Mat]) -> None:
         self._body, self._assemble = body, assemble
-        self._velocity = kinematics.wheel_velocity(body.mesh)
 
     @cached_property
     def gyroscopic(self) -> PETSc.Mat:
@@ -52,7 +52,7 @@ class Rotation:
     @cached_property
     def convective(self) -> PETSc.Mat:
         """S, kg."""
-        return self._assemble(self._centrifugal(kinematics.convective))
+        return self._assemble(convective_form(self._body))
 
     @cached_property
     def body(self) -> PETSc.Mat:
@@ -62,11 +62,9 @@ class Rotation:
     @cached_property
     def body_convective(self) -> PETSc.Mat:
         """S_B, kg."""
-        return self._assemble(self._centrifugal(kinematics.body_rate))
-
-    def _centrifugal(self, rate: Callable[[Expr, Expr], Expr]) -> ufl.Form:
-        u, v, w = self._body.trial, self._body.test, self._velocity
-        return self._body.inertia(-ufl.inner(rate(v, w), rate(u, w)))
+        u, v, w = self._body.trial, self._body.test, kinematics.wheel_velocity(self._body.mesh)
+        rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
+        return self._assemble(self._body.inertia(-ufl.inner(test_rate, rate)))
 
 
 class Operators:

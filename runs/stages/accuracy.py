@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tireroad.contact.results.error_bars import CAUSES, Bars, Measured, bars, measured, total
+from tireroad.contact.results.error_bars import CAUSES, Bars, Measured, measured, total
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.state import StaticState
@@ -21,15 +21,15 @@ from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build.model_limit import model_limit
-from tireroad.runs.stages.build.rolling.loop import Forces
 from tireroad.runs.stages.build.rolling.run_in import first_step
-from tireroad.runs.stages.companions import COARSER, Given, companion
+from tireroad.runs.stages.coarser import COARSER
+from tireroad.runs.stages.companions import Given, companions
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 SHARE = 0.33  # of the run's own cost, that all companions together take
 _FEWEST = 64  # steps that a companion repeats at the least
-_LOOPS = 3.0  # time loops that four companions take for each step they repeat
+_LOOPS = 3.5  # time loops that five companions take for each step they repeat
 _COARSE = 0.14  # of the cost before the loop, on elements of twice the size
 FORCES = ("contact_force", "axle_force")
 _UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
@@ -103,14 +103,13 @@ class AccuracyStage(Computed[Accuracy]):
         for cause in CAUSES:
             try:
                 with record.timing(cause):
-                    forces, beside, share = companion(cause, given)
+                    told = companions(cause, given)
             except (ConvergenceError, InputError) as error:
                 absent[cause] = str(error)
                 continue
-            off = _measured(forces, start * history.step, limit, up_to)
-            other = _measured(beside, start * history.step, limit, up_to) if beside else exact
+            parts = [one.bars(exact, start * history.step, limit, up_to) for one in told]
             for name in exact:
-                found[name][cause] = bars(other[name], off[name], share)
+                found[name][cause] = total(dict(enumerate(part[name] for part in parts)))
         product = Accuracy(
             centre=exact["contact_force"].centre,
             window=steps * history.step,
@@ -200,15 +199,6 @@ class AccuracyStage(Computed[Accuracy]):
             by_cause=by_cause,
             absent=absent,
         )
-
-
-def _measured(forces: Forces, start: float, limit: float, up_to: float) -> dict[str, Measured]:
-    """The figures of the forces of a companion after `start` s."""
-    first = round(start / forces.step)
-    both = {"contact_force": forces.contact, "axle_force": forces.axle}
-    return {
-        name: measured(values[first:], forces.step, limit, up_to) for name, values in both.items()
-    }
 
 
 def _describe(

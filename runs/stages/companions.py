@@ -2,51 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from tireroad.contact.respaced import halved, ratio, thinned
 from tireroad.contact.results.chatter import choose, oscillation
-from tireroad.contact.results.error_bars import orders, random_share, share
+from tireroad.contact.results.error_bars import (
+    Bars,
+    Measured,
+    bars,
+    measured,
+    orders,
+    random_share,
+    share,
+)
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.static.path.carried_over import carried_over
 from tireroad.fem.static.state import StaticState
 from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
-from tireroad.runs.files.folder import make_folder
 from tireroad.runs.process import observe
-from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.base.job import Job
-from tireroad.runs.stages.base.record import Record
-from tireroad.runs.stages.base.stage import Done, Part, Shared, Stage
-from tireroad.runs.stages.build.cavity import AirColumn
+from tireroad.runs.stages.base.stage import Done
 from tireroad.runs.stages.build.rolling.loop import Forces, forces
-from tireroad.runs.stages.build.setup import Setup
-from tireroad.runs.stages.greens import GreensStage
-from tireroad.runs.stages.modes import Fields, ModesStage, Motions
-from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
-from tireroad.runs.stages.static import StaticStage
-from tireroad.runs.stages.stored.obtained import obtained
+from tireroad.runs.stages.build.wall import Normal, backed
+from tireroad.runs.stages.coarser import coarser
 
-UP_TO_GREENS: tuple[type[Part], ...] = (
-    StaticStage,
-    Motions,
-    Setup,
-    ModesStage,
-    AirColumn,
-    Fields,
-    FullMatrices,
-    RotatingStage,
-    GreensStage,
-)
 FEWER = 1 / np.sqrt(2)  # of the highest mode: up to where the companion keeps states
-COARSER = "coarser"  # the folder in the run's own where its coarser companion's stages are, until they are of no use
-LEAST = (8, 4)  # elements around and along that a companion has
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,14 +87,17 @@ class Given:
         return other
 
     def repeated(
-        self, setup: ContactSetup, response: Response, coarser: int | None = None
+        self,
+        setup: ContactSetup,
+        response: Response,
+        coarser: int | None = None,
+        contact: Normal | None = None,
     ) -> Forces:
-        """The loop by another setup (settled), response or a step `coarser` times as long, by default that of
-        `base`. Collective."""
+        """The loop by another setup (settled), response, `contact` or a step `coarser` times as long, by default that
+        of `base`. Collective."""
         times = coarser or (1 if self.base is None else 2)
-        return forces(
-            self.job, setup, response, times * self.step, self.steps // times, self.scheme
-        )
+        step, steps = times * self.step, self.steps // times
+        return forces(self.job, setup, response, step, steps, self.scheme, contact)
 
 
 def settled(job: Job, setup: ContactSetup, response: Response, force: np.ndarray) -> ContactSetup:
@@ -153,75 +144,22 @@ def fewer_modes(given: Given) -> Forces:
     return given.repeated(given.settled, kept)
 
 
-@dataclass(frozen=True, kw_only=True)
-class CoarserStatic(StaticStage):
-    """The coarser mesh's static state by a few steps from that of the `run`; from the beginning at a deflection,
-    which counts from its own first touch, and where those steps find no balance."""
-
-    run: Job
-    near: Done[StaticState]
-
-    def inputs(self) -> dict:
-        """Of any static state, and where it starts."""
-        return super().inputs() | {"near": self.near.key}
-
-    def compute(self, record: Record) -> StaticState:
-        """Collective."""
-        wanted = self.job.scene.static
-        if wanted.deflection is None:
-            given = self.near.product, self.run.tire, self.job.tire, wanted.load
-            if (found := carried_over(*given)) is not None:
-                return found
-        return super().compute(record)
-
-
 def coarser_mesh(given: Given) -> Forces:
     """Elements of twice the size, from the static state on. Collective."""
-    job, done = coarser_job(given.job), dict[str, Done]()
-    on_root(job.comm, lambda: make_folder(job.directory))
-    for kind in UP_TO_GREENS:
-        part = (
-            CoarserStatic(job=job, run=given.job, near=given.static)
-            if kind is StaticStage
-            else kind.taken(job, done)
-        )
-        if (found := _made(job, kind, part, done)) is not None:
-            done[kind.name] = found
+    job, done = coarser(given.job, given.static)
     response, state = done["greens"].product.contact, done["static"].product
     setup = done["setup"].product.with_slip(given.free_slip)
     setup = settled(job, setup, response, state.normal_force)
     return given.of(job).repeated(setup, response)
 
 
-def coarser_job(job: Job) -> Job:
-    """The same scene on half the elements around, and bead to bead where the scene says how many; its stages are
-    shared as those of any run, in a folder beside the run's own.
-
-    InputError where the mesh is too coarse to be halved.
-    """
-    tire, static = job.scene.tire, job.scene.static
-    coarse = replace(tire, segments=tire.segments // 2, shape=tire.shape.coarser(tire))
-    if coarse.segments < LEAST[0] or coarse.proportions().along < LEAST[1]:
-        raise InputError("the mesh is too coarse to be halved")
-    rotation = job.scene.rotation
-    if rotation is not None:  # as fast as the run's own wheel, whatever the travel speed
-        rotation = replace(rotation, speed=job.speed, travel_speed=None)
-    scene = replace(
-        job.scene,
-        rotation=rotation,
-        tire=coarse,
-        static=replace(static, error_estimate=False),
-    )
-    return replace(job, scene=scene, directory=job.directory / COARSER, found={})
-
-
-def _made(job: Job, kind: type[Part], part: Part | None, done: dict[str, Done]) -> Done | None:
-    """What a part of the chain adds to what is done; None where it adds nothing. Collective."""
-    if kind is RotatingStage and not job.speed:
-        return RotatingStage.instead(job, done)
-    if isinstance(part, Stage):
-        return obtained(part).done
-    return Done("", part.make) if isinstance(part, Shared) else None
+def finer_wall(given: Given) -> Forces:
+    """With what the wall gives way to between the nodes under the points, which no coarser mesh tells: half the elements
+    change what is far from a point eight times and more, what is near it twice. Collective."""
+    force = given.static.product.normal_force
+    made = backed(given.job, given.static.product, given.setup, given.response)
+    setup = made.setup.settled(made.response, force, made.contact)[0]
+    return given.repeated(setup, made.response, contact=made.contact)
 
 
 COMPANIONS: dict[str, Callable[[Given], Forces]] = {
@@ -233,16 +171,47 @@ COMPANIONS: dict[str, Callable[[Given], Forces]] = {
 """By the cause of the error that each is for (contact.results.error_bars.CAUSES)."""
 
 
-def companion(cause: str, given: Given) -> tuple[Forces, Forces | None, float]:
-    """The forces of a companion, those they are compared with (None: the run's own), and the share of their
-    difference that is the error, without a word.
+class Companion(NamedTuple):
+    """The `forces` of a companion, those they are compared with (None: the run's own), and the share of their difference
+    that is the error."""
+
+    forces: Forces
+    beside: Forces | None
+    share: float
+
+    def bars(
+        self, run: Mapping[str, Measured], since: float, limit: float, up_to: float
+    ) -> dict[str, Bars]:
+        """What it tells of the forces of a `run` after `since` s, as of contact.results.error_bars.measured."""
+        off = _figures(self.forces, since, limit, up_to)
+        other = _figures(self.beside, since, limit, up_to) if self.beside else run
+        return {name: bars(other[name], off[name], self.share) for name in run}
+
+
+def _figures(forces: Forces, since: float, limit: float, up_to: float) -> dict[str, Measured]:
+    first = round(since / forces.step)
+    both = {"contact_force": forces.contact, "axle_force": forces.axle}
+    return {
+        name: measured(values[first:], forces.step, limit, up_to) for name, values in both.items()
+    }
+
+
+def companions(cause: str, given: Given) -> list[Companion]:
+    """Of a cause, without a word; the errors they tell add up as squares.
 
     Collective; InputError or ConvergenceError where there is none.
     """
     with observe.quiet():
         beside = None if cause == "step" else given.base
-        found = COMPANIONS[cause](given)
+        found = [Companion(COMPANIONS[cause](given), beside, _share(cause, given))]
+        if cause == "mesh":
+            with suppress(InputError, ConvergenceError):
+                found.append(Companion(finer_wall(given), beside, 1.0))
+    return found
+
+
+def _share(cause: str, given: Given) -> float:
     points = ratio(given.settled.patch) if cause == "points" else 2.0
     size = {"step": 2.0, "points": points, "modes": 1 / FEWER, "mesh": 2.0}[cause]
     order = orders(given.job.tire.section.order)[cause]
-    return found, beside, (random_share if cause == "points" else share)(size, order)
+    return (random_share if cause == "points" else share)(size, order)

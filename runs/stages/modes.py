@@ -67,7 +67,6 @@ class ModesStage(Computed[ModalBasis]):
             "modal": asdict(self.job.scene.modal),
             "rotating": self.job.speed != 0,
             "cavity": cavity.inputs(self.job),
-            "moving rim": self.job.axle is not None,
         }
 
     def compute(self, record: Record) -> ModalBasis:

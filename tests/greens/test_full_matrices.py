@@ -122,7 +122,7 @@ def test_error_up_to_half_the_highest_mode() -> None:
         assert none > 0.3 and error["attachment"] < error["static"] / 5
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_estimates_are_of_the_size_of_the_errors() -> None:
     """Within twelve times of the truth and not below a quarter of it."""
     _, _, modes, readings, loads = tire()

@@ -81,7 +81,7 @@ def test_stored_responses_give_the_same_again(run) -> None:
         assert np.array_equal(file["displacement"][: len(short)], short)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_velocity_and_acceleration_are_the_rates(run) -> None:
     out, _ = run("--set", "greens.residual=static", "--until", "response")
     with h5py.File(out / "response.h5") as file:

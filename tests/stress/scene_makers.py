@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from matplotlib.image import imsave
 
 from tireroad.contact.roads.kind import ROADS
 from tireroad.contact.tread.law import TREADS
@@ -98,6 +99,13 @@ count = 8
 ON_GRID = "[contact]\npoints = { dx = 0.006, dy = 0.006 }\n"
 CREEPS = ON_GRID + 'tread = "viscoelastic"\n'
 BRUSH = ON_GRID + "friction = 0.8\nslip = [0.01, 0.0]\nbrush_stiffness_per_area = 2e8\n"
+GROOVES = """[pattern]
+[[pattern.groove]]
+[[pattern.groove]]
+direction = "circumferential"
+width = 0.01
+"""
+IMAGE = '[pattern]\nfile = "tread.png"\n'
 
 
 def measured(kind: str, file: str) -> str:
@@ -120,6 +128,8 @@ BASES = {  # text, tables whose keys are changed more often than others
     "crg": (measured("crg", "road.crg"), "road."),
     "creeps": (BASE.replace("[contact]\n", CREEPS), "contact."),
     "brush": (BASE.replace("[contact]\n", BRUSH), "contact."),
+    "grooves": (BASE.replace("[contact]\n", ON_GRID) + GROOVES, "pattern."),
+    "image": (BASE.replace("[contact]\n", ON_GRID) + IMAGE, "pattern."),
 }
 NASTY = ["nan", "inf", "-inf", "true", '"text"', '""', "[]", "[1]", "[1, 2, 3]", "{}", "{a = 1}", "0",
          "-0.0", "-1", "1e308", "-1e308", "5e-324", "1" + "0" * 400, "2147483648", "1979-05-27",
@@ -136,7 +146,8 @@ SIZES = (
 
 
 def write_files(folder: Path) -> None:
-    """The files of the scenes: a small torus with a slanted ply as a deck, and a rough road by line, grid and OpenCRG."""
+    """The files of the scenes: a small torus with a slanted ply as a deck, a rough road by line, grid and OpenCRG,
+    and a tread's pattern as an image."""
     arcs = np.linspace(-HALF_ANGLE, HALF_ANGLE, 33)
     belt = membranes("B", 0.006, arcs, 9001, 9001, True, 70.0)
     (folder / "tire.inp").write_text(plain(Torus(arcs=8, wall=1)) + belt + CORDS)
@@ -147,6 +158,8 @@ def write_files(folder: Path) -> None:
     line = np.column_stack([x, 5e-4 * np.sin(x / 0.03) + 2e-4 * np.cos(x / 0.011)])
     np.savetxt(folder / "line.csv", 1e3 * line, delimiter=",")
     (folder / "road.crg").write_bytes(crg("KDBI", z[::2, ::10]))
+    ink = np.add.outer(np.arange(64), np.arange(400)) % 40 < 6
+    imsave(folder / "tread.png", 1.0 - ink, cmap="gray")
 
 
 def value(rng: np.random.Generator, key, legal: bool) -> str:

@@ -6,7 +6,7 @@ from tireroad.runs.validation.stress import greens as stress_greens
 from tireroad.runs.validation.stress import modal as stress_modal
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("package", [stress_modal, stress_greens], ids=["modal", "greens"])
 def test_every_case_ends_well(package) -> None:
     rows = package.rows()

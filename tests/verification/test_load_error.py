@@ -115,6 +115,7 @@ def test_it_says_why_there_is_none():
     assert "nothing touches" in load_error(loader, AT_REST)
 
 
+@pytest.mark.long
 @pytest.mark.mpi
 def test_the_same_estimate_on_any_number_of_processes():
     alone, shared = (

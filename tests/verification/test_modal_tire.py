@@ -77,6 +77,7 @@ def test_round_tire_has_double_modes_and_doppler_shifts(round_tire):
     np.testing.assert_allclose(turning.eigenvalue.real, -gamma / 2, atol=0.02 * gamma)
 
 
+@pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.parametrize("inertia", ["full", "doppler"])
 def test_full_quadratic_problem_agrees_with_many_projected_modes(pressed, inertia):

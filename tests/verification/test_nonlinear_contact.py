@@ -138,7 +138,7 @@ def test_a_road_that_has_risen_carries_the_static_load():
     assert abs(risen(straight, patch) / further.load() - 1) > 0.01
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_rolling_it_tends_to_the_linear_tire(tmp_path):
     """Waves of 0.05 and 0.5 mm at 100 rad/s: what is off grows with them, from nearly none."""
     from tireroad.runs.validation.excursion import _SINE, beside, scene_of

@@ -13,7 +13,7 @@ PER_WAVE = 4  # places of a tile a shortest wave
 WAVES = (16, 6)  # longest waves in a tile, along and across
 WIDEST = 0.6  # m: a tile is at least as wide, since it does repeat across; no tire is wider
 MOST_PLACES = 16_000_000  # of a tile: 128 MB
-KEPT = 3  # blended halves of tiles in memory
+KEPT = 3, 2_000_000  # blended halves of tiles in memory, at least, and places of more (16 MB)
 
 
 def tile_size(longest: float) -> tuple[float, float]:
@@ -61,7 +61,7 @@ class Tiles:
         self._shape = self._places()
         self._filter: Array | None = None
         self._tiles: dict[int, Array] = {}
-        self._halves: dict[int, Array] = {}
+        self._halves: dict[int, Array] = {}  # the one asked for last at the end
         self.spacing = 0.5 * shortest
 
     def _places(self) -> tuple[int, int]:
@@ -100,16 +100,20 @@ class Tiles:
 
     def _half(self, number: int) -> Array:
         """Heights over the overlap of tiles number - 1 and number, with the row that follows."""
-        if number not in self._halves:
-            if len(self._halves) >= KEPT:
-                del self._halves[next(iter(self._halves))]
-            half = self._shape[0] // 2
-            share = 0.5 * np.pi * (np.arange(half + 1) / half)[:, None]
-            before, here = self._drawn(number - 1), self._drawn(number)
-            # The row that follows the earlier tile's end has no weight.
-            ending = np.concatenate([before[half:], before[:1]])
-            self._halves[number] = np.cos(share) * ending + np.sin(share) * here[: half + 1]
+        found = self._halves.pop(number, None)
+        self._halves[number] = self._blended(number) if found is None else found
+        # A footprint lies on several of short waves: with fewer kept than that, each step draws all of them anew.
+        while len(self._halves) > max(KEPT[0], KEPT[1] // self._halves[number].size):
+            del self._halves[next(iter(self._halves))]
         return self._halves[number]
+
+    def _blended(self, number: int) -> Array:
+        half = self._shape[0] // 2
+        share = 0.5 * np.pi * (np.arange(half + 1) / half)[:, None]
+        before, here = self._drawn(number - 1), self._drawn(number)
+        # The row that follows the earlier tile's end has no weight.
+        ending = np.concatenate([before[half:], before[:1]])
+        return np.cos(share) * ending + np.sin(share) * here[: half + 1]
 
     def height(self, x: Array, y: Array) -> Array:
         """Bilinear heights (m) at x, y (m) of equal shape."""

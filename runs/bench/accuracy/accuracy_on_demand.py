@@ -19,6 +19,7 @@ from tireroad.runs.bench.parts.rolling_cases import (
     CASES,
     DURATION,
     FINE,
+    TIRES,
     Case,
     Driven,
     Recorded,
@@ -98,7 +99,7 @@ def tables(folder: Path, cases: Iterable[Case], grid: Mapping, kept: Path) -> li
 
 def _outcome(folder: Path, case: Case, grid: Mapping, forces: Path) -> Outcome:
     """Reference, search and exhaustive search of a case. On one process."""
-    fine = case.scene(folder, DURATION, *sets(**FINE))
+    fine = case.scene(folder, DURATION, *sets(**{**FINE, **TIRES[case.tire].fine}))
     exact = recorded(fine, folder / "reference", forces, _cache(folder))
     scene = case.scene(folder, DURATION, *WANTED)
     ladders = Ladders.of(scene)
@@ -203,7 +204,7 @@ def _summary(found: list[Outcome]) -> Table:
     )
     notes = [
         f"{len(found)} cases; {100 * TARGET:g} % of the axle force up to {UP_TO:g} Hz, {DURATION:g} s. True error: against "
-        f"{told_settings(FINE)}. The exhaustive search takes rungs of the same ladders. Costs are processor seconds; "
+        f"{told_settings(FINE, 'fine')}. The exhaustive search takes rungs of the same ladders. Costs are processor seconds; "
         "without error bars, but for the search."
     ]
     return Table(

@@ -24,6 +24,7 @@ from tireroad.runs.bench.parts.rolling_cases import (
     CASES,
     DURATION,
     FINE,
+    TIRES,
     Case,
     Driven,
     Recorded,
@@ -55,9 +56,11 @@ def tables(
     """Of the `cases`; settings of the run and of the far finer one. On one process."""
     found: list[Effectivity] = []
     for case in by_wheel(cases):
-        where = _Where(folder / case.wheel, kept, case, duration, coarse, fine)
+        tire = TIRES[case.tire]
+        given = {**coarse, **tire.run}, {**fine, **tire.fine}
+        where = _Where(folder / case.wheel, kept, case, duration, *given)
         file = kept / "error_bars" / f"{case.wheel}-{case.road}.json"
-        of = [identity("accuracy").code, coarse, fine, duration]
+        of = [identity("accuracy").code, *given, duration]
         known = read_kept(file, of)
         if known is None:
             observe.say(f"  {case} ...")
@@ -67,7 +70,7 @@ def tables(
         found += some
         good = np.mean([one.good for one in some if one.cause == ALL])
         observe.say(f"  {case}: {100 * good:.3g} % good")
-    note = f"{told_settings(coarse)}; true: against {told_settings(fine)}."
+    note = f"{told_settings(coarse, 'run')}; true: against {told_settings(fine, 'fine')}."
     return [shares(found, note), by_cause(found), every(found)]
 
 

@@ -4,11 +4,11 @@ whose forces are kept, so that a bench goes on where it was stopped and another 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
@@ -22,12 +22,30 @@ from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.pipeline import Finished, run_scene
 
-TIRES = {
-    "soft": "",
-    "thick": "thickness = 0.016\n",
-    "belted": "",
-}
-BELTS = """
+
+@dataclass(frozen=True, kw_only=True)
+class Tire:
+    """What a tire's scene has in `text`, and its `residual`: rolling belts couple kept modes with the rest (docs/method.md).
+    Of settings as of `sets`, `run` are those in which its runs, and `fine` those in which its reference differ."""
+
+    text: str
+    residual: str = "static"
+    run: Mapping[str, Any] = field(default_factory=dict)
+    fine: Mapping[str, Any] = field(default_factory=dict)
+
+
+_SOFT = """
+[tire]
+footprint_size = 0.25
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 500.0
+error_estimate = false
+[damping]
+mass = 300.0
+"""
+_BELT = """
 [[tire.cords]]
 name = "belt"
 depth = 0.006
@@ -35,6 +53,26 @@ arc = [-30.0, 30.0]
 angle = 0.0
 youngs_modulus = 2e9
 """
+_RADIAL = """
+[tire]
+section = "radial"
+footprint_size = 0.25
+[static]
+inflation = 2.2e5
+load = 4000.0
+error_estimate = false
+"""
+TIRES = {
+    "soft": Tire(text=_SOFT),
+    "belted": Tire(text=_SOFT + _BELT, residual="attachment"),
+    # 205/60 R15 under its rated load: of order 2, several elements through its wall, its footprint ten times as wide.
+    "radial": Tire(
+        text=_RADIAL,
+        residual="attachment",
+        run={"segments": 16, "arc": 14, "order": 2},
+        fine={"segments": 26, "arc": 24, "order": 2, "footprint": 0.1, "pitch": 0.004},
+    ),
+}
 ROADS = {
     "sine": 'kind = "sine"\namplitude = 2e-4\nwavelength = 0.15',
     "cleat": 'kind = "cleat"\nheight = 0.003\nlength = 0.02\nposition = 0.3',
@@ -43,13 +81,14 @@ ROADS = {
 }
 SPEEDS = (30.0, 60.0)  # rad/s
 DURATION = 0.16  # s
-# Finer than any setting that is judged, and than its companions: elements at the footprint half as long as those of
-# 18 x 8, of order 3, and points nearer to each other than half of 8 mm.
+# Finer than any setting that is judged, and than its companions. What a point's force does near by falls as the size
+# of the elements at the footprint: nodes there are 2.7 mm apart, a fifth of those of 18 x 8 elements. Points are nearer
+# to each other than half of 8 mm.
 FINE: dict[str, Any] = {
-    "segments": 30,
-    "arc": 12,
+    "segments": 40,
+    "arc": 14,
     "order": 3,
-    "footprint": 0.2,
+    "footprint": 0.07,
     "modes": 200,
     "pitch": 0.003,
     "step": 1e-4,
@@ -58,16 +97,7 @@ FINE: dict[str, Any] = {
 REACH = 0.012
 SCENE = """
 name = "case"
-[tire]
-footprint_size = 0.25
-{tire}[tire.material]
-youngs_modulus = 48e6
-{cords}
-[static]
-load = 500.0
-error_estimate = false
-[damping]
-mass = 300.0
+{tire}
 [rotation]
 speed = {speed}
 [greens]
@@ -104,12 +134,10 @@ class Case:
 
         folder.mkdir(parents=True, exist_ok=True)
         text = SCENE.format(
-            tire=TIRES[self.tire],
-            cords=BELTS if self.tire == "belted" else "",
+            tire=TIRES[self.tire].text,
             road=ROADS[self.road],
             speed=self.speed,
-            # rolling belts couple kept modes with the rest (docs/method.md)
-            residual="attachment" if self.tire == "belted" else "static",
+            residual=TIRES[self.tire].residual,
             reach=REACH,
             duration=duration,
         )
@@ -147,8 +175,14 @@ def sets(
     )
 
 
-def told_settings(keys: dict) -> str:
-    """Settings as of `sets` in words."""
+def told_settings(keys: Mapping[str, Any], part: Literal["run", "fine"]) -> str:
+    """Settings as of `sets` in words, and those of the tires that differ in this `part` of theirs."""
+    own = {name: getattr(tire, part) for name, tire in TIRES.items()}
+    others = [f"of the {name} tire {_told({**keys, **one})}" for name, one in own.items() if one]
+    return "; ".join([_told(keys), *others])
+
+
+def _told(keys: Mapping[str, Any]) -> str:
     return (
         f"{keys['segments']} x {keys['arc']} elements of order {keys['order']}, {keys['modes']} modes, points "
         f"{1e3 * keys['pitch']:g} mm apart, steps of {1e3 * keys['step']:g} ms"

@@ -11,6 +11,7 @@ from tireroad.contact.roads.road import make_road
 from tireroad.contact.roads.texture.isotropic import bands, profile_power, surface_density
 from tireroad.contact.roads.texture.layered import Skewed, band_power
 from tireroad.contact.roads.texture.levels import mean_profile_depth, texture_of, third_octaves
+from tireroad.contact.roads.texture.tiles import Tiles
 from tireroad.contact.roads.texture.widened import memory, widened
 from tireroad.fem.errors import InputError
 
@@ -241,3 +242,17 @@ def test_a_measured_road_shorter_than_the_drum_is_refused(tmp_path) -> None:
     road = make_road(kind="laser", file=file, across="ruts", drum_radius=0.5)
     with pytest.raises(InputError, match="the run needs the road from 0 to 3.142 m"):
         road.prepare(0.0, 2.0, -0.1, 0.1)
+
+
+def test_a_tile_is_drawn_once_while_a_footprint_passes(monkeypatch) -> None:
+    """A footprint longer than three of the short waves' tiles: each step drew all of them anew."""
+    drawn = []
+    draw = Tiles._tile
+    monkeypatch.setattr(
+        Tiles, "_tile", lambda self, k: drawn.append((id(self), k)) or draw(self, k)
+    )
+    road = TwoSlope(stone_size=0.004).make()
+    x, y = np.broadcast_arrays(np.linspace(0.0, 0.8, 81)[:, None], np.linspace(-0.05, 0.05, 5))
+    for step in range(40):
+        road.height(x + 0.004 * step, y)
+    assert len(drawn) == len(set(drawn)) > 6

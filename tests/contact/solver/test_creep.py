@@ -72,7 +72,7 @@ def test_published_pressure_of_rolling_cylinders(time, published) -> None:
         assert abs(centre) < 0.02e-3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("share", [1.0, 0.3])
 def test_rolled_in_time_it_comes_to_the_steady_state(share) -> None:
     """Steps of a point, and of 0.3 of it, where material is read between the points."""

@@ -64,7 +64,7 @@ def test_hardly_any_friction_is_none(make) -> None:
     assert np.abs(state.force - plain.force).max() < 1e-5
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_pushed_sideways_and_back_it_keeps_some_force(make) -> None:
     """The way counts: what slipped on the way there does not slip back at once."""
     _, loader = pressed(make(), Friction(coefficient=0.3, steps=2))
@@ -89,7 +89,7 @@ def test_steps_of_the_way_there_are_fine_enough(make) -> None:
     assert many == pytest.approx(few, rel=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_rolling_it_is_free_or_driven_or_drifts(make) -> None:
     body = make()
     state, loader = pressed(body, Friction(coefficient=0.8), TURNING)

@@ -23,7 +23,7 @@ def loader(make_body):
     return loader
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.mpi
 def test_falls_to_the_state_that_small_steps_find(loader):
     """One shape carries this load, and no drag is left in it."""

@@ -98,6 +98,7 @@ def cheapest(scene, target: float) -> float:
     return best
 
 
+@pytest.mark.long
 def test_it_ends_within_the_target_near_the_least_cost(file, search, monkeypatch) -> None:
     started, tried, final = search
     started()

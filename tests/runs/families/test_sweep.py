@@ -113,24 +113,24 @@ def test_a_second_sweep_into_the_same_folder_is_refused(folder: Path) -> None:
 
 def test_a_sweep_runs_gathers_and_shares(folder: Path, launch) -> None:
     path = folder / "family.toml"
-    members = {"light": "250.0", "same": "250.0", "crushed": "1e7"}
+    members = {"light": "2e5", "same": "2e5", "burst": "1e8"}
     text = "".join(
-        f'[[member]]\nname = "{name}"\nset = {{ "static.load" = {load}, "damping.mass" = {k}.0 }}\n'
-        for k, (name, load) in enumerate(members.items())
+        f'[[member]]\nname = "{name}"\nset = {{ "static.inflation" = {pressure}, "damping.mass" = {k}.0 }}\n'
+        for k, (name, pressure) in enumerate(members.items())
     )
     path.write_text('scene = "base.toml"\n' + text)
     out = folder / "out"
     done = launch("-m", "runs", "sweep", path, "--out", out, "--local", 1)
-    # A load that no tire carries fails; the others are kept, and the failure is named.
+    # A pressure that the tire does not hold fails; the others are kept, and the failure is named.
     assert done.returncode == 3 and "light: done" in done.stdout
-    assert "crushed: a solver gave up" in done.stdout
+    assert "burst: a solver gave up" in done.stdout
     with (out / "sweep.csv").open() as file:
         rows = {row["member"]: row for row in csv.DictReader(file)}
     # Damping takes no part in the static state and the modes: computed once for both.
     assert rows["light"]["modes: lowest (Hz)"] == rows["same"]["modes: lowest (Hz)"] != ""
-    assert rows["crushed"]["modes: lowest (Hz)"] == ""
+    assert rows["burst"]["modes: lowest (Hz)"] == ""
     logs = {name: (out / "logs" / f"{name}.txt").read_text() for name in members}
     assert "modes     done" in logs["light"] and "modes     reused" in logs["same"]
     with h5py.File(out / "sweep.h5") as file:
-        assert file["axis/static.load"][:].tolist() == [250.0, 250.0, 1e7]
+        assert file["axis/static.inflation"][:].tolist() == [2e5, 2e5, 1e8]
     assert (out / "sweep.html").read_text().count("did not end well") == 1

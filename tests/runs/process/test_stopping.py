@@ -221,6 +221,7 @@ def test_mpirun_ends_with_four(scene: Path) -> None:
     assert (out / "checkpoint.h5").exists()
 
 
+@pytest.mark.long
 def test_one_request_by_several_ways_is_one(scene: Path) -> None:
     """`timeout` and terminals signal the supervisor and the worker: the checkpoint is written."""
     out = scene.parent / "group"
@@ -232,6 +233,7 @@ def test_one_request_by_several_ways_is_one(scene: Path) -> None:
     assert (out / "checkpoint.h5").exists()
 
 
+@pytest.mark.long
 def test_nohup_is_respected(scene: Path) -> None:
     command = ["nohup", *PROGRAM, "run", scene, "--out", scene.parent / "o", "--until", "static"]
     with begin(command) as process:

@@ -11,7 +11,8 @@ from tireroad.contact.results.error_bars import CAUSES
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.base.job import Job
-from tireroad.runs.stages.companions import Given, coarser_job, companion
+from tireroad.runs.stages.coarser import coarser_job
+from tireroad.runs.stages.companions import Given, companions
 from tireroad.runs.stages.pipeline import run_scene
 
 SCENE = """
@@ -82,7 +83,7 @@ def contact_force(folder) -> np.ndarray:
 def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
     given = _given(whole)
     other, _ = run(cause, "contact", *sets)
-    forces, beside, part = companion(cause, given)
+    forces, beside, part = companions(cause, given)[0]
     assert forces.step == 2e-4 and (beside is None) == (cause == "step")
     # Elements of order 2 make 3; the footprint is a few points wide, so that finer ones tell, whose errors have
     # nothing to do with the run's.
@@ -118,7 +119,7 @@ def test_bars_are_in_the_summary_and_beside_the_bands(whole):
         assert file["third_octave/level_error"].shape == shape
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_cannot_be_estimated_is_said_not_to_be(run):
     folder, _ = run("nodes", "accuracy", "contact.points=nodes", "contact.reach=")
     told = json.loads((folder / "summary.json").read_text())["stages"]["accuracy"]["headline"]

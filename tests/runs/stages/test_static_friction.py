@@ -41,7 +41,9 @@ spectra = false
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("points", ['"nodes"', "{ dx = 0.008, dy = 0.008 }"])
+@pytest.mark.parametrize(
+    "points", [pytest.param('"nodes"', marks=pytest.mark.long), "{ dx = 0.008, dy = 0.008 }"]
+)
 def test_nothing_moves_on_a_flat_road_and_the_axle_bears_the_side_force(tmp_path, points) -> None:
     (tmp_path / "scene.toml").write_text(SCENE.format(points=points))
     scene = load(tmp_path / "scene.toml")

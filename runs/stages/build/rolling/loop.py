@@ -18,13 +18,14 @@ from tireroad.contact.tread.free_rolling import free_slip
 from tireroad.greens.recursion import Recursion, sharers
 from tireroad.greens.response import Response
 from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.point_forces import directions, histories
 
 
 def driven_tire(job: Job, tire, step: float, steps: int) -> Driven | None:
-    """The tire under the scene's prescribed forces, and with a wheel that is read, where there is either."""
+    """The tire under the scene's prescribed forces, and with a wheel whose motions or moments are read, where there is either."""
     forces = job.scene.force
-    if not forces and job.axle is None:
+    if not forces and not corner.readings(job):
         return None
     time = step * np.arange(steps + 1)
     return Driven(tire, histories(forces, time), directions(forces))
@@ -90,24 +91,32 @@ class Forces(NamedTuple):
 
 
 def forces(
-    job: Job, setup: ContactSetup, response: Response, step: float, steps: int, scheme: str
+    job: Job,
+    setup: ContactSetup,
+    response: Response,
+    step: float,
+    steps: int,
+    scheme: str,
+    contact=None,
 ) -> Forces:
     """The loop of the job's scene by another response, step or setup (settled), kept in memory. Collective.
 
-    `scheme` "linear" or "constant". ConvergenceError where the road touches beyond the patch.
+    `scheme` "linear" or "constant"; `contact`, in place of the scene's table. ConvergenceError where the road touches
+    beyond the patch.
     """
     kept = response.resolved(step)
     comm = sharers(kept, job.comm)
     tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm)
-    loop = make_loop(job.scene.contact, setup, driven_tire(job, tire, step, steps) or tire, step)
-    contact, axle = np.zeros((2, steps, 3))
+    spec = contact or job.scene.contact
+    loop = make_loop(spec, setup, driven_tire(job, tire, step, steps) or tire, step)
+    total, axle = np.zeros((2, steps, 3))
     given = setup.patch, setup.drive, step, steps
     with threadpool_limits(1, "blas"):
         for k, instant in enumerate(
             roll(loop.tire, loop.solver, *given, loop.friction, 0, loop.memory)
         ):
-            contact[k, :2] = instant.horizontal.sum(axis=0)
-            contact[k, 2], axle[k] = instant.force.sum(), instant.axle_force
+            total[k, :2] = instant.horizontal.sum(axis=0)
+            total[k, 2], axle[k] = instant.force.sum(), instant.axle_force
             if instant.force[setup.patch.edge].any():
                 setup.patch.check_edge(instant.force[None], np.array([instant.time]), setup.reach)
-    return Forces(contact, axle, step)
+    return Forces(total, axle, step)

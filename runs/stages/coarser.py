@@ -1,0 +1,103 @@
+"""The same scene on half the elements, up to its Green's functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from tireroad.fem.errors import InputError
+from tireroad.fem.static.path.carried_over import carried_over
+from tireroad.fem.static.state import StaticState
+from tireroad.runs.files.folder import make_folder
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.stage import Done, Part, Shared, Stage
+from tireroad.runs.stages.build.cavity import AirColumn
+from tireroad.runs.stages.build.setup import Setup
+from tireroad.runs.stages.greens import GreensStage
+from tireroad.runs.stages.modes import Fields, ModesStage, Motions
+from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
+from tireroad.runs.stages.static import StaticStage
+from tireroad.runs.stages.stored.obtained import obtained
+
+UP_TO_GREENS: tuple[type[Part], ...] = (
+    StaticStage,
+    Motions,
+    Setup,
+    ModesStage,
+    AirColumn,
+    Fields,
+    FullMatrices,
+    RotatingStage,
+    GreensStage,
+)
+COARSER = "coarser"  # the folder in the run's own where its coarser companion's stages are, until they are of no use
+LEAST = (8, 4)  # elements around and along that a companion has
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoarserStatic(StaticStage):
+    """The coarser mesh's static state by a few steps from that of the `run`; from the beginning at a deflection,
+    which counts from its own first touch, and where those steps find no balance."""
+
+    run: Job
+    near: Done[StaticState]
+
+    def inputs(self) -> dict:
+        """Of any static state, and where it starts."""
+        return super().inputs() | {"near": self.near.key}
+
+    def compute(self, record: Record) -> StaticState:
+        """Collective."""
+        wanted = self.job.scene.static
+        if wanted.deflection is None:
+            given = self.near.product, self.run.tire, self.job.tire, wanted.load
+            if (found := carried_over(*given)) is not None:
+                return found
+        return super().compute(record)
+
+
+def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
+    """The job of a run with elements of twice the size, and what is done of it, from the static state on. Collective."""
+    job, done = coarser_job(run), dict[str, Done]()
+    on_root(job.comm, lambda: make_folder(job.directory))
+    for kind in UP_TO_GREENS:
+        part = (
+            CoarserStatic(job=job, run=run, near=static)
+            if kind is StaticStage
+            else kind.taken(job, done)
+        )
+        if (found := _made(job, kind, part, done)) is not None:
+            done[kind.name] = found
+    return job, done
+
+
+def coarser_job(job: Job) -> Job:
+    """The same scene on half the elements around, and bead to bead where the scene says how many; its stages are
+    shared as those of any run, in a folder beside the run's own.
+
+    InputError where the mesh is too coarse to be halved.
+    """
+    tire, static = job.scene.tire, job.scene.static
+    coarse = replace(tire, segments=tire.segments // 2, shape=tire.shape.coarser(tire))
+    if coarse.segments < LEAST[0] or coarse.proportions().along < LEAST[1]:
+        raise InputError("the mesh is too coarse to be halved")
+    rotation = job.scene.rotation
+    if rotation is not None:  # as fast as the run's own wheel, whatever the travel speed
+        rotation = replace(rotation, speed=job.speed, travel_speed=None)
+    scene = replace(
+        job.scene,
+        rotation=rotation,
+        tire=coarse,
+        static=replace(static, error_estimate=False),
+    )
+    return replace(job, scene=scene, directory=job.directory / COARSER, found={})
+
+
+def _made(job: Job, kind: type[Part], part: Part | None, done: dict[str, Done]) -> Done | None:
+    """What a part of the chain adds to what is done; None where it adds nothing. Collective."""
+    if kind is RotatingStage and not job.speed:
+        return RotatingStage.instead(job, done)
+    if isinstance(part, Stage):
+        return obtained(part).done
+    return Done("", part.make) if isinstance(part, Shared) else None
