@@ -55,6 +55,17 @@ class Axle:
         if min(moving) <= 0 or (self.body_mass is not None and self.body_mass <= 0):
             raise InputError("axle: what moves needs a mass, and what turns an inertia, above 0")
 
+    @classmethod
+    def held(cls) -> Axle:
+        """One that does not move at all."""
+        return cls(
+            wheel_mass=1.0,
+            wheel_inertia=(1.0, 1.0, 1.0),
+            stiffness=np.zeros(6),
+            damping=np.zeros(6),
+            locked=DIRECTIONS,
+        )
+
     @property
     def moving(self) -> list[int]:
         """Directions (of six) in which the wheel moves."""

@@ -54,6 +54,7 @@ class SmallMotions:
             if value not in known:
                 raise InputError(f'{name} = "{value}" is unknown: take {" or ".join(known)}')
         self.tire, self.static, self.rim, self._road = tire, static, rim, road
+        self._rim_motions: dict[bool, RimMotion] = {}
 
     @property
     def lattice(self) -> Lattice:
@@ -75,12 +76,17 @@ class SmallMotions:
         support = Support(self.rim, **held)
         return Operators(self.body, self.static.inflation, support, self.static.rolling)
 
-    @cached_property
-    def rim_motion(self) -> RimMotion:
-        """What the rim's motions meet in the matrices of a tire whose rim is held."""
-        self.body.set_displacement(self.static.displacement)
-        shape = self.static.rolling
-        return rim_motion(self.body, self.static.inflation, shape, shape.speed != 0)
+    def rim_motion(self, turns: bool) -> RimMotion | None:
+        """What the rim's motions meet in the matrices of a tire whose rim is held, `turns` or stands; None of a free rim, and
+        where the road holds what touches it. Collective.
+        """
+        if (self.rim, self._road) != ("fixed", "forces"):
+            return None
+        if turns not in self._rim_motions:
+            self.body.set_displacement(self.static.displacement)
+            given = self.body, self.static.inflation, self.static.rolling
+            self._rim_motions[turns] = rim_motion(*given, turns)
+        return self._rim_motions[turns]
 
     def _touching(self) -> np.ndarray:
         face = self.body.surface

@@ -1,4 +1,4 @@
-"""Force on a held axle per force on the tread: from the momentum, and from the modes of a free rim.
+"""Force and moment on a held axle per force on the tread: from the momentum, and from the modes of a free rim.
 
 The tire passes on what acts on it less what its momentum takes up,
 
@@ -10,35 +10,73 @@ With the rigid rim's six motions r and the loads c, a rim that is held stands st
     f_r = -H_rr^-1 H_rc f_c     on the tire,
 
 the opposite of which acts on the axle. Damping by the mass acts against the wheel and not against the
-ground, so the axle carries  gamma1 int rho (s + Omega B) u = gamma1 (s - Omega e_y x) p  besides, with
-p = int rho u the tire's first moment while the rim is held.
+ground, so the axle carries  gamma1 (s R^T M + Omega R^T B) u  besides, u the tire's motion while the rim is held.
+R^T B = -(B R)^T; for the force it is  gamma1 (s - Omega e_y x) int rho u.
+
+Both ways give the moments about the axle's centre too: rotations r of the rim, R = e_k x, x the loaded tire. By
+momentum they are
+
+    m_axle = R^T f - [s^2 R^T M + 2 s Omega R^T G + R^T (K + Omega^2 S)] u,
+
+whose convective terms do not cancel (modal.corner.Corner.moments).
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import sparse
 
-from tireroad.greens.response import Response
+from tireroad.fem.collective import summed
+from tireroad.fem.matrices.rim_motion import RimMotion
+from tireroad.greens.basis import Probes
+from tireroad.greens.response import Response, couple
+from tireroad.modal.solver.modes import Modes
 
-_TURN = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])  # e_y x
+if TYPE_CHECKING:
+    from tireroad.greens.coupling import Wheel
 
 
 def axle_transfer(
     receptance: np.ndarray, frequency: np.ndarray, speed: float, damping: float
 ) -> np.ndarray:
-    """Force of the tire on the axle per unit load, (f, 3, k), -.
+    """Force, -, and moment, m, of the tire on the axle per unit load, (f, 6, k).
 
-    `receptance` (f, 9, 6 + k): translation (m) and rotation (rad) of the free rim and first moment
-    (kg m), per force and moment on the rim and per load, at `frequency` (f,) Hz above 0; `speed` rad/s,
-    `damping` gamma1 1/s. Equal to sum of loads - d/dt momentum of the tire with a held rim.
+    `receptance` (f, 18, 6 + k) per force and moment on the rim and per load: translation (m) and rotation (rad) of
+    the free rim, then R^T M u and R^T B u of the tire beside it, at `frequency` (f,) Hz above 0; `speed` rad/s,
+    `damping` gamma1 1/s.
     """
-    rim, moment = receptance[:, :6], receptance[:, 6:]
+    rim, rest = receptance[:, :6], receptance[:, 6:]
     held = -np.linalg.solve(rim[:, :, :6], rim[:, :, 6:])
-    first = moment[:, :, 6:] + moment[:, :, :6] @ held
+    mass, rate = np.split(rest[:, :, 6:] + rest[:, :, :6] @ held, 2, axis=1)
     s = 2j * np.pi * frequency[:, None, None]
-    return -held[:, :3] + damping * (s * first - speed * (_TURN @ first))
+    return -held + damping * (s * mass + speed * rate)
+
+
+def by_free_rim(
+    wheel: Wheel, modes: Modes, loads: Probes, frequency: np.ndarray, motion: RimMotion
+) -> np.ndarray:
+    """Force, -, and moment, m, on the held axle per unit load (f, 6, k), at `frequency` (f,) Hz above 0.
+
+    By the `modes` of the free rim of the `wheel`, which the rim's and the `loads`' (k, 3 s) attachment modes join; `motion` of
+    the rim of the same state. Collective.
+    """
+    width = loads.shape[1]
+    rim = sparse.hstack([sparse.csr_matrix((6, width)), sparse.identity(6)])
+    apart = sparse.hstack([loads, sparse.csr_matrix((loads.shape[0], 6))])
+    probes = sparse.vstack([rim, apart], format="csr")
+    grown, fields = wheel.standing_attachments(modes, probes)
+    seen, carried = grown.seen(probes), grown.projection.carried
+    rate = -motion.rows["body"] if wheel.speed else np.zeros_like(motion.rows["mass"])
+    beside = np.hstack([motion.rows["mass"], rate])
+    own = summed(wheel.operators.body.comm, beside.T @ fields[: len(beside)])
+    # What damps by the mass is the tire, not the air.
+    own = np.pad(own, ((0, 0), (0, carried.shape[1] - own.shape[1])))
+    response = couple(grown.states, np.vstack([seen[:6], own]), seen, carried)
+    turning = wheel.speed, wheel.against_wheel
+    return axle_transfer(response.receptance(frequency), frequency, *turning)
 
 
 def from_moment(total: np.ndarray, moment: np.ndarray, frequency: np.ndarray) -> np.ndarray:

@@ -26,11 +26,10 @@ from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.turning import Turning
-from tireroad.greens.axle import axle_transfer
 from tireroad.greens.basis import Array, Basis, Pencil, Probes, regained
 from tireroad.greens.residual.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.residual.second_order import Moments, modal_moments, second_order
-from tireroad.greens.response import Response, couple
+from tireroad.greens.response import Response
 from tireroad.modal.basis import Projection, project, with_air
 from tireroad.modal.damping import Damping, StrainEnergy, tail_loss
 from tireroad.modal.rolling import decouple
@@ -44,8 +43,8 @@ _SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by 
 class Wheel:
     """The full matrices of a tire that turns: `damping` as in modal.damping, `rotation` None when it
     stands. `beyond` (gamma1 1/s, gamma2 s) damps what no mode has, and the full matrices: given where
-    `damping` is by strain energy, of which there are no full matrices. `corner` joins a wheel that
-    moves to a projection on modes. Its properties are collective at their first use."""
+    `damping` is by strain energy, of which there are no full matrices. `corner` joins a wheel,
+    held or not, to a projection on modes. Its properties are collective at their first use."""
 
     operators: Operators
     rotation: Rotation | None
@@ -69,6 +68,11 @@ class Wheel:
     @property
     def _given(self) -> tuple:
         return self.operators, self.rotation, self.speed, self._uniform, self.inertia
+
+    @property
+    def against_wheel(self) -> float:
+        """Damping by the mass, 1/s, that acts against the wheel: by strain energy a rigid motion is not damped."""
+        return 0.0 if self.beyond is not None else self._uniform[0]
 
     @property
     def _uniform(self) -> tuple[float, float]:
@@ -98,7 +102,7 @@ class Wheel:
         """
         if option in ("static", "dirac"):
             return self._with_statics(basis, outputs, loads, option == "dirac")
-        if option == "second-order" and self.corner:
+        if option == "second-order" and basis.projection.moves:
             raise InputError("greens.residual: second-order knows no wheel that moves")
         r, k, same = outputs.shape[0], loads.shape[0], outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
@@ -132,7 +136,7 @@ class Wheel:
         self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, moment: Array
     ) -> Response:
         """The states with what they lack, the rim held, of a static displacement and a first moment."""
-        if self.corner is None:
+        if not basis.projection.moves:
             response = basis.couple(outputs, loads, flexibility)
             return self._lacking(response, moment - response.static_moment())
         held = basis.held
@@ -162,7 +166,7 @@ class Wheel:
             nothing = np.zeros((3, probes.shape[0]))
             missing = self._completed(basis, probes, probes, flexibility, nothing).residual
             columns = shapes @ (weights.T @ foremost(missing, np.abs(np.diag(flexibility))))
-            grown = self._grown(modes, columns, basis.projection, every=False)
+            grown, _ = self._grown(modes, columns, basis.projection, every=False)
             if self.beyond is not None:
                 pencils = self._pencils(grown.projection)
                 flexibility = (
@@ -171,7 +175,7 @@ class Wheel:
             of_loads = self.operators.body.comm.allreduce(self.operators.carried @ shapes)
             moment = (weights @ of_loads.T).T
             return self._completed(grown, probes, probes, flexibility, moment)
-        return self._standing_attachments(modes, probes).couple(probes, probes)
+        return self.standing_attachments(modes, probes)[0].couple(probes, probes)
 
     def _check_same(self, basis: Basis, modes: Modes) -> None:
         """InputError where these modes are not those of the basis. Collective."""
@@ -188,34 +192,16 @@ class Wheel:
         """Whether the turning tire has no static answer: with a free rim K_Omega has no inverse."""
         return self.rotation is not None and self.operators.unknowns.rim is not None
 
-    def _standing_attachments(self, modes: Modes, probes: Probes) -> Basis:
-        """Modes with the static shapes, relieved where nothing holds the tire, of K. Collective."""
+    def standing_attachments(self, modes: Modes, probes: Probes) -> tuple[Basis, Array]:
+        """Modes with the static shapes, relieved where nothing holds the tire, of K; their fields, own rows. Collective."""
         loads = on_own_rows(self.operators, probes)
         return self._grown(modes, statics(self.operators, self.operators.stiffness, loads))
 
-    def axle(self, modes: Modes, loads: Probes, frequency: np.ndarray) -> np.ndarray:
-        """Force on the held axle per unit load (f, 3, k), -, by the modes of the free rim (greens.axle).
-
-        `loads` (k, 3 s); the rim's and the loads' attachment modes join the basis. Collective.
-        """
-        width = loads.shape[1]
-        rim = sparse.hstack([sparse.csr_matrix((6, width)), sparse.identity(6)])
-        apart = sparse.hstack([loads, sparse.csr_matrix((loads.shape[0], 6))])
-        probes = sparse.vstack([rim, apart], format="csr")
-        grown = self._standing_attachments(modes, probes)
-        seen, carried = grown.seen(probes), grown.projection.carried
-        # What damps by the mass is the tire, not the air.
-        moment = np.where(np.arange(carried.shape[1]) < grown.projection.own, carried, 0.0)
-        response = couple(grown.states, np.vstack([seen[:6], moment]), seen, carried)
-        # By strain energy a rigid motion is not damped, so nothing acts against the wheel.
-        turning = self.speed, self._uniform[0] if self.beyond is None else 0.0
-        return axle_transfer(response.receptance(frequency), frequency, *turning)
-
     def _grown(
         self, modes: Modes, columns: np.ndarray, known: Projection | None = None, every: bool = True
-    ) -> Basis:
-        """The basis with attachment modes, or those that are more than static; `known` is the projection on
-        the modes. Collective.
+    ) -> tuple[Basis, Array]:
+        """The basis with attachment modes, or those that are more than static, and their fields; `known` is the projection
+        on the modes. Collective.
         """
         operators, comm = self.operators, self.operators.body.comm
         grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
@@ -228,7 +214,8 @@ class Wheel:
         projection = self.corner(projection, grown) if self.corner else projection
         states = self.decouple(projection, comm)
         shape, speed = operators.trace(grown.vectors), self.speed
-        return Basis(shape=shape, projection=projection, states=states, speed=speed)
+        basis = Basis(shape=shape, projection=projection, states=states, speed=speed)
+        return basis, grown.vectors
 
     @property
     def turning(self) -> Turning:

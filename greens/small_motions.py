@@ -41,7 +41,8 @@ def wheel_of(
 
     def corner(projection: Projection, modes: Modes) -> Projection:
         comm, places = motions.body.comm, motions.static.positions
-        return with_corner(projection, modes, axle, motions.rim_motion, places, comm)
+        rim = motions.rim_motion(turning.speed != 0)
+        return with_corner(projection, modes, axle, rim, places, comm)
 
     return Wheel(
         operators=motions.operators,
@@ -51,5 +52,5 @@ def wheel_of(
         inertia=turning.inertia,
         air=air,
         beyond=tail,
-        corner=corner if axle else None,
+        corner=corner,
     )

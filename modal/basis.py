@@ -17,7 +17,7 @@ from tireroad.fem.matrices.operators import Rotation
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.modal.air import Air
 from tireroad.modal.corner import Corner, meeting
-from tireroad.modal.solver.fields import CHUNK, multiply, projected
+from tireroad.modal.solver.fields import loss_factors, projected
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import Labels
 
@@ -29,7 +29,8 @@ class Projection:
     `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad skew; `convective`, `body_convective`
     (m, m) 1/rad2 symmetric, all four None for a wheel that stands; `momentum` (3, m) kg^1/2:
     int rho phi_k, the mass each mode moves; `loss_factor` (m,) by strain energy (modal.damping), None where
-    no compound has one. What else takes part: `air`, a coordinates after the m, and a `corner`, c after them.
+    no compound has one. What else takes part: `air`, a coordinates after the m, and a `corner`, c after them, none of a
+    wheel that is held, whose hub yet carries moments.
     """
 
     squares: np.ndarray
@@ -45,52 +46,57 @@ class Projection:
     @property
     def carried(self) -> np.ndarray:
         """Momentum (3, m + a + c) kg^1/2 per rate of all coordinates: of all that the hub has to move."""
-        if self.corner is None:
+        if not self.moves:
             return self.inside
-        whole = self.corner.carried(self.inside, self.air_mass)
-        return whole @ self._change
+        return self.wheel.carried(self.inside, self.air_mass) @ self._change
 
     @property
     def inside(self) -> np.ndarray:
         """Momentum (3, m + a) kg^1/2 per rate of tire and air against the rim."""
-        if self.air is None:
-            return self.momentum
-        return np.hstack([self.momentum, self.air.duct.momentum])
+        return (
+            self.momentum
+            if self.air is None
+            else np.hstack([self.momentum, self.air.duct.momentum])
+        )
 
     def pencil(
         self, drag: np.ndarray, stiffness: np.ndarray, speed: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """D~ (1/s) and K~ (1/s2) of all coordinates, unit mass, from those of tire and air, (m + a, m + a)."""
-        if self.corner is None:
+        if not self.moves:
             return drag, stiffness
-        turn = self._change
-        return tuple(
-            turn.T @ matrix @ turn for matrix in self.corner.joined(drag, stiffness, speed)
-        )
+        turn, joined = self._change, self.wheel.joined(drag, stiffness, speed)
+        return turn.T @ joined[0] @ turn, turn.T @ joined[1] @ turn
 
     def seen(self, shapes: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
         """All coordinates (k, m + a + c) as `probes` read them, `shapes` (k, m) being what they see of the modes:
         the air's are not seen.
         """
         seen = shapes if self.air is None else np.pad(shapes, ((0, 0), (0, self.air.count)))
-        return seen if self.corner is None else self.corner.seen(seen, probes) @ self._change
+        return self.wheel.seen(seen, probes) @ self._change if self.moves else seen
 
     def moments(self, speed: float) -> np.ndarray:
         """The rows (3, 3, m + a + c) of `Corner.moments` on all coordinates."""
-        return self.wheel.moments(self.inside.shape[1], speed) @ self._change
+        rows = self.wheel.moments(self.inside.shape[1], speed)
+        return rows @ self._change if self.moves else rows
+
+    @property
+    def moves(self) -> bool:
+        """Whether there is a corner that lets the wheel move."""
+        return self.corner is not None and self.corner.count > 0
 
     @property
     def wheel(self) -> Corner:
         """The corner, of which there must be one."""
-        assert self.corner is not None, "the axle of this tire is fixed"
+        assert self.corner is not None, "nothing is known of this tire's rim"
         return self.corner
 
     @property
     def adrift(self) -> np.ndarray:
         """Orthonormal motions (m + a + c, r) of a corner that meet neither stiffness nor damping."""
-        if self.corner is None:
+        if not self.moves:
             return np.zeros((self.inside.shape[1], 0))
-        return self.corner.adrift(*self._moved)
+        return self.wheel.adrift(*self._moved)
 
     @property
     def air_mass(self) -> float:
@@ -194,7 +200,8 @@ def project(
     fem.operators, or None. Collective.
     """
     moved = comm.allreduce(carried @ modes.vectors)
-    losing = None if loss is None else _loss_factors(modes, loss, comm, known)
+    done = None if known is None else known.loss_factor
+    losing = None if loss is None else loss_factors(modes, loss, comm, done)
     if rotation is None:
         return Projection(squares=modes.squares, momentum=moved, loss_factor=losing)
 
@@ -221,30 +228,15 @@ def with_corner(
     places: np.ndarray,
     comm: MPI.Comm,
 ) -> Projection:
-    """The projection on the modes (all rows), joined by a wheel that moves where there is one; `places` (s, 3) m
-    of the outer face in the static state. Collective."""
-    if axle is None:
+    """The projection on the modes (all rows), joined by the wheel, one that is held where `axle` is None; `places` (s, 3) m
+    of the outer face in the static state; as it is without a `rim`. Collective."""
+    if rim is None:
         return projection
-    assert rim is not None, "with an axle that moves come the motions of the rim"
-    return replace(projection, corner=meeting(axle, rim, modes.vectors, places, comm))
+    return replace(
+        projection, corner=meeting(axle or Axle.held(), rim, modes.vectors, places, comm)
+    )
 
 
 def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projection:
     """The projection on the modes (all rows), joined by the air where there is any. Collective."""
-    if air is None:
-        return projection
-    return replace(projection, air=Air(air.duct, air.coupling(modes.vectors)))
-
-
-def _loss_factors(
-    modes: Modes, loss: PETSc.Mat, comm: MPI.Comm, known: Projection | None
-) -> np.ndarray:
-    """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of modes of unit mass; 0 of rigid ones. Collective."""
-    done = np.zeros(0) if known is None or known.loss_factor is None else known.loss_factor
-    lost = np.empty(modes.vectors.shape[1] - len(done))
-    for start in range(0, len(lost), CHUNK):
-        some = modes.vectors[:, len(done) + start : len(done) + start + CHUNK]
-        lost[start : start + CHUNK] = (some * multiply(loss, some)).sum(axis=0)
-    squares = modes.squares[len(done) :]
-    eta = np.divide(comm.allreduce(lost), squares, out=np.zeros(len(squares)), where=squares > 0)
-    return np.concatenate([done, eta])
+    return replace(projection, air=Air(air.duct, air.coupling(modes.vectors)) if air else None)

@@ -72,14 +72,14 @@ def decouple(projection: Projection, turning: Turning, comm: MPI.Comm) -> StateM
 
 def _decoupled(projection: Projection, turning: Turning, comm: MPI.Comm) -> tuple[StateModes, dict]:
     """The states and the figures of modal.rotating.checks. Collective."""
-    if turning.speed == 0 and projection.air is None and projection.corner is None:
+    if turning.speed == 0 and projection.air is None and not projection.moves:
         return standing(projection, turning.damping), {}
     if turning.speed and projection.gyroscopic is None:
         raise InputError(
             "these modes were projected for a wheel that stands: project the rotation too"
         )
-    if projection.corner is not None:
-        projection.corner.check(turning.speed)
+    if projection.moves:
+        projection.wheel.check(turning.speed)
     given, adrift = pencil(projection, turning), projection.adrift
 
     def solve() -> tuple[StateModes, dict]:

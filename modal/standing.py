@@ -70,10 +70,8 @@ def projected(
     projection = project(modes, matrices, operators.carried, comm, loss=loss)
     if loss is not None:
         loss.destroy()
-    rim = motions.rim_motion if axle else None
-    joined = with_corner(
-        with_air(projection, modes, air), modes, axle, rim, motions.static.positions, comm
-    )
+    given = axle, motions.rim_motion(rotation), motions.static.positions, comm
+    joined = with_corner(with_air(projection, modes, air), modes, *given)
     return ModalBasis(
         frequency=modes.frequency,
         shape=operators.trace(modes.vectors),

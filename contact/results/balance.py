@@ -52,7 +52,7 @@ class Motion:
     def known(rolling: RollingModes, response: Response) -> bool:
         """Whether the losses of these states can be told."""
         projection = rolling.basis.projection
-        plain = not rolling.full and projection.air is None and projection.corner is None
+        plain = not rolling.full and projection.air is None and not projection.moves
         moving = rolling.turning.speed > 0 and not len(response.block)
         return plain and moving and own_states(response, rolling)
 

@@ -11,25 +11,32 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import ufl
+from dolfinx import fem
 from petsc4py import PETSc
 
+from tireroad.fem import compat
 from tireroad.fem.axle import Axle
 from tireroad.fem.collective import summed
-from tireroad.fem.matrices.direct import multiply
-from tireroad.fem.matrices.operators import Operators
-from tireroad.fem.matrices.support import Support, rigid_motions
-from tireroad.fem.static.virtual_work import Rolling
+from tireroad.fem.matrices.support import FIXED, TURN, Unknowns, rigid_motions, turning_moments
+from tireroad.fem.static.virtual_work import (
+    AT_REST,
+    Rolling,
+    body_rate_form,
+    convection_form,
+    convective_form,
+    static_residual,
+)
 from tireroad.fem.tire.body import Body
 
 TRANSLATIONS = slice(0, 3)
-NAMES = ("mass", "stiffness", "gyroscopic", "convective")
 
 
 @dataclass(frozen=True)
 class RimMotion:
     """By the names of the matrices, `rows` (n, 6): X R on own unknowns of the tire with a fixed rim, and
-    `whole` (6, 6): R^T X R with the rim's own part; kg, N/m, kg/rad, kg/rad2 and with m or m2 for rotations.
-    Without gyroscopic and convective ones when the wheel stands.
+    `whole` (6, 6): R^T X R with the rim's own part; kg, N/m, kg/rad, kg/rad2 and with m or m2 for rotations. `rows`
+    have "body", B R, besides. Without gyroscopic, convective and body ones when the wheel stands.
     """
 
     rows: dict[str, np.ndarray]
@@ -37,29 +44,69 @@ class RimMotion:
 
 
 def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> RimMotion:
-    """The rim's motions at the body's present displacement; the rim's static forces turn with it. Collective."""
-    operators = Operators(body, inflation, Support("free"), rolling)
-    unknowns = operators.unknowns
+    """The rim's motions at the body's present displacement; the rim's static forces turn with it. Collective.
+
+    No matrix is made: stresses, cords and pressure turn with the material, F(Q x) = Q F(x), so that of a rotation
+    about e_k  K R = e_k x F,  F the nodal forces of the static state; the others act on R as linear forms.
+    """
+    comm, unknowns = body.comm, Unknowns(body, FIXED)
     points = body.lattice.points(body.ids) + body.owned(body.u.x.array)
-    motions = rigid_motions(points)[unknowns.free]
-    if unknowns.rim is not None and unknowns.rim.mine:
-        motions = np.vstack([motions, np.linalg.inv(unknowns.rim.coordinates)])
-    products = {"mass": operators.mass[:, None] * motions}
-    products["stiffness"] = _still(multiply(operators.stiffness, motions))
-    operators.stiffness.destroy()
+    motions = rigid_motions(points)
+    force = _nodal_forces(body, inflation, AT_REST)
+    products = {"mass": body.nodal_mass()[:, None] * motions, "stiffness": np.zeros_like(motions)}
+    for k, unit in enumerate(np.eye(3)):
+        products["stiffness"][:, TURN + k] = np.cross(unit, force).ravel()
     if turns:
-        rotation = operators.rotation()
-        for name in ("gyroscopic", "convective"):
-            products[name] = _still(multiply(getattr(rotation, name), motions))
-        _destroy(*vars(rotation).values())
-    rows = {name: product[: len(unknowns.free)] for name, product in products.items()}
-    comm = body.comm
+        products |= _turning(body, motions)
+    rows = {name: product[unknowns.free] for name, product in products.items()}
+    products.pop("body", None)
     whole = {name: summed(comm, motions.T @ product) for name, product in products.items()}
-    for name in set(NAMES[1:]) & set(whole):
-        sign = -1 if name == "gyroscopic" else 1
-        whole[name] = (whole[name] + sign * whole[name].T) / 2
-        whole[name][TRANSLATIONS] = whole[name][:, TRANSLATIONS] = 0.0
+    # The wheel takes the forces of the rim: of the tire's own nodes, and the rim's where it rolls beside them.
+    rim = np.setdiff1d(np.arange(body.nodes), unknowns.free // 3)
+    turned = _nodal_forces(body, inflation, rolling)[rim].T @ points[rim] - force.T @ points
+    turned = summed(comm, turned)
+    whole["stiffness"] = np.zeros((6, 6))
+    whole["stiffness"][TURN:, TURN:] = turning_moments(turned)
+    for name, sign in (("gyroscopic", -1), ("convective", 1)):
+        if name in whole:
+            whole[name] = (whole[name] + sign * whole[name].T) / 2
+            whole[name][TRANSLATIONS] = whole[name][:, TRANSLATIONS] = 0.0
     return RimMotion(rows, whole)
+
+
+def _nodal_forces(body: Body, inflation: float, rolling: Rolling) -> np.ndarray:
+    """Of stresses, pressure and rolling, own nodes (nodes, 3) N. Collective."""
+    work = static_residual(body, fem.Constant(body.mesh, inflation), rolling)
+    return _assembled(body, work)
+
+
+def _assembled(body: Body, form: ufl.Form) -> np.ndarray:
+    """Own rows (nodes, 3) of a linear form. Collective."""
+    out = fem.petsc.assemble_vector(compat.form(form))
+    out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    found = out.array_r.reshape(-1, 3).copy()
+    out.destroy()
+    return found
+
+
+def _turning(body: Body, motions: np.ndarray) -> dict[str, np.ndarray]:
+    """G R, S R and B R (3 nodes, 6); a translation meets nothing in G and S: what is there is rounding, or the mesh's
+    error in a closed surface. Collective."""
+    field = fem.Function(body.space)
+    forms = {
+        "gyroscopic": convection_form(body),
+        "convective": convective_form(body),
+        "body": body_rate_form(body),
+    }
+    acting = {name: ufl.action(form, field) for name, form in forms.items()}
+    out = {name: np.zeros_like(motions) for name in forms}
+    for k, motion in enumerate(motions.T):
+        body.owned(field.x.array)[:] = motion.reshape(-1, 3)
+        field.x.scatter_forward()
+        for name, form in acting.items():
+            if k >= TURN or name == "body":
+                out[name][:, k] = _assembled(body, form).ravel()
+    return out
 
 
 def carried_pencil(
@@ -76,14 +123,3 @@ def carried_pencil(
         drag[:6, :6] += speed * (2 * whole["gyroscopic"] + axle.gyroscopic)
         stiffness[:6, :6] += speed**2 * whole["convective"]
     return mass, drag, stiffness
-
-
-def _still(product: np.ndarray) -> np.ndarray:
-    """A translation meets nothing: what is there is rounding, or the mesh's error in a closed surface."""
-    product[:, TRANSLATIONS] = 0.0
-    return product
-
-
-def _destroy(*matrices: PETSc.Mat) -> None:
-    for matrix in matrices:
-        matrix.destroy()

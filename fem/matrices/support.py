@@ -164,11 +164,15 @@ class Rim:
 
     def turning_stiffness(self, force: np.ndarray) -> np.ndarray:
         """W (6, 6) of static forces (d,) N on the rim's dofs that turn with it. Collective."""
-        force = force.reshape(-1, 3)
-        product = summed(self._comm, force.T @ self._points)
+        product = summed(self._comm, force.reshape(-1, 3).T @ self._points)
         whole = np.zeros((6, 6))
-        whole[TURN:, TURN:] = (product + product.T) / 2 - np.trace(product) * np.eye(3)
+        whole[TURN:, TURN:] = turning_moments(product)
         return self.coordinates.T @ whole @ self.coordinates
+
+
+def turning_moments(product: np.ndarray) -> np.ndarray:
+    """W_ab (3, 3) N m/rad of forces that turn along, from sum_i r_a x_b N m."""
+    return (product + product.T) / 2 - np.trace(product) * np.eye(3)
 
 
 def rigid_motions(points: np.ndarray) -> np.ndarray:

@@ -113,6 +113,12 @@ def convection_form(body: Body) -> ufl.Form:
     return body.inertia(skew)
 
 
+def convective_form(body: Body) -> ufl.Form:
+    """S: -int rho (grad v w) . (grad u w), in trial and test functions."""
+    w, convect = kinematics.wheel_velocity(body.mesh), kinematics.convective
+    return body.inertia(-ufl.inner(convect(body.test, w), convect(body.trial, w)))
+
+
 def body_rate_form(body: Body) -> ufl.Form:
     """B = G - Q, Q = int rho v . (e_y x u)."""
     u, v = body.trial, body.test

@@ -10,6 +10,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.collective import summed
+from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.spectrum import Part, Slice
 from tireroad.modal.solver.team import Team
 
@@ -128,3 +129,18 @@ def projected(
     if known is not None:
         out[:k, :k] = known
     return out
+
+
+def loss_factors(
+    modes: Modes, loss: PETSc.Mat, comm: MPI.Comm, known: np.ndarray | None
+) -> np.ndarray:
+    """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of modes of unit mass; 0 of rigid ones. `known`: of the first
+    of them. Collective."""
+    done = np.zeros(0) if known is None else known
+    lost = np.empty(modes.vectors.shape[1] - len(done))
+    for start in range(0, len(lost), CHUNK):
+        some = modes.vectors[:, len(done) + start : len(done) + start + CHUNK]
+        lost[start : start + CHUNK] = (some * multiply(loss, some)).sum(axis=0)
+    squares = modes.squares[len(done) :]
+    eta = np.divide(comm.allreduce(lost), squares, out=np.zeros(len(squares)), where=squares > 0)
+    return np.concatenate([done, eta])

@@ -105,11 +105,13 @@ def static(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 
 def contact(file: h5py.File) -> dict[str, Callable[[Path], object]]:
-    """contact_force.csv: total force, and axle force, over time."""
+    """contact_force.csv: total force, axle force and moments on the hub over time."""
     columns = {"time [s]": file["time"][()]}
     columns |= _components("contact force", file["total_force"][()], "N")
     if "axle_force" in file:
         columns |= _components("axle force", file["axle_force"][()], "N")
+    if "hub_moment" in file:
+        columns |= _components("hub moment", file["hub_moment"][()], "N m")
     if "active" in file:
         columns["points in contact [-]"] = file["active"][()]
     return _table("contact_force.csv", columns) | _page(xdmf.contact(file))
@@ -118,9 +120,9 @@ def contact(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 def spectra(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     """spectra.csv: complex spectra; third_octave.csv: levels of all quantities, with their errors; density.csv."""
     columns = {"frequency [Hz]": file["frequency"][()]}
-    for name in ("axle_force", "contact_force"):
+    for name, unit in (("axle_force", "N"), ("contact_force", "N"), ("hub_moment", "N m")):
         if name in file:
-            columns |= _components(name.replace("_", " "), file[name][()], "N")
+            columns |= _components(name.replace("_", " "), file[name][()], unit)
     files = _table("spectra.csv", columns)
     if "third_octave/centre" in file:
         files |= _table("third_octave.csv", bands(file["third_octave"]))
@@ -166,6 +168,8 @@ def response(file: h5py.File) -> dict[str, Callable[[Path], object]]:
             columns |= _components(f"displacement {point + 1}", moved[:, point], "m")
         if "axle_force" in file:
             columns |= _components("axle force", file["axle_force"][()], "N")
+        if "hub_moment" in file:
+            columns |= _components("hub moment", file["hub_moment"][()], "N m")
         files |= _table("response.csv", columns)
     if "receptance" in file:
         columns, values = {"frequency [Hz]": file["frequency"][()]}, file["receptance"][()]

@@ -85,7 +85,7 @@ class GreensStage(Computed[Responses]):
         response = selected(whole, rolling, wanted, points.counted)
         seen, kept = (one.between(points.counted, points.counted) for one in (whole, response))
         record.indicators |= judged(points.name, seen, kept, rolling, wanted)
-        if rolling.basis.projection.corner is not None:
+        if rolling.basis.projection.moves:
             loads, top = points.loads[points.counted], band(rolling, wanted)
             corner.check_blocked(record, rolling, loads, top)
         responses = Responses(**self._apart(points.name, response))
@@ -112,15 +112,16 @@ class GreensStage(Computed[Responses]):
 
     def _apart(self, name: str, whole: Response) -> dict[str, Response]:
         """The contact's response, the prescribed forces among its inputs (contact.driven), and theirs."""
-        forces = len(self.job.scene.force)
-        if name == "force" or not (forces or self.job.axle):
+        forces, more = len(self.job.scene.force), corner.readings(self.job)
+        if name == "force" or not (forces or more):
             return {name: whole}
         count = len(components(self.job)) * len(self.setup.product.patch.index)
         inputs = count + forces
         contact = {"contact": whole.between(slice(None), slice(inputs))}
         if not forces:
             return contact
-        readings = slice(inputs, inputs + 3 * forces)
+        held = 0 if self.job.axle else more
+        readings = slice(inputs, inputs + 3 * forces + held)
         return contact | {"force": whole.between(readings, slice(count, inputs))}
 
     def _describe(self, record: Record, responses: Responses) -> None:

@@ -102,7 +102,7 @@ class ResponseStage(Computed[PointResponse]):
     def _integration(self, record: Record, seen: Driven) -> Integration:
         """Step and scheme of given forces. Collective."""
         scene = self.job.scene
-        plan = planned(self.job, record, seen.response, shortest_period(scene.force))
+        plan = planned(self.job, record, seen.whole, shortest_period(scene.force))
         # Given forces have no contact to chatter: linear over the step is of the higher order.
         scheme = "linear" if scene.time.scheme == "auto" else scene.time.scheme
         return integration(self.job, plan, scheme)
@@ -110,7 +110,7 @@ class ResponseStage(Computed[PointResponse]):
     def _in_time(self, record: Record, seen: Driven) -> Curves:
         """Displacements and axle force of the prescribed forces. Collective."""
         scene, chosen, force = self.job.scene, seen.integration, seen.force()
-        displacement, axle = self._marched(record, seen, force)
+        displacement, axle, moment = self._marched(record, seen, force)
         record.headline |= {
             "step": (chosen.step, "s"),
             "scheme": (chosen.scheme, "-"),
@@ -123,16 +123,17 @@ class ResponseStage(Computed[PointResponse]):
         }
         if scene.output.axle_force and scene.modal.rim != "free":  # else nothing holds the axle
             curves["axle_force"] = axle, "N"
+            curves |= {"hub_moment": (moment, "N m")} if moment.size else {}
         return curves
 
     def _marched(self, record: Record, seen: Driven, force: np.ndarray) -> tuple:
-        """Displacement (nt, 3 k) and axle force (nt, 3) under forces (nt, k). Collective."""
+        """Displacement (nt, 3 k), axle force (nt, 3) and moments on the hub (nt, 3 or 0) under forces (nt, k). Collective."""
         tire, direction = seen.integration.tire, directions(self.job.scene.force)
-        displacement, axle = np.zeros((len(force), 3 * len(direction))), np.zeros((len(force), 3))
+        displacement, axle = np.zeros((len(force), len(tire.same_step))), np.zeros((len(force), 3))
         tire.start(force[0])
         axle[0] = force[0] @ direction - tire.inertia_force()
-        if not seen.response.pulse:
-            displacement[0] = seen.response.residual @ force[0]
+        if not seen.whole.pulse:
+            displacement[0] = seen.whole.residual @ force[0]
         with record.timing("time loop"), observe.Progress("response", len(force) - 1) as bar:
             for k in range(1, len(force)):
                 free = tire.predict()
@@ -140,4 +141,5 @@ class ResponseStage(Computed[PointResponse]):
                 displacement[k] = free + tire.same_step @ force[k]
                 axle[k] = force[k] @ direction - tire.inertia_force()
                 bar.advance()
-        return displacement, axle
+        displacement, moment = np.split(displacement, [3 * len(direction)], axis=1)
+        return displacement, axle, moment

@@ -178,7 +178,7 @@ def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
     }
     if rolling.basis.projection.air is not None:
         cavity.describe(record, rolling)
-    if rolling.basis.projection.corner is not None:
+    if rolling.basis.projection.moves:
         corner.describe(record, rolling)
     if len(oscillating):
         record.headline["lowest"] = (float(oscillating.imag.min() / (2 * np.pi)), "Hz")

@@ -33,8 +33,8 @@ class Spectra:
     `axle_force`, (f, 3) N; third octaves: band `centre` (b,) Hz, `level` of the axle force and
     `contact_level` (b, 3) dB re 1 N, with their estimated errors `level_error` and `contact_level_error` dB,
     NaN where unknown, None where they were not wanted. The first `left_out` s of the run, its run-in, are not in them, nor
-    is anything beyond the `limit` of the model. `wheel`: the motions of a wheel that moves and the moments on its
-    hub, (f, 3) or (f, 1), by the names of runs.stages.build.corner. `levels`: third octaves of all that the run tells, and
+    is anything beyond the `limit` of the model. `wheel`: the moments on the hub and the motions
+    of a wheel that moves, (f, 3) or (f, 1), by the names of runs.stages.build.corner. `levels`: third octaves of all that the run tells, and
     densities, by the names of runs.stages.stored.levels.
     """
 

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.model import SmallMotions
-from tireroad.greens.axle import by_momentum, from_moment
+from tireroad.greens.axle import by_free_rim, by_momentum, from_moment
 from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.standing import solved
 from tireroad.runs.measure.tabulate import Table
@@ -148,5 +148,6 @@ def _free_rim(tires: Tires) -> Iterator[Found]:
     wheel, modes = wheel_of(free, tires.wheel.turning), solved(free.operators, count=max(COUNTS))
     for count in COUNTS:
         began = time.perf_counter()
-        transfer = wheel.axle(modes.first(count), loads, FREQUENCY)
+        given = modes.first(count), loads, FREQUENCY, motions.rim_motion(wheel.speed != 0)
+        transfer = by_free_rim(wheel, *given)[:, :3]
         yield Found("free rim", count, transfer, time.perf_counter() - began)

@@ -159,7 +159,7 @@ def wheel(speed: float, count: int, axle_at: int = 0):
         speed=speed,
         damping=DAMPING,
         inertia="full",
-        corner=corner if axle else None,
+        corner=corner,
     )
     projection = corner(projection, modes)
     states = full.decouple(projection, COMM)

@@ -1,4 +1,4 @@
-"""What the report says of a wheel that moves."""
+"""What the report says of the wheel: moments on its hub, and how it moves where it does."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,18 @@ _AXES = "xyz"
 
 
 def wheel(results: Results, section: Section, time: NDArray) -> None:
-    """Adds the motion of wheel and body, and the moments on the hub, where the wheel moves (contact.h5)."""
+    """Adds the moments on the hub, and the motion of wheel and body where the wheel moves (contact.h5)."""
     moved = results.optional("contact.h5", "wheel/translation")
+    moment = results.optional("contact.h5", "hub_moment")
+    if moment is not None:
+        hub = "the held axle" if moved is None else "the hub"
+        for axis, name in enumerate(_AXES):
+            section.facts.append(
+                (f"greatest moment on {hub}, {name}", _most(moment[:, axis], "N m"))
+            )
     if moved is None:
         return
     turned = results.array("contact.h5", "wheel/rotation")
-    moment = results.array("contact.h5", "hub_moment")
     body = results.array("contact.h5", "body/height")
     for axis, name in enumerate(_AXES):
         if np.abs(moved[:, axis]).max() > 0:
@@ -27,7 +33,6 @@ def wheel(results: Results, section: Section, time: NDArray) -> None:
         if np.abs(turned[:, axis]).max() > 0:
             turn = _most(turned[:, axis], "rad")
             section.facts.append((f"greatest rotation of the wheel, {name}", turn))
-        section.facts.append((f"greatest moment on the hub, {name}", _most(moment[:, axis], "N m")))
     lines = {"wheel, z": moved[:, 2], "body, z": body}
     shown = {name: 1e3 * line for name, line in lines.items() if np.abs(line).max() > 0}
     if shown:

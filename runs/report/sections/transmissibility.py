@@ -26,17 +26,30 @@ def add(results: Results, section: Section, names: list[str]) -> None:
         transmissibilities(frequency, found, other, names),
         "Force on the axle per force at the point, by momentum; dashed: by modes of a tire with a free rim.",
     )
-    if other is not None:
-        apart = np.linalg.norm(other - found) / np.linalg.norm(found)
-        fact = "axle force by the free rim off that by momentum"
-        section.facts.append((fact, quantity(100 * float(apart), "%")))
+    turning, held = (
+        results.optional(name, f"transmissibility/{part}") for part in ("moment", "free_rim_moment")
+    )
+    if turning is not None:
+        section.show(
+            transmissibilities(frequency, turning, held, names, "dB re 1 N m/N"),
+            "Moment on the axle, about its centre, per force at the point.",
+        )
+    for what, one, by_momentum in (("force", other, found), ("moment", held, turning)):
+        if one is not None and by_momentum is not None:
+            apart = np.linalg.norm(one - by_momentum) / np.linalg.norm(by_momentum)
+            fact = f"axle {what} by the free rim off that by momentum"
+            section.facts.append((fact, quantity(100 * float(apart), "%")))
 
 
 @styled
 def transmissibilities(
-    frequency: NDArray, found: NDArray, other: NDArray | None, names: list[str]
+    frequency: NDArray,
+    found: NDArray,
+    other: NDArray | None,
+    names: list[str],
+    reference: str = "dB re 1 N/N",
 ) -> str:
-    """Magnitudes of (f, 3, k) in dB re 1, a row a point."""
+    """Magnitudes of (f, 3, k) in dB of the `reference`, a row a point."""
     rows = min(found.shape[2], POINTS)
     figure, axes = canvas(9.5, 2.4 * rows + 0.4, rows, sharex=True)
     floor = LEAST * np.abs(found).max()
@@ -49,7 +62,7 @@ def transmissibilities(
                 level = 20 * np.log10(np.maximum(np.abs(values[:, column, point]), floor))
                 label = component if dashes == "-" else None
                 here.plot(frequency, level, dashes, color=COLOURS[column], label=label)
-        here.set(title=names[point], ylabel="dB re 1 N/N")
+        here.set(title=names[point], ylabel=reference)
         here.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)
     axes[-1, 0].set_xlabel("frequency in Hz")
     return encode(figure)

@@ -1,4 +1,4 @@
-"""A wheel that moves in a run: what its modes hold for it, and what a contact loop tells of it."""
+"""The wheel in a run: what the modes hold for it, and what is read of it as it moves or is held."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 
-READINGS = SEEN + 3  # motions of wheel and body, moments on the hub
+MOMENTS = 3  # on the hub: what is read of every wheel, after all else
 UNITS = {
     "wheel/translation": "m",
     "wheel/rotation": "rad",
@@ -29,7 +29,6 @@ _PLACES = {
     "wheel/translation": slice(0, 3),
     "wheel/rotation": slice(3, 6),
     "body/height": slice(6, 7),
-    "hub_moment": slice(7, 10),
 }
 _FREQUENCIES, _LOADS = 25, 20
 
@@ -39,6 +38,23 @@ def inputs(job: Job) -> dict | None:
     return asdict(job.scene.axle) if job.axle else None
 
 
+def readings(job: Job) -> int:
+    """How many more outputs a response has: motions of wheel and body, and moments on the hub; of a wheel that is held the
+    moments alone, where the force on the axle is wanted; of a free rim, and with pulses for a residual, none.
+    """
+    if job.axle:
+        return SEEN + MOMENTS
+    modal, wanted = job.scene.modal, job.scene.output.axle_force
+    pulse = job.scene.greens.residual == "dirac"  # which would answer at once with moments too
+    return MOMENTS if wanted and not pulse and (modal.rim, modal.road) == ("fixed", "forces") else 0
+
+
+def layout(job: Job) -> dict[str, tuple[tuple, str]]:
+    """Shape of a step and unit of what is read, by the names in contact.h5."""
+    names = {0: (), MOMENTS: ("hub_moment",)}.get(readings(job), tuple(UNITS))
+    return {name: ((3,) if name != "body/height" else (), UNITS[name]) for name in names}
+
+
 def fill(file: h5py.File, corner: Corner | None) -> None:
     """Write what the rim's motions meet beside the modes; the axle itself is the scene's."""
     for name in ARRAYS if corner else ():
@@ -46,15 +62,17 @@ def fill(file: h5py.File, corner: Corner | None) -> None:
 
 
 def read(file: h5py.File, axle: Axle | None) -> Corner | None:
-    """The corner of a file of modes, with the scene's axle."""
-    if axle is None:
+    """The corner of a file of modes, with the scene's axle, or held."""
+    if "corner" not in file:
         return None
-    return Corner(axle=axle, **{name: file[f"corner/{name}"][:] for name in ARRAYS})
+    return Corner(axle=axle or Axle.held(), **{name: file[f"corner/{name}"][:] for name in ARRAYS})
 
 
-def widened(probes: sparse.csr_matrix) -> sparse.csr_matrix:
-    """Probes (k, 3 s) of the outer face, with those of wheel, body and hub after them, (k + 10, 3 s + 10)."""
-    return sparse.block_diag([probes, sparse.identity(READINGS)], format="csr")
+def widened(probes: sparse.csr_matrix, count: int) -> sparse.csr_matrix:
+    """Probes (k, 3 s) of the outer face, with the last `count` of those of wheel, body and hub after them,
+    (k + count, 3 s + 10)."""
+    every = sparse.identity(SEEN + MOMENTS, format="csr")
+    return sparse.block_diag([probes, every[SEEN + MOMENTS - count :]], format="csr")
 
 
 def standing_moment(patch: Patch) -> np.ndarray:
@@ -67,10 +85,11 @@ def standing_moment(patch: Patch) -> np.ndarray:
 
 
 def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
-    """Datasets of contact.h5 (n, ...) from readings (n, 10); `static` N m as above."""
-    out = {name: readings[:, place] for name, place in _PLACES.items()}
-    out["body/height"] = out["body/height"][:, 0]
-    out["hub_moment"] = out["hub_moment"] + static
+    """Datasets of contact.h5 (n, ...) from readings (n, 10), or (n, 3) of the moments; `static` N m as above."""
+    out = {"hub_moment": readings[:, -MOMENTS:] + static}
+    if readings.shape[1] > MOMENTS:
+        out |= {name: readings[:, place] for name, place in _PLACES.items()}
+        out["body/height"] = out["body/height"][:, 0]
     return out
 
 

@@ -9,6 +9,7 @@ from scipy import sparse
 
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
+from tireroad.greens.axle import by_free_rim
 from tireroad.greens.coupling import Wheel
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
@@ -47,7 +48,17 @@ class Driven:
     @property
     def response(self) -> Response:
         """Displacement (3 k) per force (k) of the tire as it turns, without the road."""
+        return self.whole.between(slice(3 * len(self.job.scene.force)), slice(None))
+
+    @property
+    def whole(self) -> Response:
+        """The same, and where the axle is held and its force wanted, the moments (3) on it after the displacements."""
         return self.greens.product.force
+
+    def moments(self, frequency: Array) -> Array | None:
+        """Moment (f, 3, k) m on the held axle per given force, at `frequency` (f,) Hz; None where it is not known."""
+        read = self.whole.between(slice(3 * len(self.job.scene.force), None), slice(None))
+        return read.receptance(frequency) if len(read.residual) else None
 
     def of_contact(self, name: str) -> Array:
         """An array of contact.h5 by its name, e.g. "normal_force" (nt, c) N, on every process. Collective."""
@@ -58,15 +69,17 @@ class Driven:
         return driven_points(self.job)
 
     def by_free_rim(self, count: int, frequency: Array) -> tuple[Array, float]:
-        """Force (f, 3, k) of the tire on the held axle per given force, by `count` modes of the same static state with
-        its rim let go; the highest of them, Hz. Collective."""
+        """Force and moment (f, 6, k) of the tire on the held axle per given force, by `count` modes of the same static
+        state with its rim let go; the highest of them, Hz. Collective."""
         turning = turning_of(self.job)
         motions = SmallMotions(
             self.job.tire, self.static, rim="free", road=self.job.scene.modal.road
         )
         basis = standing_modes(motions, count=count, rotation=turning.speed != 0)
         wheel = wheel_of(motions, turning, projection=basis.projection)
-        found = wheel.axle(basis.modes, self.points()[0], frequency)
+        held = SmallMotions(self.job.tire, self.static)
+        motion = held.rim_motion(turning.speed != 0)
+        found = by_free_rim(wheel, basis.modes, self.points()[0], frequency, motion)
         return found, float(basis.frequency[-1])
 
     @property

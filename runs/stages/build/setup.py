@@ -85,7 +85,7 @@ def components(job: Job) -> tuple[int, ...]:
 @dataclass(frozen=True)
 class Probes:
     """What is driven and read, on the outer face: `name` "contact" or "force", `outputs` (r, 3 s) and
-    `loads` (k, 3 s), or wider with a wheel that moves; `counted` of both are displacements at loads."""
+    `loads` (k, 3 s), or wider where the wheel is read too; `counted` of both are displacements at loads."""
 
     name: str
     outputs: sparse.csr_matrix
@@ -96,8 +96,9 @@ class Probes:
 def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
     """Of the contact patch with what prescribed forces add to it, or of the prescribed forces alone."""
     loads, readings = driven_points(job) if job.scene.force else (None, None)
+    more = corner.readings(job)
     if setup is None:
-        return Probes("force", readings, loads)
+        return _driven_alone(loads, readings, 0 if job.axle else more)
     count, index = len(state.points), setup.patch.index
     frames = state.frames
     parts = [
@@ -109,10 +110,21 @@ def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
     if job.scene.force:
         parts += [loads, readings]
     points = sparse.vstack(parts, format="csr")
-    if job.axle is None:
+    if not more:
         return Probes("contact", points, points)
-    points, last = corner.widened(points), points.shape[0]
+    points, last = corner.widened(points, more), points.shape[0]
     return Probes("contact", points, points, slice(last))
+
+
+def _driven_alone(loads: sparse.csr_matrix, readings: sparse.csr_matrix, more: int) -> Probes:
+    """Of prescribed forces, and `more` readings of the wheel."""
+    if not more:
+        return Probes("force", readings, loads)
+    wide, last = corner.widened(readings, more), readings.shape[0]
+    loads = sparse.csr_matrix(
+        (loads.data, loads.indices, loads.indptr), (len(loads.indptr) - 1, wide.shape[1])
+    )
+    return Probes("force", wide, loads, slice(last))
 
 
 def driven_points(job: Job) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:

@@ -1,4 +1,4 @@
-"""Force on the held axle per force at the driven points, over frequency: by momentum, and by a free rim."""
+"""Force and moment on the held axle per force at the driven points, over frequency: by momentum, and by a free rim."""
 
 from __future__ import annotations
 
@@ -25,13 +25,15 @@ if TYPE_CHECKING:
 # Of the highest mode. Of a tire of 48 MPa with 60, 120, 250 modes (311, 448, 687 Hz) the two ways are 0.5, 0.25, 0.2 %
 # apart up to half of it, and 40, 3, 0.2 % up to 300 Hz.
 LIMIT = 0.5
-FREQUENCY, MOMENTUM, FREE_RIM = (
-    f"transmissibility/{name}" for name in ("frequency", "momentum", "free_rim")
+FREQUENCY, MOMENTUM, FREE_RIM, MOMENT, FREE_RIM_MOMENT = (
+    f"transmissibility/{name}"
+    for name in ("frequency", "momentum", "free_rim", "moment", "free_rim_moment")
 )
 
 
 @OUTPUTS.register(
-    "transmissibility", "force on the held axle per force at each driven point, over frequency"
+    "transmissibility",
+    "force and moment on the held axle per force at each driven point, over frequency",
 )
 class Transmissibility(Output):
     to: float = number(300.0, "Hz", "highest frequency", least=1e-3, most=1e6)
@@ -58,9 +60,9 @@ class Transmissibility(Output):
         )
 
     def curves(self, seen: Driven, record: Record) -> Curves:
-        """The curves (f, 3, k), -, of k driven points, from `step` to `to` Hz: force of the tire on the axle per
-        force. By the momentum of the response's states and, where the scene asks for it, by modes of the tire
-        with a free rim (greens.axle): each checks the other. Collective.
+        """The curves (f, 3, k) of k driven points, from `step` to `to` Hz: force, -, of the tire on the axle per
+        force, and moment, m, about its centre. By the momentum of the response's states and, where the scene asks for
+        it, by modes of the tire with a free rim (greens.axle): each checks the other. Collective.
         """
         from tireroad.greens.axle import by_momentum
 
@@ -73,14 +75,22 @@ class Transmissibility(Output):
         record.headline["largest force on the axle per force"] = (float(np.abs(found[peak])), "-")
         record.headline["force on the axle is largest at"] = (float(frequency[peak[0]]), "Hz")
         curves: Curves = {FREQUENCY: (frequency, "Hz"), MOMENTUM: (found, "-")}
+        moment = seen.moments(frequency)
+        if moment is not None:
+            curves[MOMENT] = moment, "m"
         highest = float(seen.modes.product.frequency[-1])
         if self.free_rim:
             with record.timing("free rim"):
                 other, top = seen.by_free_rim(self.free_rim, frequency)
             highest = min(highest, top)
-            curves[FREE_RIM] = other, "-"
-            name = f"axle force by the free rim off that by momentum up to {self.to:.4g} Hz"
-            record.indicators[name] = (apart(other, found), "-")
+            force, turning = np.split(other, 2, axis=1)
+            curves |= {FREE_RIM: (force, "-"), FREE_RIM_MOMENT: (turning, "m")}
+            for what, one, by_momenta in (("force", force, found), ("moment", turning, moment)):
+                if by_momenta is not None:
+                    name = (
+                        f"axle {what} by the free rim off that by momentum up to {self.to:.4g} Hz"
+                    )
+                    record.indicators[name] = (apart(one, by_momenta), "-")
         if self.to > LIMIT * highest:
             record.warnings.append(
                 f"output.transmissibility goes to {self.to:g} Hz; beyond {LIMIT * highest:.4g} Hz, half the highest mode, "

@@ -39,16 +39,13 @@ _LAYOUT: dict[str, tuple[tuple, str]] = {
     "residual": ((), "-"),
 }
 DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, where a scene has them
-_OF_WHEEL = {
-    name: ((3,) if name != "body/height" else (), unit) for name, unit in corner.UNITS.items()
-}
 
 
 @dataclass(frozen=True, kw_only=True)
 class ContactHistory:
     """What the road did to the tire, n steps of `step` s at the times `time` (n,): `total_force` (n, 3) N,
     `axle_force` (n, 3) N where it is kept, displacement (n, k, 3) m at `driven` points, where there are any, and by the names of runs.stages.corner the
-    motions and moments of a `wheel` that moves. `free_slip`: what slip was added so that the wheel rolls freely.
+    moments on the hub of the `wheel`, and its motions where it moves. `free_slip`: what slip was added so that the wheel rolls freely.
     """
 
     step: float
@@ -152,7 +149,7 @@ class ContactFile:
         road_file.fill(self._file, self._setup)
         forces = len(self._job.scene.force)
         driven: dict[str, tuple[tuple, str]] = {DRIVEN: ((forces, 3), "m")} if forces else {}
-        driven |= _OF_WHEEL if self._job.axle else {}
+        driven |= corner.layout(self._job)
         # A chunk of many points would be many megabytes: 4 MB at most is read at once.
         rows = 2 ** int(np.log2(np.clip(500_000 // max(c, 1), 1, BLOCK)))
         for name, (shape, unit) in (self._layout | driven).items():
@@ -207,7 +204,7 @@ class ContactFile:
         readings, forces = np.stack(self._readings), len(self._job.scene.force)
         points, wheel = np.split(readings, [3 * forces], axis=1)
         driven = {DRIVEN: points.reshape(-1, forces, 3)} if forces else {}
-        if self._job.axle is None:
+        if not corner.readings(self._job):
             return driven
         return driven | corner.parts(wheel, corner.standing_moment(self._patch))
 

@@ -56,12 +56,17 @@ def test_both_ways_agree_and_slow_forces_pass(tmp_path) -> None:
         group = file["transmissibility"]
         frequency, momentum, free = (group[k][:] for k in ("frequency", "momentum", "free_rim"))
         assert {group[k].attrs["unit"] for k in ("momentum", "free_rim")} == {"-"}
+        moment, other = (group[k][:] for k in ("moment", "free_rim_moment"))
+        assert group["moment"].attrs["unit"] == group["free_rim_moment"].attrs["unit"] == "m"
     assert frequency == pytest.approx(25.0 * np.arange(1, 7))
     assert momentum.shape == free.shape == (6, 3, 2)
     assert apart(free, momentum) < 0.01
+    assert moment.shape == other.shape == (6, 3, 2)
+    assert apart(other, moment) < 0.01
     stage = json.loads((tmp_path / "summary.json").read_text())["stages"]["response"]
     with h5py.File(tmp_path / "modes.h5") as file:
         assert file["frequency"][-1] < 2 * 150.0  # so the band goes beyond half the highest mode
     assert any("half the highest mode" in text for text in stage["warnings"])
     page = (tmp_path / "report.html").read_text()
     assert "Force on the axle per force at the point" in page
+    assert "Moment on the axle, about its centre" in page

@@ -15,16 +15,18 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.friction import Friction
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.free_rolling import free_slip
-from tireroad.greens.recursion import Recursion, sharers
+from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
+from tireroad.greens.sharing import sharers
 from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.point_forces import directions, histories
 
 
 def driven_tire(job: Job, tire, step: float, steps: int) -> Driven | None:
-    """The tire under the scene's prescribed forces, and with a wheel that is read, where there is either."""
+    """The tire under the scene's prescribed forces, and with a wheel whose motions or moments are read, where there is either."""
     forces = job.scene.force
-    if not forces and job.axle is None:
+    if not forces and not corner.readings(job):
         return None
     time = step * np.arange(steps + 1)
     return Driven(tire, histories(forces, time), directions(forces))

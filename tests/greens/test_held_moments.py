@@ -1,0 +1,120 @@
+"""Moments on an axle that is held: by each node of the rim in the full matrices, by very stiff springs."""
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from scipy import sparse
+from test_corner import COMM, DAMPING, FREQUENCY, SPOTS, body, loads, places, wheel
+
+from tireroad.fem import compat
+from tireroad.fem.axle import Axle
+from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.rim_motion import rim_motion
+from tireroad.fem.matrices.support import FIXED
+from tireroad.fem.static.virtual_work import (
+    AT_REST,
+    Rolling,
+    convection_form,
+    convective_form,
+    static_residual,
+    tangent,
+)
+from tireroad.fem.turning import Turning
+from tireroad.greens.basis import Basis
+from tireroad.modal.basis import with_corner
+from tireroad.modal.corner import SEEN
+from tireroad.modal.rolling import decouple
+from tireroad.modal.solver.fields import everywhere
+
+HELD = 2  # the place of the held axle in `wheel`
+EVERY = 10**6
+
+
+def by_rows(basis: Basis, speed: float, frequency: np.ndarray = FREQUENCY) -> np.ndarray:
+    """Moments (f, 3, 4) m on the hub, as a run reads them."""
+    reading = sparse.hstack(
+        [sparse.csr_matrix((3, loads(speed, SEEN).shape[1])), sparse.identity(3)], format="csr"
+    )
+    return basis.couple(reading, loads(speed, SEEN + 3)[: len(SPOTS)]).receptance(frequency)
+
+
+def off(one: np.ndarray, other: np.ndarray) -> float:
+    """Largest distance over the frequencies."""
+    size = np.linalg.norm(other, axis=(1, 2))
+    return float((np.linalg.norm(one - other, axis=(1, 2)) / size).max())
+
+
+def of_nodes(points: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Sum of x_i x f_i (3, k) over the nodes, forces (3 n, k)."""
+    return np.cross(points[:, :, None], force.reshape(len(points), 3, -1), axis=1).sum(axis=0)
+
+
+def by_nodes(speed: float) -> np.ndarray:
+    """The same from the force on each node of the rim by the full matrices, and from each node's damping, which pushes the
+    wheel as it pushes the node."""
+    made = body(speed)
+    held = Operators(made, 2e5, FIXED, Rolling(speed=speed))
+    free, static = held.unknowns.free, fem.Constant(made.mesh, 2e5)
+    rim = np.setdiff1d(np.arange(3 * made.nodes), free)
+    points = made.lattice.points(made.ids)
+    loaded = (points + made.owned(made.u.x.array)).ravel()[free].reshape(-1, 3)
+    forms = {1: (0, tangent(made, static_residual(made, static, AT_REST)))}
+    if speed:
+        forms = {**forms, 2: (1, convection_form(made)), 3: (0, convective_form(made))}
+    factor = {1: 1.0, 2: 2 * speed, 3: speed**2}
+    tire, at_rim = ([np.zeros((n, len(free))) for _ in range(2)] for n in (len(free), len(rim)))
+    for part, (order, form) in forms.items():
+        matrix = fem.petsc.assemble_matrix(compat.form(form))
+        matrix.assemble()
+        whole = everywhere(matrix)[:, free] * factor[part]
+        tire[order] += whole[free].toarray()
+        at_rim[order] += whole[rim].toarray()
+    drag = DAMPING[0] * np.diag(held.mass) + DAMPING[1] * everywhere(held.stiffness).toarray()
+    rate = np.zeros_like(drag)
+    if speed:
+        rate = speed * everywhere(held.rotation().body).toarray() / held.mass[:, None]
+    face = made.surface
+    pushed = loads(speed, 0).toarray().T.reshape(-1, 3, len(SPOTS))
+    nodal = np.zeros((made.nodes, 3, len(SPOTS)))
+    nodal[face.local] = pushed[face.place]
+    nodal = nodal.reshape(
+        -1, len(SPOTS)
+    )  # the elements beside the bead pass some of it to the wheel
+    load, out = nodal[free], []
+    for s in 2j * np.pi * FREQUENCY:
+        damped = drag @ (s * np.eye(len(free)) + rate)
+        u = np.linalg.solve(
+            s**2 * np.diag(held.mass) + s * tire[1] + tire[0] + damped, load.astype(complex)
+        )
+        pulled = (s * at_rim[1] + at_rim[0]) @ u - nodal[rim]
+        out.append(of_nodes(loaded, damped @ u) - of_nodes(points[rim[::3] // 3], pulled))
+    return np.stack(out)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("speed", [0.0, 60.0])
+def test_moments_are_those_of_the_forces_on_the_rims_nodes(speed) -> None:
+    if COMM.size > 1:
+        pytest.skip("dense matrices")
+    basis = wheel(speed, EVERY, HELD)[2]
+    assert not basis.projection.moves
+    assert off(by_rows(basis, speed), by_nodes(speed)) < 1e-7
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("speed", [0.0, 60.0])
+def test_very_stiff_springs_carry_the_moments_of_the_held_axle(speed) -> None:
+    """Springs times rotations of a wheel that hardly moves: of that motion the held axle's rows know nothing."""
+    full, modes, held = wheel(speed, 60, HELD)
+    stiff = np.diag([1e12] * 3 + [1e11] * 3)
+    axle = Axle(wheel_mass=15.0, wheel_inertia=(0.4, 0.8, 0.5), stiffness=stiff, damping=0 * stiff)
+    motion = rim_motion(body(speed), 2e5, Rolling(speed=speed), speed != 0)
+    plain = held.held.projection
+    projection = with_corner(plain, modes, axle, motion, places(speed), COMM)
+    states = decouple(projection, Turning(speed=speed, damping=DAMPING), COMM)
+    corner = Basis(shape=held.shape, projection=projection, states=states, speed=speed)
+    wide = loads(speed, SEEN + 3)
+    turned = corner.couple(wide[4:11], wide[:4]).receptance(FREQUENCY)[:, 3:6]
+    assert (
+        off(by_rows(held, speed), 1e11 * turned) < 1e-4
+    )  # the states of so stiff a hub are known to 1e-5
