@@ -8,9 +8,11 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.results.error_bars import CAUSES
+from tireroad.contact.tread.kernel import KernelTread
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.build.wall import backed
 from tireroad.runs.stages.coarser import coarser_job
 from tireroad.runs.stages.companions import Given, companions
 from tireroad.runs.stages.pipeline import run_scene
@@ -83,7 +85,9 @@ def contact_force(folder) -> np.ndarray:
 def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
     given = _given(whole)
     other, _ = run(cause, "contact", *sets)
-    forces, beside, part = companions(cause, given)[0]
+    told = companions(cause, given)
+    assert len(told) == (2 if cause == "mesh" else 1)
+    forces, beside, part = told[0]
     assert forces.step == 2e-4 and (beside is None) == (cause == "step")
     # Elements of order 2 make 3; the footprint is a few points wide, so that finer ones tell, whose errors have
     # nothing to do with the run's.
@@ -91,6 +95,41 @@ def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
     assert part == pytest.approx(wanted[cause])
     found = forces.contact
     assert found[:, 2] == pytest.approx(contact_force(other)[:, 2], rel=1e-8)
+
+
+@pytest.mark.long
+def test_the_rubber_between_nodes_is_what_finer_elements_have(run, whole):
+    """How much further a point sinks than those beside it, with nodes a third as far apart."""
+    _, finer = run("finer", "greens", "tire.segments=40", "tire.footprint_size=0.1")
+    given, fine = _given(whole), _given((None, finer))
+    made = backed(given.job, given.static.product, given.setup, given.response)
+    wall = made.contact.law.wall
+    own = sinks(given.setup.patch, given.response)
+    told = sinks(made.setup.patch, made.response, wall)
+    true = sinks(fine.setup.patch, fine.response)
+    assert 0.5 < (told - own) / (true - own) < 2.0
+
+
+def sinks(patch, response, wall=None) -> float:
+    """Of the points near the middle, m/N: under their own force beyond those under one two points away."""
+    p = len(patch.index)  # the nodes come first
+    nodes = (response.static() + response.residual)[:p, :p]
+    flexibility = patch.weights @ (patch.weights @ nodes.T).T
+    if wall is not None:
+        every = np.arange(len(patch.points))
+        flexibility = flexibility + KernelTread(patch.places, wall).block(every, every)
+    number = np.rint(patch.points[:, :2] / patch.places.spacing).astype(int)
+    at = {tuple(place): k for k, place in enumerate(number)}
+    middle = [at[i, 0] for i in (-2, -1, 0, 1, 2)]
+    beside = [[at[i - 2, 0], at[i + 2, 0]] for i in (-2, -1, 0, 1, 2)]
+    return float(
+        np.mean(
+            [
+                flexibility[k, k] - flexibility[k, b].mean()
+                for k, b in zip(middle, beside, strict=True)
+            ]
+        )
+    )
 
 
 def _given(whole) -> Given:
