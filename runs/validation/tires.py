@@ -119,13 +119,14 @@ class Tires:
         tire = Recursion(response=kept, step=choice.step, scheme="linear", comm=self.job.comm)
         return tire, choice.step, seconds + time.perf_counter() - began
 
-    def response(self, count: int, residual: str) -> Response:
-        """The response of the lowest modes, as the program's own stages make it."""
+    def response(self, count: int, residual: str, counted: bool = True) -> Response:
+        """The response of the lowest modes, as the program's own stages make it; what is `counted` of it, or all."""
         if count not in self._rolling:
             few = self.modes.first(count)
             self._rolling[count] = rolling_modes(few, turning_of(self.job), self.job.comm)
         rolling, points = self._rolling[count], self.probes
-        given = points.outputs[points.counted], points.loads[points.counted], residual
+        part = points.counted if counted else slice(None)
+        given = points.outputs[part], points.loads[part], residual
         return make_response(lambda: self.wheel, rolling, *given, lambda: rolling.basis).response
 
     def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
