@@ -129,7 +129,7 @@ def _total(loads: sparse.csr_matrix) -> np.ndarray:
 
 def _full(tires: Tires) -> Found:
     """All unknowns; the moment by the rows that modes are given, which tests hold against the forces on the rim's nodes."""
-    loads = _loads(tires)
+    loads = tires.probes.on_face.loads
     began = time.perf_counter()
     wheel, none = tires.wheel, sparse.csr_matrix((0, loads.shape[1]))
     full = wheel.rotating_stiffness, wheel.rotating_damping
@@ -148,14 +148,9 @@ def _full(tires: Tires) -> Found:
     return Found("full FE", "all", force, moment, time.perf_counter() - began)
 
 
-def _loads(tires: Tires) -> sparse.csr_matrix:
-    """On the outer face alone."""
-    return tires.probes.loads[:, : 3 * len(tires.run.static.points)]
-
-
 def _momentum(tires: Tires, count: int) -> Found:
     """The program's own way: its response, with the momentum of each state for an output."""
-    loads = _loads(tires)
+    loads = tires.probes.on_face.loads
     began = time.perf_counter()
     response = tires.response(count, "attachment", counted=False)
     transfer = by_momentum(response, _total(loads), FREQUENCY)
@@ -165,7 +160,7 @@ def _momentum(tires: Tires, count: int) -> Found:
 
 def _free_rim(tires: Tires) -> Iterator[Found]:
     """Modes of the same static state with its rim let go."""
-    loads, motions = _loads(tires), tires.motions
+    loads, motions = tires.probes.on_face.loads, tires.motions
     free = SmallMotions(motions.tire, motions.static, rim="free")
     wheel, modes = wheel_of(free, tires.wheel.turning), solved(free.operators, count=max(COUNTS))
     for count in COUNTS:
