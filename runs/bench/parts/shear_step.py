@@ -27,7 +27,7 @@ STEP = 1e-4
 ELASTIC = 5e6, 0.45
 NODES, STATES, FINER = (12, 9), 200, 4
 BRUSH = 3e4  # N/m of each point
-BLOCKS, STEPS = 15, 20
+BLOCKS, STEPS = 7, 20
 
 
 def parts_of(shape: tuple[int, int], modes: int, horizontal: bool = False):
