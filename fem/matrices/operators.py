@@ -10,7 +10,8 @@ geometric and follower-pressure stiffness, the rubber's part at its dynamic modu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 import ufl
@@ -32,15 +33,38 @@ from tireroad.fem.static.virtual_work import (
 )
 from tireroad.fem.tire.body import Body
 
+ROTATION = ("gyroscopic", "convective", "body", "body_convective")
 
-@dataclass(frozen=True)
+
 class Rotation:
-    """G, S and B of the full inertia, and S_B of the doppler one; Omega is taken out of all."""
+    """G, S and B of the full inertia, and S_B of the doppler one, Omega taken out of all: each made at its first use,
+    which is collective. A static flexibility needs two of the four.
+    """
 
-    gyroscopic: PETSc.Mat
-    convective: PETSc.Mat
-    body: PETSc.Mat
-    body_convective: PETSc.Mat
+    def __init__(self, body: Body, assemble: Callable[[ufl.Form], PETSc.Mat]) -> None:
+        self._body, self._assemble = body, assemble
+
+    @cached_property
+    def gyroscopic(self) -> PETSc.Mat:
+        """G, kg."""
+        return self._assemble(convection_form(self._body))
+
+    @cached_property
+    def convective(self) -> PETSc.Mat:
+        """S, kg."""
+        return self._assemble(convective_form(self._body))
+
+    @cached_property
+    def body(self) -> PETSc.Mat:
+        """B, kg."""
+        return self._assemble(body_rate_form(self._body))
+
+    @cached_property
+    def body_convective(self) -> PETSc.Mat:
+        """S_B, kg."""
+        u, v, w = self._body.trial, self._body.test, kinematics.wheel_velocity(self._body.mesh)
+        rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
+        return self._assemble(self._body.inertia(-ufl.inner(test_rate, rate)))
 
 
 class Operators:
@@ -100,18 +124,8 @@ class Operators:
         return self._assemble(self._material(wall.losses())) if wall.loses else None
 
     def rotation(self) -> Rotation:
-        """The matrices of the rotating frame. Collective."""
-        body = self.body
-        u, v = body.trial, body.test
-        w = kinematics.wheel_velocity(body.mesh)
-        rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
-        forms = (
-            convection_form(body),
-            convective_form(body),
-            body_rate_form(body),
-            body.inertia(-ufl.inner(test_rate, rate)),
-        )
-        return Rotation(*(self._assemble(form) for form in forms))
+        """The matrices of the rotating frame."""
+        return Rotation(self.body, self._assemble)
 
     def consistent_mass(self) -> PETSc.Mat:
         """int rho phi_i . phi_j by full integration, kg: what the diagonal `mass` is compared to. Collective."""

@@ -27,7 +27,14 @@ from tireroad.runs.files.disk import replacing, write_text
 from tireroad.runs.process import observe
 
 VARIABLE, OFF = "TIREROAD_CACHE", "off"
-SHARED = ("static", "modes", "rotating", "greens", "stiffness")  # what the user's own folder keeps
+SHARED = (
+    "static",
+    "modes",
+    "fields",
+    "rotating",
+    "greens",
+    "stiffness",
+)  # what the user's own folder keeps
 LARGEST = 10e9  # bytes of it
 
 

@@ -24,6 +24,7 @@ from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done, Shared
 from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.turning import damping_of
+from tireroad.runs.stages.stored import fields_file
 
 _NAMED = 8  # modes of a round tire shown by name
 
@@ -89,6 +90,13 @@ class ModesStage(Computed[ModalBasis]):
             _say_names(modes.frequency, labels)
         return replace(basis, labels=labels)
 
+    def produce(self, key: str, record: Record) -> ModalBasis:
+        """As any stage; fields that other members of a family will need are kept for them. Collective."""
+        basis = super().produce(key, record)
+        if self.job.scene.greens.residual == "attachment" and basis.modes is not None:
+            fields_file.keep(self.job, key, self.motions.product.operators, basis.modes)
+        return basis
+
     def _teams(self, record: Record) -> int:
         """As many teams of processes as the memory that is free holds factors. Collective."""
         comm = self.job.comm
@@ -127,7 +135,7 @@ class ModesStage(Computed[ModalBasis]):
 
 @dataclass(frozen=True, kw_only=True)
 class Fields(Shared[ModalBasis]):
-    """The modes with their fields on all unknowns: as this run solved them, or once more."""
+    """The modes with their fields on all unknowns: as this run solved them, of the shared cache, or once more."""
 
     name: ClassVar[str] = "fields"
     modes: Done[ModalBasis]
@@ -141,7 +149,11 @@ class Fields(Shared[ModalBasis]):
         if basis.modes is not None:
             return basis
         motions, air = self.motions.product, self.air.product
-        return with_fields(
+        given = self.job, self.modes.key, motions.operators
+        known = fields_file.kept(*given, len(basis.frequency))
+        if known is not None:
+            return replace(basis, modes=known, column=air)
+        again = with_fields(
             basis,
             motions,
             count=wanted.count,
@@ -149,6 +161,9 @@ class Fields(Shared[ModalBasis]):
             air=air,
             axle=self.job.axle,
         )
+        assert again.modes is not None, "they were solved just now"
+        fields_file.keep(*given, again.modes)
+        return again
 
 
 def _describe(record: Record, modes: Modes) -> None:

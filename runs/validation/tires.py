@@ -146,6 +146,7 @@ class Tires:
             inertia=wheel.inertia,
             spectral_radius=radius,
             modal=modal,
+            air=wheel.air,
             corner=(axle, self.motions.rim_motion(wheel.speed != 0)) if axle else None,
         )
         return tire, step, time.perf_counter() - began

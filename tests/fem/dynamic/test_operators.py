@@ -9,7 +9,7 @@ from scipy.sparse import diags
 from scipy.sparse.linalg import eigsh
 
 from tireroad.fem import compat
-from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.operators import ROTATION, Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 
 
@@ -18,7 +18,7 @@ def free_ring(make_body, csr):
     body = make_body(segments=12, arc=4, free=True)
     operators = Operators(body, 0.0)
     rotation = operators.rotation()
-    matrices = {name: csr(matrix) for name, matrix in vars(rotation).items()}
+    matrices = {name: csr(getattr(rotation, name)) for name in ROTATION}
     matrices["stiffness"] = csr(operators.stiffness)
     return body, operators, matrices
 
