@@ -69,8 +69,11 @@ def on_a_grid(brush: float | None, sheared: bool = False):
     )
     weights = sparse.csr_matrix(np.kron(along, across))
     places = GridPlaces(counts, spacing, np.arange(len(points.points)))
-    elastic = {"youngs_modulus": ELASTIC[0], "poisson_ratio": ELASTIC[1]}
-    kernel = KernelTread(places, partial(half_space_influence, **elastic))
+    pressed, dragged = (
+        partial(law, youngs_modulus=ELASTIC[0], poisson_ratio=ELASTIC[1])
+        for law in (half_space_influence, half_space_shear)
+    )
+    kernel = KernelTread(places, pressed)
     normal = tire.same_step[:count, :count]
     solver = ActiveSet(SpreadCompliance(normal, weights, kernel))
     drive = Drive(wavy, lambda t: 0.0, 20.0)
@@ -86,7 +89,7 @@ def on_a_grid(brush: float | None, sheared: bool = False):
         BrushLaw(brush, 0.8, (0.02, 0.01)), points.points[:, 0], points.line, 20.0, STEP
     )
     bristles.begin(points.force > 0)
-    shear = KernelShear(places, partial(half_space_shear, **elastic)) if sheared else None
+    shear = KernelShear(places, dragged) if sheared else None
     coupling = Friction(bristles, tire.same_step, weights, shear)
     loop = roll(OnPoints(tire, weights, 3), solver, points, drive, STEP, 1000, coupling)
     return loop, coupling
