@@ -42,6 +42,11 @@ def joined(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
     return every
 
 
+def alike(comm: MPI.Comm, value: object) -> bool:
+    """Whether all processes have the same of a small thing. Collective."""
+    return comm.size == 1 or len(set(comm.allgather(value))) == 1
+
+
 def broadcast(comm: MPI.Comm, value: T, root: int = 0) -> T:
     """The object that `root` has, on every process; its arrays are sent as they are. Collective."""
     return value if comm.size == 1 else pkl5.Intracomm(comm).bcast(value, root)

@@ -20,18 +20,6 @@ from tireroad.fem.collective import joined
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 from tireroad.greens.response import Response
 
-SHARED_FROM = 20e6  # bytes of both matrices: less is in reach of the caches, and processes only wait for each other
-
-
-def sharers(response: Response, comm: MPI.Comm) -> MPI.Comm:
-    """The processes that a loop by this response is worth spreading over: all of `comm`, or each one by itself.
-
-    They share the matrices' rows too, those of the tire's answer within the step and of the contact's solver; what is left
-    to each is the factor of the points that touch. 625 points and 410 states have 8 MB, 1,296 and 1,010 42 MB.
-    """
-    size = response.output.nbytes + response.input.nbytes
-    return comm if size >= SHARED_FROM else MPI.COMM_SELF
-
 
 class Recursion:
     """Response states of a `Response`, spread over the processes of `comm` by eigenvalue.

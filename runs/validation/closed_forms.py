@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.validation import closed_contact, closed_tire
-from tireroad.runs.validation.parts import shear, static_friction
+from tireroad.runs.validation.parts import closed_contact, closed_tire, shear, static_friction
 
 ABOUT = "tube, rings, oscillator, Hertz, punch, friction, creep of rolling, static friction and brush against closed forms"
 

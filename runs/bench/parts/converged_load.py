@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from tireroad.fem.static.load_error import LoadError
 
 HEIGHTS = (0.002, 0.005, 0.010, 0.015, 0.020)  # m above the first touch of the finest
-CUTS = 2  # times that elements at the footprint are cut in two
+# Times that elements at the footprint are cut in two. The edge of a footprint falls anywhere in an element: the width of a
+# soft torus 2 mm down went 11.18, 10.69, 10.40, 10.55 mm, which two cuts took for a sequence that ends at 9.96.
+CUTS = 3
 QUANTITIES = ("load", "length", "width")
 
 
@@ -58,13 +60,15 @@ class Converged:
 
 
 def converged(sequence: list[Pressed]) -> Converged:
-    """The limit of a sequence of halved sizes, by Aitken where it closes in, else its last; the error is what
+    """The limit of a sequence of halved sizes, by Aitken where all of it closes in, else its last; the error is what
     the last step changed."""
-    last = np.array([one.values for one in sequence[-3:]])
-    before, step = last[-2] - last[-3], last[-1] - last[-2]
-    ratio = np.divide(step, before, out=np.ones(3), where=before != 0)
-    closing = np.where((ratio > 0) & (ratio < 0.7), ratio / (1 - np.clip(ratio, 0, 0.7)), 0.0)
-    return Converged(last[-1] + closing * step, np.abs(step / last[-1]))
+    values = np.array([one.values for one in sequence])
+    steps = np.diff(values, axis=0)
+    ratios = np.divide(steps[1:], steps[:-1], out=np.ones_like(steps[1:]), where=steps[:-1] != 0)
+    closes = ((ratios > 0) & (ratios < 0.7)).all(axis=0)
+    ratio = np.clip(ratios[-1], 0, 0.7)
+    limit = values[-1] + np.where(closes, ratio / (1 - ratio), 0.0) * steps[-1]
+    return Converged(limit, np.abs(steps[-1] / values[-1]))
 
 
 def at_heights(loader, heights, cuts: int = 0) -> list[Known]:

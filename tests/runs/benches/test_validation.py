@@ -7,10 +7,11 @@ from tireroad.contact.model import step_solver
 from tireroad.contact.results.spectra import distance
 from tireroad.contact.rolling import Loop, roll
 from tireroad.runs.measure.tabulate import modules
-from tireroad.runs.validation import closed_tire, rolling, schemes
+from tireroad.runs.validation import rolling, schemes
 from tireroad.runs.validation.comparison import Comparison
 from tireroad.runs.validation.histories import History, follow
 from tireroad.runs.validation.moved_road import SCENE
+from tireroad.runs.validation.parts import closed_tire
 from tireroad.runs.validation.tires import Choice, Tires
 
 DURATION = 0.1
