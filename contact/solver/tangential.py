@@ -65,7 +65,13 @@ class Stiffness:
         return largest + float(self._spring.max()) + (self._tread.bound if self._tread else 0.0)
 
 
-def stick_slip(stiffness: Stiffness, constant: Array, bound: Array, guess: Array) -> Array:
+def stick_slip(
+    stiffness: Stiffness,
+    constant: Array,
+    bound: Array,
+    guess: Array,
+    within: float = TOLERANCE,
+) -> Array:
     """Tangential forces t (a, 2) N.
 
     `stiffness` B, `constant` c (a, 2) m, `bound` (a,) N, infinite where nothing slips, `guess`
@@ -73,7 +79,7 @@ def stick_slip(stiffness: Stiffness, constant: Array, bound: Array, guess: Array
     (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353), r the inverse of B's
     diagonal; its linear problems are close to the identity where the bristles are softer than the
     tire, and GMRES solves them in a few products with B. Projected gradients, slow but sure for
-    symmetric B, where Newton circles. Returns with a residual below 1e-10 of the forces or raises
+    symmetric B, where Newton circles. Returns with a residual below `within` of the forces or raises
     ConvergenceError.
     """
     begin, moved = (np.ascontiguousarray(a).view(complex)[:, 0] for a in (guess, constant))
@@ -81,7 +87,7 @@ def stick_slip(stiffness: Stiffness, constant: Array, bound: Array, guess: Array
     for _ in range(NEWTON_STEPS):
         trial = force - stiffness.inverse * (stiffness(force) + moved)
         residual = force - _onto_discs(trial, bound)
-        if _small(residual, force, bound):
+        if _small(residual, force, bound, within):
             return _onto_discs(force, bound).view(float).reshape(-1, 2)
         force = force + _newton(stiffness, trial, bound, residual)
     return _gradients(stiffness, moved, bound, begin).view(float).reshape(-1, 2)
@@ -130,7 +136,7 @@ def _onto_discs(force: Plane, bound: Array) -> Plane:
     return np.where(outside, bound / np.where(outside, length, 1.0), 1.0) * force
 
 
-def _small(residual: Plane, force: Plane, bound: Array) -> bool:
+def _small(residual: Plane, force: Plane, bound: Array, within: float = TOLERANCE) -> bool:
     largest = float(bound.max(initial=0.0))
     scale = max(largest if np.isfinite(largest) else 0.0, float(np.abs(force).max(initial=0.0)))
-    return bool(np.abs(residual).max(initial=0.0) <= TOLERANCE * scale)
+    return bool(np.abs(residual).max(initial=0.0) <= within * scale)

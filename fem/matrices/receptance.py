@@ -23,19 +23,20 @@ def receptance(
     outputs: sparse.csr_matrix,
     loads: sparse.csr_matrix,
     frequency: np.ndarray,
-    moment: bool = False,
+    beside: np.ndarray | None = None,
     air: Column | None = None,
 ) -> np.ndarray:
     """H (f, r, k) complex, m/N, on every process, at the frequencies in Hz. Collective.
 
-    With `moment` three rows more: the first moment int rho u of the tire, kg m/N; `air` takes part.
+    With `beside` (m, n), on own unknowns, m rows more: those products with the motion, e.g. operators.carried for the
+    first moment int rho u of the tire, kg m/N; `air` takes part.
     `stiffness` K_Omega and `damping` E as in fem.matrices.compliance. One unsymmetric factorisation of twice
     the unknowns a frequency. Raises ConvergenceError when a solve leaves a residual above 1e-8.
     """
     comm = operators.body.comm
     rows = on_own_rows(operators, outputs).T.tocsr()
-    if moment:
-        rows = sparse.vstack([rows, sparse.csr_matrix(operators.carried)], format="csr")
+    if beside is not None:
+        rows = sparse.vstack([rows, sparse.csr_matrix(beside)], format="csr")
     columns = on_own_rows(operators, loads)
     shape = rows.shape[0], columns.shape[1]
     if air is not None:

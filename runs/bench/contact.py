@@ -3,33 +3,22 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
-from functools import partial
 
 import numpy as np
-from mpi4py import MPI
-from scipy import sparse
 from threadpoolctl import threadpool_limits
 
-from tireroad.contact.grid_patch import OnPoints
 from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.rolling import Drive, roll
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.friction import Friction
-from tireroad.contact.solver.grid_compliance import SpreadCompliance
 from tireroad.contact.tread.brush import Brush, BrushLaw
-from tireroad.contact.tread.compliance import half_space_compliance, half_space_influence
-from tireroad.contact.tread.kernel import GridPlaces, KernelTread
-from tireroad.greens.recursion import Recursion
 from tireroad.runs.bench.parts.contact_points import large, rough
 from tireroad.runs.bench.parts.contact_steps import convolution, orders
 from tireroad.runs.bench.parts.corner_step import corner
-from tireroad.runs.measure.synthetic import Strip, oval_patch
+from tireroad.runs.bench.parts.shear_step import STEP, on_a_grid, parts_of, shearing, wavy
 from tireroad.runs.measure.tabulate import Table
 
 ABOUT = "the contact loop: cost of a step, friction, convolution, many points; asked and measured"
-STEP = 1e-4
-ELASTIC = 5e6, 0.45
 BLOCK = 20  # steps between two looks at the floor
 
 
@@ -37,7 +26,7 @@ BLOCK = 20  # steps between two looks at the floor
 def run() -> list[Table]:
     """The tables; ratios are of times measured in one run, in turns, with one BLAS thread as in a run."""
     tables = [_step(), _friction(), convolution(), orders(), large(), rough(), corner()]
-    return [_asked(*tables), *tables]
+    return [_asked(*tables), *tables, shearing()]
 
 
 def _asked(step, friction, convolved, order, many, static, moving) -> Table:
@@ -67,34 +56,9 @@ def _asked(step, friction, convolved, order, many, static, moving) -> Table:
     return Table("The contact loop: asked and measured", columns, rows, static.notes)
 
 
-def _parts(shape: tuple[int, int], modes: int, horizontal: bool = False):
-    """Patch, tire with `modes` complex states, tread; 500 N on an oval of a tenth of a metre."""
-    patch = oval_patch(shape, (0.15 / shape[0], 0.12 / shape[1]), 500.0)
-    around = max(modes // 20, 2)
-    strip = Strip(speed=20.0)
-    if horizontal:
-        response = strip.horizontal_response(patch.points, around // 2, 10, 1e2)
-        response = replace(response, residual=_local(patch.points))
-    else:
-        response = strip.response(patch.points, around, 10)
-    tire = Recursion(response=response, step=STEP, scheme="linear", comm=MPI.COMM_SELF)
-    tread = half_space_compliance(patch.points[:, :2], patch.half_sizes, *ELASTIC)
-    return patch, tire, tread, response
-
-
-def _local(points: np.ndarray) -> np.ndarray:
-    """What the modes left out give way to, m/N in z, x, y: smooth over 2 cm, as a wall's is."""
-    away = ((points[:, None] - points[None]) ** 2).sum(axis=-1)
-    return np.kron([[1.0, 0.1, 0.0], [0.1, 0.5, 0.0], [0.0, 0.0, 0.5]], 1e-6 * np.exp(-away / 4e-4))
-
-
-def _wavy(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    return 2e-4 * np.minimum(np.maximum(x, 0) / 0.3, 1.0) ** 3 * np.sin(80 * x + 10 * y)
-
-
 def _loop(shape, modes: int, height, brush: float | None = None, steps: int = 1000):
     """(instants, solver, response) of the loop alone; with friction 0.8 at a brush stiffness in N/m."""
-    patch, tire, tread, response = _parts(shape, modes, brush is not None)
+    patch, tire, tread, response = parts_of(shape, modes, brush is not None)
     count = len(patch.points)
     solver = ActiveSet(tire.same_step[:count, :count] + tread)
     coupling = None
@@ -130,7 +94,7 @@ def _mean(function) -> float:
 
 def _step() -> Table:
     rows, long = [], np.ones(4_000_000)
-    for name, height in (("flat road at rest", Flat().height), ("wavy road", _wavy)):
+    for name, height in (("flat road at rest", Flat().height), ("wavy road", wavy)):
         loop, solver, response = _loop((25, 20), 500, height)
         states = len(response.eigenvalue)
         matrices, vector, force = np.ones((2, 500, 2 * states)), np.ones(2 * states), np.ones(500)
@@ -159,17 +123,17 @@ def _step() -> Table:
 def _friction() -> Table:
     rows = []
     for shape, modes in (((12, 9), 200), ((25, 20), 500)):
-        plain = _loop(shape, modes, _wavy, steps=10**6)[0]
+        plain = _loop(shape, modes, wavy, steps=10**6)[0]
         for brush in (2e4, 2e5):
-            rubbing, _, response = _loop(shape, modes, _wavy, brush)
+            rubbing, _, response = _loop(shape, modes, wavy, brush)
             step, (without,), (ratio,), most = _beside(
                 rubbing, lambda loop=plain: next(loop), blocks=15
             )
             rows.append([shape[0] * shape[1], most, len(response.eigenvalue), brush, step * 1e3,
                          without * 1e3, 1 / ratio])  # fmt: skip
-    fine = _on_a_grid((12, 9), 200, 4, None)
+    fine, _ = on_a_grid(None)
     for brush in (3e3, 3e4):
-        rubbing = _on_a_grid((12, 9), 200, 4, brush)
+        rubbing, _ = on_a_grid(brush)
         step, (without,), (ratio,), most = _beside(rubbing, lambda: next(fine), blocks=15)
         rows.append([45 * 33, most, 220, brush, step * 1e3, without * 1e3, 1 / ratio])
     columns = [("points", "-"), ("touching", "-"), ("states", "-"), ("brush", "N/m"),
@@ -177,38 +141,3 @@ def _friction() -> Table:
     notes = ["Friction 0.8 at a slip of 2 % and 1 %; the last two on a grid that 108 nodes carry. Asked: "
              "a step without at most 0.4 of one with."]  # fmt: skip
     return Table("One step with friction, wavy road", columns, rows, notes)
-
-
-def _on_a_grid(shape: tuple[int, int], modes: int, finer: int, brush: float | None):
-    """The loop on a grid `finer` times as fine as the nodes that carry it."""
-    patch, tire, _, _ = _parts(shape, modes, True)
-    count = len(patch.points)
-    counts = (shape[0] - 1) * finer + 1, (shape[1] - 1) * finer + 1
-    spacing = 0.15 / shape[0] / finer, 0.12 / shape[1] / finer
-    points = oval_patch(counts, spacing, 500.0)
-    along, across = (
-        np.maximum(1 - np.abs(np.arange(c)[:, None] / finer - np.arange(n)), 0.0)
-        for c, n in zip(counts, shape, strict=True)
-    )
-    weights = sparse.csr_matrix(np.kron(along, across))
-    places = GridPlaces(counts, spacing, np.arange(len(points.points)))
-    kernel = KernelTread(
-        places, partial(half_space_influence, youngs_modulus=ELASTIC[0], poisson_ratio=ELASTIC[1])
-    )
-    normal = tire.same_step[:count, :count]
-    solver = ActiveSet(SpreadCompliance(normal, weights, kernel))
-    drive = Drive(_wavy, lambda t: 0.0, 20.0)
-    if brush is None:
-        tire = Recursion(
-            response=Strip(speed=20.0).response(patch.points, modes // 20, 10),
-            step=STEP,
-            scheme="linear",
-            comm=MPI.COMM_SELF,
-        )
-        return roll(OnPoints(tire, weights), solver, points, drive, STEP, 10**6)
-    bristles = Brush(
-        BrushLaw(brush, 0.8, (0.02, 0.01)), points.points[:, 0], points.line, 20.0, STEP
-    )
-    bristles.begin(points.force > 0)
-    coupling = Friction(bristles, tire.same_step, weights)
-    return roll(OnPoints(tire, weights, 3), solver, points, drive, STEP, 1000, coupling)

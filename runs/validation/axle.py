@@ -15,11 +15,12 @@ from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.model import SmallMotions
 from tireroad.greens.axle import by_free_rim, by_momentum, from_moment
 from tireroad.greens.small_motions import wheel_of
+from tireroad.modal.corner import MOMENTS
 from tireroad.modal.standing import solved
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.tires import Tires
 
-ABOUT = "axle force per force on the tread: by momentum, by the free rim's modes, by full finite elements"
+ABOUT = "axle force and moment per force on the tread: by momentum, by the free rim's modes, by full finite elements"
 FREQUENCY = np.array([10.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0])  # Hz
 COUNTS = (30, 100, 300)
 
@@ -54,11 +55,12 @@ FORCES = (
 
 @dataclass(frozen=True)
 class Found:
-    """Axle force per force (f, 3, k), -, by one way, and the seconds it took."""
+    """Axle force, -, and moment, m, per force (f, 3, k) by one way, and the seconds it took."""
 
     form: str
     modes: int | str
     transfer: np.ndarray
+    moment: np.ndarray
     seconds: float
 
 
@@ -71,19 +73,21 @@ def run() -> list[Table]:
         ("off full FE", "%"),
         ("worst off full FE", "%"),
         ("off the other form", "%"),
+        ("moment off full FE", "%"),
+        ("moment off the other form", "%"),
         ("run time", "s"),
     ]
     rows = [row for speed in (0.0, 100.0) for row in _rows(speed)]
     notes = [
-        f"Transfer functions from forces on the inflated tire's tread to the axle, {FREQUENCY[0]:g} to "
-        f"{FREQUENCY[-1]:g} Hz: relative L2, and the worst entry over the largest.",
+        "Transfer functions from forces on the inflated tire's tread to the force on the held axle and to the moment about "
+        f"its centre, {FREQUENCY[0]:g} to {FREQUENCY[-1]:g} Hz: relative L2, and the worst entry over the largest.",
         "Momentum: sum of forces less the rate of momentum, modes of the clamped rim with attachment modes. "
         "Free rim: -H_rr^-1 H_rc, modes of a rigid rim that nothing holds, with attachment modes of rim "
         "and loads. Full FE: all unknowns of the clamped rim, frequency by frequency.",
         "Rolling the two forms differ by the lumping of the mass too: int rho e_y x u is by full "
         "integration in one and by the diagonal mass in the other.",
     ]
-    return [Table("Axle force, two ways", columns, rows, notes)]
+    return [Table("Axle force and moment, two ways", columns, rows, notes)]
 
 
 def _rows(speed: float) -> Iterator[list]:
@@ -95,7 +99,7 @@ def _rows(speed: float) -> Iterator[list]:
         tires = Tires(SCENE.format(speed=speed, forces=forces), Path(folder))
         exact = _full(tires)
         free = _free_rim(tires)
-        yield [speed, "full FE", "all", 0.0, 0.0, "", exact.seconds]
+        yield [speed, "full FE", "all", 0.0, 0.0, "", 0.0, "", exact.seconds]
         for count in COUNTS:
             pair = [_momentum(tires, count), next(free)]
             for one, other in (pair, pair[::-1]):
@@ -105,6 +109,8 @@ def _rows(speed: float) -> Iterator[list]:
                     one.modes,
                     *_off(one.transfer, exact.transfer),
                     _off(one.transfer, other.transfer)[0],
+                    _off(one.moment, exact.moment)[0],
+                    _off(one.moment, other.moment)[0],
                     one.seconds,
                 ]
 
@@ -122,32 +128,43 @@ def _total(loads: sparse.csr_matrix) -> np.ndarray:
 
 
 def _full(tires: Tires) -> Found:
-    loads = tires.probes.loads
+    """All unknowns; the moment by the rows that modes are given, which tests hold against the forces on the rim's nodes."""
+    loads = tires.probes.on_face.loads
     began = time.perf_counter()
     wheel, none = tires.wheel, sparse.csr_matrix((0, loads.shape[1]))
     full = wheel.rotating_stiffness, wheel.rotating_damping
-    moment = receptance(wheel.operators, *full, none, loads, FREQUENCY, moment=True)
-    return Found(
-        "full FE", "all", from_moment(_total(loads), moment, FREQUENCY), time.perf_counter() - began
-    )
+    motion, speed = tires.motions.rim_motion(wheel.speed != 0), wheel.speed
+    turned = {name: rows[:, 3:].T for name, rows in motion.rows.items()}
+    static, rate = turned["stiffness"], np.zeros_like(turned["mass"])
+    if speed:
+        static, rate = static + speed**2 * turned["convective"], -2 * speed * turned["gyroscopic"]
+    beside = np.vstack([wheel.operators.carried, turned["mass"], rate, static])
+    found = receptance(wheel.operators, *full, none, loads, FREQUENCY, beside=beside)
+    carried, mass, rate, static = np.split(found, 4, axis=1)
+    s = 2j * np.pi * FREQUENCY[:, None, None]
+    corner = tires.modes.projection.wheel
+    moment = corner.rigid(loads)[:, MOMENTS].T - s**2 * mass - s * rate - static
+    force = from_moment(_total(loads), carried, FREQUENCY)
+    return Found("full FE", "all", force, moment, time.perf_counter() - began)
 
 
 def _momentum(tires: Tires, count: int) -> Found:
     """The program's own way: its response, with the momentum of each state for an output."""
-    loads = tires.probes.loads
+    loads = tires.probes.on_face.loads
     began = time.perf_counter()
-    response = tires.response(count, "attachment")
+    response = tires.response(count, "attachment", counted=False)
     transfer = by_momentum(response, _total(loads), FREQUENCY)
-    return Found("momentum", count, transfer, time.perf_counter() - began)
+    moment = response.between(slice(-3, None), slice(None)).receptance(FREQUENCY)
+    return Found("momentum", count, transfer, moment, time.perf_counter() - began)
 
 
 def _free_rim(tires: Tires) -> Iterator[Found]:
     """Modes of the same static state with its rim let go."""
-    loads, motions = tires.probes.loads, tires.motions
+    loads, motions = tires.probes.on_face.loads, tires.motions
     free = SmallMotions(motions.tire, motions.static, rim="free")
     wheel, modes = wheel_of(free, tires.wheel.turning), solved(free.operators, count=max(COUNTS))
     for count in COUNTS:
         began = time.perf_counter()
         given = modes.first(count), loads, FREQUENCY, motions.rim_motion(wheel.speed != 0)
-        transfer = by_free_rim(wheel, *given)[:, :3]
-        yield Found("free rim", count, transfer, time.perf_counter() - began)
+        force, moment = np.split(by_free_rim(wheel, *given), 2, axis=1)
+        yield Found("free rim", count, force, moment, time.perf_counter() - began)

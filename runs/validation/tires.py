@@ -119,21 +119,19 @@ class Tires:
         tire = Recursion(response=kept, step=choice.step, scheme="linear", comm=self.job.comm)
         return tire, choice.step, seconds + time.perf_counter() - began
 
-    def response(self, count: int, residual: str) -> Response:
-        """The response of the lowest modes, as the program's own stages make it."""
+    def response(self, count: int, residual: str, counted: bool = True) -> Response:
+        """The response of the lowest modes, as the program's own stages make it; what is `counted` of it, or all."""
         if count not in self._rolling:
             few = self.modes.first(count)
             self._rolling[count] = rolling_modes(few, turning_of(self.job), self.job.comm)
         rolling, points = self._rolling[count], self.probes
-        given = points.outputs[points.counted], points.loads[points.counted], residual
+        points = points.on_face if counted else points
+        given = points.outputs, points.loads, residual
         return make_response(lambda: self.wheel, rolling, *given, lambda: rolling.basis).response
 
     def full(self, step: float, radius: float = RADIUS) -> tuple[FullTire, float, float]:
         """All degrees of freedom between the same points; step; set-up in s."""
-        wheel, points = self.wheel, self.probes
-        nodes = slice(
-            3 * len(self.run.static.points)
-        )  # a corner's probes read its wheel after the outer face
+        wheel, points = self.wheel, self.probes.on_face
         axle = self.job.axle
         began = time.perf_counter()
         damping, modal = self._damping()
@@ -143,8 +141,8 @@ class Tires:
             speed=wheel.speed,
             damping=damping,
             step=step,
-            outputs=points.outputs[points.counted][:, nodes],
-            loads=points.loads[points.counted][:, nodes],
+            outputs=points.outputs,
+            loads=points.loads,
             inertia=wheel.inertia,
             spectral_radius=radius,
             modal=modal,
@@ -165,7 +163,7 @@ class Tires:
 
     def nonlinear(self, step: float) -> tuple[NonlinearTire, float, float]:
         """The full finite elements with large motions; step; set-up in s."""
-        points, static, wheel = self.probes, self.run.static, self.wheel
+        points, static, wheel = self.probes.on_face, self.run.static, self.wheel
         began = time.perf_counter()
         damping, modal = self._damping()
         tire = NonlinearTire(

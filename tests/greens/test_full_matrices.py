@@ -202,7 +202,7 @@ def test_the_error_of_the_axle_force_is_about_what_is_estimated(speed, option) -
     found = made.respond(basis, modes, loads, loads, option)
     frequency = np.array([0.25, 0.5]) * modes.frequency[-1]
     full = made.rotating_stiffness, made.rotating_damping
-    exact = receptance(operators, *full, loads, loads, frequency, moment=True)[:, -3:]
+    exact = receptance(operators, *full, loads, loads, frequency, beside=operators.carried)[:, -3:]
     moving = replace(
         found, output=found.momentum, block_output=found.block_momentum, residual=0 * exact[0].real
     )

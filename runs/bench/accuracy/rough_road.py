@@ -140,10 +140,9 @@ def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
 
 
 def modal(given: Prepared, response: Response, step: float) -> History:
-    """The loop on the states that the step resolves."""
-    tire = Recursion(
-        response=response.resolved(step), step=step, scheme="linear", comm=MPI.COMM_SELF
-    )
+    """The loop on the states that the step resolves; what a run's response reads of its wheel is left out."""
+    alone = response.between(slice(response.residual.shape[1]), slice(None)).resolved(step)
+    tire = Recursion(response=alone, step=step, scheme="linear", comm=MPI.COMM_SELF)
     with threadpool_limits(1, "blas"):
         return follow(given.trial, tire, step, 0.0)
 

@@ -11,10 +11,14 @@ from tireroad.runs.scene.tables.scene import Scene
 
 PROGRAM = 2.1e8
 """Bytes of one process with all libraries loaded and the mesh made (measured)."""
-MATRICES = 10
-"""Sparse matrices held at the highest: K, its scaled copy and parts, four of rotation, the rolling two."""
+MATRICES = 6
+"""Sparse matrices held at the highest: K, its scaled copy and parts, those of rotation (measured: with the rest 0.92 GB
+for the quickstart, 2.3 to 2.8 GB for a passenger tire of 102,060 unknowns on one process, 1.6 GB on each of two)."""
 TANGENTS = 4
 """Of them in the static state: the whole ring's tangent, half of it with its fold, and where its entries go."""
+COLUMNS = 250
+"""Columns of a tangent's inverse by which its set of contact settles (fem.static.linear_contact has 400 at most), twice: a torus
+of 220,500 unknowns took 2.3 GB on each of two processes; 1.8 come out, 1.4 without them. Gone before the modes."""
 BASES = 3
 """Copies of all modes held at the highest: slices, the sorted vectors, their products."""
 DENSE = 1000
@@ -28,11 +32,14 @@ PIVOT = 5
 PACKED = 0.3
 """Size of contact.h5 over its numbers: most forces are 0 (measured: 0.24 on stones, 0.29 on texture)."""
 
+FOOTPRINT = "columns of the footprint"
+
 # Keys that make a part large.
 KEYS = {
     "matrices": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     "factor of the stiffness": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     "modes": "modal.count or modal.up_to, and the mesh",
+    FOOTPRINT: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     "rotating pencil": "modal.count or modal.up_to",
     "flexibility of the patch": "contact.points or the mesh, contact.reach, the road's height",
     "contact": "contact.points, contact.reach, the road's height",
@@ -100,6 +107,8 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
     }
     if "modes" not in left_out:
         parts["modes"] = 8.0 * BASES * free * count
+    elif scene.static.on_road:
+        parts[FOOTPRINT] = 8.0 * 2 * COLUMNS * free
     if "rotating" not in left_out:
         parts["rotating pencil"] = 16.0 * 4 * (2 * count) ** 2
     if "contact" not in left_out:

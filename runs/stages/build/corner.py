@@ -19,6 +19,7 @@ from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 
 MOMENTS = 3  # on the hub: what is read of every wheel, after all else
+BESIDE = SEEN + MOMENTS  # columns of probes after the outer face
 UNITS = {
     "wheel/translation": "m",
     "wheel/rotation": "rad",
@@ -43,7 +44,7 @@ def readings(job: Job) -> int:
     moments alone, where the force on the axle is wanted; of a free rim, and with pulses for a residual, none.
     """
     if job.axle:
-        return SEEN + MOMENTS
+        return BESIDE
     modal, wanted = job.scene.modal, job.scene.output.axle_force
     pulse = job.scene.greens.residual == "dirac"  # which would answer at once with moments too
     return MOMENTS if wanted and not pulse and (modal.rim, modal.road) == ("fixed", "forces") else 0
@@ -71,8 +72,8 @@ def read(file: h5py.File, axle: Axle | None) -> Corner | None:
 def widened(probes: sparse.csr_matrix, count: int) -> sparse.csr_matrix:
     """Probes (k, 3 s) of the outer face, with the last `count` of those of wheel, body and hub after them,
     (k + count, 3 s + 10)."""
-    every = sparse.identity(SEEN + MOMENTS, format="csr")
-    return sparse.block_diag([probes, every[SEEN + MOMENTS - count :]], format="csr")
+    every = sparse.identity(BESIDE, format="csr")
+    return sparse.block_diag([probes, every[BESIDE - count :]], format="csr")
 
 
 def standing_moment(patch: Patch) -> np.ndarray:

@@ -92,6 +92,17 @@ class Probes:
     loads: sparse.csr_matrix
     counted: slice = field(default_factory=lambda: slice(None))
 
+    @property
+    def on_face(self) -> Probes:
+        """What is counted, by the outer face alone."""
+        if self.counted == slice(None):
+            return self
+        face = slice(self.outputs.shape[1] - corner.BESIDE)
+        outputs = self.outputs[self.counted][:, face].tocsr()
+        if self.loads is self.outputs:  # which is worth half of the solutions
+            return Probes(self.name, outputs, outputs)
+        return Probes(self.name, outputs, self.loads[:, face].tocsr())
+
 
 def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
     """Of the contact patch with what prescribed forces add to it, or of the prescribed forces alone."""

@@ -54,7 +54,7 @@ def _by_all_unknowns(scenes: Scenes) -> Moved:
     run = scenes.run(SCENE, "contact.brush_stiffness=", until="greens")
     job, step = run.job, float(run.job.scene.time.step)
     alone = replace(job, scene=replace(job.scene, force=()))
-    tire = full_tire(run, probes(alone, run.static, run.setup), step, RADIUS)
+    tire = full_tire(run, probes(alone, run.static, run.setup).on_face, step, RADIUS)
     found = follow(Trial(job.scene.contact, run.setup, job.scene.time.duration), tire, step, 0.0)
     lowest = int(np.linalg.norm(run.setup.patch.points[:, :2], axis=1).argmin())
     moved = np.zeros((len(found.values["displacement"]), 3))

@@ -29,7 +29,7 @@ class Simplified:
     def __init__(self, scenes: Scenes, damping: float) -> None:
         self.comm = scenes.comm
         self.run: Finished = scenes.run(SCENE, f"damping.mass={damping:g}", until="greens")
-        self._points = probes(self.run.job, self.run.static, None)
+        self._points = probes(self.run.job, self.run.static, None).on_face
 
     @property
     def frequency(self) -> Array:

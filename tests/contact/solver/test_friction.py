@@ -121,6 +121,27 @@ def test_coupled_step_satisfies_its_own_equations(friction, slip) -> None:
     assert (moved > 0.1) == (friction != 0.0)
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-7, 1e-6, 1e-3, 1.0])
+def test_a_guess_that_is_nearly_right_is_not_taken_for_the_answer(off) -> None:
+    """Stick and slip are found roughly at first: a guess within that changes nothing, and is wrong all the same."""
+    _, friction, solver = run(BrushLaw(3e4, 5.0, (0.005, 0.002)), 60, height=wavy)
+    kept, count = friction.state(), len(PATCH.points)
+    moved = 1e-4 * np.sin(np.arange(2 * count))
+
+    def solved(guess: np.ndarray) -> np.ndarray:
+        friction.set_state(kept | {"horizontal": guess, "horizontal_before": guess})
+        given = PATCH.gap - 1e-4, None, PATCH.force, moved
+        return friction.solve(solver, *given)[1]
+
+    exact = solved(np.zeros((count, 2)))
+    for _ in range(3):  # each begins where the last one ended
+        exact = solved(exact)
+    largest = np.abs(exact).max()
+    assert largest > 1.0
+    found = solved(exact * (1 + off))
+    assert np.abs(found - exact).max() < 1e-8 * largest
+
+
 def test_answer_is_the_same_from_any_start() -> None:
     """A step solved from a random guess ends where the warm start ended."""
     rng = np.random.default_rng(2)

@@ -27,6 +27,14 @@ def test_gmres_solves_what_is_far_from_symmetric(skew: float) -> None:
     assert not gmres(apply, 0 * right, 1e-2).any()
 
 
+def test_gmres_of_many_unknowns_goes_on_beyond_its_short_cycle() -> None:
+    rng = np.random.default_rng(4)
+    factor = rng.standard_normal((300, 300))
+    matrix, right = factor @ factor.T / 300 + 0.01 * np.eye(300), rng.standard_normal(300)
+    found = gmres(lambda v: matrix @ v, right, 1e-8)
+    assert np.linalg.norm(matrix @ found - right) < 1e-7 * np.linalg.norm(right)
+
+
 def case(rng: np.random.Generator, points: int, nodes: int):
     """Nodes carry points: A between nodes, weights, springs, the same as one matrix."""
     factor = rng.standard_normal((2 * nodes, 2 * nodes))
