@@ -5,13 +5,12 @@ from pathlib import Path
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.process.memory import available_memory
-from tireroad.runs.scene.extent.estimate import FOOTPRINT, KEYS, Estimate
+from tireroad.runs.scene.extent.estimate import FACTOR, FOOTPRINT, KEYS, LOAD_ERROR, Estimate
 
 # The estimate may be off by 1.5: beyond that a run cannot succeed, below it it may not.
 CERTAIN, DOUBTFUL = 1.5, 0.8
-FACTOR = "factor of the stiffness"
 # What the processes of a run share out by rows where memory is short; of all else each has its own.
-SPREAD = ("matrices", FACTOR, FOOTPRINT, "modes", "flexibility of the patch")
+SPREAD = ("matrices", FACTOR, FOOTPRINT, LOAD_ERROR, "modes", "flexibility of the patch")
 # Of a factor, what MUMPS keeps on disk out of core: of 54,000 and 108,000 unknowns it took 26 and 22 % of the memory.
 ON_DISK = 0.7
 LONG = 3600.0  # s: of a run that takes longer the user is warned

@@ -33,11 +33,16 @@ PACKED = 0.3
 """Size of contact.h5 over its numbers: most forces are 0 (measured: 0.24 on stones, 0.29 on texture)."""
 
 FOOTPRINT = "columns of the footprint"
+FACTOR = "factor of the stiffness"
+LOAD_ERROR = "estimate of the load's error"
+HIGHEST = 3
+"""Order of elements, as fem.static.load_error has it, which is not loaded to estimate."""
 
 # Keys that make a part large.
 KEYS = {
     "matrices": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
-    "factor of the stiffness": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
+    FACTOR: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
+    LOAD_ERROR: "static.error_estimate, and the mesh",
     "modes": "modal.count or modal.up_to, and the mesh",
     FOOTPRINT: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     "rotating pencil": "modal.count or modal.up_to",
@@ -90,25 +95,24 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
     unknowns of second order, this gives 88 MB and 211 MB. What it is for a turning tire's responses has both triangles.
     """
     tire, free, count = scene.tire, size.free, size.modes
-    block = _column(scene)
-    columns = max(free / block, 2.0)
+    through = tire.proportions().through
+    tangents = _matrices(TANGENTS, free, through, tire.order)
     parts = {
         "program": PROGRAM,
-        "matrices": 12.0
-        * (TANGENTS if "modes" in left_out else MATRICES)
-        * (3 * free)
-        * _layers_coupled(tire.proportions().through, tire.order)
-        * _columns_coupled(tire.order),
-        "factor of the stiffness": (8.0 if turning(scene) and "greens" not in left_out else 4.0)
-        * 7.75
-        * columns
-        * math.log2(columns)
-        * block**2,
+        "matrices": _matrices(MATRICES, free, through, tire.order),
+        FACTOR: (2 if turning(scene) and "greens" not in left_out else 1)
+        * _factor(free, through, tire.order),
     }
-    if "modes" not in left_out:
+    if "modes" in left_out:
+        parts["matrices"] = tangents
+        if scene.static.on_road:
+            parts[FOOTPRINT] = 8.0 * 2 * COLUMNS * free
+    else:
         parts["modes"] = 8.0 * BASES * free * count
-    elif scene.static.on_road:
-        parts[FOOTPRINT] = 8.0 * 2 * COLUMNS * free
+    if scene.static.on_road and scene.static.error_estimate:
+        # Gone before the modes are looked for, whose matrices and vectors may take as much.
+        later = parts["matrices"] - tangents + parts.get("modes", 0.0)
+        parts[LOAD_ERROR] = max(_companions(free, through, tire.order) - later, 0.0)
     if "rotating" not in left_out:
         parts["rotating pencil"] = 16.0 * 4 * (2 * count) ** 2
     if "contact" not in left_out:
@@ -119,6 +123,32 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
         parts["receptances"] = 16.0 * 5 * size.frequencies * k**2
         parts["time series"] = 8.0 * size.steps * (4 * k + 3 * _each_step(scene, k) + 6) * 2
     return parts
+
+
+def _factor(free: float, through: int, order: int) -> float:
+    """One triangle of a factor of so many unknowns, elements through the wall, and order."""
+    block = _unknowns_through(through, order)
+    columns = max(free / block, 2.0)
+    return 4.0 * 7.75 * columns * math.log2(columns) * block**2
+
+
+def _matrices(count: int, free: float, through: int, order: int) -> float:
+    coupled = _layers_coupled(through, order) * _columns_coupled(order)
+    return 12.0 * count * (3 * free) * coupled
+
+
+def _companions(free: float, through: int, order: int) -> float:
+    """The two of the load's error (fem.static.load_error), by half of the ring: elements cut in two at the footprint,
+    which doubles them, and another order everywhere, a higher one on half as many elements around.
+    """
+    other = order + 1 if order < HIGHEST else order - 1
+    layers = _unknowns_through(through, other) / _unknowns_through(through, order)
+    share = 0.25 if other > order else 0.5
+    rest = share * free * (other / order) ** 2 * layers
+    return sum(
+        _matrices(TANGENTS, one, through, p) + _factor(one, through, p)
+        for one, p in ((free, order), (rest, other))
+    )
 
 
 def _each_step(scene: Scene, points: int) -> int:
@@ -197,7 +227,11 @@ def _seconds(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, f
 
 def _column(scene: Scene) -> int:
     """Unknowns of one column of nodes through the wall."""
-    return 3 * (scene.tire.proportions().through * scene.tire.order + 1)
+    return _unknowns_through(scene.tire.proportions().through, scene.tire.order)
+
+
+def _unknowns_through(through: int, order: int) -> int:
+    return 3 * (through * order + 1)
 
 
 def _columns_coupled(order: int) -> float:
