@@ -55,6 +55,7 @@ class GreensStage(Computed[Responses]):
         return {
             "modes": self.rotating.key,
             "axle": corner.inputs(self.job),
+            "readings": corner.readings(self.job),
             "damping": repr(turning_of(self.job).damping),
             "greens": asdict(scene.greens),
             "forces": [asdict(force) for force in scene.force],
@@ -144,7 +145,11 @@ class GreensStage(Computed[Responses]):
     def write(self, file, product: Responses) -> None:
         """The responses by name, and the nodes of the patch."""
         for name, response in product.named.items():
-            fill_response(file, name, response)
+            forces = len(self.job.scene.force)
+            points = 3 * forces
+            if name == "contact":
+                points += len(components(self.job)) * len(self.setup.product.patch.index) + forces
+            fill_response(file, name, response, points)
         if self._stands_with_air:
             cavity.fill_states(file, self.rotating.product)
         if self.setup.product:

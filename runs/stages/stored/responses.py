@@ -20,11 +20,13 @@ _UNITS = {
 }
 
 
-def fill_response(file: h5py.File, name: str, response: Response) -> None:
-    """Write a response as a group, and its static flexibility for whoever reads the file."""
+def fill_response(file: h5py.File, name: str, response: Response, points: int) -> None:
+    """Write a response as a group, and for whoever reads the file the static flexibility of its first outputs, so many
+    displacements of `points`; what is read of the wheel follows them."""
     for key, unit in _UNITS.items():
         put(file, f"{name}/{key}", getattr(response, key), unit)
-    put(file, f"{name}/static_flexibility", response.residual + response.static(), "m/N")
+    flexibility = (response.residual + response.static())[:points]
+    put(file, f"{name}/static_flexibility", flexibility, "m/N")
     file[name].attrs["rigid_states"] = response.rigid
 
 

@@ -1,5 +1,7 @@
 """A wheel that moves through all stages: limits, what is written and told, what is reused and refused."""
 
+from types import SimpleNamespace
+
 import h5py
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.axle import axle_of
+from tireroad.runs.stages.build import corner
 
 SCENE = """
 [tire]
@@ -159,3 +162,20 @@ def test_treads_and_brushes_that_cannot_be(tmp_path, contact, told):
     scene.write_text(SCENE.replace('points = "nodes"', f'points = "nodes"\n{contact}'))
     with pytest.raises(InputError, match=told):
         load(scene)
+
+
+@pytest.mark.parametrize(
+    ("change", "known"),
+    [
+        ("", True),
+        ("output.axle_force=false", False),
+        ("greens.residual=dirac", False),
+        ("greens.residual=second-order", False),
+        ("rotation.method=full", False),
+    ],
+)
+def test_moments_are_read_where_they_are_known(tmp_path, change: str, known: bool) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE)
+    scene = load(tmp_path / "scene.toml", [change] if change else [])
+    job = SimpleNamespace(scene=scene, axle=None)
+    assert (corner.readings(job) > 0) == known
