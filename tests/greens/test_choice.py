@@ -33,6 +33,7 @@ def momentum_rate(response):
     return replace(response, output=output, block_output=none[:, :0], residual=none)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("carried", [1e-6, 1.0])
 def test_participation_is_what_making_static_loses(uneven, carried) -> None:
     """With little momentum the displacements decide, with much of it the axle force does."""

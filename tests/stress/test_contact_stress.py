@@ -21,6 +21,8 @@ from tireroad.runs.validation.stress.contact import (
     thrown_up,
 )
 
+pytestmark = pytest.mark.slow
+
 CASES = [replace(case, steps=min(case.steps, 400)) for case in cases()]
 
 

@@ -11,6 +11,7 @@ from fuzz_scenes import fuzz_check
 from started import environment
 
 
+@pytest.mark.slow
 def test_random_scenes_through_check(tmp_path: Path) -> None:
     for number in range(150):
         end, tried = fuzz_check(tmp_path, 11, number)

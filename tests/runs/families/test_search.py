@@ -122,6 +122,7 @@ def test_the_chosen_scene_needs_no_search_and_is_the_run_s(file, search) -> None
     assert chosen.accuracy.target == 0.05 and not chosen.accuracy.searches
 
 
+@pytest.mark.slow
 def test_a_search_that_was_stopped_goes_on_and_a_looser_one_is_known(file, search, monkeypatch):
     started, tried, _ = search
     started()

@@ -17,6 +17,8 @@ from tireroad.runs.stages.coarser import coarser_job
 from tireroad.runs.stages.companions import Given, companions
 from tireroad.runs.stages.pipeline import run_scene
 
+pytestmark = pytest.mark.slow
+
 SCENE = """
 name = "sure"
 [tire]

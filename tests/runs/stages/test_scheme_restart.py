@@ -13,6 +13,8 @@ from tireroad.runs.scene.load import load
 from tireroad.runs.stages import contact
 from tireroad.runs.stages.pipeline import run_scene
 
+pytestmark = pytest.mark.slow
+
 SCENE = """
 name = "again"
 [tire]

@@ -13,6 +13,8 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
 
+pytestmark = pytest.mark.slow
+
 TIRE = """
 [tire]
 segments = 12
