@@ -30,13 +30,11 @@ from tireroad.greens.basis import Array, Basis, Pencil, Probes, regained
 from tireroad.greens.residual.attachment import dynamic, fewest, foremost, with_attachments
 from tireroad.greens.residual.second_order import Moments, modal_moments, second_order
 from tireroad.greens.response import Response
-from tireroad.modal.basis import Projection, project, with_air
+from tireroad.modal.basis import Projection, project, same_fields, with_air
 from tireroad.modal.damping import Damping, StrainEnergy, tail_loss
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import StateModes, held_matrices
 from tireroad.modal.solver.modes import Modes
-
-_SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by their sign at least
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,9 +177,7 @@ class Wheel:
 
     def _check_same(self, basis: Basis, modes: Modes) -> None:
         """InputError where these modes are not those of the basis. Collective."""
-        found, known = self.operators.trace(modes.vectors), basis.shape
-        alike = np.shape(found) == np.shape(known)
-        if not alike or np.abs(found - known).max(initial=0.0) > _SAME * np.abs(known).max():
+        if not same_fields(self.operators.trace(modes.vectors), basis.shape):
             raise InputError(
                 "attachment modes: the modes on all unknowns are not those that the basis shows; take "
                 "both from one solution (modal.standing.with_fields)"

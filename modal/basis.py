@@ -21,6 +21,8 @@ from tireroad.modal.solver.fields import loss_factors, projected
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import Labels
 
+_SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by their sign at least
+
 
 @dataclass(frozen=True, kw_only=True)
 class Projection:
@@ -184,6 +186,13 @@ class ModalBasis:
             labels=self.labels and self.labels.first(count),
             column=self.column,
         )
+
+
+def same_fields(found: np.ndarray, known: np.ndarray) -> bool:
+    """Whether shapes on the outer face (s, m) are of one solution: another one's signs and vectors of repeated
+    frequencies differ."""
+    alike = np.shape(found) == np.shape(known)
+    return alike and bool(np.abs(found - known).max(initial=0.0) <= _SAME * np.abs(known).max())
 
 
 def project(

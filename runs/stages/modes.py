@@ -150,7 +150,7 @@ class Fields(Shared[ModalBasis]):
             return basis
         motions, air = self.motions.product, self.air.product
         given = self.job, self.modes.key, motions.operators
-        known = fields_file.kept(*given, len(basis.frequency))
+        known = fields_file.kept(*given, basis)
         if known is not None:
             return replace(basis, modes=known, column=air)
         again = with_fields(

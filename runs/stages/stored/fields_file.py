@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tireroad.fem.matrices.operators import Operators
+from tireroad.modal.basis import ModalBasis, same_fields
 from tireroad.modal.solver.modes import Modes
 from tireroad.runs.files.store import put
 from tireroad.runs.process.mpi import on_root
@@ -45,8 +46,10 @@ def keep(job: Job, key: str, operators: Operators, modes: Modes) -> None:
     on_root(job.comm, move)
 
 
-def kept(job: Job, key: str, operators: Operators, count: int) -> Modes | None:
-    """The `count` modes with the hash `key` and their fields, from the cache; None where it has none. Collective."""
+def kept(job: Job, key: str, operators: Operators, basis: ModalBasis) -> Modes | None:
+    """The modes of a basis with the hash `key` and their fields, from the cache; None where it has none, or those of
+    another solution (fields and modes.h5 come to the cache one by one, of any number of processes). Collective."""
+    count = len(basis.frequency)
     if job.fresh or job.cache.folder is None or _size(operators, count) > LARGEST:
         return None
     path = job.path(NAME)
@@ -61,7 +64,11 @@ def kept(job: Job, key: str, operators: Operators, count: int) -> Modes | None:
     on_root(job.comm, remove)
     whole = found.pop("field")
     vectors = operators.restrict(np.ascontiguousarray(whole[operators.body.ids]))
-    return Modes(vectors=vectors, **found)
+    return (
+        Modes(vectors=vectors, **found)
+        if same_fields(operators.trace(vectors), basis.shape)
+        else None
+    )
 
 
 def _read(file: Any) -> dict[str, Any]:
