@@ -191,8 +191,7 @@ class ModalBasis:
 def same_fields(found: np.ndarray, known: np.ndarray) -> bool:
     """Whether shapes on the outer face (s, m) are of one solution: another one's signs and vectors of repeated
     frequencies differ."""
-    alike = np.shape(found) == np.shape(known)
-    return alike and bool(np.abs(found - known).max(initial=0.0) <= _SAME * np.abs(known).max())
+    return found.shape == known.shape and np.allclose(found, known, 0, _SAME * np.abs(known).max())
 
 
 def project(
