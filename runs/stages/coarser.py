@@ -20,8 +20,7 @@ from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
 from tireroad.runs.stages.static import StaticStage
 from tireroad.runs.stages.stored.obtained import obtained
 
-UP_TO_GREENS: tuple[type[Part], ...] = (
-    StaticStage,
+STATIC_TO_GREENS: tuple[type[Part], ...] = (
     Motions,
     Setup,
     ModesStage,
@@ -61,7 +60,8 @@ def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
     """The job of a run with elements of twice the size, and what is done of it, from the static state on. Collective."""
     job, done = coarser_job(run), dict[str, Done]()
     on_root(job.comm, lambda: make_folder(job.directory))
-    for kind in UP_TO_GREENS:
+    chain: tuple[type[Part], ...] = (StaticStage, *STATIC_TO_GREENS)
+    for kind in chain:
         part = (
             CoarserStatic(job=job, run=run, near=static)
             if kind is StaticStage

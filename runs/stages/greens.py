@@ -70,6 +70,11 @@ class GreensStage(Computed[Responses]):
         return self.job.speed == 0 and has_air(self.job.scene)
 
     @property
+    def _contact_forces(self) -> int:
+        """Components of the forces on the nodes of the patch."""
+        return len(components(self.job)) * len(self.setup.product.patch.index)
+
+    @property
     def _wanted(self) -> Wanted:
         given = self.job.scene.greens
         return Wanted(
@@ -116,7 +121,7 @@ class GreensStage(Computed[Responses]):
         forces, more = len(self.job.scene.force), corner.readings(self.job)
         if name == "force" or not (forces or more):
             return {name: whole}
-        count = len(components(self.job)) * len(self.setup.product.patch.index)
+        count = self._contact_forces
         inputs = count + forces
         contact = {"contact": whole.between(slice(None), slice(inputs))}
         if not forces:
@@ -148,7 +153,7 @@ class GreensStage(Computed[Responses]):
             forces = len(self.job.scene.force)
             points = 3 * forces
             if name == "contact":
-                points += len(components(self.job)) * len(self.setup.product.patch.index) + forces
+                points += self._contact_forces + forces
             fill_response(file, name, response, points)
         if self._stands_with_air:
             cavity.fill_states(file, self.rotating.product)
