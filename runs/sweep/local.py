@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -60,6 +59,7 @@ def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
     """
     waiting = list(sweep.members)
     workers: list[_Worker] = []
+    started = 0
     ended: list[Ended] = []
     threads = max((os.cpu_count() or 1) // (at_a_time * sweep.processes), 1)
     try:
@@ -68,7 +68,8 @@ def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
                 workers.remove(one)
                 one.close()
             while waiting and len(workers) < at_a_time:
-                workers.append(_Worker(sweep, folder, threads))
+                started += 1
+                workers.append(_Worker(sweep, folder, threads, started))
             for one in workers:
                 if not one.member and waiting:
                     one.take(waiting.pop(0))
@@ -89,7 +90,7 @@ def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
 class _Worker:
     """A process, or an mpirun of several, that computes one `member` after the other; None between them."""
 
-    def __init__(self, sweep: Sweep, folder: Path, threads: int) -> None:
+    def __init__(self, sweep: Sweep, folder: Path, threads: int, number: int) -> None:
         self.member: Member | None = None
         self._sweep, self._folder, self._logs = sweep, folder, folder / "logs"
         self._logs.mkdir(parents=True, exist_ok=True)
@@ -98,14 +99,15 @@ class _Worker:
             "OPENBLAS_NUM_THREADS": str(threads),
             "OMP_NUM_THREADS": str(threads),
         }
-        self._own = tempfile.TemporaryFile()
-        self.process = subprocess.Popen(
-            _program(sweep, "work"),
-            env={**os.environ, **settings},
-            stdin=subprocess.PIPE,
-            stdout=self._own,
-            stderr=subprocess.STDOUT,
-        )
+        self._own = self._logs / f"worker-{number}.txt"  # what no member says
+        with self._own.open("wb") as own:
+            self.process = subprocess.Popen(
+                _program(sweep, "work"),
+                env={**os.environ, **settings},
+                stdin=subprocess.PIPE,
+                stdout=own,
+                stderr=subprocess.STDOUT,
+            )
 
     def take(self, member: Member) -> None:
         """Begin a member."""
@@ -129,9 +131,7 @@ class _Worker:
             status, said = int(self._status.read_text(encoding="ascii")), _last(self._log)
             self._status.unlink()
         elif crashed is not None:
-            self._own.seek(0)
-            words = self._own.read().decode(errors="replace").strip().splitlines()
-            status, said = crashed, words[-1] if words else _last(self._log)
+            status, said = crashed, _last(self._own) or _last(self._log)
         else:
             return None
         member, self.member = self.member, None
@@ -154,7 +154,6 @@ class _Worker:
         """Wait for its end."""
         self.end()
         self.process.wait()
-        self._own.close()
 
 
 def _last(log: Path) -> str:
