@@ -14,6 +14,7 @@ from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.forces import Forces
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.linear_contact import LinearContact, held_step
+from tireroad.fem.static.path.history import History
 from tireroad.fem.static.path.step import Step
 from tireroad.fem.static.road import Road
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
@@ -47,6 +48,7 @@ class Equilibrium(Forces):
         self._system = self._make_system("lu" if self._damped else "cholesky")
         self._contact: LinearContact | None = None
         self._solved = body.u.x.array.copy()
+        self.history: History | None = None
 
     def _make_road(self) -> Road:
         return Road(self.body)
@@ -66,6 +68,14 @@ class Equilibrium(Forces):
     def solve(
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
     ) -> Step:
+        """As `_solve`, or as the `history` of a computation that was stopped has it. Collective."""
+
+        def solve() -> Step:
+            return self._solve(road_height, load, allowed)
+
+        return solve() if self.history is None else self.history.solve(self, solve)
+
+    def _solve(self, road_height: float | None, load: float | None, allowed: float) -> Step:
         """Equilibrium with the road plane at the given height (m), or without a road. Collective.
 
         With a `load` (N) the road is moved, from the given height on, until it carries that. `allowed` N may stay
@@ -84,9 +94,9 @@ class Equilibrium(Forces):
             error = self._error(load)
             reason = self._stopped(error, changed, tangents, allowed / self.force_scale)
             if reason == "converged":
-                self._solved = field.array.copy()
-                self.road_height = None if road_height is None else self.road.height
-                return Step(True, tangents, error, reason)
+                step = Step(True, tangents, error, reason)
+                self.solved(step)
+                return step
             closing = None
             changed = changed or bool(self._contact and self._contact.changed)
             if not reason and (changed or not error < _SERVES * last):
@@ -96,11 +106,29 @@ class Equilibrium(Forces):
             reason = reason or self._move(closing, load)
             if reason:
                 break
-        field.array[:], self._contact = kept[0], None
+        field.array[:] = kept[0]
         self.road.put_back(kept[1])
-        return Step(False, tangents, error, reason)
+        step = Step(False, tangents, error, reason)
+        self.solved(step)
+        return step
+
+    def solved(self, step: Step) -> None:
+        """The body is in the state that a step has found, or was put back where it found none."""
+        if step.converged:
+            self._solved = self.body.u.x.array.copy()
+            self.road_height = None if self.road.height == -np.inf else self.road.height
+        else:
+            self._contact = None
 
     def predict(self, road_height: float) -> bool:
+        """As `_predict`, or as the `history` has it: the solution that follows is known then. Collective."""
+
+        def predict() -> bool:
+            return self._predict(road_height)
+
+        return predict() if self.history is None else self.history.predict(predict)
+
+    def _predict(self, road_height: float) -> bool:
         """Go from the state that was solved for last to near that on a road at `road_height` (m) by its last tangent, which
         settles the sets of contact; whether there is such a tangent, and the body still in that state. Collective.
         """
