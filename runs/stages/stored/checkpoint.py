@@ -103,7 +103,8 @@ class _Parts:
         if not self._waiting:
             return
         provenance = self._job.provenance(self._stage, self._key)
-        with suppress(FileNotFoundError):  # a result folder that was removed is an error of the file
+        # That the result folder was removed is said by what writes the file.
+        with suppress(FileNotFoundError):
             self._folder.mkdir(exist_ok=True)
         with store.writing(self._path(self._first), provenance) as file:
             for k, entry in enumerate(self._waiting):
