@@ -1,7 +1,8 @@
-"""Static equilibrium under inflation, steady rolling and a flat, frictionless road (friction: fem.static.friction).
+"""Static equilibrium under inflation, steady rolling and a smooth, frictionless road (friction: fem.static.friction).
 
 F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f, f >= 0 on the tread dofs,
-z + u_z >= z_road and one of both zero.
+z + u_z >= z_road and one of both zero. On roads that are no level plane the tread's nodes move in the road's coordinates
+(fem.static.curved.unrolled).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
+from tireroad.fem.static.curved.unrolled import Unrolled
 from tireroad.fem.static.forces import Forces
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.linear_contact import LinearContact, held_step
@@ -23,9 +25,7 @@ from tireroad.fem.tire.body import Body
 MOST_STEPS = 25  # tangents; a load step that needs more is better halved
 TOLERANCE = 1e-12  # of the force scale
 _SERVES = 0.2  # a step with an old tangent costs a twentieth of one with a new tangent
-_STAYS = (
-    1e-10  # of the wall: rounding, as a state is carried from half the ring to the whole and back
-)
+_STAYS = 1e-10  # of the wall: rounding, as a state is carried from half the ring and back
 _DIVERGED = 1e8  # times the force scale: nothing comes back from there
 
 
@@ -33,32 +33,45 @@ class Equilibrium(Forces):
     """The nonlinear problem of one body. Its solver is made once. Collective.
 
     `solve` starts from the body's displacement and puts it back when it does not converge. `road_height` (m) is that
-    of the last state that did; the road's `shape` is a level plane here (fem.static.curved has others);
-    `force_scale`: N, by which residuals are measured.
+    of the last state that did, under the axle where its `shape` is no level plane; `force_scale`: N, by which
+    residuals are measured.
     """
 
-    shape: RoadShape = FLAT
-
-    def __init__(self, body: Body, rolling: Rolling = AT_REST) -> None:
+    def __init__(self, body: Body, rolling: Rolling = AT_REST, shape: RoadShape = FLAT) -> None:
         super().__init__(body, rolling)
         self.road_height: float | None = None
+        self.shape = shape
         self.road = self._make_road()
+        self._unrolled = None if shape.flat else Unrolled(body, self.road)
         self.force_scale = self._yardsticks()
         self._damped = bool(rolling.speed * (rolling.damping + rolling.stiffness_damping))
         self._system = self._make_system("lu" if self._damped else "cholesky")
         self._contact: LinearContact | None = None
         self._solved = body.u.x.array.copy()
-        self.history: History | None = None
+        self.history = History(None)
 
     def _make_road(self) -> Road:
-        return Road(self.body)
+        return Road(self.body, self.shape)
 
     def _make_system(self, kind: str) -> System:
         return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
 
     def _make_contact(self) -> LinearContact | None:
-        """Settles the sets of contact within a step; None where the tangent is not symmetric, or depends on them."""
-        return None if self._damped else LinearContact(self.body.comm, self._system, self.road)
+        """Settles the sets of contact within a step; None where the tangent is not symmetric, or the road not flat."""
+        settles = self.shape.flat and not self._damped
+        return LinearContact(self.body.comm, self._system, self.road) if settles else None
+
+    @property
+    def _in_its_coordinates(self) -> Unrolled | None:
+        """Those in which Newton's method works now; None: the wheel's axes."""
+        return self._unrolled if self.road.height > -np.inf else None
+
+    def _out(self) -> np.ndarray:
+        """Forces out of balance at the owned unknowns, N. Collective."""
+        out, along = self._assemble_residual(), self._in_its_coordinates
+        if along is not None:
+            along.turn(self._work.array)
+        return out
 
     @property
     def rounding(self) -> float:
@@ -69,11 +82,7 @@ class Equilibrium(Forces):
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
     ) -> Step:
         """As `_solve`, or as the `history` of a computation that was stopped has it. Collective."""
-
-        def solve() -> Step:
-            return self._solve(road_height, load, allowed)
-
-        return solve() if self.history is None else self.history.solve(self, solve)
+        return self.history.solve(self, lambda: self._solve(road_height, load, allowed))
 
     def _solve(self, road_height: float | None, load: float | None, allowed: float) -> Step:
         """Equilibrium with the road plane at the given height (m), or without a road. Collective.
@@ -94,9 +103,7 @@ class Equilibrium(Forces):
             error = self._error(load)
             reason = self._stopped(error, changed, tangents, allowed / self.force_scale)
             if reason == "converged":
-                step = Step(True, tangents, error, reason)
-                self.solved(step)
-                return step
+                return self.solved(Step(True, tangents, error, reason))
             closing = None
             changed = changed or bool(self._contact and self._contact.changed)
             if not reason and (changed or not error < _SERVES * last):
@@ -108,25 +115,20 @@ class Equilibrium(Forces):
                 break
         field.array[:] = kept[0]
         self.road.put_back(kept[1])
-        step = Step(False, tangents, error, reason)
-        self.solved(step)
-        return step
+        return self.solved(Step(False, tangents, error, reason))
 
-    def solved(self, step: Step) -> None:
-        """The body is in the state that a step has found, or was put back where it found none."""
+    def solved(self, step: Step) -> Step:
+        """The step: the body is in the state that it has found, or was put back where it found none."""
         if step.converged:
             self._solved = self.body.u.x.array.copy()
             self.road_height = None if self.road.height == -np.inf else self.road.height
         else:
             self._contact = None
+        return step
 
     def predict(self, road_height: float) -> bool:
         """As `_predict`, or as the `history` has it: the solution that follows is known then. Collective."""
-
-        def predict() -> bool:
-            return self._predict(road_height)
-
-        return predict() if self.history is None else self.history.predict(predict)
+        return self.history.predict(lambda: self._predict(road_height))
 
     def _predict(self, road_height: float) -> bool:
         """Go from the state that was solved for last to near that on a road at `road_height` (m) by its last tangent, which
@@ -136,7 +138,7 @@ class Equilibrium(Forces):
         stays = bool(moved <= _STAYS * self.body.ring.thickness)
         if self._contact is None or not self.body.comm.allreduce(stays, op=MPI.LAND):
             return False
-        self._assemble_residual()
+        self._out()
         on_road = self.road.height > -np.inf
         rise = road_height - self.road.height if on_road else 0.0
         if not on_road:  # nothing touches it yet, so nothing is raised by it
@@ -155,7 +157,7 @@ class Equilibrium(Forces):
     def _error(self, load: float | None) -> float:
         """Norm of what is out of balance over the force scale, distance to the road as the dof's force."""
         with self.cost("assembly"):
-            out = self._assemble_residual().copy()
+            out = self._out().copy()
         self.road.take_off(out)
         distance = self.road.distance()
         parts = np.array([out @ out + distance @ distance, self.road.force.sum()])
@@ -167,7 +169,9 @@ class Equilibrium(Forces):
         """Assemble and factorise at the present state, the held dofs on their way to the road."""
         with self.cost("assembly"):
             self._assemble_tangent()
-        taken = self._system.take(self.matrix, self.road.held, *self.road.steps())
+            along = self._in_its_coordinates
+            matrix = self.matrix if along is None else along.tangent(self.matrix)
+        taken = self._system.take(matrix, self.road.held, *self.road.steps())
         self._contact = self._make_contact() if taken else None
         return taken
 
@@ -182,7 +186,8 @@ class Equilibrium(Forces):
             return "the road meets nothing that resists"
         (change, reaction), field = step, self.body.u.x
         self._before.x.array[:] = field.array
-        field.array[: len(change)] += change
+        along = self._in_its_coordinates
+        field.array[: len(change)] += change if along is None else along.spread(change)
         self.road.lay_on()
         self.road.react(reaction)
         return ""

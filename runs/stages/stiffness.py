@@ -9,7 +9,7 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.road_stiffness import RoadStiffness, road_stiffness
-from tireroad.fem.static.curved.balance import make_equilibrium
+from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.path.load_curve import CurvePoint, load_curve, slopes
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.state import StaticState
@@ -100,7 +100,7 @@ class StiffnessStage(Computed[Stiffness]):
         body, state = self.job.tire.body, self.static.product
         body.u.x.array[:] = 0.0
         with record.timing("mesh and forms"):
-            equilibrium = make_equilibrium(body, steady_rolling(self.job), state.road)
+            equilibrium = Equilibrium(body, steady_rolling(self.job), state.road)
         loader = Loader(equilibrium, lambda progress: None)
         try:
             loader.inflate(self.job.scene.static.inflation)

@@ -23,17 +23,20 @@ _ROAD = "active", "force", "height"
 
 
 class History:
-    """Of the equilibrium problems of one stage, in the order in which they are solved."""
+    """Of the equilibrium problems of one stage, in the order in which they are solved; without a `journal` of none."""
 
-    def __init__(self, journal: Journal) -> None:
+    def __init__(self, journal: Journal | None) -> None:
         self._journal = journal
         self._problems: list[Equilibrium] = []
         self._predicted: list[bool] = []
-        last = {int(entry["problem"]): k for k, entry in enumerate(journal.found)}
+        found = journal.found if journal else []
+        last = {int(entry["problem"]): k for k, entry in enumerate(found)}
         self._again = set(last.values())
 
     def solve(self, problem: Equilibrium, solve: Callable[[], Step]) -> Step:
         """What `solve()` gives, the body and the road left as it leaves them. Collective."""
+        if self._journal is None:
+            return solve()
         number, comm = self._number(problem), problem.body.comm
         place = self._journal.done
         entry = self._journal.next(comm, lambda one: _same_mesh(problem, one))
@@ -49,12 +52,12 @@ class History:
             _put(problem, entry, "begin")
             return solve()
         _put(problem, entry, "end")
-        step = _read(entry)
-        problem.solved(step)
-        return step
+        return problem.solved(_read(entry))
 
     def predict(self, predict: Callable[[], bool]) -> bool:
         """What `predict()` gives; where the solution after it is known, what it gave then. Collective."""
+        if self._journal is None:
+            return predict()
         if self._journal.done < len(self._journal.found):
             known = self._journal.found[self._journal.done]["predicted"]
             answer = bool(known[len(self._predicted)])
