@@ -7,9 +7,9 @@ import numpy as np
 from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.fem.journal import Journal
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
+from tireroad.fem.static.path.journal import Journal
 from tireroad.modal.basis import ModalBasis, project, with_air, with_corner
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes

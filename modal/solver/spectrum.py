@@ -17,7 +17,7 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.journal import Entry, Journal
+from tireroad.fem.static.path.journal import Entry, Journal
 from tireroad.modal.solver.boundaries import between, merged, onward
 from tireroad.modal.solver.shifted import Shifted
 from tireroad.modal.solver.slices import Interval, eigenpairs

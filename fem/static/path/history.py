@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tireroad.fem.journal import Entry, Journal
+from tireroad.fem.static.path.journal import Entry, Journal
 from tireroad.fem.static.path.step import Step
 
 if TYPE_CHECKING:
