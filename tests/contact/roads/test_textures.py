@@ -1,5 +1,7 @@
 """Textures: what a profile says, surfaces with a given spectrum, and lines that a laser measured."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
@@ -136,3 +138,21 @@ def test_a_tile_is_drawn_once_while_a_footprint_passes(monkeypatch) -> None:
     for step in range(40):
         road.height(x + 0.004 * step, y)
     assert len(drawn) == len(set(drawn)) > 6
+
+
+def test_levelling_and_bounds_draw_each_tile_once(monkeypatch) -> None:
+    """A strip of 20 m, whose short waves have 125 halves of tiles, under all its width: what is drawn is drawn once."""
+    drawn: list[tuple[float, int]] = []
+    tile = Tiles._tile
+    monkeypatch.setattr(
+        Tiles,
+        "_tile",
+        lambda self, number: drawn.append((self.spacing, number)) or tile(self, number),
+    )
+    road = make_road(kind="two-slope", longest_wave=0.5)
+    prepared = road.prepare(0.0, 20.0, -0.1, 0.1)
+    levelled = Counter(drawn)
+    assert len(levelled) > 100 and max(levelled.values()) == 1
+    drawn.clear()
+    prepared.highest(0.0, 20.0, -0.1, 0.1)
+    assert len(drawn) < 0.1 * len(levelled)
