@@ -20,7 +20,9 @@ for line in sys.stdin:
     pathlib.Path(told["log"]).write_text(f"first\\nthis was {name}\\n")
     if name == "crashes":
         os.kill(os.getpid(), signal.SIGSEGV)
-    pathlib.Path(told["status"]).write_text("3" if name == "fails" else "0")
+    part = pathlib.Path(told["status"] + ".part")
+    part.write_text("3" if name == "fails" else "0")
+    part.rename(told["status"])
 """
 
 
