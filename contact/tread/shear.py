@@ -98,6 +98,9 @@ class Shear(Protocol):
     def between(self, index: Index) -> Between:
         """`spread` between the points `index`."""
 
+    def matrix(self, index: Index) -> Array:
+        """The same as a matrix (2a, 2a): of all forces along x, then of those along y."""
+
 
 class Between:
     """(a,) m of (a,) N, complex: `apply`; `own` m/N, the mean of what a point's two forces move itself; `bound` m/N of the
@@ -139,6 +142,11 @@ class MatrixShear:
         some = self._lift[np.ix_(index, index)]
         return np.hstack([some.real, -some.imag])
 
+    def matrix(self, index: Index) -> Array:
+        """As a matrix, of x, then of y."""
+        some = np.concatenate([2 * index, 2 * index + 1])
+        return self._matrix[np.ix_(some, some)]
+
     def between(self, index: Index) -> Between:
         """`spread` between the points `index`."""
         some = np.stack([2 * index, 2 * index + 1], axis=-1).ravel()
@@ -170,6 +178,11 @@ class KernelShear:
     def lifted(self, index: Index) -> Array:
         """`lift` between the points `index` as a matrix (a, 2a)."""
         return np.hstack([*self._between(index)[3:]])
+
+    def matrix(self, index: Index) -> Array:
+        """As a matrix, of x, then of y."""
+        xx, xy, yy = self._between(index)[:3]
+        return np.block([[xx, xy], [xy, yy]])
 
     def between(self, index: Index) -> Between:
         """`spread` between the points `index`."""
