@@ -100,7 +100,8 @@ def test_bands_have_their_bars_at_their_names(count: int) -> None:
     axes = drawn[0].axes[0]
     names = [200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600, 2000, 2500]
     ticks = [
-        (place, text.get_text()) for place, text in zip(axes.get_xticks(), axes.get_xticklabels())
+        (place, text.get_text())
+        for place, text in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
     ]
     assert ticks == [(place, str(name)) for place, name in enumerate(names[:count])]
     floor, _ = figures.level_range(level)
