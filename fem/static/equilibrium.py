@@ -135,6 +135,10 @@ class Equilibrium(Forces):
         missing = 0.0 if load is None else load - total
         return float(np.hypot(np.sqrt(square), missing)) / self.force_scale
 
+    def out_of_balance(self) -> float:
+        """Norm of the forces (N) that are, in the present state under the present forces of the road. Collective."""
+        return self._error(None) * self.force_scale
+
     def _take_tangent(self) -> bool:
         """Assemble and factorise at the present state, the held dofs on their way to the road."""
         with self.cost("assembly"):
