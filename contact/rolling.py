@@ -24,7 +24,7 @@ from tireroad.greens.residual.sparse_columns import LoadedColumns
 
 # Road heights that are found at once: as many steps as make this many points, so that what a call
 # costs is shared; and at most so many steps.
-_POINTS_AHEAD, _STEPS_AHEAD = 20_000, 64
+_POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
 
 
 class Tire(Protocol):

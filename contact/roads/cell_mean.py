@@ -51,6 +51,7 @@ class CellMean:
         middles = (np.arange(count) + 0.5) / count * 4 - 2
         self._within = np.abs(middles) < 1
         self._y = rows[:, 0, None] + rows[:, 2, None] * middles  # (r, m)
+        self._begin, self._mean = 0, np.empty((len(rows), 0))
 
     def height(self, x: Array, _: Array) -> Array:
         """Heights (n, c) m with the points at x (n, c) m; y is known."""
@@ -58,10 +59,23 @@ class CellMean:
         first = np.floor(place).astype(int)
         share = place - first
         begin = int(first.min(initial=0))
-        mean = self._means(begin, int(first.max(initial=0)) + 2)
-        here = first - begin
+        mean = self._known(begin, int(first.max(initial=0)) + 2)
+        here = first - self._begin
         near, far = mean[self._row, here], mean[self._row, here + 1]
         return near + share * (far - near)
+
+    def _known(self, begin: int, end: int) -> Array:
+        """(r, …) m at the places from `_begin` * step to `end` * step at least. What a footprint was over stays known
+        while it rolls on: of ten places nine were asked for before."""
+        known = self._begin + self._mean.shape[1]
+        if not self._begin <= begin <= known:
+            self._mean, known = np.empty((len(self._y), 0)), begin
+        else:
+            self._mean = self._mean[:, begin - self._begin :]
+        self._begin = begin
+        if end > known:
+            self._mean = np.concatenate([self._mean, self._means(known, end)], axis=1)
+        return self._mean
 
     def _means(self, begin: int, end: int) -> Array:
         """(r, end - begin) m at the places begin * step, …"""

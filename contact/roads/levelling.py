@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 # The strip's profile is taken over at most this many points.
 MOST_POINTS = 1_000_000
-STRETCH = 10.0  # m
+PIECE = 20_000  # points that are asked for at once
 # The Gaussian profile filter of ISO 16610-21 passes half of a wave of the cut-off length; its
 # weight exp(-pi (x / (alpha lambda))^2) has the standard deviation alpha lambda / sqrt(2 pi).
 DEVIATION = np.sqrt(np.log(2) / np.pi) / np.sqrt(2 * np.pi)
@@ -69,7 +69,8 @@ def _profile(road: Road, x0: float, x1: float, y0: float, y1: float) -> tuple[Ar
     nx, ny = (max(int(c / excess), 1) for c in counts)
     x = x0 + (np.arange(nx) + 0.5) * (x1 - x0) / nx
     y = y0 + (np.arange(ny) + 0.5) * (y1 - y0) / ny
-    # A stretch at a time: a road in a file is read once, not once for every y.
-    parts = np.array_split(x, max(int((x1 - x0) / STRETCH), 1))
-    means = [sum(road.height(part, np.full(len(part), yj)) for yj in y) / ny for part in parts]
+    # All the width of a short piece at a time: a file is read once, and a texture that is drawn as it is reached is drawn
+    # once, not once for every y.
+    pieces = np.array_split(x, max(nx * ny // PIECE, 1))
+    means = [road.height(*np.meshgrid(piece, y)).sum(axis=0) / ny for piece in pieces]
     return x, np.concatenate(means)

@@ -12,7 +12,6 @@ import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.sections.ring import Ring
-from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
 from tireroad.fem.static.path.carried_over import sampled
@@ -118,7 +117,7 @@ class Balance:
         other: Equilibrium | None = self._half(ring, displacement)
         if other is None:
             own = Body(body.comm, ring, body.materials, cords=body.plies.cords)
-            other = make_equilibrium(own, self.rolling, shape)
+            other = Equilibrium(own, self.rolling, shape)
             own.set_displacement(displacement)
         other.pressure.value = float(self.solved.pressure.value)
         return other

@@ -1,7 +1,8 @@
-"""Static equilibrium under inflation, steady rolling and a flat, frictionless road (friction: fem.static.friction).
+"""Static equilibrium under inflation, steady rolling and a smooth, frictionless road (friction: fem.static.friction).
 
 F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f, f >= 0 on the tread dofs,
-z + u_z >= z_road and one of both zero.
+z + u_z >= z_road and one of both zero. On roads that are no level plane the tread's nodes move in the road's coordinates
+(fem.static.curved.unrolled).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
+from tireroad.fem.static.curved.unrolled import Unrolled
 from tireroad.fem.static.forces import Forces
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.linear_contact import LinearContact, held_step
@@ -32,16 +34,16 @@ class Equilibrium(Forces):
     """The nonlinear problem of one body. Its solver is made once. Collective.
 
     `solve` starts from the body's displacement and puts it back when it does not converge. `road_height` (m) is that
-    of the last state that did; the road's `shape` is a level plane here (fem.static.curved has others);
-    `force_scale`: N, by which residuals are measured.
+    of the last state that did, under the axle where its `shape` is no level plane; `force_scale`: N, by which
+    residuals are measured.
     """
 
-    shape: RoadShape = FLAT
-
-    def __init__(self, body: Body, rolling: Rolling = AT_REST) -> None:
+    def __init__(self, body: Body, rolling: Rolling = AT_REST, shape: RoadShape = FLAT) -> None:
         super().__init__(body, rolling)
         self.road_height: float | None = None
+        self.shape = shape
         self.road = self._make_road()
+        self._unrolled = None if shape.flat else Unrolled(body, self.road)
         self.force_scale = self._yardsticks()
         self._damped = bool(rolling.speed * (rolling.damping + rolling.stiffness_damping))
         self._system = self._make_system("lu" if self._damped else "cholesky")
@@ -49,14 +51,27 @@ class Equilibrium(Forces):
         self._solved = body.u.x.array.copy()
 
     def _make_road(self) -> Road:
-        return Road(self.body)
+        return Road(self.body, self.shape)
 
     def _make_system(self, kind: str) -> System:
         return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
 
     def _make_contact(self) -> LinearContact | None:
-        """Settles the sets of contact within a step; None where the tangent is not symmetric, or depends on them."""
-        return None if self._damped else LinearContact(self.body.comm, self._system, self.road)
+        """Settles the sets of contact within a step; None where the tangent is not symmetric, or the road not flat."""
+        settles = self.shape.flat and not self._damped
+        return LinearContact(self.body.comm, self._system, self.road) if settles else None
+
+    @property
+    def _in_its_coordinates(self) -> Unrolled | None:
+        """Those in which Newton's method works now; None: the wheel's axes."""
+        return self._unrolled if self.road.height > -np.inf else None
+
+    def _out(self) -> np.ndarray:
+        """Forces out of balance at the owned unknowns, N. Collective."""
+        out, along = self._assemble_residual(), self._in_its_coordinates
+        if along is not None:
+            along.turn(self._work.array)
+        return out
 
     @property
     def rounding(self) -> float:
@@ -108,7 +123,7 @@ class Equilibrium(Forces):
         stays = bool(moved <= _STAYS * self.body.ring.thickness)
         if self._contact is None or not self.body.comm.allreduce(stays, op=MPI.LAND):
             return False
-        self._assemble_residual()
+        self._out()
         on_road = self.road.height > -np.inf
         rise = road_height - self.road.height if on_road else 0.0
         if not on_road:  # nothing touches it yet, so nothing is raised by it
@@ -127,7 +142,7 @@ class Equilibrium(Forces):
     def _error(self, load: float | None) -> float:
         """Norm of what is out of balance over the force scale, distance to the road as the dof's force."""
         with self.cost("assembly"):
-            out = self._assemble_residual().copy()
+            out = self._out().copy()
         self.road.take_off(out)
         distance = self.road.distance()
         parts = np.array([out @ out + distance @ distance, self.road.force.sum()])
@@ -143,7 +158,9 @@ class Equilibrium(Forces):
         """Assemble and factorise at the present state, the held dofs on their way to the road."""
         with self.cost("assembly"):
             self._assemble_tangent()
-        taken = self._system.take(self.matrix, self.road.held, *self.road.steps())
+            along = self._in_its_coordinates
+            matrix = self.matrix if along is None else along.tangent(self.matrix)
+        taken = self._system.take(matrix, self.road.held, *self.road.steps())
         self._contact = self._make_contact() if taken else None
         return taken
 
@@ -158,7 +175,8 @@ class Equilibrium(Forces):
             return "the road meets nothing that resists"
         (change, reaction), field = step, self.body.u.x
         self._before.x.array[:] = field.array
-        field.array[: len(change)] += change
+        along = self._in_its_coordinates
+        field.array[: len(change)] += change if along is None else along.spread(change)
         self.road.lay_on()
         self.road.react(reaction)
         return ""

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.model import TireModel
-from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
+from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction.press import Friction, with_friction
 from tireroad.fem.static.path.loading import Loader, Progress
 from tireroad.fem.static.state import StaticState, static_state
@@ -37,7 +37,7 @@ def press(
     """
     if not (math.isfinite(inflation) and inflation >= 0.0):
         raise InputError(f"inflation = {inflation:g} Pa must be 0 or more, and finite")
-    loader = Loader(make_equilibrium(tire.body, rolling, road), report)
+    loader = Loader(Equilibrium(tire.body, rolling, road), report)
     loader.inflate(inflation)
     loader = place(loader, load, deflection, road_height, friction)
     return static_state(loader.equilibrium, loader.touch)

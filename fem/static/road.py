@@ -1,4 +1,4 @@
-"""The flat road under the tread nodes of one body: which touch it, and with what force."""
+"""The smooth road under the tread nodes of one body: which touch it, and with what force."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.tire.body import Body
 
 
 class Road:
-    """A plane at `height` (m; -inf: none) and the owned tread nodes that can meet it, in the order of `body.tread`:
-    `dofs` their vertical unknowns, `active` those that touch, `force` N on each, `stiffness` N/m of each unknown.
+    """A surface of a `shape` at `height` (m under the axle; -inf: none) and the owned tread nodes that can meet it, in the
+    order of `body.tread`: `dofs` their vertical unknowns, `active` those that touch, `force` N on each, along the way the
+    road is raised by a metre of height, `stiffness` N/m of each unknown.
     """
 
-    def __init__(self, body: Body) -> None:
-        self._body = body
+    def __init__(self, body: Body, shape: RoadShape = FLAT) -> None:
+        self._body, self.shape = body, shape
         self._z = body.space.tabulate_dof_coordinates()[body.tread, 2]
         self.dofs = 3 * body.tread + 2
         self.height = -np.inf
@@ -29,9 +31,20 @@ class Road:
         """Owned unknowns that the road holds."""
         return self.dofs[self.active]
 
+    def places(self) -> np.ndarray:
+        """x, y and z (n, 3) m of the owned tread nodes."""
+        body = self._body
+        points = body.space.tabulate_dof_coordinates()[body.tread]
+        return points + body.owned(body.u.x.array)[body.tread]
+
     def tread_height(self) -> np.ndarray:
-        """Height z + u_z of the owned tread nodes, m."""
-        return self._z + self._body.u.x.array[self.dofs]
+        """Height z + u_z of the owned tread nodes over the road's shape, m."""
+        height = self._z + self._body.u.x.array[self.dofs]
+        return height if self.shape.flat else height - self.shape.height(*self.places().T[:2])
+
+    def pressing(self) -> np.ndarray:
+        """The normal force's part (n,) N along the wheel's z."""
+        return self.force
 
     def gap(self) -> np.ndarray:
         """Height of the owned tread nodes above the road, m; infinite without one."""
@@ -75,7 +88,7 @@ class Road:
 
     def choose(self) -> bool:
         """Take the active set of the present state; whether it is another one on any process. Collective."""
-        wanted = self.force > self.stiffness * self.gap()
+        wanted = self.pressing() > self.stiffness * self.gap()
         changed = bool((wanted != self.active).any())
         self.active = wanted
         self.force[~wanted] = 0.0
@@ -83,8 +96,10 @@ class Road:
 
     def lay_on(self) -> None:
         """Put what touches on the road to the last bit: rounding would leave a gap or a penetration. Collective."""
-        field = self._body.u.x
-        field.array[self.dofs[self.active]] = (self.height - self._z)[self.active]
+        field, level = self._body.u.x, np.full(len(self.dofs), self.height)
+        if not self.shape.flat:
+            level += self.shape.height(*self.places().T[:2])
+        field.array[self.dofs[self.active]] = (level - self._z)[self.active]
         field.scatter_forward()
 
     def take(self, force: np.ndarray, height: float) -> None:
@@ -94,9 +109,9 @@ class Road:
         self.lay_on()
 
     def at_nodes(self) -> np.ndarray:
-        """Force on all owned nodes, N; not negative."""
+        """Normal force on all owned nodes, its part along the wheel's z, N; not negative."""
         force = np.zeros(self._body.nodes)
-        force[self._body.tread] = self.force
+        force[self._body.tread] = self.pressing()
         return force
 
     @property
@@ -105,7 +120,7 @@ class Road:
         return None
 
     def pulled(self) -> np.ndarray | None:
-        """Horizontal force (nodes, 2) N on all owned nodes; None without friction."""
+        """Force (nodes, 2) N along and across the road on all owned nodes; None without friction."""
         return None
 
     def load(self) -> float:

@@ -26,8 +26,8 @@ class StaticState:
     `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are what it was
     computed for, and travel with it. `cords` by name of the ply; `mass` (kg) of wall and cords. `fine_extent`: the extent of the
     contact on finer elements, where that is known (fem.static.load_error).
-    With friction: `pull` (s, 2) N, the road's horizontal force on the tire, and of a tire that rolls `travel`, m in a
-    radian without the wheel's slip.
+    With friction: `pull` (s, 2) N, the road's force on the tire along and across it, and of a tire that rolls `travel`,
+    m in a radian along the road without the wheel's slip.
     """
 
     displacement: np.ndarray
@@ -52,7 +52,9 @@ class StaticState:
     @property
     def load(self) -> float:
         """Total force along the road's normal under the axle, N."""
-        return float(self.force.sum()) / self.road.upright
+        if self.pull is None or self.road.flat:
+            return float(self.force.sum()) / self.road.upright
+        return float((self.push @ self.road.up).sum())
 
     @property
     def deflection(self) -> float | None:
@@ -71,9 +73,13 @@ class StaticState:
         """Force (s, 3) N of the road, in the wheel's axes."""
         slopes = self.road.slopes(*self.positions[:, :2].T)
         push = np.stack([*(-self.force * slope for slope in slopes), self.force], axis=-1)
-        if self.pull is not None:
+        if self.pull is None:
+            return push
+        frames = self.frames
+        if frames is None:
             push[:, :2] += self.pull
-        return push
+            return push
+        return push + np.einsum("st,sti->si", self.pull, frames[:, :2])
 
     @property
     def moment(self) -> np.ndarray:

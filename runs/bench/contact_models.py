@@ -15,7 +15,7 @@ from tireroad.contact.literature.springs import fitted_stiffness
 from tireroad.contact.literature.wedges import LookUp, Wedges, look_up
 from tireroad.contact.results.spectra import distance, third_octaves
 from tireroad.contact.tread.law import TREADS
-from tireroad.fem.static.curved.balance import make_equilibrium
+from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.tread_surface import TreadSurface
@@ -101,7 +101,7 @@ def _pressed(given: Prepared) -> list[StaticState]:
     """The inflated tire without a road, then on a plane, up to 1.3 times the deflection."""
     body, static = given.run.job.tire.body, given.run.static
     body.u.x.array[:] = 0.0
-    loader = Loader(make_equilibrium(body, static.rolling), lambda progress: None)
+    loader = Loader(Equilibrium(body, static.rolling), lambda progress: None)
     loader.inflate(static.inflation)
     states = [static_state(loader.equilibrium, loader.touch)]
     depths = 1.3 * static.deflection * (np.arange(DEPTHS) + 1) / DEPTHS

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.diagnosis import with_cause
+from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import UNKNOWN, load_error
 from tireroad.fem.static.path.loading import Loader
@@ -88,7 +88,7 @@ class StaticStage(Computed[StaticState]):
         """Load steps up to the state at `speed` rad/s. Collective."""
         rolling = steady_rolling(self.job, speed)
         with record.timing("mesh and forms"):
-            equilibrium = make_equilibrium(self.job.tire.body, rolling, road_shape(self.job.scene))
+            equilibrium = Equilibrium(self.job.tire.body, rolling, road_shape(self.job.scene))
         loader = Loader(equilibrium, _show)
         began = Timing.clock()
         try:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices.road_stiffness import RoadStiffness, road_stiffness
-from tireroad.fem.static.curved.balance import make_equilibrium
+from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.path.load_curve import CurvePoint, load_curve, slopes
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.state import StaticState
@@ -18,6 +19,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.stiffness import deflections
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done
+from tireroad.runs.stages.build import sliding
 from tireroad.runs.stages.static import steady_rolling
 
 _CURVE = {
@@ -46,12 +48,13 @@ _FIGURES = {
 @dataclass(frozen=True)
 class Stiffness:
     """`curve`: arrays (k,) over the deflections by the names of the file; `figures` of one state by name;
-    `matrix` (6, 6) of the stuck footprint, None where it was not asked for.
+    `matrix` (6, 6) of the stuck footprint, None where it was not asked for; `slides` with friction, by axis.
     """
 
     curve: dict[str, np.ndarray]
     figures: dict[str, float]
     matrix: np.ndarray | None
+    slides: Mapping[str, sliding.Curve] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +65,7 @@ class StiffnessStage(Computed[Stiffness]):
     static: Done[StaticState]
 
     def inputs(self) -> dict:
-        """The static state and the table."""
+        """The static state, which knows the wheel's slip, and the table."""
         return {"static": self.static.key, "stiffness": asdict(self.job.scene.stiffness)}
 
     def compute(self, record: Record) -> Stiffness:
@@ -82,10 +85,12 @@ class StiffnessStage(Computed[Stiffness]):
                 places = body.lattice.points(body.ids) + body.owned(body.u.x.array)
                 centre = body.comm.allreduce(force @ places) / points[-1].load
                 stuck = self._stuck(record, np.flatnonzero(force > 0), centre)
+            slides = self._slides(record, stuck)
         finally:
             body.set_displacement(state.displacement)
-        found = _result(points, state, stuck)
+        found = replace(_result(points, state, stuck), slides=slides)
         _describe(record, found, stuck)
+        sliding.describe(record, slides, state.travel is not None)
         return found
 
     def _stuck(self, record: Record, nodes: np.ndarray, centre: np.ndarray) -> RoadStiffness:
@@ -95,12 +100,19 @@ class StiffnessStage(Computed[Stiffness]):
             rolling = steady_rolling(self.job)
             return road_stiffness(self.job.tire.body, inflation, nodes, centre, rolling)
 
+    def _slides(self, record: Record, stuck: RoadStiffness | None) -> Mapping[str, sliding.Curve]:
+        """Force over the way of the road with friction, of a scene that has some. Collective."""
+        if stuck is None:
+            return {}
+        with record.timing("sliding"):
+            return sliding.slides(self.job, self.static.product, stuck)
+
     def _curve(self, record: Record) -> tuple[list[CurvePoint], np.ndarray]:
         """The points of the curve, and the last forces on own nodes, N. Collective."""
         body, state = self.job.tire.body, self.static.product
         body.u.x.array[:] = 0.0
         with record.timing("mesh and forms"):
-            equilibrium = make_equilibrium(body, steady_rolling(self.job), state.road)
+            equilibrium = Equilibrium(body, steady_rolling(self.job), state.road)
         loader = Loader(equilibrium, lambda progress: None)
         try:
             loader.inflate(self.job.scene.static.inflation)
@@ -127,6 +139,7 @@ class StiffnessStage(Computed[Stiffness]):
             put(file, name, np.array(value), _FIGURES[name])
         if product.matrix is not None:
             put(file, "matrix", product.matrix, "N/m, N/rad, N m/m, N m/rad")
+        sliding.fill(file, product.slides, self.static.product.travel is not None)
 
     def read(self, file) -> Stiffness:
         """The same back."""
@@ -134,6 +147,7 @@ class StiffnessStage(Computed[Stiffness]):
             {name: file[f"curve/{name}"][:] for name in _CURVE},
             {name: float(file[name][()]) for name in _FIGURES if name in file},
             file["matrix"][:] if "matrix" in file else None,
+            sliding.read(file),
         )
 
 

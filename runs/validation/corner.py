@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import compare, verdicts
+from tireroad.runs.validation.parts import corner_limits
 from tireroad.runs.validation.rolling import ROADS
 from tireroad.runs.validation.tires import LOADED, Choice, Tires
 
@@ -71,4 +72,5 @@ def run() -> list[Table]:
             found = compare(tires, STEPS, CHOICES, ("contact force", "axle force"))
             tables.append(found.table(f"{name}: {tires.setting}"))
             rows.append(found.verdict(name, WITHIN, 1.0, tires.modes_seconds))
-    return [*tables, verdicts("Wheel on its corner: what was asked for", rows, [])]
+    asked = verdicts("Wheel on its corner: what was asked for", rows, [])
+    return [*tables, asked, corner_limits.table()]

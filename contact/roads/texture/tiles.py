@@ -62,6 +62,9 @@ class Tiles:
         self._filter: Array | None = None
         self._tiles: dict[int, Array] = {}
         self._halves: dict[int, Array] = {}  # the one asked for last at the end
+        self._ends: dict[
+            int, tuple[float, float]
+        ] = {}  # lowest and highest place of each half ever drawn
         self.spacing = 0.5 * shortest
 
     def _places(self) -> tuple[int, int]:
@@ -113,7 +116,9 @@ class Tiles:
         before, here = self._drawn(number - 1), self._drawn(number)
         # The row that follows the earlier tile's end has no weight.
         ending = np.concatenate([before[half:], before[:1]])
-        return np.cos(share) * ending + np.sin(share) * here[: half + 1]
+        z = np.cos(share) * ending + np.sin(share) * here[: half + 1]
+        self._ends[number] = float(z.min()), float(z.max())
+        return z
 
     def height(self, x: Array, y: Array) -> Array:
         """Bilinear heights (m) at x, y (m) of equal shape."""
@@ -142,16 +147,18 @@ class Tiles:
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """The highest place from x0 to x1, m."""
-        return max(float(z.max()) for z in self._strip(x0, x1))
+        return max(high for _, high in self._strip(x0, x1))
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """The lowest place from x0 to x1, m."""
-        return min(float(z.min()) for z in self._strip(x0, x1))
+        return min(low for low, _ in self._strip(x0, x1))
 
-    def _strip(self, x0: float, x1: float) -> Iterator[Array]:
+    def _strip(self, x0: float, x1: float) -> Iterator[tuple[float, float]]:
         length = self._shape[0] // 2 * self._pitch
         for index in range(int(np.floor(x0 / length)), int(np.floor(x1 / length)) + 1):
-            yield self._half(index)
+            if index not in self._ends:
+                self._half(index)
+            yield self._ends[index]
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> Tiles:
         """Nothing to prepare."""

@@ -6,6 +6,9 @@ In the wheel's axes the surface is z = h + s(x, y), h its height under the axle.
     s = -y tan gamma + d(x) / cos gamma,   d = sqrt(R^2 - x^2) - R on a drum, R - sqrt(R^2 - x^2) inside one,
 
 on a drum whose axis is level. Beyond 0.9 R a drum is continued by its tangent: nothing touches there.
+
+All of them roll out flat: a place on the road is told by xi = R asin(x/R) (x on a plane) along it and eta = y cos gamma - z sin
+gamma across it. A body on the road that moves up with it keeps both.
 """
 
 from __future__ import annotations
@@ -56,21 +59,37 @@ class RoadShape:
         near = self._near(x)
         return -self._sign * near / np.sqrt(self.drum_radius**2 - near**2) / self.upright, across
 
-    def curvature(self, x: Array) -> Array:
-        """d2s/dx2, 1/m."""
+    def bending(self, x: Array) -> Array:
+        """How the direction along the road turns towards its normal, 1/m along it: -1/R on a drum, 1/R inside one."""
         if self.drum_radius is None:
             return np.zeros(np.shape(x))
-        near, radius = self._near(x), self.drum_radius
-        bend = -(radius**2) / (radius**2 - near**2) ** 1.5
-        return np.where(near == x, self._sign * bend / self.upright, 0.0)
+        return np.where(self._near(x) == x, -self._sign / self.drum_radius, 0.0)
+
+    def unrolled(self, places: Array) -> Array:
+        """xi, eta (n, 2) m of places (n, 3) m."""
+        if self.flat:
+            return places[:, :2]
+        x, y, z = places.T
+        along = x
+        if self.drum_radius is not None:
+            near, radius = self._near(x), self.drum_radius
+            cosine = np.sqrt(1.0 - (near / radius) ** 2)
+            along = radius * np.arcsin(near / radius) + (x - near) / cosine
+        return np.stack([along, y * self.upright - z * math.sin(self.camber)], axis=-1)
 
     def frames(self, x: Array, y: Array) -> Array:
         """Unit vectors (n, 3, 3) in the wheel's axes: along the road, across it to the left, its normal."""
         along, across = self.slopes(x, y)
         one, nothing = np.ones(len(along)), np.zeros(len(along))
-        forward = _unit(np.stack([one, nothing, along], axis=-1))
+        left = _unit(np.stack([nothing, one, across], axis=-1))
         normal = _unit(np.stack([-along, -across, one], axis=-1))
-        return np.stack([forward, np.cross(normal, forward), normal], axis=1)
+        forward = _unit(np.asarray(np.cross(left, normal), dtype=np.float64))
+        return np.stack([forward, left, normal], axis=1)
+
+    @property
+    def up(self) -> Array:
+        """(3,): the road's normal under the axle, along which it is raised."""
+        return np.array([0.0, math.sin(self.camber), self.upright])
 
     def stretch(self, x: Array, y: Array) -> Array:
         """Normal force over its part along the wheel's z, and height over distance, at x, y (m)."""

@@ -1,7 +1,10 @@
-"""Equilibrium on a level road with Coulomb friction; Newton's method in one loop, sets of contact, stick and slip in it."""
+"""Equilibrium on a smooth road with Coulomb friction; Newton's method in one loop, sets of contact, stick and slip in it."""
 
 from __future__ import annotations
 
+import numpy as np
+
+from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction.road import RubbingRoad
 from tireroad.fem.static.friction.sliding import Sliding
@@ -17,7 +20,7 @@ class RubbingEquilibrium(Equilibrium):
 
     def __init__(self, body: Body, rolling: Rolling, friction: float, sliding: Sliding) -> None:
         self._given = friction, sliding
-        super().__init__(body, rolling)
+        super().__init__(body, rolling, sliding.shape)
 
     def _make_road(self) -> RubbingRoad:
         return RubbingRoad(self.body, *self._given)
@@ -27,3 +30,16 @@ class RubbingEquilibrium(Equilibrium):
 
     def _make_contact(self) -> None:
         """None: the tangent is not symmetric."""
+
+    def nudged(self, load: float) -> np.ndarray:
+        """Sum (2,) N of the forces along and across the road after one linearised step under that `load` (N), what sticks and
+        slips as it does; the state is put back. Collective."""
+        field = self.body.u.x
+        kept, self._before.x.array[:] = (field.array.copy(), self.road.kept()), field.array
+        self._out()
+        if not self._take_tangent() or self._move(self._system.closing, load):
+            raise ConvergenceError("static: the tangent of a state with friction is singular")
+        pulled = self.body.comm.allreduce(self.road.pull.sum(axis=0))
+        field.array[:] = kept[0]
+        self.road.put_back(kept[1])
+        return pulled

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import root_scalar
 
-from tireroad.fem.errors import ConvergenceError, InputError, LoadingStopped
+from tireroad.fem.errors import ConvergenceError, LoadingStopped
 from tireroad.fem.static.friction.balance import RubbingEquilibrium
 from tireroad.fem.static.friction.sliding import Passing, Standing
 from tireroad.fem.static.path.loading import Loader
@@ -46,11 +46,11 @@ def with_friction(
     loader: Loader, inflated: np.ndarray, load: float | None, friction: Friction
 ) -> Loader:
     """The `loader`'s state on the road, with friction; `inflated` is its body's `u` before there was a road, `load` (N)
-    what the road has to carry, None: it stays where it is. InputError on roads that are no level plane. Collective.
+    what the road has to carry along its normal under the axle, None: it stays where it is. Collective.
     """
     equilibrium = loader.equilibrium
-    if not equilibrium.shape.flat:
-        raise InputError("static.friction is of a level road: without camber and drum")
+    if load is not None:
+        load *= equilibrium.shape.upright
     if equilibrium.rolling.speed:
         return _rolling(loader, load, friction)
     return _pressed(loader, inflated, load, friction)
@@ -73,7 +73,7 @@ def _pressed(
     """Standing: each step slips as much as it does from the last on; the last one carries the load."""
     deflection, body = loader.deflection, loader.body
     body.u.x.array[:] = inflated
-    sliding = Standing(body)
+    sliding = Standing(body, loader.equilibrium.shape)
     rubbing, _ = _on(loader, sliding, friction)
     size, done = deflection / friction.steps, 0.0
 
@@ -94,7 +94,7 @@ def _rolling(loader: Loader, load: float | None, friction: Friction) -> Loader:
     radius = friction.radius
     if radius is None:
         radius = static_state(loader.equilibrium, loader.touch).rolling_radius()
-    sliding = Passing(loader.body, radius)
+    sliding = Passing(loader.body, radius, shape=loader.equilibrium.shape)
     height, force = loader.equilibrium.road_height, loader.equilibrium.contact_force()
     rubbing, problem = _on(loader, sliding, friction)
     road = problem.road
@@ -108,7 +108,7 @@ def _rolling(loader: Loader, load: float | None, friction: Friction) -> Loader:
     def drag(trial: float) -> float:
         sliding.radius = trial
         _checked(rubbing, problem.solve(problem.road_height, load))
-        return float(rubbing.body.comm.allreduce(road.pull[:, 0].sum()))
+        return rubbing.body.comm.allreduce(road.forward())
 
     _march(rubbing, attempt, friction.coefficient, Show("static.friction", 1.0, ""))
     if friction.radius is None:

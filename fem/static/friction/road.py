@@ -1,4 +1,4 @@
-"""The flat road under the tread nodes of one body, with Coulomb friction.
+"""The smooth road under the tread nodes of one body, with Coulomb friction.
 
 At a node that touches, with f its normal force, t the road's horizontal force on it, g how far it slides and c its stiffness,
 
@@ -11,10 +11,15 @@ Newton's method on that, node by node: with n the direction of t - c g, m at a r
 
 f+ and g+ of the linearised problem: no step of its own for t. k is |t| over |g| once it slips: a node that
 slides is led by its friction as by a spring across its way, and along it only by mu times its normal force.
+
+On a road that is no level plane t and g are counted along the road and across it (fem.static.curved). With l = -e_xi . cos
+gamma n_0 the force along which the road is raised is v = p - l t_xi, p the normal force's part along the wheel's z, and
+f = s p, s the surface's stretch: a node that slips knows p by v and the t_xi out of balance.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,15 +30,31 @@ from tireroad.fem.static.road import Road
 from tireroad.fem.tire.body import Body
 
 Array = np.ndarray
-_ROUNDING = 1e-9  # of a node's bound
+
+
+@dataclass(frozen=True, kw_only=True)
+class Couplings:
+    """Of `unknowns` (k, 2) along the road: the `shares` (k, 2, m) of the rows of other unknowns, `sources` (k, m), `own` (k, 2, 2)
+    N/m on themselves, and the `springs` (k, 2, 2) N/m to the nodes `ahead` (k,), numbers of blocks; -1: none."""
+
+    unknowns: Array
+    sources: Array
+    shares: Array
+    own: Array
+    springs: Array
+    ahead: Array
+
+
+_ROUNDING, _BRINK = 1e-9, 1e-7  # of a node's bound
 _STIFFEST = 1e6  # k over c: a node on the brink of sticking
 
 
 class RubbingRoad(Road):
-    """As `Road`; `pull` (n, 2) N horizontal forces on the tire, `sticks` (n,) which nodes do; `friction` mu."""
+    """As `Road`; `pull` (n, 2) N forces on the tire along and across the road, `sticks` (n,) which nodes do; `friction`
+    mu."""
 
     def __init__(self, body: Body, friction: float, sliding: Sliding) -> None:
-        super().__init__(body)
+        super().__init__(body, sliding.shape)
         self.friction, self.sliding = friction, sliding
         self.pull = np.zeros((len(body.tread), 2))
         self.sticks = np.zeros(len(body.tread), dtype=bool)
@@ -59,10 +80,31 @@ class RubbingRoad(Road):
         back = back[self.sticks].ravel()
         return np.append(down, back), np.append(rise, np.zeros(len(back)))
 
+    def _lie(self) -> tuple[Array, Array]:
+        """s and l (n,) at the nodes' places."""
+        shape = self.shape
+        if shape.flat:
+            return np.ones(len(self.dofs)), np.zeros(len(self.dofs))
+        x, y, _ = self.places().T
+        return shape.stretch(x, y), -shape.upright * shape.frames(x, y)[:, 0] @ shape.up
+
+    def pressing(self) -> Array:
+        """p (n,) N."""
+        return self.force + self._lie()[1] * self.pull[:, 0]
+
+    def forward(self) -> float:
+        """Of all forces on the tire, normal ones too, the sum along the wheel's x, N. Not collective."""
+        if self.shape.flat:
+            return float(self.pull[:, 0].sum())
+        x, y, _ = self.places().T
+        pushed = -self.shape.slopes(x, y)[0] @ self.pressing()
+        return float(pushed + (self.pull * self.shape.frames(x, y)[:, :2, 0]).sum())
+
     def _trial(self) -> tuple[Array, Array]:
         """t - c g (n, 2) N and mu f (n,) N, f as Newton's method sees it. Collective."""
-        normal = np.maximum(self.force - self.stiffness * self.gap(), 0.0)
-        return self.pull - self._softly[:, None] * self.sliding.slid(), self.friction * normal
+        pressing = np.maximum(self.pressing() - self.stiffness * self.gap(), 0.0)
+        bound = self.friction * self._lie()[0] * pressing
+        return self.pull - self._softly[:, None] * self.sliding.slid(), bound
 
     def choose(self) -> bool:
         """As of a road without friction; and which nodes stick. A node that does goes on to until its force is too large;
@@ -104,10 +146,23 @@ class RubbingRoad(Road):
             share / np.maximum(1.0 - share, 1e-300), _STIFFEST
         )
 
+    def _sources(self) -> tuple[Array, Array]:
+        """Of nodes that slip, the unknowns (k, m) whose forces tell mu f, and by which shares (k, m)."""
+        stretch, lean = (part[self._slips] for part in self._lie())
+        upright = self.dofs[self._slips, None]
+        if self.shape.flat:
+            return upright, self.friction * stretch[:, None]
+        where = np.concatenate([upright, self._along[self._slips, :1]], axis=1)
+        return where, self.friction * stretch[:, None] * np.stack(
+            [np.ones(len(lean)), lean], axis=1
+        )
+
     def rows(self, out: Array) -> Array:
         """At nodes that slip, the balance along the road with its friction eliminated. Collective."""
         where = self._along[self._slips]
-        out[where] -= self.friction * self._way * out[self.dofs[self._slips], None]
+        sources, shares = self._sources()
+        bound = (shares * out[sources]).sum(axis=1)
+        out[where] -= self._way * bound[:, None]
         out[where] += self._led_by(self.sliding.slid())
         return out
 
@@ -116,12 +171,41 @@ class RubbingRoad(Road):
         off = (self._across * slid[self._slips]).sum(axis=1)
         return (self._led * off)[:, None] * self._across
 
-    def couplings(self) -> tuple[Array, Array, Array, Array]:
-        """What `rows` does to the tangent's rows: of the unknowns (k, 2) the shares (k, 2) of the vertical one's row, and the
-        springs (k, 2, 2) N/m to the nodes ahead, numbers of blocks (k,). Not collective."""
+    def couplings(self) -> Couplings:
+        """What `rows` does to the tangent's rows. Not collective."""
+        sources, shares = self._sources()
         springs = self._led[:, None, None] * self._across[:, :, None] * self._across[:, None, :]
-        ahead = self.sliding.ahead(self._slips)
-        return self._along[self._slips], -self.friction * self._way, springs, ahead
+        own = springs.copy()
+        if not self.shape.flat:  # a node that moves on along a drum is pressed along another normal
+            own[:, :, 0] += self._way * self._leaning()[:, None]
+        return Couplings(
+            unknowns=self._along[self._slips],
+            sources=sources,
+            shares=-self._way[:, :, None] * shares[:, None, :],
+            own=own,
+            springs=springs,
+            ahead=self.sliding.ahead(self._slips),
+        )
+
+    def _leaning(self) -> Array:
+        """Of nodes that slip, mu b (f l s + t_xi), N/m: less mu f by a metre along the road, b its bending."""
+        stretch, lean = (part[self._slips] for part in self._lie())
+        normal = stretch * self.pressing()[self._slips]
+        bending = self.shape.bending(self.places()[self._slips, 0])
+        return self.friction * bending * (normal * stretch * lean + self.pull[self._slips, 0])
+
+    def resume(self, pressing: Array, pull: Array, height: float) -> None:
+        """Start from a state: normal forces (nodes,) N by their part along the wheel's z, forces (nodes, 2) N along and across
+        the road at `height` (m). Collective."""
+        self.take(pressing, height)
+        self.pull = pull[self._body.tread]
+        stretch, lean = self._lie()
+        bound = self.friction * stretch * self.force
+        self.force = self.force - lean * self.pull[:, 0]
+        size = np.linalg.norm(self.pull, axis=1)
+        self.sticks = self.active & (size < (1 - _BRINK) * bound)
+        self._slips = np.flatnonzero(self.active & ~self.sticks)
+        self._way = self.pull[self._slips] / size[self._slips, None]
 
     def upward(self, reaction: Array) -> float:
         return float(reaction[: int(self.active.sum())].sum())
@@ -130,8 +214,11 @@ class RubbingRoad(Road):
         count = int(self.active.sum())
         super().react(reaction[:count])
         self.pull[self.sticks] = reaction[count:].reshape(-1, 2)
-        normal = self.friction * self.force[self._slips]
-        self.pull[self._slips] = normal[:, None] * self._way - self._led_by(self.sliding.slid())
+        led, (stretch, lean) = self._led_by(self.sliding.slid()), self._lie()
+        stretch, lean = self.friction * stretch[self._slips], lean[self._slips]
+        pressing = self.force[self._slips] - lean * led[:, 0]
+        pressing /= 1.0 - lean * stretch * self._way[:, 0]
+        self.pull[self._slips] = (stretch * pressing)[:, None] * self._way - led
 
     def kept(self) -> tuple[Any, ...]:
         return *super().kept(), self.sticks.copy(), self.pull.copy(), self._slips, self._way

@@ -7,7 +7,8 @@ at theta + D, while the road passes by r D, r the wheel's travel in a radian. It
     g = x(theta) - x(theta + D) + D r (1 - s_x, s_y),
 
 s_x > 0 of a wheel that drives, s_y > 0 of one that drifts towards +y (contact.tread.brush). Where it sticks, g = 0: the
-steps along a streamline add up to the convective rate of the stuck displacement, whatever their length.
+steps along a streamline add up to the convective rate of the stuck displacement, whatever their length. On a tilted road and on
+a drum x is the place on the road rolled out, xi and eta (fem.static.curved.shape).
 """
 
 from __future__ import annotations
@@ -16,13 +17,16 @@ from typing import Protocol
 
 import numpy as np
 
+from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.tire.body import Body
 
 Array = np.ndarray
 
 
 class Sliding(Protocol):
-    """Of the owned tread nodes, n of them in the order of `body.tread`."""
+    """On a road of a `shape`, of the owned tread nodes, n of them in the order of `body.tread`."""
+
+    shape: RoadShape
 
     def slid(self) -> Array:
         """g (n, 2) m. Collective."""
@@ -46,15 +50,15 @@ class Sliding(Protocol):
 class Standing:
     """`place` (2,) m: where the road has moved to, along and across."""
 
-    def __init__(self, body: Body) -> None:
-        self._body = body
-        self._points = body.space.tabulate_dof_coordinates()[body.tread, :2]
+    def __init__(self, body: Body, shape: RoadShape = FLAT) -> None:
+        self._body, self.shape = body, shape
+        self._points = body.space.tabulate_dof_coordinates()[body.tread]
         self.place = np.zeros(2)
         self.commit()
 
     def _relative(self) -> Array:
-        moved = self._body.owned(self._body.u.x.array)[self._body.tread, :2]
-        return self._points + moved - self.place
+        moved = self._body.owned(self._body.u.x.array)[self._body.tread]
+        return self.shape.unrolled(self._points + moved) - self.place
 
     def slid(self) -> Array:
         return self._relative() - self._before
@@ -71,13 +75,19 @@ class Standing:
 
 
 class Passing:
-    """`radius` m: how far the wheel travels in a radian; `slip` (s_x, s_y)."""
+    """`radius` m: how far the wheel travels in a radian, along the road; `slip` (s_x, s_y)."""
 
-    def __init__(self, body: Body, radius: float, slip: tuple[float, float] = (0.0, 0.0)) -> None:
+    def __init__(
+        self,
+        body: Body,
+        radius: float,
+        slip: tuple[float, float] = (0.0, 0.0),
+        shape: RoadShape = FLAT,
+    ) -> None:
         self._body, lattice = body, body.lattice
-        self.radius, self.slip = radius, slip
+        self.radius, self.slip, self.shape = radius, slip, shape
         self._around, self._along = lattice.face_shape
-        self._points = lattice.points(lattice.face)[:, :2]
+        self._points = lattice.points(lattice.face)
         number = body.space.dofmap.index_map.local_range[0] + np.arange(body.nodes)
         self._number = body.surface(number.astype(float)).astype(np.int64)
         where = np.zeros(body.nodes, np.intp)
@@ -89,8 +99,8 @@ class Passing:
 
     def _steps(self) -> Array:
         """g (s, 2) m of all nodes of the outer face. Collective."""
-        moved = self._body.surface(self._body.owned(self._body.u.x.array))[:, :2]
-        place = self._points + moved
+        moved = self._body.surface(self._body.owned(self._body.u.x.array))
+        place = self.shape.unrolled(self._points + moved)
         travel = self.radius * np.array([1.0 - self.slip[0], self.slip[1]])
         return place - place[self._next] + self._angle[:, None] * travel
 

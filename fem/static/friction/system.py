@@ -2,7 +2,7 @@
 
     (L K + S) P dv = L (- out) - springs,     du = P dv:
 
-L adds to the horizontal rows of nodes that slip -mu n times their vertical one; S are the springs across their way; P
+L adds to the horizontal rows of nodes that slip -mu n times what of their rows is the normal force; S are the springs across their way; P
 takes nodes that stick along with the free one ahead of them on their streamline. None of it is symmetric.
 """
 
@@ -77,9 +77,14 @@ class RubbingSystem:
 
     def _rows_and_springs(self, matrix: PETSc.Mat) -> tuple[PETSc.Mat, PETSc.Mat]:
         first = matrix.getOwnershipRange()[0]
-        unknowns, shares, springs, ahead = self._road.couplings()
-        vertical = unknowns[:, :1] - unknowns[:, :1] % 3 + 2 + first
-        rows = _sparse(matrix, unknowns, np.broadcast_to(vertical, unknowns.shape), shares)
+        given = self._road.couplings()
+        unknowns, springs, ahead = given.unknowns, given.springs, given.ahead
+        rows = _sparse(
+            matrix,
+            np.broadcast_to(unknowns[:, :, None], given.shares.shape),
+            np.broadcast_to(given.sources[:, None, :] + first, given.shares.shape),
+            given.shares,
+        )
         row = np.broadcast_to(unknowns[:, :, None], springs.shape)
         own = np.broadcast_to(unknowns[:, None, :] + first, springs.shape)
         far = np.broadcast_to((3 * ahead[:, None] + np.arange(2))[:, None, :], springs.shape)
@@ -88,7 +93,7 @@ class RubbingSystem:
             matrix,
             np.concatenate([row.ravel(), row[led]]),
             np.concatenate([own.ravel(), far[led]]),
-            np.concatenate([springs.ravel(), -springs[led]]),
+            np.concatenate([given.own.ravel(), -springs[led]]),
         )
 
     def _along(self, matrix: PETSc.Mat) -> PETSc.Mat | None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tireroad.fem.matrices import probe
 from tireroad.fem.sections.locate import interpolation, locate
-from tireroad.fem.static.curved.balance import make_equilibrium
+from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.tire.mesh import Lattice
 
@@ -26,7 +26,7 @@ def carried_over(
     """
     body = other.body
     body.set_displacement(sampled(tire.lattice, state.displacement, body.lattice))
-    equilibrium = make_equilibrium(body, state.rolling, state.road)
+    equilibrium = Equilibrium(body, state.rolling, state.road)
     equilibrium.pressure.value = state.inflation
     carried = None if load is None else load * state.road.upright
     step = equilibrium.solve(state.road_height, load=carried)

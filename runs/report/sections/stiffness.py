@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,7 +48,48 @@ def section(results: Results) -> Section:
     made.table = Table(head, [tuple(f"{v:.4g}" for v in row) for row in np.transpose(columns)])
     picture = curve(columns[0], columns[1], columns[5], load)
     made.show(picture, "Load and contact area over deflection; dashed: the scene's load.")
+    _slides(results, made)
     return made
+
+
+def _slides(results: Results, made: Section) -> None:
+    """Adds force over the way of the road, of a tire with friction."""
+    rolls = results.attribute("static.h5", "travel") is not None
+    curves = {}
+    for name in ("longitudinal", "lateral"):
+        moved = results.optional(_FILE, f"slide/{name}/moved")
+        if moved is not None:
+            curves[name] = (
+                (1.0 if rolls else 1e3) * moved,
+                results.array(_FILE, f"slide/{name}/force"),
+            )
+    if not curves:
+        return
+    for name, (_, force) in curves.items():
+        made.facts.append((f"largest {name} force", quantity(float(force.max()), "N")))
+    made.show(
+        slid(curves, "slip of the wheel" if rolls else "way of the road, mm"),
+        "Force along and across the road with friction, "
+        + (
+            "of the rolling wheel over its slip."
+            if rolls
+            else "over the way that the road is moved under the standing tire."
+        ),
+    )
+
+
+@styled
+def slid(curves: Mapping[str, tuple[NDArray, NDArray]], label: str) -> str:
+    """Force (n) N over way or slip (n) by name, as a picture."""
+    figure, axes = canvas(6.2, 3.0)
+    here, start = axes[0, 0], np.zeros(1)
+    for colour, (name, (moved, force)) in zip(COLOURS, curves.items(), strict=False):
+        x, y = (np.concatenate([start, part]) for part in (moved, force))
+        here.plot(x, y, "o-", ms=3, color=colour, label=name)
+    here.set_xlabel(label)
+    here.set_ylabel("force, N")
+    here.legend(loc="lower right")
+    return encode(figure)
 
 
 @styled

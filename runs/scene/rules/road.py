@@ -31,13 +31,6 @@ def check_shape(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             ("road", "drum_radius"),
             f"= {drum:g} m leaves no room inside for a tire of {outer:g} m: at least {_ROOM * outer:.3g} m",
         )
-    rubs = scene.static.friction is not None
-    if rubs and (drum is not None or camber):
-        raise error(
-            ("static", "friction"),
-            f"= {scene.static.friction:g} is of a level road: take static.camber = 0 deg and no road.drum_radius, "
-            "or leave it out",
-        )
     if scene.modal.road == "held" and (drum is not None or camber):
         raise error(
             ("modal", "road"),

@@ -38,7 +38,7 @@ class Static:
     friction: float | None = number(
         None,
         "-",
-        "coefficient of Coulomb friction between tire and road in the static state, on a level road; absent: none. A "
+        "coefficient of Coulomb friction between tire and road in the static state; absent: none. A "
         "tire that stands sticks and slips as it is pressed on, one that rolls as its tread passes, its wheel rolling freely "
         "but for contact.slip and rotation.slip_angle",
         least=0,

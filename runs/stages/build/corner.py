@@ -84,8 +84,10 @@ def standing_moment(patch: Patch) -> np.ndarray:
     """Moment (3,) N m of the static contact forces about the axle's centre."""
     up = np.array([0.0, 0.0, 1.0]) if patch.frames is None else patch.frames[:, 2]
     push = patch.force[:, None] * up
-    if patch.pull is not None:
+    if patch.pull is not None and patch.frames is None:
         push[:, :2] += patch.pull
+    elif patch.pull is not None:
+        push = push + np.einsum("ct,cti->ci", patch.pull, patch.frames[:, :2])
     return np.cross(patch.points, push).sum(axis=0)
 
 

@@ -38,7 +38,7 @@ def headline(state: StaticState, friction: float | None) -> dict[str, tuple[floa
     if state.pull is None or friction is None:
         return {}
     force, size = state.pull.sum(axis=0), np.linalg.norm(state.pull, axis=1)
-    sticks = size < (1 - _SMALL) * friction * state.force
+    sticks = size < (1 - _SMALL) * friction * state.normal_force
     share = state.force[sticks].sum() / state.force.sum()
     forward, left, torque, upright = np.round([*force, *state.moment[1:]], 6)
     return {

@@ -96,3 +96,25 @@ def test_waves_that_points_cannot_tell_are_gone() -> None:
     false = np.exp(-2j * np.pi * x / 0.164)
     assert 2 * abs(false @ wave.height(x, 0.0)) / 41 == pytest.approx(1.0, abs=0.05)
     assert 2 * abs(false @ means) / 41 < 0.045
+
+
+def test_what_a_footprint_was_over_is_asked_for_once_and_to_the_last_bit() -> None:
+    """Rolled on, back and away: the same bits as from the beginning; rolled on, as much road as is new."""
+    asked = []
+
+    class Counted(Wave):
+        def height(self, x, y):
+            asked.append(np.shape(x)[1])
+            return super().height(x, y)
+
+    patch = np.linspace(0.0, 0.2, 50)
+    kept = CellMean(Counted(0.013), np.zeros(50), np.tile(HALF, (50, 1)))
+    spent = []
+    for start in (0.1, 0.11, 0.12, 0.115, 0.3, 5.0):
+        asked.clear()
+        x = start + patch[None]
+        found = kept.height(x, None)
+        spent.append(sum(asked))
+        fresh = CellMean(Wave(0.013), np.zeros(50), np.tile(HALF, (50, 1)))
+        assert np.array_equal(found, fresh.height(x, None))
+    assert spent[1] < 0.15 * spent[0] and spent[2] == pytest.approx(spent[1], rel=0.02)

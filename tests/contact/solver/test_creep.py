@@ -1,68 +1,29 @@
 """A tread that creeps: against published rolling cylinders, its elastic limits, and in time."""
 
-from functools import partial
-
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
-from tireroad.contact.patch import Patch
 from tireroad.contact.solver.complementarity import ActiveSet
-from tireroad.contact.tread.compliance import dense_compliance, half_space_influence
 from tireroad.contact.tread.creep import TreadMemory, creep_of, steady
-from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.contact.tread.laws.viscoelastic import Viscoelastic
 from tireroad.fem.errors import InputError
-
-# Two cylinders of PA6: G, nu, common radius, load of 1 m, speed. Wang and Knothe, J. Appl. Mech. 60 (1993) 310.
-SHEAR, NU, RADIUS, LOAD, SPEED = 1143e6, 0.4, 0.05, 600e3, 1.0
-POINTS, DX, DY = 99, 0.16e-3, 1.0
-# One body against a rigid one gives way as two of twice its modulus.
-INFLUENCE = partial(half_space_influence, youngs_modulus=(1 + NU) * SHEAR, poisson_ratio=NU)
-
-
-def influence(x, y, a, b):
-    return INFLUENCE(x, y, a, b)
-
-
-def cylinder() -> Patch:
-    """One line of points a metre wide: plane strain in the middle."""
-    x = (np.arange(POINTS) - POINTS // 2) * DX
-    nothing = np.zeros(POINTS)
-    return Patch(
-        index=np.arange(POINTS),
-        points=np.stack([x, nothing, nothing], axis=-1),
-        half_sizes=np.tile([DX / 2, DY / 2], (POINTS, 1)),
-        force=nothing,
-        gap=x**2 / (2 * RADIUS),
-        edge=np.zeros(POINTS, bool),
-        line=np.zeros(POINTS, int),
-        places=GridPlaces((POINTS, 1), (DX, DY), np.arange(POINTS)),
-    )
-
-
-def pressed(solver: ActiveSet, gap: np.ndarray) -> np.ndarray:
-    """Pressures (MPa) under the load."""
-
-    def excess(approach):
-        return solver.solve(gap - approach).sum() - LOAD
-
-    approach = brentq(excess, 0.0, 1e-2, xtol=1e-15)
-    return solver.solve(gap - approach) / (DX * DY) / 1e6
-
-
-def matrix(patch: Patch) -> np.ndarray:
-    return dense_compliance(patch.points[:, :2], patch.half_sizes, influence)
-
-
-@pytest.mark.parametrize(
-    ("time", "published"), [(1e-9, 60.32), (0.009, 78.74), (0.045, 84.72), (2.0, 85.31)]
+from tireroad.runs.validation.parts.creeping import (
+    DX,
+    DY,
+    PUBLISHED,
+    SPEED,
+    cylinder,
+    influence,
+    matrix,
+    pressed,
+    rolled,
 )
+
+
+@pytest.mark.parametrize(("time", "published"), PUBLISHED.items())
 def test_published_pressure_of_rolling_cylinders(time, published) -> None:
     """Within 2 % (1.1 % at 0.009 s, a grid four times finer changes 0.02 %); most of it in front between the limits."""
-    patch = cylinder()
-    creep = np.array([1.0]), np.array([time])
-    pressure = pressed(ActiveSet(matrix(patch) @ steady(creep, patch, SPEED)), patch.gap)
+    patch, pressure = cylinder(), rolled(time)
     assert pressure.max() == pytest.approx(published, rel=0.012)
     x = patch.points[:, 0]
     centre = float(x @ pressure / pressure.sum())

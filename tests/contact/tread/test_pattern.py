@@ -1,84 +1,26 @@
 """A tread pattern in the loop: orders by hand, a slick as its limit, pitches, files, and what is refused."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from mpi4py import MPI
 
-from tireroad.contact.roads.kinds.flat import Flat
-from tireroad.contact.rolling import roll
-from tireroad.contact.setup import ContactSetup, Rolled
-from tireroad.contact.solver.complementarity import ActiveSet
-from tireroad.contact.tread.compliance import winkler_compliance
 from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError
-from tireroad.runs.measure.synthetic import oval_patch
 from tireroad.runs.scene.tables.pattern import Groove, PatternTable
 from tireroad.runs.stages.build.pattern import make_pattern
-
-BED, SPEED, STEP, PITCHES = 2e8, 20.0, 1e-4, 50
-AROUND = 2.0  # m
-
-
-class Rigid:
-    """A tire that does not give way."""
-
-    comm = MPI.COMM_SELF
-
-    def __init__(self, count: int) -> None:
-        self.same_step = np.zeros((count, count))
-
-    def predict(self) -> np.ndarray:
-        return np.zeros(len(self.same_step))
-
-    def advance(self, force: np.ndarray) -> None:
-        pass
-
-    def inertia_force(self) -> np.ndarray:
-        return np.zeros(3)
-
-
-def grooves(**given) -> Pattern:
-    starts = pitch_starts(PITCHES, [1.0], 1, AROUND)
-    return Pattern(AROUND, [Groove(**given)], starts)
-
-
-def rolled(pattern: Pattern | None, steps: int) -> tuple[np.ndarray, object]:
-    """Vertical force (steps,) N of a rigid tire on a bed of springs on a flat road."""
-    patch = oval_patch((120, 5), (0.001, 0.02), 500.0)
-    bed = winkler_compliance(patch.area, BED)
-    patch = replace(patch, gap=np.where(patch.force > 0, 0.0, patch.gap))
-    way = Rolled(speed=SPEED, duration=steps * STEP, motion=lambda t: 0.0)
-    setup = ContactSetup(patch=patch, reach=1.0, road=Flat(), rolled=way, pattern=pattern)
-    if pattern is not None:  # as it settles: what lies over a groove carries nothing
-        deep = setup.begun > 0
-        pressed = np.diag(bed) * patch.force
-        lifted = np.maximum(setup.begun - pressed, 0.0)
-        carried = np.where(
-            deep, np.maximum(patch.force - setup.begun / np.diag(bed), 0.0), patch.force
-        )
-        setup = replace(setup, patch=replace(patch, force=carried, gap=patch.gap + lifted))
-    drive, solver = setup.drive, ActiveSet(bed)
-    run = roll(Rigid(len(patch.points)), solver, setup.patch, drive, STEP, steps)
-    return np.array([one.force.sum() for one in run]), setup.patch
+from tireroad.runs.validation.parts import grooved
+from tireroad.runs.validation.parts.grooved import AROUND, grooves, rolled
 
 
 def test_orders_of_equal_pitches_by_hand() -> None:
     """Grooves that never touch, a rigid road: F(t) = sum over the land of the slick's forces; its order n has the
     groove's Fourier coefficient sin(n pi w/l)/(n pi) times the transform of the force along x."""
-    pitch, width = AROUND / PITCHES, 0.012
-    period = pitch / SPEED
-    force, _ = rolled(grooves(width=width, depth=0.05, flank=1e-4), round(10 * period / STEP))
-    slick = oval_patch((120, 5), (0.001, 0.02), 500.0)
-    x, f = slick.points[:, 0], slick.force
-    assert force.mean() == pytest.approx(500.0 * (1 - width / pitch), rel=0.01)
+    pitch = grooved.AROUND / grooved.PITCHES
+    steps = round(grooved.TIMES * pitch / grooved.SPEED / grooved.STEP)
+    force, _ = rolled(grooves(width=grooved.WIDTH, depth=0.05, flank=1e-4), steps)
+    assert force.mean() == pytest.approx(500.0 * (1 - grooved.WIDTH / pitch), rel=0.01)
+    for order, found in zip((1, 2, 3), grooved.orders(force), strict=True):
+        assert found == pytest.approx(grooved.by_hand(order), rel=0.02)
     lines = 2 * np.abs(np.fft.rfft(force - force.mean())) / len(force)
-    for order in (1, 2, 3):
-        along = abs(np.sum(f * np.exp(2j * np.pi * order * x / pitch)))
-        groove = np.sin(np.pi * order * width / pitch) / (np.pi * order)
-        by_hand = 2 * groove * along
-        assert lines[10 * order] == pytest.approx(abs(by_hand), rel=0.03, abs=0.5)
     between = np.delete(lines, np.arange(0, len(lines), 10))
     assert between.max() < 0.01 * lines[10]
 
@@ -154,8 +96,8 @@ def test_files_that_are_no_pattern(tmp_path, arrays) -> None:
 
 def test_a_pattern_without_land_is_refused() -> None:
     y = np.linspace(-0.05, 0.05, 11)
-    assert grooves(width=0.01).land(y) == pytest.approx(1 - 0.011 / 0.04, abs=0.01)
+    assert grooves(width=0.01).land(y) == pytest.approx(1 - 0.011 / 0.05, abs=0.01)
     with pytest.raises(InputError, match="no contact area"):
-        grooves(width=0.05).land(y)
+        grooves(width=0.06).land(y)
     with pytest.raises(InputError, match="no contact area"):
         Pattern(AROUND, heights=Heights(np.full((4, 2), 0.001), np.array([-1.0, 1.0]))).land(y)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.fem.static.curved.balance import make_equilibrium
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
+from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.press import place
 from tireroad.fem.static.state import static_state
@@ -20,9 +20,7 @@ SHAPES = {
 
 def pressed(make_body, road, comm=MPI.COMM_SELF, **given):
     """(state, loader) of the tire under 1500 N, or as given."""
-    equilibrium = make_equilibrium(
-        make_body(comm=comm, segments=16, footprint_size=0.3), shape=road
-    )
+    equilibrium = Equilibrium(make_body(comm=comm, segments=16, footprint_size=0.3), shape=road)
     loader = Loader(equilibrium, lambda progress: None)
     loader.inflate(2e5)
     wanted = {"load": None, "deflection": None, "road_height": None} | (given or {"load": 1500.0})
@@ -37,13 +35,28 @@ def test_slopes_are_those_of_the_height(name) -> None:
     along = (road.height(x + step, y) - road.height(x - step, y)) / (2 * step)
     across = (road.height(x, y + step) - road.height(x, y - step)) / (2 * step)
     assert np.allclose(road.slopes(x, y), [along, across], atol=1e-7)
-    bend = (road.slopes(x + step, y)[0] - road.slopes(x - step, y)[0]) / (2 * step)
-    assert np.allclose(road.curvature(x)[:3], bend[:3], atol=1e-6)
     frames = road.frames(x, y)
     assert np.allclose(frames @ frames.transpose(0, 2, 1), np.eye(3))
     assert np.allclose(np.linalg.det(frames), 1.0)
     tangents = np.stack([[np.ones(5), 0 * x, along], [0 * x, np.ones(5), across]])  # 2, 3, 5
     assert np.allclose(np.einsum("nj,tjn->tn", frames[:, 2], tangents), 0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_rolled_out_distances_are_those_on_the_surface(name) -> None:
+    """A place moved along the frame's first vector moves by as much in xi, along the second in eta; up, in neither; the first
+    turns towards the normal as `bending` says."""
+    road, step = SHAPES[name], 1e-6
+    x, y = np.array([-0.2, 0.0, 0.1]), np.array([0.05, -0.02, 0.0])
+    places = np.stack([x, y, road.height(x, y)], axis=-1)
+    frames = road.frames(x, y)
+    for axis, moved in ((0, [1, 0]), (1, [0, 1])):
+        ends = [road.unrolled(places + sign * step * frames[:, axis]) for sign in (1, -1)]
+        assert np.allclose((ends[0] - ends[1]) / (2 * step), moved, atol=1e-7)
+    assert np.allclose(road.unrolled(places + 0.1 * road.up), road.unrolled(places))
+    ahead, back = (places + sign * step * frames[:, 0] for sign in (1, -1))
+    turned = (road.frames(*ahead.T[:2]) - road.frames(*back.T[:2]))[:, 0] / (2 * step)
+    assert np.allclose(turned, road.bending(x)[:, None] * frames[:, 2], atol=1e-6)
 
 
 def test_a_drum_is_a_circle() -> None:

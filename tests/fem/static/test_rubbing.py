@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tireroad.fem.errors import InputError
-from tireroad.fem.static.curved.balance import make_equilibrium
-from tireroad.fem.static.curved.shape import FLAT, RoadShape
+from tireroad.fem.static.curved.shape import FLAT
+from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction.press import Friction
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.press import place
@@ -21,7 +20,7 @@ TURNING = Rolling(speed=40.0)
 
 def pressed(body, friction, rolling=AT_REST, road=FLAT):
     """(state, loader) of a torus under LOAD."""
-    loader = Loader(make_equilibrium(body, rolling, road), lambda progress: None)
+    loader = Loader(Equilibrium(body, rolling, road), lambda progress: None)
     loader.inflate(2e5)
     loader = place(loader, LOAD, None, None, friction)
     return static_state(loader.equilibrium, loader.touch), loader
@@ -120,11 +119,6 @@ def test_what_sticks_keeps_its_distance_on_the_road(make) -> None:
     assert road.sticks.sum() >= 0.5 * road.active.sum()
     assert np.abs(slid[road.sticks]).max() < 1e-12
     assert np.abs(slid[road.active & ~road.sticks]).max(initial=1.0) > 1e-9
-
-
-def test_tilted_roads_are_refused(make) -> None:
-    with pytest.raises(InputError, match="level road"):
-        pressed(make(), Friction(coefficient=0.5), road=RoadShape(camber=0.05))
 
 
 @pytest.mark.long

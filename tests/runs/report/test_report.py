@@ -6,7 +6,6 @@ import resource
 import subprocess
 import sys
 from base64 import b64decode
-from dataclasses import asdict
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
@@ -14,14 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from synthetic_results import sealed, write_results, write_rotating
+from written_page import page
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.report import figures, surface_figures
 from tireroad.runs.report.page import write_report
-from tireroad.runs.report.sections import search
-from tireroad.runs.search.journal import Trial
-from tireroad.runs.search.settings import CAUSES, Settings
-from tireroad.runs.search.shares import Found
 
 pytestmark = pytest.mark.slow
 
@@ -37,19 +33,10 @@ PICTURES = 11  # of a folder with every file
 
 
 @pytest.fixture
-def results(tmp_path: Path) -> Path:
-    return write_results(tmp_path / "run")
-
-
-@pytest.fixture
 def blank(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures stay unpainted, which is 9/10 of the time: for tests of what the page says."""
     for module in (figures, surface_figures):
         monkeypatch.setattr(module, "encode", lambda *_, **__: "data:image/png;base64,iVBORw0KGgo=")
-
-
-def page(directory: Path) -> str:
-    return write_report(directory).read_text(encoding="utf-8")
 
 
 def titles(text: str) -> list[str]:
@@ -230,46 +217,3 @@ def test_stages_come_in_the_order_they_ran(results: Path) -> None:
     text = page(results)
     order = [text.index(f"<tr><td>{name}</td><td>") for name in ("static", "modes", "contact")]
     assert order == sorted(order)
-
-
-@pytest.mark.long
-def test_a_search_is_drawn_by_cost_and_error(
-    results: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its trials in the order tried; a page without one, or with one that cannot be read, has none."""
-    assert "The search:" not in page(results)
-    settings = Settings((16, 8), 3, 200.0, "static", 0.01, 1e-3, dict.fromkeys(CAUSES, 0))
-    parts = dict.fromkeys(CAUSES, 0.04)
-    found = [
-        Found(parts, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ())),
-        Found(parts | {"mesh": 0.3}, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ())),
-    ]
-    trials = [
-        Trial(settings, {"static": 4.0, "contact": cost}, 3.0, one)
-        for cost, one in zip((9.0, 1.0), found, strict=True)
-    ]
-    text = json.dumps(
-        {
-            "of": "",
-            "trials": [
-                asdict(one) for one in [*trials, Trial(settings, {}, 2.0, failed="no balance")]
-            ],
-        }
-    )
-    (results / "search.json").write_text(text)
-    with (results / "scene.toml").open("a") as file:
-        file.write("[accuracy]\ntarget = 0.1\nup_to = 100.0\n")
-    drawn = []
-    monkeypatch.setattr(
-        search, "trade", lambda *given: drawn.append(given) or "data:image/png;base64,"
-    )
-    text = page(results)
-    assert "10 % of the axle force up to 100 Hz" in text
-    cost, error, causes = drawn[0]
-    assert cost.tolist() == [13.0, 5.0]
-    assert error == pytest.approx([0.8, np.hypot(3.0, 0.4 * 3**0.5)])
-    assert causes.shape == (2, 4) and causes[1, CAUSES.index("mesh")] == pytest.approx(3.0)
-    monkeypatch.undo()
-    assert search.trade(cost, error, causes).startswith("data:image/svg")
-    (results / "search.json").write_text("{")
-    assert "The search:" not in page(results)

@@ -4,8 +4,6 @@ import h5py
 import numpy as np
 import pytest
 
-from tireroad.runs.stages import pipeline
-
 pytestmark = pytest.mark.slow
 
 TIRE = """
@@ -233,20 +231,6 @@ def test_a_force_on_the_tire_in_contact_ends_where_statics_has_it(run):
     assert axle == pytest.approx(total + [0.0, 0.0, 2.0], abs=1e-3)
     work = stages["contact"]["indicators"]["work of the prescribed forces"]["value"]
     assert work == pytest.approx(2.0 * found[2], rel=1e-6)
-
-
-def test_options_that_petsc_did_not_read_are_told(monkeypatch) -> None:
-    from petsc4py import PETSc
-
-    told = []
-    monkeypatch.setattr(pipeline.observe, "warn", told.append)
-    options = PETSc.Options()
-    options["made_up_read"], options["made_up_unread"] = 3, 4
-    assert options.getInt("made_up_read") == 3
-    pipeline._check_options(["-made_up_read", "3", "-made_up_unread", "4"])
-    assert told == ["PETSc options that nothing read: -made_up_unread"]
-    for name in ("made_up_read", "made_up_unread"):
-        options.delValue(name)
 
 
 @pytest.mark.long

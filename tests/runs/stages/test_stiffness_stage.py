@@ -106,3 +106,29 @@ def test_what_makes_no_curve_is_refused(tmp_path, text, named):
     path.write_text(text)
     with pytest.raises(InputError, match=named):
         load(path)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rolls", [False, True], ids=["standing", "rolling"])
+def test_force_over_the_way_with_friction(run, rolls):
+    """Up to mu times the load, from the slope of what sticks; in the file, the summary and the report."""
+    text = "[static]\nload = 900.0\nfriction = 0.5\nerror_estimate = false\n"
+    text += "[rotation]\nspeed = 40.0\n" if rolls else ""
+    more = "[stiffness]\nsteps = 2\nslide_steps = 4\n"
+    folder, stages = run(f"slide-{rolls}", text + more)
+    with h5py.File(folder / "stiffness.h5") as file:
+        for name in ("longitudinal", "lateral"):
+            curve = {key: item[()] for key, item in file[f"slide/{name}"].items()}
+            units = {key: item.attrs["unit"] for key, item in file[f"slide/{name}"].items()}
+            assert units["moved"] == ("-" if rolls else "m")
+            assert np.all(np.diff(curve["force"]) > 0)
+            assert 0.97 * 450.0 < curve["force"][-1] <= 450.0 * (1 + 1e-9)
+            assert curve["force"][0] < 1.01 * curve["start"] * curve["moved"][0]
+            if not rolls:
+                end = 2 * 450.0 / file[name][()]
+                assert curve["moved"] == pytest.approx(end * np.arange(1, 5) / 4)
+    title = "cornering stiffness" if rolls else "lateral, secant at half of its largest force"
+    assert stages["stiffness"]["headline"][title]["value"] > 0
+    assert "Force along and across the road with friction" in (folder / "report.html").read_text()
+    _, again = run(f"slide-{rolls}", text + more)
+    assert again["stiffness"]["status"] == "reused"

@@ -1,0 +1,78 @@
+"""The tread's nodes in the coordinates of a road that is no level plane.
+
+Along the road, across it, and up, X = X(xi, eta, w): on the surface at xi, eta (fem.static.curved.shape), and w off it along the
+way the road is raised, cos gamma n_0 for each metre of its height, n_0 its normal under the axle. With B = dX/d(xi, eta, w),
+whose columns are e_xi, e_eta and cos gamma n_0, virtual work makes of forces out of balance and tangent
+
+    B^T out,    B^T K B + out . d2X,    d2X/dxi2 = -n/R  on a drum, n/R inside one, all others 0,
+
+so that a node is held in w alone, or in all three where it sticks, as on a level road. A frictionless road pushes with a force
+f along the wheel's z, f = N n_z, N its normal force, which is the reaction at w.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+from scipy import sparse
+
+from tireroad.fem.static.road import Road
+from tireroad.fem.tire.body import Body
+
+Array = np.ndarray
+
+
+class Unrolled:
+    """Of the owned nodes that can meet a `road`, at their present places. All methods but `turn` and `spread` are
+    collective."""
+
+    def __init__(self, body: Body, road: Road) -> None:
+        self._body, self._road = body, road
+        self._blocks = 3 * body.tread[:, None] + np.arange(3)
+        self._tangent: PETSc.Mat | None = None
+
+    def _basis(self) -> Array:
+        """B (n, 3, 3), its columns the last axis."""
+        shape, places = self._road.shape, self._road.places()
+        basis = shape.frames(*places.T[:2]).transpose(0, 2, 1)
+        basis[:, :, 2] = shape.upright * shape.up
+        return basis
+
+    def turn(self, out: Array) -> None:
+        """B^T out in place, N, of the owned unknowns."""
+        out[self._blocks] = np.einsum("nij,ni->nj", self._basis(), out[self._blocks])
+
+    def spread(self, change: Array) -> Array:
+        """Motion of the owned unknowns in the wheel's axes, m, from one in these coordinates."""
+        change = change.copy()
+        change[self._blocks] = np.einsum("nij,nj->ni", self._basis(), change[self._blocks])
+        return change
+
+    def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """B^T K B, and the turning of the road's normal forces: of use until the next one is made."""
+        if self._tangent is not None:
+            self._tangent.destroy()
+        transform = self._transform(matrix)
+        self._tangent = turned = matrix.ptap(transform)
+        transform.destroy()
+        road = self._road
+        x, y, _ = road.places().T
+        normal = road.pressing() * road.shape.stretch(x, y) * road.active
+        diagonal = turned.getDiagonal()
+        diagonal.array[self._blocks[:, 0]] += road.shape.bending(x) * normal
+        turned.setDiagonal(diagonal)
+        diagonal.destroy()
+        return turned
+
+    def _transform(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """B, in rows of this process's unknowns."""
+        sizes = matrix.getSizes()
+        (count, whole), first = sizes[0], matrix.getOwnershipRange()[0]
+        others = np.setdiff1d(np.arange(count), self._blocks)
+        rows = np.repeat(self._blocks, 3, axis=1).ravel()
+        columns = np.tile(self._blocks, 3).ravel()
+        entries = np.concatenate([np.ones(len(others)), self._basis().ravel()])
+        places = np.concatenate([others, rows]), np.concatenate([others, columns]) + first
+        local = sparse.csr_matrix((entries, places), shape=(count, whole))
+        parts = (part.astype(PETSc.IntType) for part in (local.indptr, local.indices))
+        return PETSc.Mat().createAIJ(sizes, csr=(*parts, local.data), comm=self._body.comm)

@@ -1,0 +1,75 @@
+"""All that is wrong with a scene is said at once, short, with what to do."""
+
+from full_scene import FULL, refused
+
+from tireroad.runs.scene.load import load
+
+CORDS = """
+[[tire.cords]]
+name = "ply"
+depth = 0.0
+arc = [-120.0, 120.0]
+angle = 90.0
+[[tire.cords]]
+name = "belt"
+"""
+
+
+def test_cords_are_read_and_kept_inside_the_wall(scene_file):
+    belt = load(scene_file(CORDS)).tire.cords[1]
+    assert (belt.depth, belt.arc, belt.angle) == (0.006, (-45.0, 45.0), 20.0)
+    assert "at most tire.thickness = 0.012 m" in refused(scene_file(CORDS + "depth = 0.013"))
+    assert "beyond the beads" in refused(scene_file(CORDS + "arc = [-121.0, 10.0]"))
+    assert "must ascend" in refused(scene_file(CORDS + "arc = [10.0, -10.0]"))
+    assert "is taken" in refused(scene_file(CORDS.replace('"belt"', '"ply"')))
+    assert 'must hold no "/"' in refused(scene_file(CORDS.replace('"belt"', '"a/b"')))
+
+
+def test_all_that_is_wrong_is_said_at_once(scene_file) -> None:
+    text = """
+    [tire]
+    segments = 3
+    odrer = 2
+    [static]
+    lod = 500
+    [contact]
+    tread = "jelly"
+    [road]
+    kind = "sine"
+    seed = 1
+    amplitude = "high"
+    [time]
+    duration = 0.1
+    step = 1.0
+    """
+    message = refused(scene_file(text), "damping.mass=-1")
+    wrong = ("tire.segments", "tire.odrer", "static.lod", "contact.tread", "road.seed")
+    for key in (*wrong, "road.amplitude", "time.step", "damping.mass"):
+        assert message.count(f"{key} ") + message.count(f"{key};") >= 1, (key, message)
+    assert message.startswith("8 errors in the scene\n")
+    assert len(message.splitlines()) == 9
+
+
+def test_consequences_are_not_said(scene_file) -> None:
+    """One mistake, one message: what other rules would say of a table that is wrong is left out."""
+    broken = "[contact]\n[road]\nkind = 'wavy'\nseed = 3\n[static]\nload = 1\n[time]\n"
+    assert refused(scene_file(broken)).count("\n") == 0
+    assert "known here: " in refused(scene_file("[road]\nkind = 'flat'\nzzz = 3\n"))
+
+
+def test_endless_keys_are_cut(scene_file) -> None:
+    message = refused(scene_file(f"{'k' * 20000} = 1\n"))
+    assert len(message) < 500 and "kkk..." in message
+
+
+def test_points_say_which_pitch(scene_file) -> None:
+    message = refused(scene_file(FULL), "contact.points={dx=0.001,dy=nan}")
+    assert "contact.points dy must be a finite number" in message
+    message = refused(scene_file(FULL), "contact.points={dx=1e-300,dy=0.001}")
+    assert "dx must be ≥ 1e-05" in message
+
+
+def test_the_built_in_tire_loses_by_its_compounds(scene_file) -> None:
+    """Not by the thesis's 500 1/s: a radial tire comes with loss factors."""
+    assert load(scene_file('[tire]\nsection = "radial"\n')).damping is None
+    assert load(scene_file("")).damping is not None
