@@ -9,6 +9,7 @@ from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
+from tireroad.fem.static.path.journal import Journal
 from tireroad.modal.basis import ModalBasis, project, with_air, with_corner
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes
@@ -42,8 +43,9 @@ def solved(
     count: int | None = None,
     up_to: float | None = None,
     teams: int | None = None,
+    journal: Journal | None = None,
 ) -> Modes:
-    """The modes alone, found by `teams` of processes (modal.solver.team). Collective."""
+    """The modes alone, found by `teams` of processes (modal.solver.team), the `journal` what was found before. Collective."""
     if count is None and up_to is None:
         raise InputError("modes: give count, how many of the lowest, or up_to, a frequency in Hz")
     return undamped.solve(
@@ -53,6 +55,7 @@ def solved(
         up_to=up_to or np.inf,
         sites=sites(operators),
         teams=teams,
+        journal=journal,
     )
 
 

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ def _together(function: Callable[[Any], None]) -> int:
     return mpi.guarded(comm, lambda: function(comm))
 
 
+@cache
 def _only_warnings() -> None:
     """Keep the compiler's chatter (distutils, at its first use of a form) off the terminal."""
     handler = logging.StreamHandler()

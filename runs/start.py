@@ -15,7 +15,7 @@ def program() -> None:
     streams.mend()
     arguments = sys.argv[1:]
     sys.argv[1:] = []  # libraries that read them stumble over names that are no text
-    if arguments[:1] in (["run"], ["resume"]) and not {"-h", "--help"} & set(arguments):
+    if arguments[:1] in (["run"], ["resume"], ["work"]) and not {"-h", "--help"} & set(arguments):
         from tireroad.runs.process.supervisor import supervise
 
         supervise()
@@ -31,6 +31,10 @@ def program() -> None:
 
 def _status(arguments: list[str]) -> int:
     try:
+        if arguments == ["work"]:  # a sweep's own, for its members
+            from tireroad.runs.sweep.worker import work
+
+            return work()
         from tireroad.runs.cli import main
 
         status = main(arguments)

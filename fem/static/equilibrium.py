@@ -16,6 +16,7 @@ from tireroad.fem.static.curved.unrolled import Unrolled
 from tireroad.fem.static.forces import Forces
 from tireroad.fem.static.held_system import HeldSystem, Moved, System
 from tireroad.fem.static.linear_contact import LinearContact, held_step
+from tireroad.fem.static.path.history import History
 from tireroad.fem.static.path.step import Step
 from tireroad.fem.static.road import Road
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
@@ -24,9 +25,7 @@ from tireroad.fem.tire.body import Body
 MOST_STEPS = 25  # tangents; a load step that needs more is better halved
 TOLERANCE = 1e-12  # of the force scale
 _SERVES = 0.2  # a step with an old tangent costs a twentieth of one with a new tangent
-_STAYS = (
-    1e-10  # of the wall: rounding, as a state is carried from half the ring to the whole and back
-)
+_STAYS = 1e-10  # of the wall: rounding, as a state is carried from half the ring and back
 _DIVERGED = 1e8  # times the force scale: nothing comes back from there
 
 
@@ -49,6 +48,7 @@ class Equilibrium(Forces):
         self._system = self._make_system("lu" if self._damped else "cholesky")
         self._contact: LinearContact | None = None
         self._solved = body.u.x.array.copy()
+        self.history = History(None)
 
     def _make_road(self) -> Road:
         return Road(self.body, self.shape)
@@ -81,6 +81,10 @@ class Equilibrium(Forces):
     def solve(
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
     ) -> Step:
+        """As `_solve`, or as the `history` of a computation that was stopped has it. Collective."""
+        return self.history.solve(self, lambda: self._solve(road_height, load, allowed))
+
+    def _solve(self, road_height: float | None, load: float | None, allowed: float) -> Step:
         """Equilibrium with the road plane at the given height (m), or without a road. Collective.
 
         With a `load` (N) the road is moved, from the given height on, until it carries that. `allowed` N may stay
@@ -99,9 +103,7 @@ class Equilibrium(Forces):
             error = self._error(load)
             reason = self._stopped(error, changed, tangents, allowed / self.force_scale)
             if reason == "converged":
-                self._solved = field.array.copy()
-                self.road_height = None if road_height is None else self.road.height
-                return Step(True, tangents, error, reason)
+                return self.solved(Step(True, tangents, error, reason))
             closing = None
             changed = changed or bool(self._contact and self._contact.changed)
             if not reason and (changed or not error < _SERVES * last):
@@ -111,11 +113,24 @@ class Equilibrium(Forces):
             reason = reason or self._move(closing, load)
             if reason:
                 break
-        field.array[:], self._contact = kept[0], None
+        field.array[:] = kept[0]
         self.road.put_back(kept[1])
-        return Step(False, tangents, error, reason)
+        return self.solved(Step(False, tangents, error, reason))
+
+    def solved(self, step: Step) -> Step:
+        """The step: the body is in the state that it has found, or was put back where it found none."""
+        if step.converged:
+            self._solved = self.body.u.x.array.copy()
+            self.road_height = None if self.road.height == -np.inf else self.road.height
+        else:
+            self._contact = None
+        return step
 
     def predict(self, road_height: float) -> bool:
+        """As `_predict`, or as the `history` has it: the solution that follows is known then. Collective."""
+        return self.history.predict(lambda: self._predict(road_height))
+
+    def _predict(self, road_height: float) -> bool:
         """Go from the state that was solved for last to near that on a road at `road_height` (m) by its last tangent, which
         settles the sets of contact; whether there is such a tangent, and the body still in that state. Collective.
         """
@@ -149,6 +164,10 @@ class Equilibrium(Forces):
         square, total = self.body.comm.allreduce(parts)
         missing = 0.0 if load is None else load - total
         return float(np.hypot(np.sqrt(square), missing)) / self.force_scale
+
+    def out_of_balance(self) -> float:
+        """Norm of the forces (N) that are, in the present state under the present forces of the road. Collective."""
+        return self._error(None) * self.force_scale
 
     def _take_tangent(self) -> bool:
         """Assemble and factorise at the present state, the held dofs on their way to the road."""
@@ -188,8 +207,7 @@ class Equilibrium(Forces):
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
         """Under a vertical traction in place of the road: the height (m) that the face gains by one step of
         Newton's method from the present state, and that by a newton more. Collective.
-        `weights` (s,) of the outer face's nodes, of sum 1, say where the `load` (N) acts and the height is read.
-        """
+        `weights` (s,) of the outer face's nodes, of sum 1, say where the `load` (N) acts and the height is read."""
         self._before.x.array[:], self._contact = self.body.u.x.array, None
         out = self._assemble_residual().copy()
         self._assemble_tangent()
@@ -215,8 +233,7 @@ class Equilibrium(Forces):
 
     def resume(self, displacement: np.ndarray, force: np.ndarray, height: float | None) -> Step:
         """Solve from a state found by other means: displacement (n, 3) m and force of the road (n,) N of all
-        lattice nodes, on a road at `height` (m). What is in balance stays as it is. Collective.
-        """
+        lattice nodes, on a road at `height` (m). What is in balance stays as it is. Collective."""
         self.body.set_displacement(displacement)
         if height is not None:
             self.road.take(force[self.body.ids], height)
@@ -224,8 +241,7 @@ class Equilibrium(Forces):
 
     def _yardsticks(self) -> float:
         """Force scale (N): the undeformed body's typical stiffness of a dof times the wall, so that 1e-12 of it is far
-        below any load of interest. The road's stiffness is that of its dofs.
-        """
+        below any load of interest. The road's stiffness is that of its dofs."""
         self._before.x.array[:] = self.body.u.x.array
         self._assemble_tangent()
         diagonal = self.matrix.getDiagonal()

@@ -10,18 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.static.path.journal import Entry, Journal
+from tireroad.modal.solver.boundaries import between, merged, onward
 from tireroad.modal.solver.shifted import Shifted
 from tireroad.modal.solver.slices import Interval, eigenpairs
 from tireroad.modal.solver.team import Team
-
-T = TypeVar("T")
 
 ZERO = 1e-12  # of the matrix norm: eigenvalues nearer to zero are rigid modes, rounding is 1e-16
 _SLICE = (
@@ -83,19 +83,28 @@ class Bottom:
 
 class Spectrum:
     """Independent parts of a symmetric problem, the same in all teams of the processes of `comm`; no eigenvalue is
-    larger than `norm`."""
+    larger than `norm`. The `journal` has what was found of them before."""
 
-    def __init__(self, comm: MPI.Comm, parts: list[Part], team: Team, norm: float) -> None:
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        parts: list[Part],
+        team: Team,
+        norm: float,
+        journal: Journal | None = None,
+    ) -> None:
         self.comm, self.parts, self.team = comm, parts, team
+        self._journal = journal or Journal()
         self.bound = 1.001 * norm
 
-    def _shared(self, work: Callable[[Part], T]) -> list[T]:
+    def _shared(self, work: Callable[[Part], np.ndarray | int]) -> list[np.ndarray]:
         """What is computed of each part, on every process, each by one team. Collective."""
         roots = self.team.roots
-        mine = {
-            k: work(self.parts[k]) for k in range(self.team.number, len(self.parts), len(roots))
-        }
-        everyone = self.comm.allgather(mine)
+        own = range(self.team.number, len(self.parts), len(roots))
+        entry = self._journal.step(
+            self.team.comm, lambda: {str(k): np.asarray(work(self.parts[k])) for k in own}
+        )
+        everyone = self.comm.allgather({k: entry[str(k)] for k in own})
         return [everyone[roots[k % len(roots)]][k] for k in range(len(self.parts))]
 
     def bottom(self) -> Bottom:
@@ -145,16 +154,16 @@ class Spectrum:
             low, known = done[-1]
             remaining = count - known.sum()
             if remaining <= 0 or low >= limit:
-                return _merged(done, largest)
+                return merged(done, largest)
             # Two per cent and two more: a little too far costs less than one step more.
             goal = min(1.02 * remaining + 2, largest)
-            trial = _next(max(low, 0.0), goal / density)
+            trial = onward(max(low, 0.0), goal / density)
             if len(done) == 1 and 2 * goal < len(bottom.near):
                 # Estimates by Ritz values lie above: at least so many eigenvalues lie below.
                 trial = max(bottom.near[int(goal)], 2 * bottom.zero)
             trial = min(trial, limit)
             if ceiling and trial >= ceiling[0]:
-                trial = _between(low, known.sum(), *ceiling, goal)
+                trial = between(low, known.sum(), *ceiling, goal)
             below = self.below(trial)
             new = below.sum() - known.sum()
             if new > _CROWDED * goal + _PROBES and trial - low > _FINEST * trial:
@@ -165,6 +174,16 @@ class Spectrum:
             density = max(new, 0.5 * goal * (new == 0)) / rise if rise else density
             done.append((trial, below))
             ceiling = None
+
+    def _found(self, part: int, interval: Interval) -> tuple[np.ndarray, np.ndarray]:
+        """`slices.eigenpairs` of a part, or what the journal has of them. Collective in the team."""
+
+        def solve() -> Entry:
+            values, vectors = eigenpairs(self.parts[part].matrix, interval, self.team)
+            return {"values": values, "vectors": vectors}
+
+        entry = self._journal.step(self.team.comm, solve)
+        return entry["values"], entry["vectors"]
 
     def slices(self, boundaries: list[tuple[float, np.ndarray]]) -> list[Slice]:
         """All eigenpairs between the boundaries. Collective."""
@@ -180,7 +199,7 @@ class Spectrum:
         for task, (k, interval) in enumerate(tasks):
             if owners[task] == team.number and error is None:
                 try:
-                    answers[task] = eigenpairs(self.parts[k].matrix, interval, team)
+                    answers[task] = self._found(k, interval)
                 except Exception as raised:
                     error = raised
         first = next((e for e in self.comm.allgather(error) if e is not None), None)
@@ -201,15 +220,6 @@ class Spectrum:
         ]
 
 
-def _merged(steps: list[tuple[float, np.ndarray]], most: float) -> list[tuple[float, np.ndarray]]:
-    """Fewer steps, of at most so many eigenvalues where none had more: the first ones were careful."""
-    kept = steps[:1]
-    for one, following in zip(steps[1:], [*steps[2:], None], strict=True):
-        if following is None or (following[1] - kept[-1][1]).sum() > most:
-            kept.append(one)
-    return kept
-
-
 def _near(shifted: Shifted) -> np.ndarray:
     """Rough eigenvalues nearest to the shift, relative to it, by three steps of inverse iteration."""
     width, team = min(_PROBES, shifted.size), shifted.team
@@ -220,19 +230,6 @@ def _near(shifted: Shifted) -> np.ndarray:
         theta = np.linalg.eigvalsh((product + product.T) / 2)
         basis = team.orthonormal(moved)[0]
     return 1 / theta
-
-
-def _next(low: float, step: float) -> float:
-    """A step up in frequency, at most threefold once the first modes are known."""
-    root = np.sqrt(low)
-    return (root + (min(step, 2 * root) if root else step)) ** 2
-
-
-def _between(low: float, known: int, high: float, crowd: int, goal: float) -> float:
-    """Where a straight line in frequency has `goal` more eigenvalues than at `low`, well inside."""
-    share = np.clip(goal / (crowd - known), 0.05, 0.9)
-    root = np.sqrt(max(low, 0.0))
-    return (root + share * (np.sqrt(high) - root)) ** 2
 
 
 def _owners(counts: list[int], teams: int) -> list[int]:

@@ -18,6 +18,7 @@ from petsc4py import PETSc
 
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.static.path.journal import Journal
 from tireroad.modal.solver.canonical import ordered, turn_to_rule
 from tireroad.modal.solver.circulant import repeated
 from tireroad.modal.solver.distributed import row_sum
@@ -67,13 +68,15 @@ def solve(
     sites: Sites | None = None,
     waves: bool = True,
     teams: int | None = None,
+    journal: Journal | None = None,
 ) -> Modes:
     """The `count` lowest modes, or all below `up_to` (Hz), of a stiffness (n, n) in N/m and a diagonal
     mass (own rows) in kg; at least one of the two is given.
 
     Symmetries are looked for with the `sites` of own unknowns, equal segments unless `waves` is False. A
     split whose modes are no modes of A is given up for the next. The processes work in `teams`, each of which holds
-    A spread over its own, by default each process in its own (modal.solver.team).
+    A spread over its own, by default each process in its own (modal.solver.team). What the `journal` has of counts and
+    slices is not computed again.
     Raises ConvergenceError when a mode is missing, inaccurate or unstable. Collective.
     """
     comm = stiffness.comm.tompi4py()
@@ -83,7 +86,7 @@ def solve(
     rank = np.arange(size) if all_sites is None else all_sites.rank()
     own = slice(*scaled.getOwnershipRange())
     team = Team.of(comm, teams or comm.size)
-    problem = _Problem(scaled, team, row_sum(scaled), mass, rank[own])
+    problem = _Problem(scaled, team, row_sum(scaled), mass, rank[own], journal or Journal())
     count, limit = min(count or size, size), (2 * np.pi * up_to) ** 2
     for split in _splits(scaled, all_sites, waves, team):
         modes = problem.solve(split, count, limit)
@@ -110,13 +113,15 @@ def _splits(matrix: PETSc.Mat, sites: Sites | None, waves: bool, team: Team) -> 
 
 @dataclass(frozen=True)
 class _Problem:
-    """A distributed, the `team` of this process, the `norm` of A; own rows' `mass` kg and `rank` by position."""
+    """A distributed, the `team` of this process, the `norm` of A; own rows' `mass` kg and `rank` by position; the `journal`
+    of what is found."""
 
     scaled: PETSc.Mat
     team: Team
     norm: float
     mass: np.ndarray
     rank: np.ndarray
+    journal: Journal
 
     @property
     def comm(self) -> MPI.Comm:
@@ -124,7 +129,7 @@ class _Problem:
 
     def solve(self, split: _Split, count: int, limit: float) -> Modes:
         """By slices of the parts. Collective."""
-        spectrum = Spectrum(self.comm, split.parts, self.team, self.norm)
+        spectrum = Spectrum(self.comm, split.parts, self.team, self.norm, self.journal)
         bottom = spectrum.bottom()
         bottom.check_stable()
         boundaries = spectrum.boundaries(bottom, count, limit)

@@ -3,12 +3,19 @@
 import math
 import os
 import resource
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
+def forget_peak() -> None:
+    """Let `peak_memory` begin anew, where the kernel can (/proc/self/clear_refs)."""
+    with suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+
+
 def peak_memory() -> float:
-    """Largest resident memory of this process since it began, bytes.
+    """Largest resident memory of this process since it began, or since `forget_peak`, bytes.
 
     Linux carries the maximum of getrusage over from the process that started this one: there it is
     read from /proc.
@@ -25,17 +32,24 @@ def peak_memory() -> float:
 _PREFIXES = "", "static_", "rotating_st_"
 
 
-def keep_factors_on_disk(folder: Path) -> None:
-    """From now on MUMPS keeps factors in files of the folder, and removes each with its factor. What the user's
+@contextmanager
+def factors_on_disk(folder: Path) -> Iterator[None]:
+    """While inside, MUMPS keeps factors in files of the folder, and removes each with its factor. What the user's
     PETSc options say stays."""
     from petsc4py import PETSc
 
     os.environ["MUMPS_OOC_TMPDIR"] = str(folder.resolve())
     options = PETSc.Options()
-    for prefix in _PREFIXES:
-        if not options.hasName(f"{prefix}mat_mumps_icntl_22"):
-            options[f"{prefix}mat_mumps_icntl_22"] = 1
-            options.getInt(f"{prefix}mat_mumps_icntl_22")  # read once: else PETSc calls it unused
+    names = [f"{prefix}mat_mumps_icntl_22" for prefix in _PREFIXES]
+    ours = [name for name in names if not options.hasName(name)]
+    for name in ours:
+        options[name] = 1
+        options.getInt(name)  # read once: else PETSc calls it unused
+    try:
+        yield
+    finally:
+        for name in ours:
+            options.delValue(name)
 
 
 def available_memory() -> float:

@@ -14,6 +14,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
+from tireroad.runs.report.drawn import once
 from tireroad.runs.report.figures import COLOURS, MUTED, bare_canvas, canvas, encode, styled
 
 PRESSURE = LinearSegmentedColormap.from_list(
@@ -79,6 +80,7 @@ def carry(field: NDArray, ends: NDArray, weight: NDArray) -> NDArray:
     return field[ends[..., 0]] * (1 - weight[..., None]) + field[ends[..., 1]] * weight[..., None]
 
 
+@once
 @styled
 def deformed(points: NDArray, moved: NDArray, quads: NDArray, road: float | None) -> str:
     """The loaded tire in three panels: surface, side view and section; road (m) or None."""
@@ -129,6 +131,7 @@ def _profile(
     axes.legend(loc="center" if plane[0] == 0 else "upper center", fontsize=8)
 
 
+@once
 @styled
 def modes(points: NDArray, quads: NDArray, shapes: NDArray, titles: Sequence[str]) -> str:
     """Mode shapes (m, s, 3), m ≤ 6, exaggerated; coloured by the displacement along the normal."""
@@ -168,6 +171,7 @@ def outward(points: NDArray, quads: NDArray) -> NDArray:
     return normal * (np.where(side < 0, -1.0, 1.0) / np.maximum(length, 1e-300))[:, None]
 
 
+@once
 @styled
 def footprints(
     points: NDArray, maps: Sequence[NDArray], titles: Sequence[str], unit: str, wide: float

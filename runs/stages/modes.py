@@ -25,6 +25,7 @@ from tireroad.runs.stages.base.stage import Computed, Done, Shared
 from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.turning import damping_of
 from tireroad.runs.stages.stored import fields_file
+from tireroad.runs.stages.stored.checkpoint import checkpointed, forget
 
 _NAMED = 8  # modes of a round tire shown by name
 
@@ -74,9 +75,14 @@ class ModesStage(Computed[ModalBasis]):
         motions, wanted = self.motions.product, self.job.scene.modal
         with record.timing("matrices"):
             operators = motions.operators
-        with record.timing("eigensolver"):
+        with (
+            record.timing("eigensolver"),
+            checkpointed(self, "counts and slices") as journal,
+        ):
             teams = self._teams(record)
-            modes = solved(operators, count=wanted.count, up_to=wanted.up_to, teams=teams)
+            modes = solved(
+                operators, count=wanted.count, up_to=wanted.up_to, teams=teams, journal=journal
+            )
         with record.timing("air"):
             air = cavity.make_air(self.job, motions, float(modes.frequency[-1]))
         with record.timing("projection"):
@@ -95,6 +101,7 @@ class ModesStage(Computed[ModalBasis]):
         basis = super().produce(key, record)
         if self.job.scene.greens.residual == "attachment" and basis.modes is not None:
             fields_file.keep(self.job, key, self.motions.product.operators, basis.modes)
+        forget(self.job, self.name)
         return basis
 
     def _teams(self, record: Record) -> int:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import FACTORS, remove_factors, write_text
 from tireroad.runs.files.folder import Summary, make_folder
 from tireroad.runs.process import observe
-from tireroad.runs.process.memory import keep_factors_on_disk, peak_memory
+from tireroad.runs.process.memory import factors_on_disk, forget_peak, peak_memory
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
 from tireroad.runs.scene.extent.estimate import Estimate, estimate
@@ -92,6 +93,7 @@ def run_scene(
 
     `cache`: finished stages shared with other runs, by default none.
     """
+    forget_peak()  # of a member of a sweep before, in the same process
     job = Job(scene, directory, comm, fresh, cache)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
@@ -102,13 +104,9 @@ def run_scene(
     reasons = skipped(scene, until)
     if petsc_options:
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
-    done: dict[str, Done] = {}
-    for kind in PARTS:
-        if (found := _done(job, kind, done, reasons, summary)) is not None:
-            done[kind.name] = found
-        job.settle(done)
+    with _factors(wanted, directory, comm):
+        done = _parts(job, reasons, summary)
     _check_options(petsc_options)
-    on_root(comm, lambda: remove_factors(directory))
     most = _peak(comm)
     observe.say(
         f"memory: {most:.2g} GB of a process at most, {_each(wanted, comm):.2g} GB estimated"
@@ -118,6 +116,28 @@ def run_scene(
     else:
         on_root(comm, lambda: _report(directory, summary))
     return Finished(job, done)
+
+
+def _parts(job: Job, reasons: Mapping[str, str], summary: Summary) -> dict[str, Done]:
+    """What each part of the pipeline leaves, by its name. Collective."""
+    done: dict[str, Done] = {}
+    for kind in PARTS:
+        if (found := _done(job, kind, done, reasons, summary)) is not None:
+            done[kind.name] = found
+        job.settle(done)
+    return done
+
+
+@contextmanager
+def _factors(wanted: Estimate, directory: Path, comm: MPI.Comm) -> Iterator[None]:
+    """While inside, factors that memory does not hold are on disk. Collective."""
+    if not on_root(comm, lambda: out_of_core(wanted, comm.size)):
+        yield
+        return
+    on_root(comm, lambda: make_folder(directory / FACTORS))
+    with factors_on_disk(directory / FACTORS):
+        yield
+    on_root(comm, lambda: remove_factors(directory))
 
 
 def _each(wanted: Estimate, comm: MPI.Comm) -> float:
@@ -130,9 +150,6 @@ def _say_demand(scene: Scene, directory: Path, comm: MPI.Comm, until: str | None
     wanted = on_root(comm, lambda: estimate(scene, until))  # it may read the road's file
     for text in on_root(comm, lambda: check_demand(wanted, directory, comm.size)):
         observe.warn(text)
-    if on_root(comm, lambda: out_of_core(wanted, comm.size)):
-        on_root(comm, lambda: make_folder(directory / FACTORS))
-        keep_factors_on_disk(directory / FACTORS)
     observe.say(
         f"estimated: {_each(wanted, comm):.2g} GB a process, "
         f"{sum(wanted.disk.values()) / 1e9:.2g} GB of disk, "

@@ -11,7 +11,8 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.diagnosis import with_cause
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint
-from tireroad.fem.static.load_error import load_error
+from tireroad.fem.static.load_error import UNKNOWN, load_error
+from tireroad.fem.static.path.history import History
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.press import place
 from tireroad.fem.static.state import StaticState, static_state
@@ -25,6 +26,7 @@ from tireroad.runs.stages.base.stage import Computed
 from tireroad.runs.stages.build.tire import road_shape
 from tireroad.runs.stages.build.turning import friction_of, rolling_shape, turning_of, wheel_slip
 from tireroad.runs.stages.stored import cords_file, friction_file, static_file
+from tireroad.runs.stages.stored.checkpoint import checkpointed, forget
 
 _SPEEDS, _SAME_SPEED = 6, 1e-6  # solutions at a travel speed at most, and when they agree
 _EXTENT = "length", "width", "area"
@@ -62,16 +64,22 @@ class StaticStage(Computed[StaticState]):
 
     def compute(self, record: Record) -> StaticState:
         """The scene's state, at a travel speed again until the wheel's speed is that of its radius. Collective."""
+        with checkpointed(self, "solutions") as journal:
+            journal.agreed(self.job.comm)
+            return self._concluded(record, *self._at_speed(record, History(journal)))
+
+    def _at_speed(self, record: Record, history: History) -> tuple[StaticState, Loader]:
+        """The state at the wheel's speed. Collective."""
         speed = self.job.speed
         for _ in range(_SPEEDS):
-            state, loader = self._solved(record, speed)
+            state, loader = self._solved(record, speed, history)
             before, speed = speed, self.job.free_speed(state)
             if abs(speed - before) <= _SAME_SPEED * speed or not state.rolling.speed:
                 break
             observe.say(
                 f"  rolling radius {state.rolling_radius():.6g} m: again at {speed:.6g} rad/s"
             )
-        return self._concluded(record, state, loader)
+        return state, loader
 
     def _concluded(self, record: Record, state: StaticState, loader: Loader) -> StaticState:
         """The state with its footprint as finer elements tell it; figures, and the error of its load. Collective."""
@@ -84,11 +92,12 @@ class StaticStage(Computed[StaticState]):
         observe.say(f"  {record.shares}")
         return state
 
-    def _solved(self, record: Record, speed: float) -> tuple[StaticState, Loader]:
+    def _solved(self, record: Record, speed: float, history: History) -> tuple[StaticState, Loader]:
         """Load steps up to the state at `speed` rad/s. Collective."""
         rolling = steady_rolling(self.job, speed)
         with record.timing("mesh and forms"):
             equilibrium = Equilibrium(self.job.tire.body, rolling, road_shape(self.job.scene))
+        equilibrium.history = history
         loader = Loader(equilibrium, _show)
         began = Timing.clock()
         try:
@@ -133,6 +142,7 @@ class StaticStage(Computed[StaticState]):
         """As any stage; the last state of a run that failed is of no use then. Collective."""
         product = super().produce(key, record)
         on_root(self.job.comm, lambda: self.job.path("static_last").unlink(missing_ok=True))
+        forget(self.job, self.name)
         return product
 
     def write(self, file, product: StaticState) -> None:
@@ -175,11 +185,14 @@ def _estimate(record: Record, state: StaticState, loader: Loader) -> StaticState
     if isinstance(found, str):
         observe.say(f"  error of the load not estimated: {found}")
         return state
-    record.indicators["estimated error of the load"] = (100 * found.relative, "%")
+    whole = found.bulk is not None
+    what = "estimated error of the load" + ("" if whole else " by the footprint's elements")
+    record.indicators[what] = (100 * found.relative, "%")
     to = f"ever smaller elements: {found.load:.5g} N" if found.signed else "of unknown sign"
+    rest = f"{100 * found.bulk:.2g} %" if whole else f"not estimated: {UNKNOWN}"
     observe.say(
-        f"  estimated error of the load at this height of the road: {100 * found.relative:.2g} % ({to}); of "
-        f"the footprint's elements {100 * found.footprint:.2g} %, of the rest {100 * found.bulk:.2g} %; {found.unknowns} unknowns with finer elements there"
+        f"  {what} at this height of the road: {100 * found.relative:.2g} % ({to}); of "
+        f"the footprint's elements {100 * found.footprint:.2g} %, of the rest {rest}; {found.unknowns} unknowns with finer elements there"
     )
     if found.relative > COARSE:
         record.warnings.append(

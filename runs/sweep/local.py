@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,62 +53,128 @@ def at_once(sweep: Sweep, wanted: int) -> tuple[int, str]:
 def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
     """Run every member into folder/members/<name>; how each ended, in the order of the sweep.
 
-    The members share a cache of finished stages, so that what has the same inputs is computed once: a
-    member waits while another computes what it needs. A stop signal ends all of them.
+    So many workers (runs.sweep.worker) take one member after the other. They share a cache of finished stages, so
+    that what has the same inputs is computed once: a member waits while another computes what it needs. A worker that
+    has crashed is replaced; a stop signal ends all of them.
     """
     waiting = list(sweep.members)
-    running: list[_Running] = []
+    workers: list[_Worker] = []
+    started = 0
     ended: list[Ended] = []
     threads = max((os.cpu_count() or 1) // (at_a_time * sweep.processes), 1)
     try:
-        while waiting or running:
-            while waiting and len(running) < at_a_time:
-                running.append(_Running(sweep, waiting.pop(0), folder, threads))
+        while waiting or any(one.member for one in workers):
+            for one in [one for one in workers if one.crashed]:
+                workers.remove(one)
+                one.close()
+            while waiting and len(workers) < at_a_time:
+                started += 1
+                workers.append(_Worker(sweep, folder, threads, started))
+            for one in workers:
+                if not one.member and waiting:
+                    one.take(waiting.pop(0))
             time.sleep(_LOOK)
-            for one in [one for one in running if one.process.poll() is not None]:
-                running.remove(one)
-                ended.append(one.ended())
-                observe.say(f"  [{len(ended)}/{len(sweep.members)}] {ended[-1].line}")
+            for one in workers:
+                if (how := one.ended()) is not None:
+                    ended.append(how)
+                    observe.say(f"  [{len(ended)}/{len(sweep.members)}] {how.line}")
     finally:
-        for one in running:
-            one.process.terminate()
-        for one in running:
-            one.process.wait()
+        for one in workers:
+            one.end()
+        for one in workers:
+            one.close()
     order = {member.name: k for k, member in enumerate(sweep.members)}
     return sorted(ended, key=lambda one: order[one.member.name])
 
 
-class _Running:
-    """A member's process."""
+class _Worker:
+    """A process, or an mpirun of several, that computes one `member` after the other; None between them."""
 
-    def __init__(self, sweep: Sweep, member: Member, folder: Path, threads: int) -> None:
-        self.member, self._began = member, time.monotonic()
-        self._log = folder / "logs" / f"{member.name}.txt"
-        self._log.parent.mkdir(parents=True, exist_ok=True)
+    def __init__(self, sweep: Sweep, folder: Path, threads: int, number: int) -> None:
+        self.member: Member | None = None
+        self._sweep, self._folder, self._logs = sweep, folder, folder / "logs"
+        self._logs.mkdir(parents=True, exist_ok=True)
         settings = {
             "TIREROAD_CACHE": str((folder / "cache").resolve()),
             "OPENBLAS_NUM_THREADS": str(threads),
             "OMP_NUM_THREADS": str(threads),
         }
-        with self._log.open("wb") as log:
+        self._own = self._logs / f"worker-{number}.txt"  # what no member says
+        with self._own.open("wb") as own:
             self.process = subprocess.Popen(
-                command(sweep, member, folder),
+                _program(sweep, "work"),
                 env={**os.environ, **settings},
-                stdin=subprocess.DEVNULL,
-                stdout=log,
+                stdin=subprocess.PIPE,
+                stdout=own,
                 stderr=subprocess.STDOUT,
             )
 
-    def ended(self) -> Ended:
-        text = self._log.read_text(encoding="utf-8", errors="replace").strip()
-        said = text.splitlines()[-1] if text else ""
-        return Ended(self.member, self.process.returncode, time.monotonic() - self._began, said)
+    def take(self, member: Member) -> None:
+        """Begin a member."""
+        self.member, self._began = member, time.monotonic()
+        self._log, self._status = (self._logs / f"{member.name}.{end}" for end in ("txt", "status"))
+        self._log.write_bytes(b"")
+        self._status.unlink(missing_ok=True)
+        files = {"log": str(self._log.resolve()), "status": str(self._status.resolve())}
+        line = json.dumps({"run": _arguments(self._sweep, member, self._folder), **files})
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):  # it has crashed, and is found so
+            self.process.stdin.write(f"{line}\n".encode())
+            self.process.stdin.flush()
+
+    def ended(self) -> Ended | None:
+        """How the member ended, once it has; None before, and between members."""
+        if self.member is None:
+            return None
+        crashed = self.process.poll()
+        if self._status.is_file():
+            status, said = int(self._status.read_text(encoding="ascii")), _last(self._log)
+            self._status.unlink()
+        elif crashed is not None:
+            status, said = crashed, _last(self._own) or _last(self._log)
+        else:
+            return None
+        member, self.member = self.member, None
+        return Ended(member, status, time.monotonic() - self._began, said)
+
+    @property
+    def crashed(self) -> bool:
+        """Whether it has ended, and how its member ended is known."""
+        return self.member is None and self.process.poll() is not None
+
+    def end(self) -> None:
+        """No more members; the one it computes is stopped."""
+        if self.member is not None:
+            self.process.terminate()
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):
+            self.process.stdin.close()
+
+    def close(self) -> None:
+        """Wait for its end."""
+        self.end()
+        self.process.wait()
+
+
+def _last(log: Path) -> str:
+    """The last line of a log."""
+    text = log.read_text(encoding="utf-8", errors="replace").strip()
+    return text.splitlines()[-1] if text else ""
 
 
 def command(sweep: Sweep, member: Member, folder: Path) -> list[str]:
-    """The command line of one member's run."""
-    program = [sys.executable, "-P", "-m", "tireroad.runs", "run", str(sweep.scene.resolve())]
-    if sweep.processes > 1:
-        program = ["mpirun", "-n", str(sweep.processes), *program]
+    """The command line of one member's run by itself."""
+    return _program(sweep, *_arguments(sweep, member, folder))
+
+
+def _program(sweep: Sweep, *arguments: str) -> list[str]:
+    """The program on the processes of one run."""
+    line = [sys.executable, "-P", "-m", "tireroad.runs", *arguments]
+    return ["mpirun", "-n", str(sweep.processes), *line] if sweep.processes > 1 else line
+
+
+def _arguments(sweep: Sweep, member: Member, folder: Path) -> list[str]:
+    """What the program is told of one member's run."""
     settings: Sequence[str] = [part for one in member.overrides() for part in ("--set", one)]
-    return [*program, "--out", str(folder / "members" / member.name), *settings]
+    out = str(folder / "members" / member.name)
+    return ["run", str(sweep.scene.resolve()), "--out", out, *settings]

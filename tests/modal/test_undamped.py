@@ -8,9 +8,9 @@ from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver import undamped
+from tireroad.modal.solver.boundaries import merged
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.solver.modes import Modes
-from tireroad.modal.solver.spectrum import _merged
 from tireroad.modal.solver.symmetry import Sites
 
 COMM = MPI.COMM_WORLD
@@ -59,10 +59,10 @@ def test_steps_that_are_merged(most):
     """No step above `most` unless it was; both ends stay, and every end is one of the counted values."""
     below = np.cumsum([[0, 0], [3, 4], [1, 0], [30, 9], [2, 2], [5, 5], [0, 1]], axis=0)
     steps = [(float(k), one) for k, one in enumerate(below)]
-    merged = _merged(steps, most)
-    ends = [int(value) for value, _ in merged]
+    kept = merged(steps, most)
+    ends = [int(value) for value, _ in kept]
     assert ends[0] == 0 and ends[-1] == 6
-    each = np.diff([one.sum() for _, one in merged])
+    each = np.diff([one.sum() for _, one in kept])
     assert {10: [8, 39, 4, 10, 1], 25: [8, 39, 15], 1000: [62]}[most] == each.tolist()
 
 

@@ -164,6 +164,7 @@ class Loader:
             return None
         if self._half_ring is None:
             equilibrium = HalfTurnEquilibrium(self.body, rolling)
+            equilibrium.history = self.equilibrium.history
             self._half_ring = _Half(Loader(equilibrium, self.report), equilibrium)
         self._half_ring.equilibrium.start(self.equilibrium)
         self._half_ring.loader._touch = self._touch

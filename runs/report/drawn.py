@@ -1,0 +1,46 @@
+"""Pictures that this process has drawn: members of a sweep with the same static state and modes show the same ones."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, ParamSpec
+
+import numpy as np
+
+P = ParamSpec("P")
+
+MOST = 16  # pictures, of up to some hundred kB
+_drawn: OrderedDict[bytes, str] = OrderedDict()
+
+
+def once(draw: Callable[P, str]) -> Callable[P, str]:
+    """`draw`, whose last pictures are kept: of the same arguments, to the last bit, it need not draw again."""
+
+    @wraps(draw)
+    def drawn(*given: P.args, **named: P.kwargs) -> str:
+        key = _digest(draw.__qualname__, given, sorted(named.items()))
+        if key not in _drawn:
+            _drawn[key] = draw(*given, **named)
+        _drawn.move_to_end(key)
+        while len(_drawn) > MOST:
+            _drawn.popitem(last=False)
+        return _drawn[key]
+
+    return drawn
+
+
+def _digest(*given: Any) -> bytes:
+    """Of arrays by their bytes, of sequences item by item, of anything else as it is written."""
+    digest = hashlib.sha256()
+    for one in given:
+        if isinstance(one, np.ndarray):
+            digest.update(f"{one.dtype}{one.shape}".encode() + np.ascontiguousarray(one).tobytes())
+        elif isinstance(one, list | tuple):
+            digest.update(f"{len(one)}".encode() + _digest(*one))
+        else:
+            digest.update(repr(one).encode())
+        digest.update(b"\0")
+    return digest.digest()

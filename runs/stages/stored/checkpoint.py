@@ -1,0 +1,130 @@
+"""The checkpoint of a stage before its loop: what the static state and the modes have found when a run is stopped or killed.
+
+Each process keeps its own results, part by part, in `<stage>_checkpoint/<rank>of<size>-<number>.h5`; a part begins
+with its result of that number. Parts carry a checksum and the key of the stage's inputs, and those from the first on
+that is absent, damaged or of other inputs are not taken.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+
+from tireroad.fem.static.path.journal import Entry, Journal
+from tireroad.runs.files import store
+from tireroad.runs.process import observe
+from tireroad.runs.process.mpi import on_root
+from tireroad.runs.process.signals import Stopped
+from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.base.stage import Stage
+
+WORTH = 60.0  # times what writing results takes, computing them has taken before they are written
+LEAST = 1.0  # s of computing
+_COLUMNS = "by_columns"
+_RATE = 2e8  # bytes a second, until a part has been written
+
+
+@contextmanager
+def checkpointed(stage: Stage, what: str) -> Iterator[Journal]:
+    """The journal of a stage; `what` its results are, for people. A stop keeps what was found. Collective."""
+    job = stage.job
+    parts = _Parts(job, stage.name, store.wanted_hash(stage.name, stage.inputs()))
+    found = parts.read()
+    journal = Journal(found, parts.keep)
+    least = min(job.comm.allgather(len(found)))
+    if least:
+        observe.say(f"  goes on from the checkpoint after {least} {what}")
+    try:
+        yield journal
+    except Stopped:
+        parts.flush()
+        raise
+
+
+def forget(job: Job, stage: str) -> None:
+    """Remove the checkpoint of a stage that has ended. Collective."""
+    job.comm.Barrier()
+    on_root(job.comm, lambda: shutil.rmtree(_folder(job, stage), ignore_errors=True))
+
+
+def _folder(job: Job, stage: str) -> Path:
+    return job.directory / f"{stage}_checkpoint"
+
+
+class _Parts:
+    """The files of this process."""
+
+    def __init__(self, job: Job, stage: str, key: str) -> None:
+        self._job, self._stage, self._key = job, stage, key
+        self._folder = _folder(job, stage)
+        self._waiting: list[Entry] = []
+        self._first, self._written = 0, time.monotonic()
+        self._rate = _RATE
+
+    def _path(self, number: int) -> Path:
+        comm = self._job.comm
+        return self._folder / f"{comm.rank}of{comm.size}-{number:04d}.h5"
+
+    def read(self) -> list[Entry]:
+        """What there is of these inputs, by as many processes; why not, where there is something else. Collective."""
+        found: list[Entry] = []
+        reason = "" if self._job.fresh else self._read(found)
+        reasons = [one for one in self._job.comm.allgather(reason) if one not in ("", "absent")]
+        if reasons:
+            observe.say(f"  {self._folder.name} is there, but {reasons[0]}: not all of it is taken")
+        return found
+
+    def _read(self, found: list[Entry]) -> str:
+        """Add what is whole to `found`; why no more of it is."""
+        wanted = self._job.provenance(self._stage, self._key).input_hash
+        while not (reason := store.why_not(self._path(len(found)), wanted, self._stage)):
+            with store.opened(self._path(len(found))) as file:
+                found += [_entry(file[name]) for name in sorted(file)]
+        return reason
+
+    def keep(self, number: int, entry: Entry) -> None:
+        """A result; written with those before, once that is worth its time."""
+        if not self._waiting:
+            self._first = number
+        self._waiting.append(entry)
+        size = sum(array.nbytes for one in self._waiting for array in one.values())
+        if time.monotonic() - self._written > max(LEAST, WORTH * size / self._rate):
+            began = time.monotonic()
+            self.flush()
+            self._rate = size / max(time.monotonic() - began, 1e-3)
+
+    def flush(self) -> None:
+        """Write what is waiting."""
+        if not self._waiting:
+            return
+        provenance = self._job.provenance(self._stage, self._key)
+        # That the result folder was removed is said by what writes the file.
+        with suppress(FileNotFoundError):
+            self._folder.mkdir(exist_ok=True)
+        with store.writing(self._path(self._first), provenance) as file:
+            for k, entry in enumerate(self._waiting):
+                group = file.create_group(f"{k:04d}")
+                for name, array in entry.items():
+                    by_columns = array.flags.f_contiguous and not array.flags.c_contiguous
+                    group[name] = array.T if by_columns else array
+                    group[name].attrs[_COLUMNS] = by_columns
+        self._waiting, self._written = [], time.monotonic()
+
+
+def _entry(group) -> Entry:
+    """The arrays of a result, by their names with those of their groups; as they lay in memory, since sums of products go
+    by that."""
+    found: dict[str, np.ndarray] = {}
+
+    def add(name: str, one) -> None:
+        if hasattr(one, "shape"):
+            array = np.asarray(one[()])
+            found[name] = array.T if one.attrs[_COLUMNS] else array
+
+    group.visititems(add)
+    return found
