@@ -16,6 +16,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
 from tireroad.fem.static.path.carried_over import sampled
 from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.path.near import balance_near
 from tireroad.fem.static.symmetry.half_turn import HalfTurnEquilibrium, looks_the_same
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
@@ -75,7 +76,7 @@ class Balance:
         lattice, displacement = field_lattice(ring), self._sampled(ring)
         other = self._problem(ring, displacement)
         other.road.take(self._touching(lattice)[other.body.ids], self.height)
-        step = other.solve(self.height, allowed=allowed)
+        step = balance_near(other, self.height, self.load, allowed)
         if not step.converged:
             raise ConvergenceError(f"static: elements half as long do not converge ({step.reason})")
         found = _nodes(other, lattice)

@@ -165,6 +165,10 @@ class Equilibrium(Forces):
         missing = 0.0 if load is None else load - total
         return float(np.hypot(np.sqrt(square), missing)) / self.force_scale
 
+    def out_of_balance(self) -> float:
+        """Norm of the forces (N) that are, in the present state under the present forces of the road. Collective."""
+        return self._error(None) * self.force_scale
+
     def _take_tangent(self) -> bool:
         """Assemble and factorise at the present state, the held dofs on their way to the road."""
         with self.cost("assembly"):
@@ -203,8 +207,7 @@ class Equilibrium(Forces):
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
         """Under a vertical traction in place of the road: the height (m) that the face gains by one step of
         Newton's method from the present state, and that by a newton more. Collective.
-        `weights` (s,) of the outer face's nodes, of sum 1, say where the `load` (N) acts and the height is read.
-        """
+        `weights` (s,) of the outer face's nodes, of sum 1, say where the `load` (N) acts and the height is read."""
         self._before.x.array[:], self._contact = self.body.u.x.array, None
         out = self._assemble_residual().copy()
         self._assemble_tangent()
@@ -230,8 +233,7 @@ class Equilibrium(Forces):
 
     def resume(self, displacement: np.ndarray, force: np.ndarray, height: float | None) -> Step:
         """Solve from a state found by other means: displacement (n, 3) m and force of the road (n,) N of all
-        lattice nodes, on a road at `height` (m). What is in balance stays as it is. Collective.
-        """
+        lattice nodes, on a road at `height` (m). What is in balance stays as it is. Collective."""
         self.body.set_displacement(displacement)
         if height is not None:
             self.road.take(force[self.body.ids], height)
@@ -239,8 +241,7 @@ class Equilibrium(Forces):
 
     def _yardsticks(self) -> float:
         """Force scale (N): the undeformed body's typical stiffness of a dof times the wall, so that 1e-12 of it is far
-        below any load of interest. The road's stiffness is that of its dofs.
-        """
+        below any load of interest. The road's stiffness is that of its dofs."""
         self._before.x.array[:] = self.body.u.x.array
         self._assemble_tangent()
         diagonal = self.matrix.getDiagonal()

@@ -19,6 +19,7 @@ from tireroad.fem.sections.split import split_ring
 from tireroad.fem.static.companion import Balance
 from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.path.near import cords_strained
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.mesh import Lattice, field_lattice
 
@@ -31,6 +32,7 @@ CUBIC = 0.1  # error of elements of order 3 over that of order 2 on the same mes
 # 2, 4 and 12 mm: 0.7 to 2.0 in size; with the wrong sign in two of the nine, in which both parts all but cancel.
 REMAINS = 0.7
 ENOUGH = 1e-4  # of the load: what of it may be out of balance in a companion
+UNKNOWN = "cords are strained too much between the points that these elements look at; take smaller elements"
 CANCELS = 0.5  # of the larger part: what is left of both, below which its sign is not known
 
 
@@ -38,19 +40,22 @@ CANCELS = 0.5  # of the larger part: what is left of both, below which its sign 
 class LoadError:
     """`load` N of ever smaller elements as estimated, `relative` how far the load is from it; what of
     that is of the `footprint`'s elements and what of all in `bulk` (relative, above 0 where the load is
-    too large); `extent` of the footprint on the finer companion, of so many `unknowns`.
+    too large; None where it is not known: both are then of the footprint's alone); `extent` of the footprint on the
+    finer companion, of so many `unknowns`.
     """
 
     load: float
     relative: float
     footprint: float
-    bulk: float
+    bulk: float | None
     extent: Footprint
     unknowns: int
 
     @property
     def signed(self) -> bool:
         """Whether it is known on which side the load errs: not where both parts all but cancel each other."""
+        if self.bulk is None:
+            return False
         return self.relative > CANCELS * max(abs(self.footprint), abs(self.bulk))
 
 
@@ -68,9 +73,10 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
     except ConvergenceError as error:
         return f"on the companion, {error}"
     edge = 1 - finer.load / given.load
+    both = edge if bulk is None else edge + bulk
     return LoadError(
-        load=given.load * (1 - edge - bulk),
-        relative=abs(edge + bulk),
+        load=given.load * (1 - both),
+        relative=abs(both),
         footprint=edge,
         bulk=bulk,
         extent=finer.extent,
@@ -86,8 +92,9 @@ def at_finer_footprint(given: Balance) -> Balance:
     return given.balanced_on(split_ring(given.ring, around, along), ENOUGH * given.load)
 
 
-def _bulk(given: Balance) -> float:
-    """How far the load is too large since the elements are too stiff, relative. Collective."""
+def _bulk(given: Balance) -> float | None:
+    """How far the load is too large since the elements are too stiff, relative; None where the state strains elements of
+    another order too much for one step to tell. Collective."""
     ring, load = given.ring, given.load
     order = ring.order + 1 if ring.order < HIGHEST else ring.order - 1
     section, corners = ring.section.of_order(order), ring.ring_corners
@@ -98,10 +105,12 @@ def _bulk(given: Balance) -> float:
         corners = half.ring_corners
     other = replace(ring, ring_corners=corners, section=section)
     place, spread = _spot(given)
-    (sinks, compliance), (further, _) = (
-        given.near(one).sinking(probe.spot(field_lattice(one), *place, spread), load)
-        for one in (ring, other)
-    )
+    weights, others = (probe.spot(field_lattice(one), *place, spread) for one in (ring, other))
+    near = given.near(other)
+    if cords_strained(near, load):
+        return None
+    sinks, compliance = given.near(ring).sinking(weights, load)
+    further = near.sinking(others, load)[0]
     share = REMAINS * (further - sinks) / compliance / load
     return share if order > ring.order else -CUBIC * share
 

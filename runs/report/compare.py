@@ -25,6 +25,12 @@ from tireroad.runs.report.quantities import quantity
 from tireroad.runs.version import PROGRAM, VERSION
 
 MOST = 12
+# Groups of levels that are drawn, and what they are called.
+DRAWN = {
+    "axle force z": "vertical axle force",
+    "contact force z": "vertical contact force",
+    "radiated power": "equivalent radiated power",
+}
 
 
 def compare(directories: Sequence[Path], out: Path) -> Path:
@@ -86,7 +92,7 @@ def _table(names: Sequence[str], groups: dict[str, list[Row]]) -> str:
 
 def _page(runs: Sequence[RunResults], names: Sequence[str], groups: dict[str, list[Row]]) -> str:
     pages = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
+        loader=FileSystemLoader(Path(__file__).parent / "pages"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -116,9 +122,10 @@ def _figures(
     runs: Sequence[RunResults], names: Sequence[str], levels: Sequence[Row]
 ) -> list[tuple[str, str]]:
     found = []
-    rows = [row for row in levels if row.group == "axle force z"]
-    if rows:
-        found.append((pictures.levels(rows, names), "Third octaves of the vertical axle force."))
+    for group, what in DRAWN.items():
+        rows = [row for row in levels if row.group == group]
+        if rows:
+            found.append((pictures.levels(rows, names), f"Third octaves of the {what}."))
     histories = {
         name: (run["contact/time"], run["contact/total_force"][:, 2])
         for name, run in zip(names, runs, strict=True)

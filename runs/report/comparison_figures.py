@@ -34,7 +34,7 @@ def levels(rows: Sequence[Row], names: Sequence[str]) -> str:
         if number:
             change = values[:, number] - values[:, 0]
             axes[1, 0].plot(place, change, marker="o", ms=3, **pen(number))
-    axes[0, 0].set_ylabel("dB re 1 N, rms")
+    axes[0, 0].set_ylabel(rows[0].unit)
     axes[0, 0].legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8)
     axes[1, 0].axhline(0.0, color="#7b8794", lw=0.8)
     axes[1, 0].set(ylabel=f"less {names[0]}, dB", xlabel="third-octave band")

@@ -15,6 +15,12 @@ from tireroad.runs.files.reader import RunResults
 
 Array = NDArray[np.float64]
 AXES = ("x", "y", "z")
+LEVELS = (
+    ("axle force", "spectra/third_octave/level", "dB re 1 N"),
+    ("contact force", "spectra/third_octave/contact_level", "dB re 1 N"),
+    ("moment on the hub", "spectra/third_octave/hub_moment_level", "dB re 1 N m"),
+    ("radiated power", "vibration/third_octave/radiated_power_level", "dB re 1 pW"),
+)
 MATCHED = 24  # lowest modes of the first run that are sought in the others
 
 
@@ -78,25 +84,35 @@ def cost_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
 
 
 def level_rows(runs: Sequence[RunResults]) -> list[Row]:
-    """Third-octave levels of the axle force by band and component, dB re 1 N."""
-    levels: list[dict[tuple[int, float], float]] = []
+    """Third-octave levels by quantity, component and band (`LEVELS`), in dB of the unit that comes with them."""
+    return [
+        row
+        for quantity, path, unit in LEVELS
+        if any(path in run for run in runs)
+        for row in _bands(runs, quantity, path, unit)
+    ]
+
+
+def _bands(runs: Sequence[RunResults], quantity: str, path: str, unit: str) -> list[Row]:
+    found: list[dict[tuple[int, float], float]] = []
     for run in runs:
         own: dict[tuple[int, float], float] = {}
-        if {"spectra/third_octave/centre", "spectra/third_octave/level"} <= set(run):
-            bands, level = run["spectra/third_octave/centre"], run["spectra/third_octave/level"]
-            for centre, parts in zip(nominal(bands), level, strict=True):
-                own |= {(axis, float(centre)): float(v) for axis, v in enumerate(parts)}
-        levels.append(own)
-    keys = sorted({key for own in levels for key in own})
+        centre = path.rpartition("/")[0] + "/centre"
+        if path in run and centre in run:
+            level = run[path].reshape(len(run[centre]), -1)  # some have components
+            for band, parts in zip(nominal(run[centre]), level, strict=True):
+                own |= {(axis, float(band)): float(v) for axis, v in enumerate(parts)}
+        found.append(own)
+    keys = sorted({key for own in found for key in own})
+    several = any(axis for axis, _ in keys)
     return [
         Row(
-            f"axle force {AXES[axis]}",
-            f"{centre:g} Hz",
-            "dB re 1 N",
-            tuple(o.get(key) for o in levels),
+            f"{quantity} {AXES[axis]}" if several else quantity,
+            f"{band:g} Hz",
+            unit,
+            tuple(own.get((axis, band)) for own in found),
         )
-        for key in keys
-        for axis, centre in [key]
+        for axis, band in keys
     ]
 
 

@@ -11,7 +11,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.diagnosis import with_cause
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint
-from tireroad.fem.static.load_error import load_error
+from tireroad.fem.static.load_error import UNKNOWN, load_error
 from tireroad.fem.static.path.history import History
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.press import place
@@ -185,11 +185,14 @@ def _estimate(record: Record, state: StaticState, loader: Loader) -> StaticState
     if isinstance(found, str):
         observe.say(f"  error of the load not estimated: {found}")
         return state
-    record.indicators["estimated error of the load"] = (100 * found.relative, "%")
+    whole = found.bulk is not None
+    what = "estimated error of the load" + ("" if whole else " by the footprint's elements")
+    record.indicators[what] = (100 * found.relative, "%")
     to = f"ever smaller elements: {found.load:.5g} N" if found.signed else "of unknown sign"
+    rest = f"{100 * found.bulk:.2g} %" if whole else f"not estimated: {UNKNOWN}"
     observe.say(
-        f"  estimated error of the load at this height of the road: {100 * found.relative:.2g} % ({to}); of "
-        f"the footprint's elements {100 * found.footprint:.2g} %, of the rest {100 * found.bulk:.2g} %; {found.unknowns} unknowns with finer elements there"
+        f"  {what} at this height of the road: {100 * found.relative:.2g} % ({to}); of "
+        f"the footprint's elements {100 * found.footprint:.2g} %, of the rest {rest}; {found.unknowns} unknowns with finer elements there"
     )
     if found.relative > COARSE:
         record.warnings.append(

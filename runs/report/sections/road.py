@@ -3,7 +3,7 @@
 from numpy.typing import NDArray
 
 from tireroad.runs.files.read import Results, Section
-from tireroad.runs.report import figures
+from tireroad.runs.report import figures, live
 from tireroad.runs.report.quantities import quantity
 
 
@@ -18,17 +18,19 @@ def texture(results: Results, section: Section) -> None:
     level = results.optional("contact.h5", "road/texture_level")
     if level is None:
         return
-    section.show(
-        _drawn(results.array("contact.h5", "road/wavelength"), level),
-        "Texture of the road along its middle: level of each third octave, re 1 um (ISO 13473-4).",
-    )
+    wavelength = 1e3 * results.array("contact.h5", "road/wavelength")
+    labels = "wavelength in mm", "level in dB re 1 µm"
+    curves, colours = {"level": level}, figures.COLOURS
+    drawn = live.chart(wavelength, curves, labels, colours, log=True, legend=False)
+    caption = "Texture of the road along its middle: level of each third octave (ISO 13473-4)."
+    section.show(_drawn(wavelength, level, labels), caption, live.charts(drawn))
 
 
 @figures.styled
-def _drawn(wavelength: NDArray, level: NDArray) -> str:
+def _drawn(wavelength: NDArray, level: NDArray, labels: tuple[str, str]) -> str:
     figure, axes = figures.canvas(9.5, 2.6)
-    axes[0, 0].step(1e3 * wavelength, level, where="mid", color=figures.COLOURS[0])
-    axes[0, 0].set(xlabel="wavelength in mm", ylabel="level in dB", xscale="log")
-    axes[0, 0].set_xlim(1e3 * wavelength[0], 1e3 * wavelength[-1])
+    axes[0, 0].step(wavelength, level, where="mid", color=figures.COLOURS[0])
+    axes[0, 0].set(xlabel=labels[0], ylabel=labels[1], xscale="log")
+    axes[0, 0].set_xlim(wavelength[0], wavelength[-1])
     axes[0, 0].set_ylim(bottom=max(level.min(), level.max() - 60.0))
     return figures.encode(figure)

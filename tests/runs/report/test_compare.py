@@ -31,6 +31,10 @@ def write(folder: Path, load: float, level: float, frequencies: list[float], tur
     with h5py.File(folder / "spectra.h5", "w") as file:
         file["third_octave/centre"] = np.array([100.0, 125.892541])
         file["third_octave/level"] = np.array([[1.0, 2.0, level], [1.0, 2.0, level + 3]])
+        file["third_octave/contact_level"] = file["third_octave/level"][:] + 4.0
+    with h5py.File(folder / "vibration.h5", "w") as file:
+        file["third_octave/centre"] = np.array([100.0])
+        file["third_octave/radiated_power_level"] = np.array([level + 50.0])
     return folder
 
 
@@ -47,7 +51,12 @@ def test_table_has_what_differs(pair: list[Path], tmp_path: Path) -> None:
         rows = {(r["group"], r["quantity"]): r for r in csv.DictReader(file)}
     assert rows["scene", "static.load"]["b"] == "550.0"
     assert float(rows["axle force z", "125 Hz"]["b"]) == 19.0
+    assert float(rows["contact force x", "100 Hz"]["b"]) == 5.0
+    assert float(rows["radiated power", "100 Hz"]["b"]) == 66.0
+    assert rows["radiated power", "100 Hz"]["unit"] == "dB re 1 pW"
     assert "+6.0 dB" in page and "+10 %" in page
+    for what in ("vertical axle force", "vertical contact force", "equivalent radiated power"):
+        assert f"Third octaves of the {what}." in page
     # Modes are matched by shape, whatever their order and sign.
     assert float(rows["modes", "mode 1, MAC 1.00"]["b"]) == 51.0
     assert float(rows["modes", "mode 3, MAC 1.00"]["b"]) == 71.0

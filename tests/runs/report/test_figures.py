@@ -8,7 +8,8 @@ import pytest
 from matplotlib import image
 from synthetic_results import lattice
 
-from tireroad.runs.report import surface_figures, thinned
+from tireroad.runs.files.read import Picture
+from tireroad.runs.report import figures, surface_figures, thinned
 from tireroad.runs.report.quantities import quantity
 
 
@@ -84,3 +85,40 @@ def test_the_space_time_map_shows_where_the_force_is() -> None:
     middle = pixels[:, pixels.shape[1] // 2].sum(axis=1)
     dark = np.flatnonzero(middle < 1.0)
     assert dark.size and dark.max() < 0.3 * len(middle), "the foremost points are drawn on top"
+
+
+@pytest.mark.parametrize("count", [1, 3, 12])
+def test_bands_have_their_bars_at_their_names(count: int) -> None:
+    """One band too: its bars stand over its name, as high as the level, with room beside them, and few lines are pale."""
+    drawn = []
+    centre = 200.0 * 10 ** (np.arange(count) / 10)
+    level = np.column_stack([np.full(count, -3.0), np.arange(count) - 12.0, np.full(count, -3.4)])
+    few = np.arange(count) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures, "encode", lambda figure, *_: drawn.append(figure) or "")
+        figures.third_octaves(centre, level, np.full((count, 3), 0.5), "dB", few)
+    axes = drawn[0].axes[0]
+    names = [200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600, 2000, 2500]
+    ticks = [
+        (place, text.get_text())
+        for place, text in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+    ]
+    assert ticks == [(place, str(name)) for place, name in enumerate(names[:count])]
+    floor, _ = figures.level_range(level)
+    for column, bars in enumerate(axes.containers[:: len(axes.containers) // 3][:3]):
+        patches = bars.patches
+        middles = [bar.get_x() + bar.get_width() / 2 for bar in patches]
+        assert middles == pytest.approx(np.arange(count) + 0.28 * (column - 1))
+        tops = [bar.get_y() + bar.get_height() for bar in patches]
+        assert tops == pytest.approx(level[:, column]) and floor < min(tops)
+        assert [bar.get_alpha() for bar in patches] == [0.45] + [None] * (count - 1)
+    low, high = axes.get_xlim()
+    assert low < -0.5 and high >= max(count, 8) - 0.5
+
+
+def test_a_picture_says_how_wide_it_was_drawn() -> None:
+    """Lines and coloured surfaces alike; an image that does not say has no least width."""
+    figure, _ = figures.bare_canvas(7.5, 2.0)
+    for kind in ("svg", "png"):
+        assert Picture(figures.encode(figure, kind), "").width == pytest.approx(7.5, abs=0.01)
+    assert Picture("data:image/png;base64,iVBORw0KGgo=", "").width == 0.0
