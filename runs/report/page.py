@@ -75,7 +75,7 @@ def render(directory: Path) -> str:
     remarked = [("realism", strange)] if strange else []
     remarked += [(name, warning) for name, stage in stages.items() for warning in stage["warnings"]]
     remarked += [(section.title, warning) for section in sections for warning in section.warnings]
-    loader = FileSystemLoader(Path(__file__).parent)
+    loader = FileSystemLoader(Path(__file__).parent / "pages")
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     pages.filters |= {"quantity": quantity, "in_script": in_script}
     return pages.get_template("report.html.j2").render(

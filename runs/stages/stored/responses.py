@@ -27,6 +27,8 @@ def fill_response(file: h5py.File, name: str, response: Response, points: int) -
         put(file, f"{name}/{key}", getattr(response, key), unit)
     flexibility = (response.residual + response.static())[:points]
     put(file, f"{name}/static_flexibility", flexibility, "m/N")
+    if response.left_out is not None:
+        put(file, f"{name}/left_out", response.left_out, "kg m/N")
     file[name].attrs["rigid_states"] = response.rigid
 
 
@@ -37,6 +39,7 @@ def read_responses(file: h5py.File, pulse: bool) -> dict[str, Response]:
             **{key: group[key][:] for key in _UNITS},
             pulse=pulse,
             rigid=int(group.attrs["rigid_states"]),
+            left_out=group["left_out"][:] if "left_out" in group else None,
         )
         for name, group in file.items()
         if "output" in group

@@ -70,3 +70,11 @@ def test_both_ways_agree_and_slow_forces_pass(tmp_path) -> None:
     page = (tmp_path / "report.html").read_text()
     assert "Force on the axle per force at the point" in page
     assert "Moment on the axle, about its centre" in page
+    scene = load(tmp_path / "a.toml", ["output.transmissibility.step=50"])
+    with observe.quiet():
+        run_scene(scene, tmp_path, MPI.COMM_SELF, until="response", fresh=False, petsc_options=[])
+    stages = json.loads((tmp_path / "summary.json").read_text())["stages"]
+    assert stages["greens"]["status"] == "reused", stages["greens"]
+    with h5py.File(tmp_path / "response.h5") as file:
+        again = file["transmissibility/momentum"][:]
+    assert np.array_equal(again, momentum[1::2]), "the same from stored Green's functions"
