@@ -7,7 +7,8 @@ linear over the steps that alternates meets the tire's states as a negative one,
 
 the fastest oscillation of the points that touch takes  2 pi / theta  steps,  cos theta = (1 - 4 mu) / (1 + 2 mu).
 A mass m on a compliance C has mu = h^2 / (12 m C): its true oscillation turns by (12 mu)^1/2 in a step. At
-mu = 1 it takes two steps, and from there on it grows without bound. A force that is constant over the step has
+mu = 1 it takes two steps, and from there on it grows without bound. Horizontal forces, where there are some, meet
+bristles and the tread's shear likewise; the larger mu of the two counts. A force that is constant over the step has
 X = 0: it takes from such an oscillation what it has, and errs by the first order of the step.
 """
 
@@ -19,16 +20,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from tireroad.contact.model import Spec, touching_compliance
+from tireroad.contact.model import Spec, touching_compliance, tread_shear
 from tireroad.contact.patch import Patch
 from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.residual.alternating import alternating, at_once
 from tireroad.greens.response import Response
 
+Stiffness = float | np.ndarray
+
 # Steps in the fastest oscillation from which forces are taken as linear: at fewer, undamped modes between impacts
 # gained energy (measured from 2.9 down: contact force a hundred times too large).
 FEWEST = 2.5
-# Points of which the oscillation is found: a second of eigenvalues.
+# Points of which the oscillation is found, along the road of half as many: a second of eigenvalues.
 MOST = 1000
 # Share of the points that touch, of which all but these came back to where they were two steps before.
 # (Seen: 0.11 to 1 where forces were wrong, 0.035 at most where they were right.)
@@ -88,34 +91,62 @@ def choose(steps: float) -> Chosen:
     )
 
 
-def oscillation(spec: Spec, patch: Patch, response: Response, step: float) -> float:
+def oscillation(
+    spec: Spec, patch: Patch, response: Response, step: float, bristles: Stiffness | None = None
+) -> float:
     """Steps (2 or more, inf) that the fastest oscillation of the points touching at rest takes, with
     forces linear over steps of `step` s.
 
-    `response` as the loop takes it (Response.resolved), its first inputs and outputs the patch's nodes.
-    Of more than `MOST` points those nearest to their middle.
+    `response` as the loop takes it (Response.resolved), its first inputs and outputs the patch's nodes, with horizontal
+    forces in z, then x and y. `bristles` N/m of each point, inf where none give way, None: no horizontal forces; the
+    points stick, so that it is their least number of steps. Of more than `MOST` points those nearest to their middle.
     """
-    index = _nearest(patch)
+    index = _nearest(patch, MOST)
     if len(index) == 0:
         return math.inf
     p = len(patch.index)
-    seen = [matrix[:p, :p] for matrix in (-alternating(response, step), at_once(response))]
-    if patch.weights is not None:
-        rows = patch.weights[index]
-        approach = rows @ (rows @ seen[0].T).T
-    else:
-        approach = seen[0][np.ix_(index, index)]
-    return _steps(_largest(approach, touching_compliance(spec, patch, seen[1], index)))
+    whole = -alternating(response, step), at_once(response)
+    seen = [matrix[:p, :p] for matrix in whole]
+    approach = _between(patch, seen[0], index)
+    mu = _largest(approach, touching_compliance(spec, patch, seen[1], index))
+    if bristles is not None:
+        along = [matrix[p : 3 * p, p : 3 * p] for matrix in whole]
+        mu = max(mu, _along(spec, patch, along, bristles))
+    return _steps(mu)
 
 
-def _nearest(patch: Patch) -> np.ndarray:
+def _along(spec: Spec, patch: Patch, seen: list[np.ndarray], bristles: Stiffness) -> float:
+    """mu of the points' horizontal forces, `seen` by nodes (2 p, 2 p), of x, then of y."""
+    index, p = _nearest(patch, MOST // 2), len(patch.index)
+    approach, compliance = (
+        np.block(
+            [[_between(patch, matrix[a : a + p, b : b + p], index) for b in (0, p)] for a in (0, p)]
+        )
+        for matrix in seen
+    )
+    shear = tread_shear(spec, patch)
+    if shear is not None:
+        compliance = compliance + shear.matrix(index)
+    own = 1.0 / np.broadcast_to(bristles, len(patch.force))[index]
+    return _largest(approach, compliance + np.diag(np.tile(own, 2)))
+
+
+def _between(patch: Patch, nodes: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """W nodes W^T (n, n) between the points of the `index`."""
+    if patch.weights is None:
+        return nodes[np.ix_(index, index)]
+    rows = patch.weights[index]
+    return rows @ (rows @ nodes.T).T
+
+
+def _nearest(patch: Patch, most: int) -> np.ndarray:
     """The points that touch at rest, (n,) of them."""
     index = np.flatnonzero(patch.force > 0)
-    if len(index) <= MOST:
+    if len(index) <= most:
         return index
     place = patch.points[index, :2]
     away = ((place - place.mean(axis=0)) ** 2).sum(axis=1)
-    return np.sort(index[np.argsort(away, kind="stable")[:MOST]])
+    return np.sort(index[np.argsort(away, kind="stable")[:most]])
 
 
 def _largest(approach: np.ndarray, compliance: np.ndarray) -> float:

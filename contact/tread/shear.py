@@ -16,7 +16,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from tireroad.contact.tread.compliance import (
     Influence,
@@ -25,9 +24,9 @@ from tireroad.contact.tread.compliance import (
     rectangle_potential,
 )
 from tireroad.contact.tread.kernel import GridPlaces, doubled
+from tireroad.contact.tread.shear_convolution import Convolution, Plane
 
 Array = NDArray[np.float64]
-Plane = NDArray[np.complex128]
 Index = NDArray[np.intp]
 
 # Points up to which a matrix moves them faster than transforms do: of 181 points 31 us against 137, of 357 both 170.
@@ -98,6 +97,9 @@ class Shear(Protocol):
     def between(self, index: Index) -> Between:
         """`spread` between the points `index`."""
 
+    def matrix(self, index: Index) -> Array:
+        """The same as a matrix (2a, 2a): of all forces along x, then of those along y."""
+
 
 class Between:
     """(a,) m of (a,) N, complex: `apply`; `own` m/N, the mean of what a point's two forces move itself; `bound` m/N of the
@@ -139,6 +141,11 @@ class MatrixShear:
         some = self._lift[np.ix_(index, index)]
         return np.hstack([some.real, -some.imag])
 
+    def matrix(self, index: Index) -> Array:
+        """As a matrix, of x, then of y."""
+        some = np.concatenate([2 * index, 2 * index + 1])
+        return self._matrix[np.ix_(some, some)]
+
     def between(self, index: Index) -> Between:
         """`spread` between the points `index`."""
         some = np.stack([2 * index, 2 * index + 1], axis=-1).ravel()
@@ -153,7 +160,7 @@ class KernelShear:
         _, x, y = doubled(grid)
         self._kernels = influence(x, y, *(np.full(x.shape, d / 2) for d in grid.spacing))
         self.coupled = bool(self._kernels[3:].any())
-        self._whole = _Convolution(self._kernels, grid.shape)
+        self._whole = Convolution(self._kernels, grid.shape)
 
     def spread(self, force: Plane) -> Plane:
         """In the plane (c,) m under forces in the plane (c,) N."""
@@ -171,6 +178,11 @@ class KernelShear:
         """`lift` between the points `index` as a matrix (a, 2a)."""
         return np.hstack([*self._between(index)[3:]])
 
+    def matrix(self, index: Index) -> Array:
+        """As a matrix, of x, then of y."""
+        xx, xy, yy = self._between(index)[:3]
+        return np.block([[xx, xy], [xy, yy]])
+
     def between(self, index: Index) -> Between:
         """`spread` between the points `index`."""
         if len(index) <= FEW:
@@ -178,7 +190,7 @@ class KernelShear:
         i, j = np.divmod(self._grid.place[index], self._grid.shape[1])
         i, j = i - i.min(), j - j.min()
         shape = int(i.max()) + 1, int(j.max()) + 1
-        part, place = _Convolution(self._kernels[:3], shape), i * shape[1] + j
+        part, place = Convolution(self._kernels[:3], shape), i * shape[1] + j
         return Between(lambda force: part.spread(force, place), part.own, part.bound)
 
     def _between(self, index: Index) -> Array:
@@ -202,48 +214,3 @@ def _product(matrix: Array) -> Between:
 
     own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
     return Between(apply, own, float(np.abs(matrix).sum(axis=1).max(initial=0.0)))
-
-
-class _Convolution:
-    """By FFT over twice a grid of `shape`, of kernels (3 or 5, ...) of a larger one; `place` (a,): flat indices of points there."""
-
-    def __init__(self, kernels: Array, shape: tuple[int, int]) -> None:
-        self._shape = shape
-        self._size = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in shape)
-        rows, columns = (
-            np.concatenate([np.arange(n), np.zeros(size - 2 * n + 1, int), np.arange(1 - n, 0)])
-            for n, size in zip(shape, self._size, strict=True)
-        )
-        some = kernels[:, rows[:, None], columns]
-        self.own = float(some[0, 0, 0] + some[2, 0, 0]) / 2
-        # No row of both components of `spread` sums to more.
-        self.bound = float(np.abs(some[:3]).sum())
-        self._xx, self._xy, self._yy, *self._lift = fft.rfft2(some)
-
-    def spread(self, force: Plane, place: Index) -> Plane:
-        """(a,) m in the plane under (a,) N in the plane."""
-        x, y = self._forward(np.stack([force.real, force.imag]), place)
-        moved = np.stack([self._xx * x + self._xy * y, self._xy * x + self._yy * y])
-        u, v = self._back(moved, place)
-        return u + 1j * v
-
-    def lift(self, force: Plane, place: Index) -> Array:
-        """(a,) m away from the road under (a,) N in the plane."""
-        x, y = self._forward(np.stack([force.real, force.imag]), place)
-        return self._back(self._lift[0] * x + self._lift[1] * y, place)
-
-    def drag(self, force: Array, place: Index) -> Plane:
-        """(a,) m in the plane under (a,) N away from the road."""
-        x, y = self._back(-np.stack(self._lift) * self._forward(force, place), place)
-        return x + 1j * y
-
-    def _forward(self, values: Array, place: Index) -> Plane:
-        nx, ny = self._shape
-        field = np.zeros((*values.shape[:-1], nx * ny))
-        field[..., place] = values
-        return fft.rfft2(field.reshape(*values.shape[:-1], nx, ny), self._size)
-
-    def _back(self, spectrum: Plane, place: Index) -> Array:
-        nx, ny = self._shape
-        field = fft.irfft2(spectrum, self._size)[..., :nx, :ny]
-        return field.reshape(*field.shape[:-2], -1)[..., place]

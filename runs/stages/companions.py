@@ -30,7 +30,7 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process import observe
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.stage import Done
-from tireroad.runs.stages.build.rolling.loop import Forces, forces
+from tireroad.runs.stages.build.rolling.loop import Forces, bristles, forces
 from tireroad.runs.stages.build.wall import Normal, backed
 from tireroad.runs.stages.coarser import coarser
 
@@ -72,7 +72,8 @@ class Given:
         kept = self.response.resolved(step)
         if len(kept.every) < len(self.response.resolved(self.step).every):
             return None
-        steps = oscillation(spec, self.settled.patch, kept, step)
+        patch = self.settled.patch
+        steps = oscillation(spec, patch, kept, step, bristles(spec, patch))
         if self.scheme == "linear" and choose(steps).scheme != "linear":
             return None
         try:

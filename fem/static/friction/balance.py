@@ -9,6 +9,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.friction.road import RubbingRoad
 from tireroad.fem.static.friction.sliding import Sliding
 from tireroad.fem.static.friction.system import RubbingSystem
+from tireroad.fem.static.path.step import Step
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 
@@ -30,6 +31,13 @@ class RubbingEquilibrium(Equilibrium):
 
     def _make_contact(self) -> None:
         """None: the tangent is not symmetric."""
+
+    def solve(
+        self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
+    ) -> Step:
+        """As of a road without friction."""
+        self.road.search()
+        return super().solve(road_height, load, allowed)
 
     def nudged(self, load: float) -> np.ndarray:
         """Sum (2,) N of the forces along and across the road after one linearised step under that `load` (N), what sticks and

@@ -61,7 +61,12 @@ class RubbingRoad(Road):
         self._along = 3 * body.tread[:, None] + np.arange(2)
         self._softly = np.ones(len(body.tread))
         self._slips = np.zeros(0, np.intp)
+        self._came = np.zeros(len(body.tread), dtype=bool)
         self._way, self._across, self._led = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
+
+    def search(self) -> None:
+        """A search for another balance begins."""
+        self._came[:] = False
 
     def weigh(self, diagonal: Array) -> None:
         super().weigh(diagonal)
@@ -109,7 +114,8 @@ class RubbingRoad(Road):
     def choose(self) -> bool:
         """As of a road without friction; and which nodes stick. A node that does goes on to until its force is too large;
         one that slips, until it would slip the other way: it never turns round at once. What touches
-        anew sticks first. (All by t - c g alone, nodes slipped to and fro together, for ever.) Collective.
+        anew sticks first, and slips when it comes a second time in a search, which else had no end. (All by t - c g alone,
+        nodes slipped to and fro together, for ever.) Collective.
         """
         touched, changed = self.active, super().choose()
         self.pull[~self.active] = 0.0
@@ -117,7 +123,10 @@ class RubbingRoad(Road):
         within = np.linalg.norm(self.pull, axis=1) <= bound * (1 + _ROUNDING)
         back = (trial[self._slips] * self._way).sum(axis=1) <= bound[self._slips]
         within[self._slips] = back
-        sticks = self.active & (within | ~touched)
+        fresh = self.active & ~touched
+        within[fresh] = ~self._came[fresh]
+        self._came |= fresh
+        sticks = self.active & within
         turned = bool((sticks != self.sticks).any())
         self.sticks = sticks
         return self._body.comm.allreduce(changed or turned, op=MPI.LOR)

@@ -22,6 +22,8 @@ from tireroad.contact.results.chatter import (
 from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.rolling import Drive, roll
 from tireroad.contact.solver.complementarity import ActiveSet
+from tireroad.contact.solver.friction import Friction
+from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.law import TREADS
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.residual.alternating import alternating
@@ -34,6 +36,7 @@ TREAD = SimpleNamespace(
 # Light, undamped and fast: at a step of 0.2 ms two thirds of its states are static, at 0.1 ms a seventh.
 LIVELY = Strip(mass=2.0, wave_speed=150.0, speed=20.0, damping=0.0)
 DURATION = 0.024
+STIFF = 1e8  # N/m, of a point's bristle
 
 
 def test_alternating_forces_settle_at_what_is_said() -> None:
@@ -87,6 +90,34 @@ def test_two_steps_an_oscillation_blow_up_where_forces_are_linear(scheme: str, g
     assert steps[0] == 2.0 and steps[1] > FEWEST
     assert (largest(1e-4, scheme) > 1e3 * largest(1e-5, "linear")) == grows
     assert choose(steps[0]).scheme == "constant" and choose(steps[1]).scheme == "linear"
+
+
+@pytest.mark.parametrize(("scheme", "grows"), [("linear", True), ("constant", False)])
+def test_bristles_too_stiff_for_the_step_blow_up_where_forces_are_linear(scheme, grows) -> None:
+    """Points that stick, their normal forces resolved: what horizontal forces do in two steps an oscillation is told."""
+
+    def largest(step: float, scheme: str) -> float:
+        tire = Recursion(response=response, step=step, scheme=scheme, comm=MPI.COMM_SELF)
+        p = len(heavy.points)
+        solver = ActiveSet(
+            tire.same_step[:p, :p] + TREAD.law.matrix(heavy.points[:, :2], heavy.half_sizes, 1.0)
+        )
+        brush = Brush(BrushLaw(STIFF), heavy.points[:, 0], heavy.line, 0.0, step)
+        brush.begin(heavy.force > 0)
+        friction = Friction(brush, tire.same_step, None)
+        drive = Drive(Flat().height, lambda t: 1e-7 * np.sin(900.0 * t), 0.0)
+        run = roll(tire, solver, heavy, drive, step, 40, friction)
+        return max(float(np.abs(i.horizontal).max()) for i in run)
+
+    heavy, spec = (
+        oval_patch((5, 4), (0.015, 0.02), 1e5),
+        SimpleNamespace(**vars(TREAD), sheared=False),
+    )
+    response = Strip(mass=2.0, damping=0.0).horizontal_response(heavy.points, 3, 3, 1.0)
+    steps = [oscillation(spec, heavy, response, h, STIFF) for h in (1e-4, 1e-5)]
+    assert oscillation(spec, heavy, response, 1e-4) > FEWEST  # normal forces alone
+    assert steps[0] == 2.0 and steps[1] > FEWEST
+    assert (largest(1e-4, scheme) > 1e3 * largest(1e-5, "linear")) == grows
 
 
 def _ridges(x: np.ndarray, y: np.ndarray) -> np.ndarray:

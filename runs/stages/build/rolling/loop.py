@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from tireroad.contact.driven import Driven
 from tireroad.contact.grid_patch import OnPoints
 from tireroad.contact.model import step_solver, tread_memory, tread_shear
+from tireroad.contact.patch import Patch
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.solver.friction import Friction
@@ -47,15 +48,22 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
     return Loop(tire, solver, friction, memory)
 
 
+def bristles(spec, patch: Patch):
+    """Stiffness (N/m) of each point's bristle, or (c,) of them; inf where none give way, None without horizontal forces."""
+    if not spec.rubs:
+        return None
+    if spec.brush_stiffness_per_area is not None:
+        return spec.brush_stiffness_per_area * patch.area
+    return spec.brush_stiffness or np.inf
+
+
 def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> Friction:
     """The brush of the scene, at rest.
 
     What pressure does to the tread sideways counts from the static state on, as all motion does; where the slip of the
     static shape counts (free rolling), that of its tread does too, but of one that creeps.
     """
-    patch, stiffness = setup.patch, spec.brush_stiffness or np.inf
-    if spec.brush_stiffness_per_area is not None:
-        stiffness = spec.brush_stiffness_per_area * patch.area
+    patch, stiffness = setup.patch, bristles(spec, setup.patch)
     shear, pressed, moved = tread_shear(spec, patch, at_once), None, None
     if shear is not None and setup.shape_slip is not None and spec.law.creep is None:
         drag = shear.drag(patch.force)

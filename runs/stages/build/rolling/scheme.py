@@ -9,6 +9,7 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.runs.process import observe
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.build.rolling.loop import bristles
 from tireroad.runs.stages.build.rolling.stepping import Planned
 
 
@@ -20,7 +21,8 @@ def chosen_scheme(
     `begun`: what was chosen for the checkpoint from which the loop goes on, or None.
     """
     wanted = job.scene.time.scheme
-    steps = oscillation(job.scene.contact, setup.patch, plan.response, plan.step)
+    spec, patch = job.scene.contact, setup.patch
+    steps = oscillation(spec, patch, plan.response, plan.step, bristles(spec, patch))
     if math.isfinite(steps):
         record.indicators["steps in the fastest oscillation of the contact"] = (steps, "-")
     given = Chosen(wanted, f'time.scheme = "{wanted}"')
