@@ -77,7 +77,7 @@ class ModesStage(Computed[ModalBasis]):
             operators = motions.operators
         with (
             record.timing("eigensolver"),
-            checkpointed(self, "counts and slices") as journal,
+            checkpointed(self, "count(s) and slice(s)") as journal,
         ):
             teams = self._teams(record)
             modes = solved(

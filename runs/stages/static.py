@@ -64,7 +64,7 @@ class StaticStage(Computed[StaticState]):
 
     def compute(self, record: Record) -> StaticState:
         """The scene's state, at a travel speed again until the wheel's speed is that of its radius. Collective."""
-        with checkpointed(self, "solutions") as journal:
+        with checkpointed(self, "solution(s)") as journal:
             journal.agreed(self.job.comm)
             return self._concluded(record, *self._at_speed(record, History(journal)))
 

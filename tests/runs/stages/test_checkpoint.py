@@ -112,7 +112,14 @@ def parts(directory: Path, stage: str) -> list[Path]:
 
 
 # By half of the ring, whole with an odd number of segments, and with a tangent that is not symmetric.
-@pytest.mark.parametrize("segments, damping", [(12, 0.0), (13, 0.0), (12, 200.0)])
+@pytest.mark.parametrize(
+    "segments, damping",
+    [
+        (12, 0.0),
+        pytest.param(13, 0.0, marks=pytest.mark.long),
+        pytest.param(12, 200.0, marks=pytest.mark.long),
+    ],
+)
 def test_static(folder: Path, monkeypatch, capsys, segments: int, damping: float) -> None:
     scene = scene_of(folder, segments, damping)
     solved = counted(monkeypatch, Equilibrium, "_solve")
@@ -126,7 +133,7 @@ def test_static(folder: Path, monkeypatch, capsys, segments: int, damping: float
     run(scene, folder / "broken", "static")
     assert len(solved) < whole - after + 3  # the last of each problem is solved again
     if COMM.rank == 0:
-        assert f"goes on from the checkpoint after {after} solutions" in capsys.readouterr().out
+        assert f"goes on from the checkpoint after {after} solution(s)" in capsys.readouterr().out
     assert_same(folder / "whole" / "static.h5", folder / "broken" / "static.h5", ROUNDING)
     assert not (folder / "broken" / "static_checkpoint").exists()
 
@@ -174,6 +181,7 @@ def test_what_is_damaged_is_not_taken(folder: Path, monkeypatch, capsys) -> None
     assert_same(folder / "whole" / "static.h5", folder / "broken" / "static.h5", ROUNDING)
 
 
+@pytest.mark.long
 def test_results_are_written_when_that_is_worth_it(folder: Path, monkeypatch) -> None:
     """A part begins with the first result that was not written before; other inputs take none of them."""
     monkeypatch.setattr(checkpoint, "LEAST", 0.0)
