@@ -87,11 +87,8 @@ def fuzz_check(folder: Path, seed: int, number: int) -> tuple[str, str]:
     return limited(run), f"{name} {changed}"
 
 
-def fuzz_run(folder: Path, seed: int, number: int, limit: float) -> tuple[str, str]:
-    """(end, what was tried) of one scene that `check` accepts, through `run` on a small mesh, in `limit` s."""
-    rng = np.random.default_rng([seed, 2, number])
-    write_files(folder)
-    path = folder / "run.toml"
+def random_scene(path: Path, rng: np.random.Generator) -> tuple[str, list[str]]:
+    """Name and overrides of a scene that `check` accepts, if a hundred are enough to find one; its text is written."""
     for _ in range(100):
         name, text, focus = _base(rng)
         path.write_text(text)
@@ -99,6 +96,13 @@ def fuzz_run(folder: Path, seed: int, number: int, limit: float) -> tuple[str, s
         with suppress(InputError):
             explain(load(path, changed))
             break
+    return name, changed
+
+
+def fuzz_run(folder: Path, seed: int, number: int, limit: float) -> tuple[str, str]:
+    """(end, what was tried) of one scene that `check` accepts, through `run` on a small mesh, in `limit` s."""
+    write_files(folder)
+    name, changed = random_scene(folder / "run.toml", np.random.default_rng([seed, 2, number]))
     status, said, memory = run_scene_file(folder, changed, limit)
     tried = f"{name} {changed} {said.strip()[-300:]}"
     wrong = ended(status, said, memory, folder / "out")

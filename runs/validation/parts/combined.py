@@ -113,6 +113,12 @@ COMBINATIONS = {
     "free wheel, friction in the static state, braked by 20 %, creeping tread": Combination(
         axle="free", static="friction = 1.0\n", tread="viscoelastic", contact=_CREEPS + "slip = [-0.2, 0.0]\n",
     ),
+    "corner, friction in the static state under camber on a drum, at a slip angle, rough": Combination(
+        camber=3.0, static="friction = 0.8\n", rotation="slip_angle = 2.0", road=_ROUGH + _DRUM,
+    ),
+    "free wheel, friction in the static state inside a drum, braked by 5 %, over a bar": Combination(
+        axle="free", static="friction = 0.8\n", contact="slip = [-0.05, 0.0]\n", road=_BAR + _INSIDE,
+    ),
     "corner, friction on a half-space without bristles, rolling freely, rough": Combination(
         rotation="free_rolling = true", contact="friction = 0.8\n",
     ),
