@@ -26,7 +26,8 @@ from tireroad.runs.stages.base.stage import Stage
 WORTH = 60.0  # times what writing results takes, computing them has taken before they are written
 LEAST = 1.0  # s of computing
 _COLUMNS = "by_columns"
-_RATE = 2e8  # bytes a second, until a part has been written
+_RATE = 2e8  # bytes a second, until a large part has been written
+_LARGE = 1e6  # bytes, of which the rate is taken: of less, the file as such is most of the time
 
 
 @contextmanager
@@ -96,7 +97,8 @@ class _Parts:
         if time.monotonic() - self._written > max(LEAST, WORTH * size / self._rate):
             began = time.monotonic()
             self.flush()
-            self._rate = size / max(time.monotonic() - began, 1e-3)
+            if size > _LARGE:
+                self._rate = size / max(time.monotonic() - began, 1e-3)
 
     def flush(self) -> None:
         """Write what is waiting."""

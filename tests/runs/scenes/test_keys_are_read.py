@@ -23,8 +23,6 @@ from tireroad.runs.scene.walk import walk
 from tireroad.runs.stages.build.pattern import make_pattern
 from tireroad.runs.stages.pipeline import run_scene
 
-# --- every key is read ---------------------------------------------------------------------------
-
 TIRE = """
 [tire]
 segments = 12
@@ -192,7 +190,14 @@ def test_every_key_is_read_by_a_run(tmp_path: Path, monkeypatch) -> None:
             "stiffness.deflections=[0.001]",
             "stiffness.which=vertical",
         )
-        _run(tmp_path / "rubbing", RUBBING)
+        slides = (
+            "tire.material.youngs_modulus=48e6",
+            "static.load=1500",
+            "stiffness.deflections=[0.02]",
+            "stiffness.slide_steps=1",
+        )
+        _run(tmp_path / "rubbing", RUBBING, *slides)
+        _run(tmp_path / "rubbing", RUBBING, *slides, "rotation.speed=20")
         _run(tmp_path / "full", FULL)
         (tmp_path / "drawing.toml").write_text(DRAWING)
         for section in ('section = "radial"', 'mesh = "drawing.toml"'):
