@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
 
 _PREFERRED = np.array((1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0))
 FEWEST = 3  # lines across a band, below which it has no level
@@ -89,6 +88,8 @@ def freedom(count: np.ndarray) -> np.ndarray:
 def confidence(degrees: np.ndarray, share: float = 0.95) -> np.ndarray:
     """dB (..., 2), negative and positive, to add to a level of so many degrees of freedom: between them lies that
     of the process, in `share` of all cases, if it is stationary and Gaussian: nu / chi-square(nu)."""
+    from scipy import stats  # imported where it is needed: it takes long
+
     nu, tail = np.asarray(degrees, float), (1 - share) / 2
     ends = [nu / stats.chi2.ppf(1 - tail, nu), nu / stats.chi2.ppf(tail, nu)]
     return 10 * np.log10(np.stack(ends, axis=-1))

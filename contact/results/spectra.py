@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 
 from tireroad.contact.results.levels import a_weighting, band_sums, confidence
 
@@ -24,6 +23,8 @@ def amplitudes(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]
 
     Hann window, mean removed, scaled so that a sine of amplitude a on a line of the spectrum shows |a|.
     """
+    from scipy import signal  # a quarter of a second, of which a run with all reused has no need
+
     window = signal.get_window("hann", len(values))[:, None]
     spectrum = np.fft.rfft(window * (values - values.mean(axis=0)), axis=0)
     return np.fft.rfftfreq(len(values), step), 2 * spectrum / window.sum()
@@ -42,6 +43,8 @@ def third_octaves(
     of change per second; A-weighted line by line if wanted; bands as of `contact.results.levels.band_sums`, below `up_to` Hz and
     half the sampling rate. Hann window over the whole record, mean removed. A record of one value has no band.
     """
+    from scipy import signal
+
     if len(values) < 2:
         return np.zeros(0), np.zeros((0, values.shape[1]))
     frequency, power = signal.periodogram(values, 1 / step, "hann", detrend="constant", axis=0)
@@ -83,6 +86,8 @@ def density(values: np.ndarray, step: float, up_to: float = np.inf, rate: bool =
     removed. The integral is the variance (Parseval). The power of segments that overlap by half under Hann's
     window is correlated by 1/36 with the next: of k averages k / (1 + (k - 1) / 18 k) count.
     """
+    from scipy import signal
+
     count = len(values)
     width = max(min(2 * int(count / _SEGMENTS / 2), round(_LONGEST / step)), min(count, 8))
     shift = width - width // 2
