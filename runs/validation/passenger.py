@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import tempfile
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from tireroad.contact.results.levels import nominal
 from tireroad.contact.results.spectra import third_octaves
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.comparison import digits
@@ -53,56 +53,44 @@ def run() -> list[Table]:
     with tempfile.TemporaryDirectory() as folder:
         tires = Tires(SCENE.format(highest=max(HIGHEST), **MESH), Path(folder))
         full = [follow(tires.trial, *tires.full(step)) for step in STEPS]
-        rows = [_row("all", "full FE", here, full[-1]) for here in full[:-1]]
+        compared = {f"full FE, {1e3 * here.step:g} ms": here for here in full[:-1]}
         for highest in HIGHEST:
             count = int((tires.modes.frequency <= highest).sum())
-            history = follow(tires.trial, *tires.modal(Choice(count, "attachment", STEPS[0])))
-            rows.append(_row(count, "attachment", history, full[-1]))
+            choice = Choice(count, "attachment", STEPS[0])
+            compared[f"{count} modes"] = follow(tires.trial, *tires.modal(choice))
         points = len(tires.trial.setup.patch.points)
         title = f"Passenger tire at 80 km/h: {points} contact points, {tires.setting}"
-    columns = [("modes", "-"), ("residual", ""), ("step", "s"), ("loop a simulated second", "s")]
-    columns += [(f"{name} force, {f:.0f} Hz", "dB") for name in _NAMES for f in _centres(full[-1])]
-    columns += [(f"worst, {name} force", "dB") for name in _NAMES]
-    return [Table(title, columns, rows, _notes(full))]
+    return [compared_table(title, compared, full[-1])]
 
 
-_NAMES = ("contact", "axle")
-
-
-def _notes(full: list[History]) -> list[str]:
-    """What is compared with what, and how sure the reference is of itself."""
-    worst = [
-        max(map(abs, _differences(here, finer)[name]))
-        for here, finer in pairwise(full)
-        for name in _NAMES
-    ]
-    own = ", ".join(f"{digits(one):g}" for one in worst[-2:])
-    return [
-        "Third octaves of the vertical forces less those of the full finite elements at their smallest step, of the same "
-        f"mesh, points, road and air; asked: {ASKED:g} dB at most. The reference's last halving of the step changes "
-        f"contact and axle force by {own} dB at most.",
-        "The loop in processor seconds of one thread.",
+def compared_table(title: str, compared: dict[str, History], exact: History) -> Table:
+    """Third octaves of the vertical forces less the `exact` ones, dB: a row a band, a column a history."""
+    rows: list[list] = []
+    for name in ("contact", "axle"):
+        centre, right = _levels(exact, name)
+        off = np.column_stack([_levels(history, name)[1] - right for history in compared.values()])
+        rows += [
+            [name, f"{band:g}", *row.round(2).tolist()]
+            for band, row in zip(nominal(centre), off, strict=True)
+        ]
+        rows.append([name, "worst", *map(digits, np.abs(off).max(axis=0))])
+    columns = [("force", ""), ("band", "Hz"), *((name, "dB") for name in compared)]
+    seconds = ", ".join(f"{name} {_seconds(history):.3g}" for name, history in compared.items())
+    notes = [
+        "Less the full finite elements at a step of "
+        f"{1e3 * exact.step:g} ms, of the same mesh, points, road and air; asked: {ASKED:g} dB at most. Modes with attachment, "
+        f"at {1e3 * STEPS[0]:g} ms. What the reference's own last halving of the step changes stands in the column of the full "
+        "finite elements.",
+        f"A simulated second of the loop, in processor seconds of one thread: {seconds}, the reference {_seconds(exact):.3g}.",
     ]  # fmt: skip
+    return Table(title, columns, rows, notes)
+
+
+def _seconds(history: History) -> float:
+    return history.seconds / (history.step * len(history.values["contact force"]))
 
 
 def _levels(history: History, name: str) -> tuple[np.ndarray, np.ndarray]:
     centre, level = third_octaves(history.values[f"{name} force"][:, 2:], history.step, 2 * BAND[1])
     kept = (centre > BAND[0]) & (centre < BAND[1])
     return centre[kept], level[kept, 0]
-
-
-def _centres(history: History) -> np.ndarray:
-    return _levels(history, "contact")[0]
-
-
-def _differences(history: History, exact: History) -> dict[str, list[float]]:
-    """dB in every third octave, by force."""
-    return {name: (_levels(history, name)[1] - _levels(exact, name)[1]).tolist() for name in _NAMES}
-
-
-def _row(modes: int | str, residual: str, history: History, exact: History) -> list:
-    found = _differences(history, exact)
-    seconds = history.seconds / (history.step * len(history.values["contact force"]))
-    values = [round(one, 2) for name in _NAMES for one in found[name]]
-    worst = [digits(max(map(abs, found[name]))) for name in _NAMES]
-    return [modes, residual, history.step, digits(seconds), *values, *worst]
