@@ -188,14 +188,19 @@ def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
 
     One given by --set is first looked for from the current folder, as shells complete it there.
     """
-    given = Path(name).expanduser()
     folders = [source.path.resolve().parent]
     if path in source.overridden:
         folders.insert(0, Path.cwd())
-    candidates = [(folder / given).resolve() for folder in folders]
-    file = next((one for one in candidates if one.is_file()), candidates[0])
-    if not file.is_file():
-        source.add(path, f"names no file: {file}")
+    try:
+        given = Path(name).expanduser()
+        candidates = [(folder / given).resolve() for folder in folders]
+        file = next((one for one in candidates if one.is_file()), candidates[0])
+        found, why = file.is_file(), ""
+    except (OSError, RuntimeError) as error:  # no name that a file can have, no such user
+        cut = name if len(name) <= 60 else f"{name[:60]}…"
+        found, file, why = False, Path(cut), f" ({getattr(error, 'strerror', error)})"
+    if not found:
+        source.add(path, f"names no file: {file}{why}")
         return _WRONG
     return str(file)
 

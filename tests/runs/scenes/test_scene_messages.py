@@ -73,3 +73,11 @@ def test_the_built_in_tire_loses_by_its_compounds(scene_file) -> None:
     """Not by the thesis's 500 1/s: a radial tire comes with loss factors."""
     assert load(scene_file('[tire]\nsection = "radial"\n')).damping is None
     assert load(scene_file("")).damping is not None
+
+
+def test_a_name_that_no_file_can_have_is_a_wrong_value(scene_file) -> None:
+    """Longer than the file system's names: said by the key, and briefly."""
+    message = refused(scene_file(FULL), f"pattern.file={'x' * 5000}")
+    assert "pattern.file" in message and "names no file: xxx" in message and len(message) < 400
+    message = refused(scene_file(FULL), "pattern.file=~no-such-user-here/tread.png")
+    assert "pattern.file" in message and "names no file: ~no-such-user-here" in message
