@@ -1,5 +1,9 @@
 """What the attacks by hand share: a small rolling scene, the program started, results compared."""
 
+# isort: off
+import tireroad  # noqa: F401  before numpy, whose BLAS chooses its kernels as it is loaded: a run in a fork has the bits of one alone
+
+# isort: on
 import hashlib
 import os
 import subprocess
