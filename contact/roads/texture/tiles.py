@@ -62,9 +62,8 @@ class Tiles:
         self._filter: Array | None = None
         self._tiles: dict[int, Array] = {}
         self._halves: dict[int, Array] = {}  # the one asked for last at the end
-        self._ends: dict[
-            int, tuple[float, float]
-        ] = {}  # lowest and highest place of each half ever drawn
+        # Lowest and highest place of each half ever drawn: numbers alone, so that bounds draw none again.
+        self._ends: dict[int, tuple[float, float]] = {}
         self.spacing = 0.5 * shortest
 
     def _places(self) -> tuple[int, int]:
