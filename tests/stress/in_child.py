@@ -18,8 +18,12 @@ MAY_EXCEED = 1.5  # a run's memory over its estimate
 
 
 def warm() -> None:
-    """Import what a run imports, and start MPI and PETSc. One thread: others would not survive a fork."""
+    """Import what a run imports, and start MPI and PETSc. One thread: others would not survive a fork.
+
+    Without the user's cache, whose stages other kernels of BLAS may have computed, to other last bits.
+    """
     os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
+    os.environ["TIREROAD_CACHE"] = "off"
     from tireroad.runs.process import mpi
 
     mpi.start_petsc([])
