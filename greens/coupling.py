@@ -55,7 +55,7 @@ class Wheel:
     air: Column | None = None
     beyond: tuple[float, float] | None = None
     corner: Callable[[Projection, Modes], Projection] | None = None
-    rim: Callable[[], RimMotion] | None = None
+    rim: Callable[[], RimMotion | None] | None = None
 
     @cached_property
     def rotating_stiffness(self) -> PETSc.Mat:
@@ -142,8 +142,9 @@ class Wheel:
         carried = self.operators.carried
         if not hub.nnz:
             return carried
-        assert self.rim is not None, "moments are read of a rim whose motions are known"
-        return np.vstack([carried, *self.rim().moments(self.speed)])
+        rim = self.rim() if self.rim else None
+        assert rim is not None, "moments are read of a rim whose motions are known"
+        return np.vstack([carried, *rim.moments(self.speed)])
 
     def _with_statics(self, basis: Basis, outputs: Probes, loads: Probes) -> Response:
         """The states, and the exact static flexibility of what they lack. Collective."""

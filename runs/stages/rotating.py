@@ -111,7 +111,7 @@ class RotatingStage(Computed[RollingModes]):
         wheel, wanted = self.wheel.product, self.job.scene.rotation
         with record.timing("full eigensolver"):
             matrices = wheel.rotating_damping, wheel.rotating_stiffness
-            rim = wheel.rim and wheel.rim()
+            rim = wheel.rim() if wheel.rim else None
             given = wheel.operators, matrices, projected, rim
             found, figures, warnings = full_states(*given, count=wanted.count, window=wanted.window)
         record.indicators |= figures
