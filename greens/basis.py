@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
+from tireroad.fem.axle import Axle
+from tireroad.greens.hub import reading
 from tireroad.greens.residual.second_order import Moments, modal_moments
 from tireroad.greens.response import Response, couple
 from tireroad.modal.basis import Projection
@@ -49,35 +51,37 @@ class Basis:
         loads: sparse.csr_matrix,
         flexibility: np.ndarray | None = None,
     ) -> Response:
-        """Response (r, k) of the probes `outputs` and `loads`."""
-        carried = self.projection.carried
+        """Response (r, k) of the probes `outputs` and `loads`; with the exact static answers `flexibility` (r, k) its
+        residual is what the states lack of them."""
         given = self.seen(outputs), self.seen(loads)
-        response = couple(self.states, *given, carried, flexibility)
-        corner = self.projection.corner
-        wanted = (
-            outputs[:, 3 * len(corner.places) + SEEN :] if corner else sparse.csr_matrix((0, 0))
-        )
-        return self._reading_moments(response, wanted, loads) if wanted.nnz else response
+        response = couple(self.states, *given, self.projection.carried)
+        wanted = self.of_hub(outputs)
+        if wanted.nnz:
+            response = reading(response, self.states, wanted, self.beside(wanted)[3:])
+            direct = wanted @ self.loaded(loads)
+            response = replace(response, residual=response.residual + direct)
+        if flexibility is None:
+            return response
+        return replace(response, residual=flexibility - response.static())
 
-    def _reading_moments(
-        self, response: Response, wanted: sparse.csr_matrix, loads: sparse.csr_matrix
-    ) -> Response:
-        """The response whose outputs `wanted` (r, 3) read the moments on the hub besides."""
-        rows, states = self.projection.moments(self.speed), self.states
-        s, block = states.eigenvalue, states.block
-        by_state, by_block = np.zeros((3, len(s)), complex), np.zeros((3, len(block)))
-        powered = states.block_right
-        for k, part in enumerate(rows):
-            by_state -= (part @ states.right) * s**k
-            by_block -= part @ powered
-            powered = powered @ block
-        moment = self.projection.wheel.rigid(loads)[:, MOMENTS] - self.seen(loads) @ rows[2].T
-        return replace(
-            response,
-            output=response.output + wanted @ by_state,
-            block_output=response.block_output + wanted @ by_block,
-            residual=response.residual + wanted @ moment.T,
-        )
+    def of_hub(self, outputs: sparse.csr_matrix) -> sparse.csr_matrix:
+        """By what weights (r, 3) the probes read the moments on the hub."""
+        corner = self.projection.corner
+        if corner is None:
+            return sparse.csr_matrix((outputs.shape[0], 3))
+        return outputs[:, 3 * len(corner.places) + SEEN :]
+
+    def loaded(self, loads: sparse.csr_matrix) -> np.ndarray:
+        """Moments (3, k) m of unit loads about the axle's centre."""
+        return self.projection.wheel.rigid(loads)[:, MOMENTS].T
+
+    def beside(self, wanted: sparse.csr_matrix) -> np.ndarray:
+        """What all coordinates carry besides, (3, m + a + c): momentum; and where moments on the hub are `wanted` (r, 3) the
+        rows A_0, A_1, A_2 of greens.hub after it, (12, m + a + c)."""
+        carried = self.projection.carried
+        if not wanted.nnz:
+            return carried
+        return np.vstack([carried, *self.projection.moments(self.speed)])
 
     @property
     def coordinates(self) -> int:
@@ -96,7 +100,8 @@ class Basis:
     @property
     def held(self) -> Basis:
         """The coordinates with the rim held; the states are not theirs."""
-        return replace(self, projection=replace(self.projection, corner=None))
+        corner = self.projection.corner and replace(self.projection.corner, axle=Axle.held())
+        return replace(self, projection=replace(self.projection, corner=corner))
 
 
 def regained(
@@ -114,7 +119,7 @@ def regained(
     own = basis.projection.squares > 0
     flexible = np.pad(own, (0, len(true[0]) - len(own)), constant_values=True)  # the air's are
     seen = basis.seen(outputs)[:, flexible], basis.seen(loads)[:, flexible]
-    carried = basis.projection.carried[:, flexible]
+    carried = basis.beside(basis.of_hub(outputs))[:, flexible]
 
     def moments(pencil: Pencil) -> Moments:
         drag, stiffness = (matrix[np.ix_(flexible, flexible)] for matrix in pencil)

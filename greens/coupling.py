@@ -12,9 +12,9 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.cavity.column import Column
+from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
-    StaticShapes,
     compliance,
     loaded_shapes,
     on_own_rows,
@@ -25,10 +25,12 @@ from tireroad.fem.matrices.compliance import (
 from tireroad.fem.matrices.inertia_relief import statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.matrices.receptance import receptance
+from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Array, Basis, Pencil, Probes, regained
+from tireroad.greens.completed import completed
 from tireroad.greens.residual.attachment import dynamic, fewest, foremost, with_attachments
-from tireroad.greens.residual.second_order import Moments, modal_moments, second_order
+from tireroad.greens.residual.second_order import Moments, second_order
 from tireroad.greens.response import Response
 from tireroad.modal.basis import Projection, project, same_fields, with_air
 from tireroad.modal.damping import Damping, StrainEnergy, tail_loss
@@ -42,7 +44,8 @@ class Wheel:
     """The full matrices of a tire that turns: `damping` as in modal.damping, `rotation` None when it
     stands. `beyond` (gamma1 1/s, gamma2 s) damps what no mode has, and the full matrices: given where
     `damping` is by strain energy, of which there are no full matrices. `corner` joins a wheel,
-    held or not, to a projection on modes. Its properties are collective at their first use."""
+    held or not, to a projection on modes; `rim`: what a held rim's motions meet, for the moments on its hub. Its
+    properties are collective at their first use."""
 
     operators: Operators
     rotation: Rotation | None
@@ -52,6 +55,7 @@ class Wheel:
     air: Column | None = None
     beyond: tuple[float, float] | None = None
     corner: Callable[[Projection, Modes], Projection] | None = None
+    rim: Callable[[], RimMotion | None] | None = None
 
     @cached_property
     def rotating_stiffness(self) -> PETSc.Mat:
@@ -99,7 +103,9 @@ class Wheel:
         for another one: its signs and its vectors of repeated frequencies differ.
         """
         if option in ("static", "dirac"):
-            return self._with_statics(basis, outputs, loads, option == "dirac")
+            whole = self._with_statics(basis, outputs, loads)
+            moved = outputs.shape[0] - np.count_nonzero(basis.of_hub(outputs).getnnz(axis=1))
+            return replace(whole, pulse=moved if option == "dirac" else 0)
         if option == "second-order" and basis.projection.moves:
             raise InputError("greens.residual: second-order knows no wheel that moves")
         r, k, same = outputs.shape[0], loads.shape[0], outputs is loads
@@ -108,50 +114,54 @@ class Wheel:
             assert modes is not None, "attachment modes need the modes on all unknowns"
             whole = self._attached(basis, modes, probes)
         else:
-            shapes = self._static_shapes(probes)
-            moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
-            poles = basis.couple(probes, probes)
-            carried, loss = basis.projection.carried, None
-            if self.beyond is not None:
-                pencils = self._pencils(basis.projection)
-                moments = moments.plus(regained(basis.held, *pencils, probes, probes))
-                loss = self.beyond[0], tail_loss(basis.projection)
-            whole = second_order(poles, basis.states, basis.seen(probes), carried, moments, loss)
-            whole = self._lacking(whole, moments.momentum - whole.static_moment())
+            whole = self._of_second_order(basis, probes)
         return whole if same else whole.between(slice(r), slice(r, r + k))
 
-    def _with_statics(self, basis: Basis, outputs: Probes, loads: Probes, pulse: bool) -> Response:
+    def _of_second_order(self, basis: Basis, probes: Probes) -> Response:
+        """The states, and those that stand for what they lack. Collective."""
+        hub = basis.of_hub(probes)
+        face = probes[:, : 3 * len(self.operators.body.surface.ids)] if hub.nnz else probes
+        full = self.rotating_stiffness, self.rotating_damping
+        shapes = static_shapes(self.operators, *full, face, self.air, self._beside(hub))
+        moments = Moments(shapes.compliance, shapes.damping, shapes.inertia, shapes.momentum)
+        poles, loss = basis.couple(face, face), None
+        if self.beyond is not None:
+            pencils = self._pencils(basis.projection)
+            moments = moments.plus(regained(basis.held, *pencils, probes, probes))
+            loss = self.beyond[0], tail_loss(basis.projection)
+        given = basis.states, basis.seen(face), basis.beside(hub), moments
+        whole = second_order(poles, *given, loss, hub)
+        if hub.nnz:
+            whole = replace(whole, residual=whole.residual + hub @ basis.loaded(face))
+        moment = moments.momentum[:3] - whole.static_moment()
+        return whole if self.air is not None else replace(whole, left_out=moment)
+
+    def _beside(self, hub: Probes) -> Array:
+        """Own rows (3, n) of the momentum; where moments on the `hub` (r, 3) are read the rows A_0, A_1, A_2 of greens.hub
+        after it, (12, n). Collective."""
+        carried = self.operators.carried
+        if not hub.nnz:
+            return carried
+        rim = self.rim() if self.rim else None
+        assert rim is not None, "moments are read of a rim whose motions are known"
+        return np.vstack([carried, *rim.moments(self.speed)])
+
+    def _with_statics(self, basis: Basis, outputs: Probes, loads: Probes) -> Response:
         """The states, and the exact static flexibility of what they lack. Collective."""
         given = self.operators, self.rotating_stiffness, outputs, loads
-        answers = compliance(*given, self.air, moment=True)
-        flexibility, moment = answers[: outputs.shape[0]], answers[outputs.shape[0] :]
+        answers = compliance(*given, self.air, beside=self._beside(basis.of_hub(outputs)))
+        flexibility, beside = answers[: outputs.shape[0]], answers[outputs.shape[0] :]
         if self.beyond is not None:
             lacking = regained(basis.held, *self._pencils(basis.projection), outputs, loads)
-            flexibility, moment = flexibility + lacking.compliance, moment + lacking.momentum
-        return replace(self._completed(basis, outputs, loads, flexibility, moment), pulse=pulse)
+            flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
+        return self._completed(basis, outputs, loads, flexibility, beside)
 
     def _completed(
-        self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, moment: Array
+        self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, beside: Array
     ) -> Response:
-        """The states with what they lack, the rim held, of a static displacement and a first moment."""
-        if not basis.projection.moves:
-            response = basis.couple(outputs, loads, flexibility)
-            return self._lacking(response, moment - response.static_moment())
-        held = basis.held
-        pencil = held_matrices(basis.projection, self.speed, self.damping, self.inertia)
-        seen = held.seen(outputs), held.seen(loads)
-        known = modal_moments(*pencil, *seen, held.projection.carried)
-        response = basis.couple(outputs, loads)
-        response = replace(response, residual=response.residual + flexibility - known.compliance)
-        return self._lacking(response, moment - known.momentum)
-
-    def _lacking(self, response: Response, moment: np.ndarray) -> Response:
-        """With the static first moment (3, k) kg m/N that the states lack; not with air, whose own is not known."""
-        return replace(response, left_out=moment) if self.air is None else response
-
-    def _static_shapes(self, probes: Probes) -> StaticShapes:
-        full = self.rotating_stiffness, self.rotating_damping
-        return static_shapes(self.operators, *full, probes, self.air)
+        """The states with what they lack (greens.completed)."""
+        made = completed(basis, self.turning, outputs, loads, flexibility, beside)
+        return made if self.air is None else replace(made, left_out=None)
 
     def _attached(self, basis: Basis, modes: Modes, probes: Probes) -> Response:
         """Response of the modes and the attachment modes of all probes. Collective."""
@@ -161,19 +171,25 @@ class Wheel:
             full = self.operators, self.rotating_stiffness
             shapes, flexibility = loaded_shapes(*full, loads, self.air)
             flexibility = weights @ (weights @ flexibility.T).T
-            nothing = np.zeros((3, probes.shape[0]))
-            missing = self._completed(basis, probes, probes, flexibility, nothing).residual
-            columns = shapes @ (weights.T @ foremost(missing, np.abs(np.diag(flexibility))))
+            columns = shapes @ (weights.T @ self._foremost(basis, probes, flexibility))
             grown, _ = self._grown(modes, columns, basis.projection, every=False)
+            rows, comm = self._beside(basis.of_hub(probes)), self.operators.body.comm
+            beside = (weights @ summed(comm, rows @ shapes).T).T
             if self.beyond is not None:
-                pencils = self._pencils(grown.projection)
-                flexibility = (
-                    flexibility + regained(grown.held, *pencils, probes, probes).compliance
-                )
-            of_loads = self.operators.body.comm.allreduce(self.operators.carried @ shapes)
-            moment = (weights @ of_loads.T).T
-            return self._completed(grown, probes, probes, flexibility, moment)
+                lacking = regained(grown.held, *self._pencils(grown.projection), probes, probes)
+                flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
+            return self._completed(grown, probes, probes, flexibility, beside)
         return self.standing_attachments(modes, probes)[0].couple(probes, probes)
+
+    def _foremost(self, basis: Basis, probes: Probes, flexibility: Array) -> Array:
+        """By which loads (p, k) of the probes shapes are made: of those that move something."""
+        moving = np.flatnonzero(np.diag(flexibility))
+        some, own = probes[moving], flexibility[np.ix_(moving, moving)]
+        missing = self._completed(basis, some, some, own, np.zeros((3, len(moving)))).residual
+        chosen = foremost(missing, np.abs(np.diag(own)))
+        out = np.zeros((len(flexibility), chosen.shape[1]))
+        out[moving] = chosen
+        return out
 
     def _check_same(self, basis: Basis, modes: Modes) -> None:
         """InputError where these modes are not those of the basis. Collective."""

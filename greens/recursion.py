@@ -55,6 +55,7 @@ class Recursion:
         if response.pulse and scheme == "linear":
             # A pulse one step long answers the mean of a linear force over the step.
             self._late = response.residual / 2
+            self._late[response.pulse :] = 0.0
             self.same_step -= self._late
         self._force = np.zeros(response.residual.shape[1])
         self._rate = np.zeros(3)

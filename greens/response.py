@@ -30,8 +30,8 @@ class Response:
     `eigenvalue` (q,) 1/s, `output` (r, q) and `input` (q, k) complex, `block` (b, b) with its
     `block_output` (r, b) and `block_input` (b, k), `residual` (r, k) m/N; `momentum` (3, q) and
     `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries. The last `rigid`
-    states of the block drift under a constant force: static figures leave them out. With `pulse` the
-    residual answers not at once but with a pulse 1/step high and one step long in place of its
+    states of the block drift under a constant force: static figures leave them out. Of the first `pulse`
+    outputs the residual answers not at once but with a pulse 1/step high and one step long in place of its
     delta(t) (thesis (C.4)). `left_out` (3, k) kg m/N, where it is known: the static first moment int rho u of
     all motions that no state has; the axle force lacks its second rate.
     """
@@ -45,7 +45,7 @@ class Response:
     residual: np.ndarray
     momentum: np.ndarray
     block_momentum: np.ndarray
-    pulse: bool = False
+    pulse: int = 0
     rigid: int = 0
     left_out: np.ndarray | None = None
 
@@ -186,7 +186,7 @@ class Response:
             output=self.output * self.eigenvalue,
             block_output=self.block_output @ self.block,
             residual=(self.output @ self.input).real + self.block_output @ self.block_input,
-            pulse=False,
+            pulse=0,
         )
 
     def between(self, outputs: slice, forces: slice) -> Response:
@@ -198,6 +198,7 @@ class Response:
             block_output=self.block_output[outputs],
             block_input=self.block_input[:, forces],
             residual=self.residual[outputs, forces],
+            pulse=sum(k < self.pulse for k in range(len(self.residual))[outputs]),
             left_out=None if self.left_out is None else self.left_out[:, forces],
         )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import InputError
+from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning
 from tireroad.greens.coupling import Wheel
@@ -39,10 +40,12 @@ def wheel_of(
         tail = beyond(turning.damping, projection)
     rotation = motions.rotation if turning.speed else None
 
+    def rim() -> RimMotion | None:
+        return motions.rim_motion(turning.speed != 0)
+
     def corner(projection: Projection, modes: Modes) -> Projection:
         comm, places = motions.body.comm, motions.static.positions
-        rim = motions.rim_motion(turning.speed != 0)
-        return with_corner(projection, modes, axle, rim, places, comm)
+        return with_corner(projection, modes, axle, rim(), places, comm)
 
     return Wheel(
         operators=motions.operators,
@@ -53,4 +56,5 @@ def wheel_of(
         air=air,
         beyond=tail,
         corner=corner,
+        rim=rim,
     )

@@ -11,8 +11,11 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
+from tireroad.fem.axle import Axle
 from tireroad.fem.collective import summed
 from tireroad.fem.matrices.operators import Operators
+from tireroad.fem.matrices.rim_motion import RimMotion
+from tireroad.modal.corner import meeting
 from tireroad.modal.damping import beyond
 from tireroad.modal.rolling import RollingModes
 from tireroad.modal.rotating import StateModes
@@ -30,21 +33,26 @@ def full_states(
     operators: Operators,
     pencil: tuple[PETSc.Mat, PETSc.Mat],
     projected: RollingModes,
+    rim: RimMotion | None = None,
     *,
     count: int,
     window: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[RollingModes, Figures, list[str]]:
     """`count` pairs nearest to zero, or all in the `window` (Hz), how far the projected states are off them,
-    and warnings. `pencil`: D + 2 Omega G and K_Omega as in fem.matrices.compliance. Collective.
+    and warnings. `pencil`: D + 2 Omega G and K_Omega as in fem.matrices.compliance; `rim`: what a held rim's motions meet,
+    for the moments on its hub. Collective.
     """
     found, figures, lacking = _solve(operators, pencil, projected, count, window)
     fields, coordinates = _orthonormal(operators, found)
     comm, old = operators.body.comm, projected.basis
     momenta = summed(comm, operators.carried @ fields)
+    projection, corner = old.projection, None
+    if rim is not None:
+        corner = meeting(Axle.held(), rim, fields, projection.wheel.places, comm)
     basis = replace(
         old,
         shape=operators.trace(fields),
-        projection=replace(old.projection, momentum=momenta),
+        projection=replace(projection, momentum=momenta, corner=corner),
         modes=None,
     )
     states = _states(found, coordinates)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,11 @@ class RoadKind(Parameters):
     """
 
     owner = "road"
+
+    @property
+    def reads(self) -> Path | None:
+        """The file that `make` reads, where it does: one process does it then, and the others have what it found."""
+        return None
 
     def make(self) -> Road:
         """The road of these parameters. InputError where files do not serve."""

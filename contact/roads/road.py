@@ -1,10 +1,10 @@
 """The road as the tire meets it: any kind of road, shifted under the axle, levelled and eased in."""
 
-from dataclasses import asdict, fields
+from dataclasses import fields
 from typing import Any
 
 from tireroad.contact.roads.kind import ROADS, RoadKind
-from tireroad.contact.roads.under_tire import Placement, RoadUnderTire
+from tireroad.contact.roads.under_tire import Placement, Road, RoadUnderTire
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import ParameterError
 
@@ -14,7 +14,7 @@ def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
 
     Keys are those of `Placement` and of the kind (contact.roads.kinds); what is absent or None takes
     its default. A spec with the attributes of Placement and `surface`, a RoadKind, is taken as it is.
-    InputError for an unknown kind or key, a value out of its range or a file that cannot be used.
+    To have the road of a file once made use `placed`. InputError for an unknown kind or key, a value out of its range or a file that cannot be used.
     """
     if spec is None or not hasattr(spec, "surface"):
         given = keys if spec is None else vars(spec)
@@ -22,9 +22,14 @@ def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
     else:
         placement = Placement(**{item.name: getattr(spec, item.name) for item in fields(Placement)})
         surface = spec.surface
+    return placed(surface.make(), surface, placement)
+
+
+def placed(road: Road, surface: RoadKind, placement: Placement) -> RoadUnderTire:
+    """The road that a `surface` has made, where the placement lays it."""
     return RoadUnderTire(
-        surface.make(),
-        **asdict(placement),
+        road,
+        **{item.name: getattr(placement, item.name) for item in fields(Placement)},
         datum=getattr(surface, "datum", "zero"),
         longest_wave=getattr(surface, "longest_wave", None),
     )

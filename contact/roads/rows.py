@@ -35,7 +35,10 @@ def check_count(file: Path, count: int) -> None:
 
 
 class Rows(Protocol):
-    """`shape` (rows, numbers a row); `read` gives rows i0 to i1, (i1 - i0, width)."""
+    """`shape` (rows, numbers a row); `read` gives rows i0 to i1, (i1 - i0, width).
+
+    Rows go to other processes of the machine by pickling: arrays as buffers, what lies in a file by being opened there.
+    """
 
     shape: tuple[int, int]
 
@@ -95,6 +98,13 @@ class FileRows:
         self._name, self._packed, self.shape = file, packed, packed.shape
         self._open = file if isinstance(file, int) else os.open(file, os.O_RDONLY)
         weakref.finalize(self, os.close, self._open)
+
+    def __reduce__(self) -> tuple[type[FileRows], tuple[Path, Packed]]:
+        """Opened by its name, or, of a file without one, as the open file of this process, where the system shows it."""
+        name = self._name
+        if isinstance(name, int):
+            name = Path(f"/proc/{os.getpid()}/fd/{name}")
+        return FileRows, (name, self._packed)
 
     def read(self, i0: int, i1: int) -> Array:
         """InputError when the file has become shorter."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +32,11 @@ class Window:
         self._known = np.zeros(0, dtype=bool)
         self.missing = 0
         self.hole: tuple[int, int] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the rows in memory, which are read again where they are wanted."""
+        nothing = {"_begin": 0, "_z": np.empty((0, len(self._y))), "_corners": ()}
+        return self.__dict__ | nothing
 
     def scan(self) -> None:
         """Look for holes, all through once. InputError when there is no height at all."""

@@ -146,7 +146,7 @@ class ActiveSet:
             if len(lifted):
                 right += self._missed(index, lifted, reference)
         change[index] = self._factor.solve(right)
-        gap = q + self._compliance.spread(change)
+        gap = q + self._factor.spread(change)
         force[index] = change[index] if reference is None else reference[index] + change[index]
         return force, gap
 

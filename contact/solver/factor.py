@@ -59,9 +59,9 @@ class ActiveFactor:
         self._members, self._changed = self.index, self.index[:0]
         self._key = base.tobytes()
         self.factorisations += 1
+        self._around = self._compliance.around(self.index)
         if len(self.index):  # LAPACK refuses empty blocks
-            block = self._compliance.block(self.index, self.index)
-            self._lu, self._pivots, info = dgetrf(block, overwrite_a=True)
+            self._lu, self._pivots, info = dgetrf(self._around.block(), overwrite_a=True)
             self._check(info)
 
     def solve(self, right: Array) -> Array:
@@ -79,6 +79,10 @@ class ActiveFactor:
         whole[self._members] = inner - self._columns @ outer
         whole[self._entered] = outer[: len(self._entered)]
         return whole[self.index]
+
+    def spread(self, force: Array) -> Array:
+        """A f (n,) m for forces f (n,) N that are loaded at the factorised set and few others."""
+        return self._around.spread(force)
 
     def _border(self, active: Mask, changed: NDArray[np.intp]) -> None:
         """The Schur complement of the changes since the factor was made."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -16,22 +18,40 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
+class Around(Protocol):
+    """A seen from some points: `block` (a, a) between them, column-major as LAPACK takes it; `spread`, A f (c,) for forces
+    (c,) at those points and few others.
+    """
+
+    def block(self) -> Array: ...
+
+    def spread(self, force: Array) -> Array: ...
+
+
 class Compliance(Protocol):
     """What the solvers need of A (c, c) m/N.
 
-    `block` is its part between given points, column-major as LAPACK takes it; `spread` is
-    `apply` for forces of which few are not zero; `precondition` roughly its inverse.
+    `block` is its part between given points, column-major; `around` prepares many products with forces
+    at about the same points; `precondition` is roughly its inverse.
     """
 
     diagonal: Array
 
     def block(self, rows: Index, columns: Index) -> Array: ...
 
-    def spread(self, force: Array) -> Array: ...
+    def around(self, index: Index) -> Around: ...
 
     def apply(self, force: Array) -> Array: ...
 
     def precondition(self, approach: Array) -> Array: ...
+
+
+@dataclass(frozen=True)
+class _ProductAround:
+    """Of a compliance that is a product: it costs the same for few forces as for many."""
+
+    block: Callable[[], Array]
+    spread: Callable[[Array], Array]
 
 
 class SpreadCompliance:
@@ -60,9 +80,9 @@ class SpreadCompliance:
         ahead = self._weights[columns] @ self._tire.T
         return np.asfortranarray(self._weights[rows] @ ahead.T + self._tread.block(rows, columns))
 
-    def spread(self, force: Array) -> Array:
-        """Approach (c,) m under forces (c,) N."""
-        return self.apply(force)
+    def around(self, index: Index) -> Around:
+        """As seen from the points of `index` (a,)."""
+        return _ProductAround(lambda: self.block(index, index), self.apply)
 
     def apply(self, force: Array) -> Array:
         """Approach (c,) m under forces (c,) N."""
@@ -84,9 +104,9 @@ class MatrixCompliance:
             return np.asfortranarray(self._matrix.take(rows, axis=0).take(columns, axis=1))
         return self._columns.between(rows, columns)
 
-    def spread(self, force: Array) -> Array:
-        """Approach (c,) m under forces (c,) N, few of them not zero."""
-        return self._columns @ force
+    def around(self, index: Index) -> Around:
+        """As seen from the points of `index` (a,)."""
+        return self._columns.around(index)
 
     def apply(self, force: Array) -> Array:
         """Approach (c,) m under forces (c,) N."""

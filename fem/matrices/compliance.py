@@ -76,7 +76,7 @@ class StaticShapes:
 
     `columns` this process's rows (n, p) of x = K_Omega^-1 b; with y = K_Omega^-T b, all (p, p) and on
     every process: `compliance` b^T x m/N, `damping` y^T (D + 2 Omega G) x m s/N, `inertia` y^T M x
-    m s2/N; `momentum` (3, p) int rho x, kg m/N.
+    m s2/N; `momentum` (3, p) int rho x, kg m/N, or (b, p) of what was asked for in its place.
     """
 
     columns: np.ndarray
@@ -106,8 +106,10 @@ def static_shapes(
     damping: PETSc.Mat,
     probes: sparse.csr_matrix,
     air: Column | None = None,
+    beside: np.ndarray | None = None,
 ) -> StaticShapes:
-    """Static shapes of the probes (p, 3 s), each a load and a reading, with the air's. Collective.
+    """Static shapes of the probes (p, 3 s), each a load and a reading, with the air's; `beside` own rows (b, n) in the place
+    of those of the momentum, which are the first of them. Collective.
 
     An unsymmetric stiffness is factorised a second time, transposed; a free tire that stands answers
     by inertia relief (fem.matrices.inertia_relief).
@@ -127,7 +129,7 @@ def static_shapes(
         summed(comm, loads.T @ x),
         summed(comm, y.T @ multiply(damping, x)),
         summed(comm, y.T @ (operators.mass[:, None] * x)),
-        summed(comm, operators.carried @ x),
+        summed(comm, (operators.carried if beside is None else beside) @ x),
     )
     return shapes if air is None else _with_following(shapes, air, x, y)
 
@@ -138,11 +140,13 @@ def _with_following(
     """The same with the damping, inertia and momentum of the air that follows the shapes. Collective."""
     g, h = air.following(x), air.following(y, transposed=True)
     drag, _ = air.duct.pencil(air.speed)
+    momentum = shapes.momentum.copy()
+    momentum[:3] += air.duct.momentum @ g
     return replace(
         shapes,
         damping=shapes.damping + h.T @ drag @ g,
         inertia=shapes.inertia + h.T @ g,
-        momentum=shapes.momentum + air.duct.momentum @ g,
+        momentum=momentum,
     )
 
 
@@ -152,17 +156,17 @@ def compliance(
     outputs: sparse.csr_matrix,
     loads: sparse.csr_matrix,
     air: Column | None = None,
-    moment: bool = False,
+    beside: np.ndarray | None = None,
 ) -> np.ndarray:
     """Displacement at the outputs per unit load, (r, k) m/N, with the air's, on every process. Collective.
 
-    `outputs` (r, 3 s) and `loads` (k, 3 s) weigh the nodes of the outer face, three dofs a node. With
-    `moment` three rows more: the first moment int rho u of the tire, kg m/N.
+    `outputs` (r, 3 s) and `loads` (k, 3 s) weigh the nodes of the outer face, three dofs a node. `beside`: own rows
+    (b, n) that are read besides, b rows more, as the first moment int rho u of the tire, kg m/N.
     Raises ConvergenceError when a solve leaves a relative residual above 1e-8.
     """
     rows, columns = on_own_rows(operators, outputs).T.tocsr(), on_own_rows(operators, loads)
-    if moment:
-        rows = sparse.vstack([rows, sparse.csr_matrix(operators.carried)], format="csr")
+    if beside is not None:
+        rows = sparse.vstack([rows, sparse.csr_matrix(beside)], format="csr")
     if air is not None:
         rows = sparse.vstack([rows, air.pushed.T], format="csr")
         columns = sparse.hstack([columns, air.pushed], format="csc")

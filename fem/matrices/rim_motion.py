@@ -42,6 +42,16 @@ class RimMotion:
     rows: dict[str, np.ndarray]
     whole: dict[str, np.ndarray]
 
+    def moments(self, speed: float) -> np.ndarray:
+        """A (3, 3, n) on own unknowns at `speed` (rad/s): a hub that is held carries the moments of the loads less
+        A_2 u'' + A_1 u' + A_0 u, N m (modal.corner.Corner.moments)."""
+        turned = {name: rows[:, TURN:].T for name, rows in self.rows.items()}
+        out = np.stack([turned["stiffness"], np.zeros_like(turned["mass"]), turned["mass"]])
+        if speed:
+            out[0] += speed**2 * turned["convective"]
+            out[1] -= 2 * speed * turned["gyroscopic"]
+        return out
+
 
 def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> RimMotion:
     """The rim's motions at the body's present displacement; the rim's static forces turn with it. Collective.

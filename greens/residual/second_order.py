@@ -16,7 +16,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
 
+from tireroad.greens.hub import reading
 from tireroad.greens.response import Response, couple
 from tireroad.modal.rotating import checks, rotating
 from tireroad.modal.states import StateModes, growing
@@ -30,7 +32,7 @@ _MASSLESS = 1e-6
 @dataclass(frozen=True)
 class Moments:
     """y^T (K_Omega, D + 2 Omega G, M) x of p probes with themselves, (p, p): m/N, m s/N, m s2/N;
-    `momentum` (3, p) kg m/N: int rho x."""
+    `momentum` (3, p) kg m/N: int rho x; or (12, p), with A_0 x, A_1 x and A_2 x of greens.hub after it."""
 
     compliance: np.ndarray
     damping: np.ndarray
@@ -69,19 +71,25 @@ def second_order(
     carried: np.ndarray,
     moments: Moments,
     loss: tuple[float, float] | None = None,
+    hub: sparse.csr_matrix | None = None,
 ) -> Response:
     """The response of p probes (outputs = forces) with residual states and an exact static limit.
 
     `shape` (p, m) are the modal shapes at the probes and `carried` (3, m) the modes' momentum. `loss`: the
     uniform rate (1/s) by which the moments' damping has them damped, and the loss factor that damps
-    them in its place, each at eta times its own circular frequency.
+    them in its place, each at eta times its own circular frequency. By the weights `hub` (p, 3) probes read moments on
+    the hub, of which `response` knows nothing; `carried` and the moments' momentum have their rows then. Their loads' own
+    part, at once, is not in it.
     """
     missing = _missing(response, modes, shape, carried, moments)
     flexibility = missing.compliance
+    hub = sparse.csr_matrix((len(flexibility), 3)) if hub is None else hub
+    whole = reading(response, modes, hub, carried[3:])
+    answers = moments.compliance - hub @ moments.momentum[3:6] if hub.nnz else moments.compliance
     sizes, directions = np.linalg.eigh((flexibility + flexibility.T) / 2)
     kept = sizes > _ROUNDING * np.abs(np.diag(moments.compliance)).max()
     if not kept.any():
-        return replace(response, residual=flexibility)
+        return replace(whole, residual=answers - whole.static())
     basis = directions[:, kept] / np.sqrt(sizes[kept])
     inertia = basis.T @ missing.inertia @ basis
     sizes, directions = np.linalg.eigh((inertia + inertia.T) / 2)
@@ -97,9 +105,10 @@ def second_order(
     checks(states, drag, stiffness)
     output = flexibility @ basis
     forces = inverse @ (basis.T @ flexibility)
-    extra = couple(states, output, forces.T, missing.momentum @ basis)
-    whole = response.joined(extra.keeping_where(lambda s: ~growing(s)))
-    return replace(whole, residual=moments.compliance - whole.static())
+    beside = missing.momentum @ basis
+    extra = reading(couple(states, output, forces.T, beside[:3]), states, hub, beside[3:])
+    whole = whole.joined(extra.keeping_where(lambda s: ~growing(s)))
+    return replace(whole, residual=answers - whole.static())
 
 
 def _by_loss_factor(stiffness: np.ndarray, rate: float, factor: float) -> np.ndarray:

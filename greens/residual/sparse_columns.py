@@ -43,8 +43,8 @@ class LoadedColumns:
 
     def __init__(self, matrix: Array, comm: MPI.Comm = MPI.COMM_SELF) -> None:
         self.columns = np.ascontiguousarray(matrix.T)
-        self._rows = SharedRows(len(matrix), comm)
-        self._own = self.columns[:, self._rows.mine]
+        self.rows = SharedRows(len(matrix), comm)
+        self._own = self.columns[:, self.rows.mine]
 
     @staticmethod
     def of(matrix: Array | LinearOperator, comm: MPI.Comm) -> LoadedColumns | LinearOperator:
@@ -53,9 +53,10 @@ class LoadedColumns:
 
     def __matmul__(self, force: Array) -> Array:
         """A f (n,) for f (k,). Collective where the rows are shared."""
-        return self._rows.gathered(self._product(force))
+        return self.rows.gathered(self.product(force))
 
-    def _product(self, force: Array) -> Array:
+    def product(self, force: Array) -> Array:
+        """This process's rows of A f for f (k,)."""
         index = force.nonzero()[0]
         breaks = np.flatnonzero(index[1:] - index[:-1] > 1)
         if len(index) < LONG * (len(breaks) + 1):
@@ -71,3 +72,29 @@ class LoadedColumns:
         """A (a, b) between `rows` (a,) and `columns` (b,), column-major."""
         # By whole columns first: a third of the time of picking entry by entry.
         return self.columns.take(columns, axis=0).take(rows, axis=1).T
+
+    def around(self, index: Index) -> ColumnsAround:
+        """The columns (a,) of `index`, side by side, for products with forces that are loaded there and at few others."""
+        return ColumnsAround(self, index)
+
+
+class ColumnsAround:
+    """Columns of A (n, n) at `index` (a,), copied once for many products: half of a product is to find and copy them."""
+
+    def __init__(self, whole: LoadedColumns, index: Index) -> None:
+        self._whole, self._index = whole, index
+        self._columns = whole.columns.take(index, axis=0)
+        self._own = self._columns[:, whole.rows.mine]
+
+    def block(self) -> Array:
+        """A (a, a) between them, column-major."""
+        return self._columns.take(self._index, axis=1).T
+
+    def spread(self, force: Array) -> Array:
+        """A f (n,) for f (n,), best of forces at `index` and few others. Collective where the rows are shared."""
+        moved = force[self._index] @ self._own
+        rest = force.copy()
+        rest[self._index] = 0.0
+        if rest.any():
+            moved += self._whole.product(rest)
+        return self._whole.rows.gathered(moved)

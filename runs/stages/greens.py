@@ -162,8 +162,7 @@ class GreensStage(Computed[Responses]):
 
     def read(self, file) -> Responses:
         """The responses."""
-        pulse = self.job.scene.greens.residual == "dirac"
-        return Responses(**read_responses(file, pulse))
+        return Responses(**read_responses(file))
 
 
 def _share_of_residual(record, where: str, response: Response) -> None:

@@ -31,6 +31,7 @@ from tireroad.runs.scene.rules.road import check_road
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.stage import Done, Part, Shared, Stage
+from tireroad.runs.stages.build.shared_road import share
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.parts import PARTS
 from tireroad.runs.stages.stored.obtained import obtained
@@ -99,6 +100,7 @@ def run_scene(
     on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
     if scene.road is not None:
         # A road file that cannot be used should be reported before hours of solving, not after.
+        share(scene.road.surface, comm)
         on_root(comm, lambda: check_road(scene))
     wanted = _say_demand(scene, directory, comm, until)
     reasons = skipped(scene, until)

@@ -132,8 +132,8 @@ class ResponseStage(Computed[PointResponse]):
         displacement, axle = np.zeros((len(force), len(tire.same_step))), np.zeros((len(force), 3))
         tire.start(force[0])
         axle[0] = force[0] @ direction - tire.inertia_force()
-        if not seen.whole.pulse:
-            displacement[0] = seen.whole.residual @ force[0]
+        late = seen.whole.pulse
+        displacement[0, late:] = seen.whole.residual[late:] @ force[0]
         with record.timing("time loop"), observe.Progress("response", len(force) - 1) as bar:
             for k in range(1, len(force)):
                 free = tire.predict()

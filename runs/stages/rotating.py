@@ -111,9 +111,9 @@ class RotatingStage(Computed[RollingModes]):
         wheel, wanted = self.wheel.product, self.job.scene.rotation
         with record.timing("full eigensolver"):
             matrices = wheel.rotating_damping, wheel.rotating_stiffness
-            found, figures, warnings = full_states(
-                wheel.operators, matrices, projected, count=wanted.count, window=wanted.window
-            )
+            rim = wheel.rim() if wheel.rim else None
+            given = wheel.operators, matrices, projected, rim
+            found, figures, warnings = full_states(*given, count=wanted.count, window=wanted.window)
         record.indicators |= figures
         record.warnings += warnings
         return found
@@ -146,14 +146,18 @@ class RotatingStage(Computed[RollingModes]):
         values = {name: file[name][:] for name in _UNITS}
         known = float(file.attrs["basis_condition"]), int(file.attrs["rigid_states"])
         states = StateModes(condition=known[0], rigid=known[1], **values)
-        own = file.get("basis", {})
-        return states, {name: own[name][:] for name in own}
+        if "basis" not in file:
+            return states, {}
+        own = file["basis"]
+        wheel = {"corner": corner.read(own, None)}
+        return states, wheel | {name: own[name][:] for name in ("shape", "momentum")}
 
     def restored(self, held: tuple[StateModes, dict]) -> RollingModes:
         """The states on the modes, or on fields of their own."""
         (states, own), basis = held, self.modes.product
         if own:
-            projection = replace(basis.projection, momentum=own["momentum"])
+            kept = {name: own[name] for name in ("momentum", "corner")}
+            projection = replace(basis.projection, **kept)
             basis = replace(basis, shape=own["shape"], projection=projection, modes=None)
         turning = turning_of(self.job)
         return RollingModes(basis=basis, states=states, turning=turning, full=bool(own))
@@ -215,6 +219,7 @@ def _fill(file, rolling: RollingModes) -> None:
     if rolling.full:
         put(file, "basis/shape", rolling.basis.shape, "kg^-1/2")
         put(file, "basis/momentum", rolling.basis.projection.momentum, "kg^1/2")
+        corner.fill(file["basis"], rolling.basis.projection.corner)
     if rolling.basis.projection.air is not None:
         put(file, "air_share", cavity.share(rolling), "-")
     if lines is not None:

@@ -133,14 +133,10 @@ def _full(tires: Tires) -> Found:
     began = time.perf_counter()
     wheel, none = tires.wheel, sparse.csr_matrix((0, loads.shape[1]))
     full = wheel.rotating_stiffness, wheel.rotating_damping
-    motion, speed = tires.motions.rim_motion(wheel.speed != 0), wheel.speed
-    turned = {name: rows[:, 3:].T for name, rows in motion.rows.items()}
-    static, rate = turned["stiffness"], np.zeros_like(turned["mass"])
-    if speed:
-        static, rate = static + speed**2 * turned["convective"], -2 * speed * turned["gyroscopic"]
-    beside = np.vstack([wheel.operators.carried, turned["mass"], rate, static])
+    motion = tires.motions.rim_motion(wheel.speed != 0)
+    beside = np.vstack([wheel.operators.carried, *motion.moments(wheel.speed)])
     found = receptance(wheel.operators, *full, none, loads, FREQUENCY, beside=beside)
-    carried, mass, rate, static = np.split(found, 4, axis=1)
+    carried, static, rate, mass = np.split(found, 4, axis=1)
     s = 2j * np.pi * FREQUENCY[:, None, None]
     corner = tires.modes.projection.wheel
     moment = corner.rigid(loads)[:, MOMENTS].T - s**2 * mass - s * rate - static

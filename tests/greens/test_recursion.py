@@ -201,7 +201,7 @@ def test_dirac_residual_answers_with_a_pulse_of_one_step() -> None:
     system = make(damping=80.0)
     whole = system.shape @ np.linalg.solve(system.stiffness, system.shape.T) + np.eye(4) * 1e-4
     at_once = system.response(compliance=whole)
-    pulse = replace(at_once, pulse=True)
+    pulse = replace(at_once, pulse=len(at_once.residual))
     force = some_force(4)
     first, second = (
         march(Recursion(response=r, step=1e-3, scheme="linear", comm=MPI.COMM_SELF), force)

@@ -49,7 +49,7 @@ def receptance(folder) -> np.ndarray:
     from tireroad.runs.stages.stored.responses import read_responses
 
     with h5py.File(folder / "greens.h5") as file:
-        return read_responses(file, False)["contact"].receptance(FREQUENCY)
+        return read_responses(file)["contact"].receptance(FREQUENCY)
 
 
 @pytest.mark.long

@@ -1,4 +1,4 @@
-"""A small road in every format, and random damage to its file."""
+"""A small road and a tread pattern in every format, and random damage to the file."""
 
 from __future__ import annotations
 
@@ -8,16 +8,19 @@ from pathlib import Path
 import h5py
 import numpy as np
 from in_child import forked
+from matplotlib.image import imsave
 
 from tireroad.contact.roads.road import make_road
 from tireroad.fem.errors import InputError
+from tireroad.runs.scene.tables.pattern import PatternTable
+from tireroad.runs.stages.build.pattern import make_pattern
 
 ENDS = ("driven", "refused", "not finite")
 LIMIT = 60.0  # s for a case
 
 
 def road_files(folder: Path) -> Iterator[Path]:
-    """A small road in every format."""
+    """A small road in every format, and a pattern's depths."""
     x, y = np.arange(0.0, 3.0, 0.02), np.arange(-0.3, 0.3, 0.02)
     z = 1e-3 * np.random.default_rng(0).standard_normal((len(x), len(y)))
     np.savez(folder / "a.npz", x=x, y=y, z=z)
@@ -33,7 +36,10 @@ def road_files(folder: Path) -> Iterator[Path]:
     crg = (header + f"$KD_DEFINITION\n#:KRBI\n{sections}").encode() + b"$" * 80 + b"\n"
     crg += z.astype(">f4").tobytes() + b"\x7f\xc0\0\0" * (-z.size % 20)
     (folder / "e.crg").write_bytes(crg)
-    yield from (folder / name for name in ("a.npz", "b.npz", "c.h5", "d.csv", "e.crg"))
+    np.savez_compressed(folder / "pattern.npz", depth=np.abs(z), y=y)
+    imsave(folder / "pattern.png", z)
+    names = ("a.npz", "b.npz", "c.h5", "d.csv", "e.crg", "pattern.npz", "pattern.png")
+    yield from (folder / name for name in names)
 
 
 def fuzz_road(files: list[Path], seed: int, number: int) -> tuple[str, str]:
@@ -48,19 +54,29 @@ def fuzz_road(files: list[Path], seed: int, number: int) -> tuple[str, str]:
         data = data[: rng.integers(len(data))]
     bad = good.with_name(f"bad{good.suffix}")
     bad.write_bytes(bytes(data))
+    drive = _patterned if good.stem == "pattern" else _driven
 
-    def drive() -> int:
+    def judged() -> int:
         try:
-            kind = "crg" if bad.suffix == ".crg" else "grid"
-            road = make_road(kind=kind, file=str(bad), holes="fill", run_in=0.0)
-            strip = road.prepare(0.1, 2.0, -0.1, 0.1)
-            z = strip.height(np.linspace(0.1, 2.0, 500), np.zeros(500))
-            return 0 if np.isfinite(z).all() else 2
+            return 0 if np.isfinite(drive(bad)).all() else 2
         except InputError:
             return 1
 
-    status, said, _ = forked(drive, bad.with_suffix(".txt"), LIMIT)
+    status, said, _ = forked(judged, bad.with_suffix(".txt"), LIMIT)
     if status is None:
         return "hang", good.name
     known = status in (0, 1, 2) and "Traceback" not in said
     return (ENDS[status] if known else f"crash {status}: {said[-2000:]}"), good.name
+
+
+def _driven(file: Path) -> np.ndarray:
+    kind = "crg" if file.suffix == ".crg" else "grid"
+    road = make_road(kind=kind, file=str(file), holes="fill", run_in=0.0)
+    strip = road.prepare(0.1, 2.0, -0.1, 0.1)
+    return strip.height(np.linspace(0.1, 2.0, 500), np.zeros(500))
+
+
+def _patterned(file: Path) -> np.ndarray:
+    pattern = make_pattern(PatternTable(file=str(file)), 0.3)
+    assert pattern is not None
+    return pattern.depth(np.linspace(0.0, 1.9, 500), np.zeros(500))

@@ -19,8 +19,5 @@ def test_damage_is_never_used(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_stages_from_files_are_those_of_the_first_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("TIREROAD_CACHE", "off")
+def test_stages_from_files_are_those_of_the_first_run(tmp_path: Path) -> None:
     assert reused.attack(tmp_path, scenes=2, seed=5) == []

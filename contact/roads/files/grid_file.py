@@ -1,9 +1,8 @@
 """Road heights on a grid from .npz, .csv and .h5 files, read as data and checked before use."""
 
-import zipfile
-import zlib
 from pathlib import Path
 
+from tireroad.contact.roads.files.archive import UNREADABLE
 from tireroad.contact.roads.files.grid_csv import read_csv
 from tireroad.contact.roads.files.grid_hdf5 import read_hdf5
 from tireroad.contact.roads.files.grid_npz import read_npz
@@ -14,17 +13,6 @@ from tireroad.fem.errors import InputError
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 READERS = {".npz": read_npz, ".csv": read_csv, ".h5": read_hdf5, ".hdf5": read_hdf5}
-# What the standard library, numpy and h5py raise for damaged files; NotImplementedError and
-# RuntimeError are zipfile's for damaged version numbers and flags, KeyError is h5py's.
-UNREADABLE = (
-    OSError,
-    EOFError,
-    KeyError,
-    zipfile.BadZipFile,
-    zlib.error,
-    NotImplementedError,
-    RuntimeError,
-)
 
 
 def read_grid(

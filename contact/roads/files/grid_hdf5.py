@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,9 +26,19 @@ class Hdf5Rows:
     def __init__(self, dataset: h5py.Dataset) -> None:
         self._dataset, self.shape = dataset, dataset.shape
 
+    def __reduce__(self) -> tuple[Callable[[str, str], Hdf5Rows], tuple[str, str]]:
+        """Another process opens the file once more."""
+        return _opened, (self._dataset.file.filename, self._dataset.name)
+
     def read(self, i0: int, i1: int) -> Array:
         """Rows i0 to i1."""
         return np.asarray(self._dataset[i0:i1], dtype=float)
+
+
+def _opened(file: str, name: str) -> Hdf5Rows:
+    import h5py
+
+    return Hdf5Rows(h5py.File(file, "r")[name])
 
 
 def read_hdf5(file: Path) -> tuple[Array, Array, Rows]:

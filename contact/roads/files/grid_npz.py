@@ -4,24 +4,25 @@ import struct
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.contact.roads.rows import PIECE, ArrayRows, FileRows, Packed, Rows, Spool, check_count
+from tireroad.contact.roads.files.archive import read_header, read_numbers
+from tireroad.contact.roads.rows import (
+    MAX_POINTS,
+    PIECE,
+    ArrayRows,
+    FileRows,
+    Packed,
+    Rows,
+    Spool,
+    check_count,
+)
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
-
-
-class _Header(NamedTuple):
-    """What stands before the numbers of an array in an archive."""
-
-    shape: tuple[int, ...]
-    by_columns: bool
-    kind: np.dtype
-    start: int
 
 
 def read_npz(file: Path) -> tuple[Array, Array, Rows]:
@@ -37,46 +38,17 @@ def read_npz(file: Path) -> tuple[Array, Array, Rows]:
             names = ", ".join(missing)
             raise InputError(f"road.file {file}: no array {names}; x, y and z are needed")
         try:
-            x, y = (_axis(file, archive, name) for name in "xy")
+            x, y = (read_numbers(archive, name, MAX_POINTS) for name in "xy")
             return x, y, _rows(file, archive)
         except (ValueError, TypeError) as error:
             raise InputError(f"road.file {file}: x, y and z must hold numbers ({error})") from error
-
-
-def _header(stream: IO[bytes], info: zipfile.ZipInfo, name: str) -> _Header:
-    """ValueError where the header is none of numbers, or does not fit the size of the member."""
-    version = np.lib.format.read_magic(stream)
-    read = np.lib.format.read_array_header_1_0
-    if version != (1, 0):
-        read = np.lib.format.read_array_header_2_0
-    shape, by_columns, kind = read(stream)
-    if kind.kind not in "iuf" or 0 in shape:
-        raise ValueError(f"{name} is {kind} of shape {shape}")
-    start, size = stream.tell(), kind.itemsize
-    for length in shape:
-        size *= length
-    if size != info.file_size - start:
-        raise ValueError(
-            f"the header of {name} announces {size:,} bytes, the archive {info.file_size - start:,}"
-        )
-    return _Header(shape, by_columns, kind, start)
-
-
-def _axis(file: Path, archive: zipfile.ZipFile, name: str) -> Array:
-    info = archive.getinfo(f"{name}.npy")
-    check_count(file, info.file_size // 8)
-    with archive.open(info) as stream:
-        header = _header(stream, info, name)
-        check_count(file, int(np.prod(header.shape, dtype=float)))
-        data = stream.read()
-    return np.frombuffer(data, header.kind).reshape(header.shape).astype(float)
 
 
 def _rows(file: Path, archive: zipfile.ZipFile) -> Rows:
     """z, left in the archive where it is not compressed; all of it passes by once, as a check."""
     info = archive.getinfo("z.npy")
     with archive.open(info) as stream:
-        header = _header(stream, info, "z")
+        header = read_header(stream, info, "z")
         if len(header.shape) != 2:
             raise ValueError(f"z has the shape {header.shape}")
         if header.by_columns:

@@ -68,10 +68,15 @@ class LaserFile(Levelled):
         if self.file is None:
             raise ParameterError("file", 'is missing: name a measured line by file = "…"')
 
+    @property
+    def reads(self) -> Path:
+        """Where the file is."""
+        return Path(self.file or "")
+
     def make(self) -> Grid:
         """The road; what was done to the measurement is in its `notes`. InputError where it cannot be used."""
         source = f"road.file {self.file}"
-        line = self._read(Path(self.file or ""), source)
+        line = self._read(self.reads, source)
         sound = cleaned(line.profile, line.pitch, self.outlier, self.longest_gap, source)
         profile, pitch = self._resampled(sound.profile, line.pitch, source)
         if self.across == "ruts":

@@ -32,7 +32,7 @@ class Measured(Levelled):
     file: str | None  # each kind of file has its own description of it
 
     @property
-    def path(self) -> Path:
+    def reads(self) -> Path:
         """Where the file is."""
         assert self.file is not None, "validate() asks for it"
         return Path(self.file)
@@ -59,7 +59,7 @@ class GridFile(Measured):
     def make(self) -> Grid:
         """The road in the file; InputError where it cannot be used."""
         return read_grid(
-            self.path,
+            self.reads,
             holes=self.holes,
             end=self.end,
             length_unit=self.length_unit,
@@ -76,4 +76,4 @@ class CrgFile(Measured):
 
     def make(self) -> Grid:
         """The road in the file; InputError where it cannot be used."""
-        return read_opencrg(self.path, holes=self.holes, end=self.end)
+        return read_opencrg(self.reads, holes=self.holes, end=self.end)

@@ -161,6 +161,8 @@ class _Reader:
             self.elements.others = True
             return
         table = records(lines, shape.nodes + 1)
+        if not len(table):
+            raise card.place.error(f"*ELEMENT, TYPE={name}: no elements follow")
         table = table + scope * SCOPE
         self.elements.add(Block(name, shape, table[:, 0], table[:, 1:], card.place))
         self.sets.add_elements(card, table[:, 0])

@@ -170,10 +170,14 @@ def _deck(
     names: dict[tuple[int, int], str],
     part: Part,
 ) -> Deck:
-    dimension = max((TYPES[sort][0] for sort, *_ in elements), default=0)
+    if not (len(labels) and len(elements)):
+        raise InputError(
+            f"{path.name}: {len(labels)} nodes and {len(elements)} elements are no mesh"
+        )
+    dimension = max(TYPES[sort][0] for sort, *_ in elements)
     order = np.argsort(labels, kind="stable")
     labels, points = labels[order], points[order]
-    if len(labels) and (labels[0] < 1 or labels[-1] > LABEL or (np.diff(labels) < 1).any()):
+    if labels[0] < 1 or labels[-1] > LABEL or (np.diff(labels) < 1).any():
         raise InputError(f"{path.name}: node labels must be different and from 1 to {LABEL}")
     if not np.isfinite(points).all():
         raise InputError(f"{path.name}: a coordinate is not a number")

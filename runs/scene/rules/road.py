@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
 from tireroad.contact.roads.kind import RoadKind
@@ -51,10 +50,28 @@ def check_road(scene: Scene) -> None:
         _check_extent(scene, road)
 
 
-@lru_cache(maxsize=1)
+_MADE: dict[tuple, Road] = {}  # the last road alone
+
+
 def made(surface: RoadKind) -> Road:
     """The road of a scene; the last one is kept, as reading a file may take seconds."""
-    return surface.make()
+    found = _MADE.get(_which(surface))
+    return found or keep(surface, surface.make())
+
+
+def keep(surface: RoadKind, road: Road) -> Road:
+    """Have the road in the place of the last one."""
+    _MADE.clear()
+    _MADE[_which(surface)] = road
+    return road
+
+
+def _which(surface: RoadKind) -> tuple:
+    """The road and the state of its file, which may have been written anew."""
+    if surface.reads is None or not surface.reads.is_file():
+        return (surface,)
+    state = surface.reads.stat()
+    return surface, state.st_ino, state.st_size, state.st_mtime_ns
 
 
 def _check_extent(scene: Scene, road: Road) -> None:

@@ -32,7 +32,6 @@ _PLACES = {
     "body/height": slice(6, 7),
 }
 _FREQUENCIES, _LOADS = 25, 20
-_KNOWING = ("none", "static", "attachment")  # residuals whose states and flexibility have moments
 
 
 def inputs(job: Job) -> dict | None:
@@ -42,16 +41,14 @@ def inputs(job: Job) -> dict | None:
 
 def readings(job: Job) -> int:
     """How many more outputs a response has: motions of wheel and body, and moments on the hub; of a wheel that is held the
-    moments alone, where the force on the axle is wanted. Of a free rim none, nor of states of the full matrices, and none
-    with a residual that would answer at once with moments too (pulses) or takes forces and moments for one another (of
-    second order).
+    moments alone, where the force on the axle is wanted. None of a free rim, and none where the road holds what touches it,
+    which then carries some of the moments.
     """
     if job.axle:
         return BESIDE
-    modal, rotation = job.scene.modal, job.scene.rotation
+    modal = job.scene.modal
     held = (modal.rim, modal.road) == ("fixed", "forces") and job.scene.output.axle_force
-    projected = rotation is None or rotation.method != "full"
-    return MOMENTS if held and projected and job.scene.greens.residual in _KNOWING else 0
+    return MOMENTS if held else 0
 
 
 def layout(job: Job) -> dict[str, tuple[tuple, str]]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from tireroad.contact.roads.files.archive import UNREADABLE, read_numbers
 from tireroad.contact.setup import ContactSetup
 from tireroad.contact.tread.pattern import Heights, Pattern, pitch_starts
 from tireroad.fem.errors import InputError
@@ -90,11 +91,8 @@ def _arrays(path: Path) -> Heights:
     """From an archive of NumPy, read as data."""
     try:
         with zipfile.ZipFile(path) as archive:
-            if sum(member.file_size for member in archive.infolist()) > 8 * MOST + 1_000_000:
-                raise InputError(f"{path}: more than {MOST} depths: take a coarser pattern")
-        with np.load(path, allow_pickle=False) as arrays:
-            return Heights(np.asarray(arrays["depth"], float), np.asarray(arrays["y"], float))
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as problem:
+            return Heights(*(read_numbers(archive, name, MOST) for name in ("depth", "y")))
+    except (ValueError, *UNREADABLE) as problem:
         raise InputError(f"{path}: no pattern: arrays depth and y are needed ({problem})") from None
 
 

@@ -9,11 +9,12 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.contact.roads.motion import make_motion
-from tireroad.contact.roads.road import make_road
+from tireroad.contact.roads.road import placed
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
 from tireroad.contact.tread.free_rolling import shape_slip
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
+from tireroad.runs.scene.rules.road import made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.stage import Done, Shared
@@ -43,7 +44,7 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
     setup = contact_setup(
         state,
         job.tire.lattice,
-        make_road(scene.road),
+        placed(made(scene.road.surface), scene.road.surface, scene.road),
         Rolled(
             speed=rolling_speed(job, state),
             duration=run_time(scene.time),

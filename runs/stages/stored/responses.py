@@ -30,14 +30,15 @@ def fill_response(file: h5py.File, name: str, response: Response, points: int) -
     if response.left_out is not None:
         put(file, f"{name}/left_out", response.left_out, "kg m/N")
     file[name].attrs["rigid_states"] = response.rigid
+    file[name].attrs["pulse"] = response.pulse
 
 
-def read_responses(file: h5py.File, pulse: bool) -> dict[str, Response]:
+def read_responses(file: h5py.File) -> dict[str, Response]:
     """All the responses of a file, by name."""
     return {
         name: Response(
             **{key: group[key][:] for key in _UNITS},
-            pulse=pulse,
+            pulse=int(group.attrs["pulse"]),
             rigid=int(group.attrs["rigid_states"]),
             left_out=group["left_out"][:] if "left_out" in group else None,
         )

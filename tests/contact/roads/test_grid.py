@@ -1,5 +1,6 @@
 """Roads on a grid: bilinear heights, holes, ends, and the files they come from."""
 
+import zipfile
 from pathlib import Path
 
 import h5py
@@ -148,6 +149,17 @@ def test_archive_of_an_unknown_version_is_refused(tmp_path: Path) -> None:
     (tmp_path / "road.npz").write_bytes(bytes(data))
     with pytest.raises(InputError, match=r"road\.npz: cannot be read"):
         read_grid(tmp_path / "road.npz")
+
+
+@pytest.mark.parametrize("header", ["{'descr': ((", "{'descr': ()", "{'descr': '<f8', 'shape': (1"])
+def test_archive_whose_headers_do_not_parse_is_refused(tmp_path: Path, header: str) -> None:
+    file = tmp_path / "road.npz"
+    with zipfile.ZipFile(file, "w") as archive:
+        for name in "xyz":
+            text = header.ljust(118).encode()
+            archive.writestr(f"{name}.npy", b"\x93NUMPY\x01\x00\x76\x00" + text + bytes(80))
+    with pytest.raises(InputError, match=r"road\.npz: .*header of x is damaged"):
+        read_grid(file)
 
 
 @pytest.mark.parametrize(

@@ -203,7 +203,7 @@ def test_a_loop_goes_on_with_the_same_bits(iterative: bool, pulse: bool) -> None
     count, steps = len(PATCH.points), 80
     drive = Drive(wavy, lambda t: 0.0, 20.0)
     response = Strip(speed=20.0).horizontal_response(PATCH.points, 3, 2, 1e3)
-    response = replace(response, residual=1e-8 * np.eye(3 * count), pulse=pulse)
+    response = replace(response, residual=1e-8 * np.eye(3 * count), pulse=3 * count * pulse)
 
     def loop() -> Loop:
         tire = Recursion(response=response, step=STEP, scheme="linear", comm=MPI.COMM_WORLD)

@@ -67,4 +67,8 @@ def test_the_parts_of_a_shared_matrix_are_those_of_the_whole() -> None:
         assert block.flags.f_contiguous
     force = rng.standard_normal(12)
     assert np.allclose(compliance.apply(force), matrix @ force, rtol=1e-12)
-    assert np.allclose(compliance.spread(force), matrix @ force, rtol=1e-12)
+    for index in (few, many):
+        around = compliance.around(index)
+        assert np.allclose(around.spread(force), matrix @ force, rtol=1e-12)
+        assert np.array_equal(around.block(), matrix[np.ix_(index, index)])
+        assert around.block().flags.f_contiguous

@@ -72,7 +72,10 @@ def test_product_is_the_matrix() -> None:
             compliance.block(some[::3], some), matrix[np.ix_(some[::3], some)], rtol=1e-11
         )
         few = np.where(np.isin(np.arange(len(matrix)), some), force, 0.0)
-        assert np.allclose(compliance.spread(few), matrix @ few)
+        for near in (some, some[:1], some[:0]):  # loaded there, and elsewhere too
+            around = compliance.around(near)
+            assert np.allclose(around.spread(few), matrix @ few)
+            assert np.allclose(around.block(), matrix[np.ix_(near, near)], rtol=1e-11)
         assert np.allclose(compliance.diagonal, matrix.diagonal(), rtol=1e-12)
 
 

@@ -94,6 +94,16 @@ def test_files_that_are_no_pattern(tmp_path, arrays) -> None:
         make_pattern(PatternTable(file=str(tmp_path / "p.npz")), 0.3)
 
 
+def test_a_damaged_archive_is_no_pattern(tmp_path) -> None:
+    depth = np.random.default_rng(0).random((40, 5))
+    np.savez_compressed(tmp_path / "p.npz", depth=depth, y=np.arange(5.0))
+    data = bytearray((tmp_path / "p.npz").read_bytes())
+    data[100:200] = bytes(100)  # in the stream of the depths: zlib's error
+    (tmp_path / "p.npz").write_bytes(data)
+    with pytest.raises(InputError, match=r"p\.npz: no pattern"):
+        make_pattern(PatternTable(file=str(tmp_path / "p.npz")), 0.3)
+
+
 def test_a_pattern_without_land_is_refused() -> None:
     y = np.linspace(-0.05, 0.05, 11)
     assert grooves(width=0.01).land(y) == pytest.approx(1 - 0.011 / 0.05, abs=0.01)

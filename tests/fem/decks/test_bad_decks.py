@@ -61,6 +61,11 @@ def across_regions():
 
 CASES = {
     "negative volume": (clockwise(), {}, r"line \d+: element 1 .*negative volume"),
+    "no elements": (
+        re.sub(r"(\*ELEMENT, TYPE=[^\n]*\n)[^*]*", r"\1", GOOD, count=1),
+        {},
+        r"line \d+: \*ELEMENT, TYPE=\w+: no elements follow",
+    ),
     "missing set": (
         GOOD.replace("ELSET=WALL, MATERIAL", "ELSET=WALLS, MATERIAL"),
         {},

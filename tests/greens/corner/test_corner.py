@@ -91,6 +91,7 @@ def wheel(speed: float, count: int, axle_at: int = 0):
         damping=DAMPING,
         inertia="full",
         corner=corner,
+        rim=lambda: motion,
     )
     projection = corner(projection, modes)
     states = full.decouple(projection, COMM)

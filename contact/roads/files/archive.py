@@ -1,0 +1,68 @@
+"""Arrays of numbers in NumPy's archives (.npz), read as data; sizes are checked before memory is taken."""
+
+import zipfile
+import zlib
+from typing import IO, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# What the standard library, numpy and h5py raise for damaged files; NotImplementedError and
+# RuntimeError are zipfile's for damaged version numbers and flags, KeyError is h5py's.
+UNREADABLE = (
+    OSError,
+    EOFError,
+    KeyError,
+    zipfile.BadZipFile,
+    zlib.error,
+    NotImplementedError,
+    RuntimeError,
+)
+
+
+class Header(NamedTuple):
+    """What stands before the numbers of an array in an archive."""
+
+    shape: tuple[int, ...]
+    by_columns: bool
+    kind: np.dtype
+    start: int
+
+
+def read_header(stream: IO[bytes], info: zipfile.ZipInfo, name: str) -> Header:
+    """ValueError where the header is none of numbers, or does not fit the size of the member."""
+    version = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0
+    if version != (1, 0):
+        read = np.lib.format.read_array_header_2_0
+    try:
+        shape, by_columns, kind = read(stream)
+    except (
+        Exception
+    ) as problem:  # numpy parses it as Python text, and lets errors of the parser out
+        raise ValueError(f"the header of {name} is damaged: {problem}") from problem
+    if kind.kind not in "iuf" or 0 in shape:
+        raise ValueError(f"{name} is {kind} of shape {shape}")
+    start, size = stream.tell(), kind.itemsize
+    for length in shape:
+        size *= length
+    if size != info.file_size - start:
+        raise ValueError(
+            f"the header of {name} announces {size:,} bytes, the archive {info.file_size - start:,}"
+        )
+    return Header(shape, by_columns, kind, start)
+
+
+def read_numbers(archive: zipfile.ZipFile, name: str, most: int) -> Array:
+    """The whole array `name`, of at most `most` numbers. ValueError as in `read_header` and for more; UNREADABLE."""
+    info = archive.getinfo(f"{name}.npy")
+    if info.file_size > 8 * most + 20_000:
+        raise ValueError(f"{name} has {info.file_size:,} bytes, more than {most:,} numbers")
+    with archive.open(info) as stream:
+        header = read_header(stream, info, name)
+        if np.prod(header.shape, dtype=float) > most:
+            raise ValueError(f"{name} has the shape {header.shape}, more than {most:,} numbers")
+        numbers = np.frombuffer(stream.read(), header.kind)
+    return numbers.reshape(header.shape, order="F" if header.by_columns else "C").astype(float)
