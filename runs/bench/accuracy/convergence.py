@@ -18,9 +18,7 @@ from tireroad.runs.files.cache import Cache
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
 
-ABOUT = (
-    "contact and axle force over mesh, points, modes, step and residual, on three roads; and by default"
-)
+ABOUT = "contact and axle force over mesh, points, modes, step and residual, on three roads; and by default"
 ROADS = {
     "smooth": ("road.kind=sine", "road.amplitude=2e-4", "road.wavelength=0.15"),
     "cleat": ("road.kind=cleat", "road.height=0.004", "road.length=0.02", "road.position=0.35"),

@@ -133,9 +133,7 @@ class Rolled:
         return self.stages["contact"]["cost"]["time loop"]
 
 
-def rolled(
-    folder: Path, mesh: Mesh, *sets: str, cache: Cache = NO_CACHE, **keys: object
-) -> Rolled:
+def rolled(folder: Path, mesh: Mesh, *sets: str, cache: Cache = NO_CACHE, **keys: object) -> Rolled:
     """A run up to its contact forces; stages that the folder or the cache holds are reused. Collective."""
     from tireroad.runs.scene.load import load
 
