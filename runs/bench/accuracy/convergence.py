@@ -104,8 +104,8 @@ def table(folder: Path, road: str, finest: dict, base: dict, changes: dict) -> T
     for what, changed in _each(changes):
         observe.say(f"  {road}: {what} {_named(changed)}")
         plain = what == DEFAULT
-        given = [dict.fromkeys(keys) if plain else keys for keys in (finest, base)]
-        found = _rolled(folder, road, *given, changed)
+        mesh, keys = (dict.fromkeys(own) if plain else own for own in (finest, base))
+        found = _rolled(folder, road, mesh, keys, changed)
         for force in ("total_force", "axle_force"):
             off = apart(exact, found, force, DURATION)
             name = "contact" if force == "total_force" else "axle"
