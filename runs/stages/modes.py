@@ -20,6 +20,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import available_memory
 from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.stages.base import kept
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done, Shared
 from tireroad.runs.stages.build import cavity, corner
@@ -49,8 +50,10 @@ class Motions(Shared[SmallMotions]):
 
     def make(self) -> SmallMotions:
         """Nothing yet: matrices are made when they are asked for."""
-        modal = self.job.scene.modal
-        return SmallMotions(self.job.tire, self.static.product, rim=modal.rim, road=modal.road)
+        job, modal = self.job, self.job.scene.modal
+        given = {"rim": modal.rim, "road": modal.road}
+        key = self.static.key, modal.rim, modal.road
+        return kept.once(key, lambda: SmallMotions(job.tire, self.static.product, **given))
 
 
 @dataclass(frozen=True, kw_only=True)
