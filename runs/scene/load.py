@@ -19,6 +19,7 @@ from tireroad.fem.parameters import ParameterError
 from tireroad.runs.scene.raw import override, read_text
 from tireroad.runs.scene.rules import scene as rules
 from tireroad.runs.scene.schema import Table, fields_of, gathered, key_of, table_of, variant_of
+from tireroad.runs.scene.sections.kind import SECTIONS
 from tireroad.runs.scene.source import Source, shortened
 from tireroad.runs.scene.tables.cavity import filled
 from tireroad.runs.scene.tables.scene import Damping, Scene
@@ -43,8 +44,7 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     changed = frozenset(override(raw, item) for item in overrides)
     source = Source(path, text, changed)
     raw.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "-", path.stem).lstrip(".-") or "scene")
-    if isinstance(tire := raw.get("tire"), dict) and "mesh" in tire:
-        tire.setdefault("section", "file")
+    _by_section(raw)
     scene = _table(Scene, raw, (), source)
     if not NAME.fullmatch(scene.name):
         source.add(
@@ -59,6 +59,18 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     rules.check(scene, raw, source)
     source.refuse()
     return scene
+
+
+def _by_section(raw: dict[str, Any]) -> None:
+    """Defaults that follow from another table: the section of a mesh, and the tread of the section's kind."""
+    tire, contact = raw.get("tire"), raw.get("contact")
+    if not isinstance(tire, dict):
+        return
+    if "mesh" in tire:
+        tire.setdefault("section", "file")
+    kind = tire.get("section")
+    if isinstance(contact, dict) and isinstance(kind, str) and kind in SECTIONS:
+        contact.setdefault("tread", SECTIONS[kind].tread_law)
 
 
 def _with_speed(scene: Scene) -> Scene:

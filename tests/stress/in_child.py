@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-BEGUN = 0.35e9  # bytes of this process with everything imported, which estimates leave out in part
+BEGUN = 0.35e9  # bytes of a process with everything imported, which estimates leave out in part
 MAY_EXCEED = 1.5  # a run's memory over its estimate
 
 
@@ -32,10 +32,12 @@ def warm() -> None:
 
 
 def forked(function: Callable[[], int], output: Path, limit: float) -> tuple[int | None, str, int]:
-    """Run `function` in a child: (exit status, what it printed, its peak memory in bytes).
+    """Run `function` in a child: (exit status, what it printed, its peak memory in bytes as if this process had BEGUN).
 
     None for one that had to be stopped after `limit` s; minus the signal for one that crashed.
     """
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    had = pages * os.sysconf("SC_PAGESIZE")
     child = os.fork()
     if child == 0:
         target = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
@@ -55,7 +57,7 @@ def forked(function: Callable[[], int], output: Path, limit: float) -> tuple[int
             sys.stderr.flush()
             os._exit(status)
     status, usage = _ended(child, limit)
-    return status, output.read_text(errors="replace"), usage
+    return status, output.read_text(errors="replace"), usage - max(had - int(BEGUN), 0)
 
 
 def _ended(child: int, limit: float) -> tuple[int | None, int]:

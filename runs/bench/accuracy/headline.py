@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from tireroad.contact.results.spectra import distance
 from tireroad.runs.bench.accuracy.rough_road import BAND, SPEED, Mesh, Rolled, rolled
@@ -31,7 +32,7 @@ def run() -> list[Table]:
 def table(folder: Path, mesh: Mesh, modes: int, duration: float, choices) -> Table:
     """The whole contact stage as a user runs it, files and checks included, choice by choice."""
     observe.say("  modes of the tire and the reference ...")
-    keys = {"modes": modes, "residual": RESIDUAL, "duration": duration}
+    keys: dict[str, Any] = {"modes": modes, "residual": RESIDUAL, "duration": duration}
     exact = rolled(folder, mesh, step=FINEST, **keys)
     rows = []
     for states, rate in choices:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from string import Formatter
 
 import numpy as np
 from mpi4py import MPI
@@ -16,6 +18,7 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
 from tireroad.modal.rolling import rolling_modes
+from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.store import opened
 from tireroad.runs.process import observe
 from tireroad.runs.stages.pipeline import Finished, run_scene
@@ -58,22 +61,30 @@ step = {step}
 
 @dataclass(frozen=True)
 class Mesh:
-    """Elements around and from bead to bead, and their size where the road touches."""
+    """Elements around and from bead to bead, and their size where the road touches; None: by default."""
 
-    segments: int
-    arc: int
-    footprint: float
+    segments: int | None
+    arc: int | None
+    footprint: float | None
 
     def __str__(self) -> str:
         return f"{self.segments} x {self.arc}"
 
 
 def write_scene(file: Path, mesh: Mesh, **keys: object) -> Path:
-    """The scene with some of its keys changed: speed, modes, residual, pitch, duration, step."""
+    """The scene with some of its keys changed: speed, modes, residual, pitch, duration, step; one that is None has no
+    line in it, and so the program's default."""
     values: dict[str, object] = {"speed": SPEED, "modes": 100, "residual": "static"}
     values |= {"pitch": 0.008, "duration": 0.2, "step": 1e-4} | vars(mesh) | keys
-    file.write_text(SCENE.format(**values))
+    absent = {name for name, value in values.items() if value is None}
+    lines = [line for line in SCENE.splitlines(True) if not absent & set(_named(line))]
+    file.write_text("".join(lines).format(**values))
     return file
+
+
+def _named(line: str) -> Iterator[str]:
+    """The fields of a line to be formatted."""
+    return (name for _, name, _, _ in Formatter().parse(line) if name)
 
 
 @dataclass(frozen=True)
@@ -111,19 +122,33 @@ class Rolled:
         return (entry["headline"] | entry["indicators"])[name]["value"]
 
     @property
+    def cost(self) -> float:
+        """Seconds of all stages; of those that were reused, what they took when they were computed. Of the processor, if
+        it all ran inside of fem.timing.by_processor."""
+        return sum(sum(entry["cost"].values()) for entry in self.stages.values())
+
+    @property
     def loop(self) -> float:
         """Wall time (s) of the time loop, files and checks included."""
         return self.stages["contact"]["cost"]["time loop"]
 
 
-def rolled(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Rolled:
-    """A run up to its contact forces; stages that the folder holds are reused. Collective."""
+def rolled(folder: Path, mesh: Mesh, *sets: str, cache: Cache = NO_CACHE, **keys: object) -> Rolled:
+    """A run up to its contact forces; stages that the folder or the cache holds are reused. Collective."""
     from tireroad.runs.scene.load import load
 
     folder.mkdir(parents=True, exist_ok=True)
     scene = load(write_scene(folder / "given.toml", mesh, **keys), list(sets))
     with observe.quiet():
-        run_scene(scene, folder, MPI.COMM_WORLD, until="contact", fresh=False, petsc_options=[])
+        run_scene(
+            scene,
+            folder,
+            MPI.COMM_WORLD,
+            until="contact",
+            fresh=False,
+            petsc_options=[],
+            cache=cache,
+        )
     stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
     with opened(folder / "contact.h5") as file:
         forces = {name: file[name][:] for name in ("total_force", "axle_force")}

@@ -44,13 +44,15 @@ class SectionKind(Parameters):
     """Base of the kinds of section. Methods take the scene's [tire], of which the kind is a part.
 
     `order` and `segments`: polynomial order and elements around where the scene leaves them open. `air`:
-    whether the tire holds air that takes part, unless [tire.cavity] says otherwise.
+    whether the tire holds air that takes part, unless [tire.cavity] says otherwise; `tread_law`: what `contact.tread` is where
+    it is left open, a layer for treads on belts, which hardly give way.
     """
 
     owner = "section"
     order: ClassVar[int] = 2
     segments: ClassVar[int] = 60
     air: ClassVar[bool] = True
+    tread_law: ClassVar[str] = "layer"
 
     def elements(self, tire: Tire) -> tuple[Self, int, int]:
         """The kind with its number of elements chosen, and order and segments of the scene or by default."""

@@ -13,7 +13,11 @@ Where = Callable[[tuple[str, ...], str], InputError]
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(Variants):
-    tread: str = registered(TREADS, "half-space", "local compliance of the tread")
+    tread: str = registered(
+        TREADS,
+        "half-space",
+        "local compliance of the tread; absent, on section radial or file: layer, as belts hardly give way",
+    )
     law: TreadLaw = variant("tread", TREADS)
     points: str | Pitch = points(
         "contact points: the nodes of the mesh, or a grid of this pitch", least=1e-5, most=1

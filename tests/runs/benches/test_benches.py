@@ -9,7 +9,6 @@ import pytest
 from tireroad.runs.bench import scaling, skipping
 from tireroad.runs.bench.accuracy import (
     accuracy_on_demand,
-    convergence,
     error_bars,
     headline,
     pareto,
@@ -182,20 +181,6 @@ def test_figures_as_they_are_read(value, text) -> None:
 
 def test_a_table_without_a_picture() -> None:
     assert drawn(Table("t", [("n", "-")], [[1]])) is None
-
-
-@pytest.mark.long
-def test_convergence_tells_what_each_change_costs(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(convergence, "DURATION", 0.03)
-    finest = {"segments": 12, "arc": 6, "order": 2, "footprint": 0.5}
-    base = {"modes": 24, "residual": "static", "pitch": 0.01, "step": 2e-4}
-    coarser = {"modes": ({"modes": 12},), "step": ({"step": 4e-4},)}
-    found = convergence.table(tmp_path, "rough", finest, base, coarser)
-    assert [row[:3] for row in found.rows[:2]] == [
-        ["modes", "modes 12", "contact"],
-        ["modes", "modes 12", "axle"],
-    ]
-    assert all(row[3] > 0 for row in found.rows)
 
 
 @pytest.mark.long

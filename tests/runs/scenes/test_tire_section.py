@@ -35,6 +35,26 @@ def test_elements_where_the_scene_leaves_them_open(tmp_path, given, expected):
 
 
 @pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ("", "half-space"),
+        ('tire.section = "torus"\n', "half-space"),
+        ('tire.section = "radial"\n', "layer"),
+        ('tire.section = "radial"\ncontact.tread = "half-space"\n', "half-space"),
+        ('contact.tread = "winkler"\n', "winkler"),
+    ],
+)
+def test_the_tread_where_the_scene_leaves_it_open(tmp_path, given, expected):
+    """A tread on belts is thin; what is written back says so, and is read the same."""
+    text = (
+        'contact.points = "nodes"\nstatic.load = 4000\nroad.kind = "flat"\ntime.duration = 0.01\n'
+    )
+    found = scene(tmp_path, text + given)
+    assert found.contact.tread == expected
+    assert scene(tmp_path, dumps(found)).contact == found.contact
+
+
+@pytest.mark.parametrize(
     "given", [(), ("tire.order=2", "tire.elements_thickness=2"), ('tire.section="radial"',)]
 )
 def test_unknowns_are_those_of_the_section(tmp_path, given):

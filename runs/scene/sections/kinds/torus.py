@@ -49,6 +49,7 @@ class TorusSection(SectionKind):
     """Order 3 unless the scene says how many elements there are: finer ones of order 2 are asked for so."""
 
     air = False
+    tread_law = "half-space"
 
     outer_radius: float = number(
         0.32, "m", "outer radius, from the axle to the crown", least=0.01, most=10
