@@ -50,10 +50,9 @@ class Motions(Shared[SmallMotions]):
 
     def make(self) -> SmallMotions:
         """Nothing yet: matrices are made when they are asked for."""
-        job, modal = self.job, self.job.scene.modal
-        given = {"rim": modal.rim, "road": modal.road}
+        tire, static, modal = self.job.tire, self.static.product, self.job.scene.modal
         key = self.static.key, modal.rim, modal.road
-        return kept.once(key, lambda: SmallMotions(job.tire, self.static.product, **given))
+        return kept.once(key, lambda: SmallMotions(tire, static, rim=modal.rim, road=modal.road))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,14 +162,8 @@ class Fields(Shared[ModalBasis]):
         known = fields_file.kept(*given, basis)
         if known is not None:
             return replace(basis, modes=known, column=air)
-        again = with_fields(
-            basis,
-            motions,
-            count=wanted.count,
-            up_to=wanted.up_to,
-            air=air,
-            axle=self.job.axle,
-        )
+        counted = {"count": wanted.count, "up_to": wanted.up_to}
+        again = with_fields(basis, motions, air=air, axle=self.job.axle, **counted)
         assert again.modes is not None, "they were solved just now"
         fields_file.keep(*given, again.modes)
         return again
