@@ -162,8 +162,14 @@ class Fields(Shared[ModalBasis]):
         known = fields_file.kept(*given, basis)
         if known is not None:
             return replace(basis, modes=known, column=air)
-        counted = {"count": wanted.count, "up_to": wanted.up_to}
-        again = with_fields(basis, motions, air=air, axle=self.job.axle, **counted)
+        again = with_fields(
+            basis,
+            motions,
+            count=wanted.count,
+            up_to=wanted.up_to,
+            air=air,
+            axle=self.job.axle,
+        )
         assert again.modes is not None, "they were solved just now"
         fields_file.keep(*given, again.modes)
         return again
