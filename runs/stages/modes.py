@@ -153,8 +153,7 @@ class Fields(Shared[ModalBasis]):
 
     def make(self) -> ModalBasis:
         """Collective."""
-        wanted = self.job.scene.modal
-        basis = self.modes.product
+        wanted, basis = self.job.scene.modal, self.modes.product
         if basis.modes is not None:
             return basis
         motions, air = self.motions.product, self.air.product
