@@ -8,12 +8,12 @@ def seconds(work: dict[str, float], size: Sizes, column: int) -> dict[str, float
     """Processor time (s) of `operations` by stage, `column` unknowns in a column of nodes through the wall.
 
     Of a core of a shared server (Intel Xeon), one BLAS thread, on 2026-11-23; from 7,020 to 98,100 unknowns (the static
-    state: 220,500) within a factor of 1.6 (tests/runs/scenes/test_estimated_time.py). What goes through the wall is done
+    state: 224,100) within a factor of 1.6 (tests/runs/scenes/test_estimated_time.py). What goes through the wall is done
     in blocks, the faster the thicker it is; so are modes, in larger ones on larger meshes.
     """
     thicker, larger = column / 9, size.free / 27_900
     share = {
-        "static": 1.25 / thicker,
+        "static": 1.45 * larger**0.08 / thicker,
         "modes": 1.4 / (thicker**0.5 * larger**0.2),
         "greens": 1.1 / thicker**0.5,
     }

@@ -8,12 +8,14 @@ from tireroad.runs.scene.extent.estimate import Estimate, estimate
 from tireroad.runs.scene.load import load
 
 SMALL = ["tire.segments=26", "tire.elements_arc=8", "modal.count=100"]
+LARGE = ["tire.segments=150", "tire.elements_arc=42"]
 FINE = ["tire.segments=30", "tire.elements_arc=26", "modal.up_to=547.3"]
 # Processor time (s) by stage of one core of a shared server (Intel Xeon) beside other work, one BLAS thread, 2026-11-23,
-# without error bars; of the largest on two processes, both together.
+# without error bars.
 MEASURED = [
     ("quickstart", SMALL, {"static": 2.67, "modes": 1.73, "contact loop": 1.48}),
     ("quickstart", [], {"static": 13.9, "modes": 9.21, "greens": 2.57, "contact loop": 1.81}),
+    ("quickstart", LARGE, {"static": 199.0}),
     ("passenger", [], {"static": 9.12, "modes": 12.7, "greens": 9.44, "contact loop": 8.84}),
     ("passenger", FINE, {"static": 39.3, "modes": 69.7}),
 ]
