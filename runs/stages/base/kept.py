@@ -1,0 +1,36 @@
+"""Matrices that one run of a family leaves to the next in the same process, while the static state is the same."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+MOST = 2  # those of a run and of its coarser companion
+_kept: OrderedDict[Hashable, Any] | None = None
+
+
+def begin() -> None:
+    """From now on keep them: this process computes one member of a family after the other."""
+    global _kept
+    _kept = OrderedDict()
+
+
+def once(key: Hashable, make: Callable[[], T]) -> T:
+    """What `make` gives, of the same key that of the run before. Collective where `make` is."""
+    if _kept is None:
+        return make()
+    if key not in _kept:
+        while len(_kept) >= MOST:  # before the new ones take their memory
+            _kept.popitem(last=False)
+        _kept[key] = make()
+    _kept.move_to_end(key)
+    return _kept[key]
+
+
+def forget() -> None:
+    """Nothing is kept: a new static state is computed, of which there are no matrices yet."""
+    if _kept is not None:
+        _kept.clear()
