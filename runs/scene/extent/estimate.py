@@ -181,7 +181,7 @@ def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
 
 def _matrices_of_points(scene: Scene, size: Sizes) -> int:
     """How many matrices of the contact points there are at once."""
-    if scene.contact.points == "nodes" or size.points <= DENSE:
+    if scene.contact.on_nodes or size.points <= DENSE:
         return 3
     by_product = scene.contact.solver == "projected-cg"
     if scene.contact.solver == "auto":

@@ -10,7 +10,8 @@ from scipy import sparse
 
 from tireroad.contact.roads.motion import make_motion
 from tireroad.contact.roads.road import placed
-from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
+from tireroad.contact.setup import ContactSetup, Rolled, contact_setup, nodes_within
+from tireroad.contact.spacing import spacing
 from tireroad.contact.tread.free_rolling import shape_slip
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
@@ -55,7 +56,7 @@ def tread_surface(job: Job, state: StaticState, key: str) -> TreadSurface:
 def scene_setup(job: Job, state: StaticState, surface: TreadSurface | None = None) -> ContactSetup:
     """The patch and the road of the job's scene; `surface`: the tread, where it is known."""
     scene, motion = job.scene, job.scene.road.motion
-    points = scene.contact.points
+    points = points_of(job, state)
     setup = contact_setup(
         state,
         job.tire.lattice,
@@ -72,6 +73,21 @@ def scene_setup(job: Job, state: StaticState, surface: TreadSurface | None = Non
         surface=surface,
     )
     return _slipping(job, state, setup) if scene.contact.rubs else setup
+
+
+def points_of(job: Job, state: StaticState) -> str | Pitch:
+    """The scene's contact points, by this state where it leaves them to the program: "nodes", or the pitch of a grid."""
+    contact = job.scene.contact
+    if contact.on_nodes:
+        return "nodes"
+    if contact.points != "auto":
+        return contact.points
+    extent = replace(
+        state, fine_extent=None
+    ).footprint()  # the same with and without an estimate of the load
+    speed = rolling_speed(job, state)
+    found = spacing(extent, nodes_within(state, 0.0), speed, job.scene.accuracy.up_to)
+    return "nodes" if found is None else Pitch(found, found)
 
 
 def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup:
