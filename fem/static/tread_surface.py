@@ -88,7 +88,8 @@ class TreadSurface:
         key = x.tobytes() + y.tobytes()
         if key not in self._located:
             self._located[key] = self._found(x, y)
-        return tuple(values.copy() for values in self._located[key])
+        ring, arc, found = self._located[key]
+        return ring.copy(), arc.copy(), found.copy()
 
     def _found(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         target = np.stack([x, y], axis=-1)
