@@ -1,7 +1,7 @@
 """Contact points on a regular grid of the road's own resolution, carried by the nodes around them.
 
-The finite elements found the static state with the road touching nodes only. On the grid it settles
-anew under the same load, about that state: f >= 0, g >= 0, f . g = 0 with
+The finite elements found the static state with the road touching nodes only, and without the tread on them. On the grid, or
+on the nodes with their tread, it settles anew under the same load, about that state: f >= 0, g >= 0, f . g = 0 with
 
     g = z_surface - z_road + delta + C~ f + W A_static (W^T f - f_nodes),  sum f = load,
 
@@ -138,7 +138,7 @@ def settle(
     of the finite elements, whose sum is kept. ConvergenceError when no rise gives that load.
     """
     load = float(nodal_force.sum())
-    flat = patch.gap - patch.weights @ (flexibility @ nodal_force)
+    flat = patch.gap - patch.at_points(flexibility @ nodal_force)
 
     def excess(rise: float) -> float:
         return float(solver.solve(flat + rise).sum()) / load - 1.0
@@ -148,8 +148,8 @@ def settle(
     force = solver.solve(flat + rise)
     if not abs(force.sum() / load - 1.0) < LOAD_TOLERANCE:
         raise ConvergenceError(
-            f"contact: the grid of points settles at {force.sum():.6g} N, not at {load:.6g} N; "
-            "take a finer grid"
+            f"contact: the points settle at {force.sum():.6g} N, not at {load:.6g} N; take a finer grid "
+            "(contact.points)"
         )
     gap = np.maximum(solver.gap, 0.0)
     return replace(patch, force=force, gap=gap), rise
@@ -161,8 +161,8 @@ def spread_pull(patch: Patch, pull: np.ndarray, force: np.ndarray) -> np.ndarray
     """
     touching = (force > 0).astype(float)
     ratio = pull / np.where(force > 0, force, 1.0)[:, None]
-    near = patch.weights @ touching
-    share = (patch.weights @ (ratio * touching[:, None])) / np.maximum(near, 1e-12)[:, None]
+    near = patch.at_points(touching)
+    share = patch.at_points(ratio * touching[:, None]) / np.maximum(near, 1e-12)[:, None]
     found = patch.force[:, None] * share
     return (
         found + (pull.sum(axis=0) - found.sum(axis=0)) * (patch.force / patch.force.sum())[:, None]
@@ -181,8 +181,8 @@ def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, floa
             return low, high
         step *= 2.0
     raise ConvergenceError(
-        "contact: no height of the tire gives the static load on the grid of points; take a finer "
-        "grid, or a larger contact.reach"
+        "contact: no height of the tire gives the static load on the points; take a finer grid "
+        "(contact.points), or a larger contact.reach"
     )
 
 

@@ -42,6 +42,10 @@ class Patch:
             return np.array([*horizontal.sum(axis=0), force.sum()])
         return np.einsum("ci,cij->j", np.column_stack([horizontal, force]), self.frames)
 
+    def at_points(self, values: np.ndarray) -> np.ndarray:
+        """Values (p, ...) of the nodes at the points."""
+        return values if self.weights is None else self.weights @ values
+
     @property
     def area(self) -> np.ndarray:
         """Area of each point's rectangle, (c,) m2."""

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tireroad.contact.grid_patch import make_grid_patch, settle, spread_pull
+from tireroad.contact.grid_patch import Surface, make_grid_patch, settle, spread_pull
 from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
@@ -141,21 +141,20 @@ class ContactSetup:
         return replace(self, road=road, rolled=still, pattern=None)
 
     def settled(self, response: Response, nodal_force: np.ndarray, spec: Spec) -> tuple:
-        """(setup, rise in m): a grid of points takes up the static load that the finite elements gave to
-        nodes, `nodal_force` (s,) N of the outer face; points at the nodes have it already."""
-        patch = self.patch
-        if patch.weights is None:
-            held = None if self.pull is None else self.pull[patch.index]
-            return replace(self, patch=replace(patch, pull=held)), 0.0
+        """(setup, rise in m): the points take up the static load that the finite elements gave to nodes, `nodal_force`
+        (s,) N of the outer face, on the tread that the elements do not have; nodes without one have it already."""
+        patch, force = self.patch, nodal_force[self.patch.index]
+        pull = None if self.pull is None else self.pull[patch.index]
+        if patch.weights is None and not spec.law.compliant:
+            return replace(self, patch=replace(patch, pull=pull)), 0.0
         if self.pattern is not None:
             patch = replace(patch, gap=patch.gap + self.begun)
         p = len(patch.index)
         flexibility = (response.static() + response.residual)[:p, :p]
         solver = static_solver(spec, patch, flexibility, self.rolled.speed)
-        settled, rise = settle(patch, solver, flexibility, nodal_force[patch.index])
-        if self.pull is not None:
-            share = spread_pull(settled, self.pull[patch.index], nodal_force[patch.index])
-            settled = replace(settled, pull=share)
+        settled, rise = settle(patch, solver, flexibility, force)
+        if pull is not None:
+            settled = replace(settled, pull=spread_pull(settled, pull, force))
         return replace(self, patch=settled), rise
 
 
@@ -168,6 +167,7 @@ def contact_setup(
     spacing: tuple[float, float] | None = None,
     reach: float | None = None,
     pattern: Pattern | None = None,
+    surface: Surface | None = None,
 ) -> ContactSetup:
     """Patch and road of a run: points at the nodes, or on a grid of the `spacing` (m).
 
@@ -175,12 +175,12 @@ def contact_setup(
     """
     if reach is None:
         reach = _reach(face, road, rolled)
-    patch = _nodes(face, reach)
+    patch = nodes_within(face, reach)
     if spacing is not None:
         from tireroad.fem.static.tread_surface import TreadSurface
 
         assert face.road_height is not None, "contact needs a tire that stands on a road"
-        surface = TreadSurface(lattice, face.seen)
+        surface = surface or TreadSurface(lattice, face.seen)
         patch = make_grid_patch(surface, face.road_height, patch, spacing, reach)
     patch = on_shape(patch, face.road)
     if pattern is not None:
@@ -191,7 +191,8 @@ def contact_setup(
     )
 
 
-def _nodes(face: OuterFace, reach: float) -> Patch:
+def nodes_within(face: OuterFace, reach: float) -> Patch:
+    """The nodes with a static gap within reach (m), and one row more around them."""
     given = face.half_sizes, face.normal_force, face.gap, face.shape, reach
     return make_patch(face.seen, *given)
 
@@ -223,7 +224,7 @@ def _reach(face: OuterFace, road: RoadUnderTire, rolled: Rolled) -> float:
     """
     reach = rolled.lift + _MARGIN
     for _ in range(2):
-        patch = _nodes(face, reach)
+        patch = nodes_within(face, reach)
         strip = _under(road, patch, rolled)
         x0, x1, y0, y1 = patch.extent
         highest = max(strip.highest(x0, x1 + rolled.travel, y0, y1), 0.0)

@@ -78,15 +78,15 @@ class Pitch:
 
 
 def points(doc: str, *, least: float, most: float) -> Any:
-    """ "nodes", or the pitch { dx = ..., dy = ... } of a grid in m."""
+    """ "nodes", "auto", or the pitch { dx = ..., dy = ... } of a grid in m."""
     limits = Limits(least=least, most=most)
 
     def read(value: Any) -> str | Pitch:
-        if value == "nodes" or isinstance(value, Pitch):
+        if isinstance(value, Pitch) or (isinstance(value, str) and value in ("nodes", "auto")):
             return value
         if not isinstance(value, dict) or set(value) != {"dx", "dy"}:
             raise ValueError(
-                f'must be "nodes" or {{ dx = 0.002, dy = 0.002 }}, not {described(value)}'
+                f'must be "nodes", "auto" or {{ dx = 0.002, dy = 0.002 }}, not {described(value)}'
             )
         pitch = {}
         for name, given in value.items():
@@ -98,7 +98,13 @@ def points(doc: str, *, least: float, most: float) -> Any:
         return Pitch(**pitch)
 
     return parameter(
-        Key(read=read, unit="m", doc=doc, values=f'"nodes" or {{dx, dy}}, {limits}', limits=limits),
+        Key(
+            read=read,
+            unit="m",
+            doc=doc,
+            values=f'"nodes", "auto" or {{dx, dy}}, {limits}',
+            limits=limits,
+        ),
         "nodes",
     )
 

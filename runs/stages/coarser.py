@@ -13,7 +13,7 @@ from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.build.cavity import AirColumn
-from tireroad.runs.stages.build.setup import Setup
+from tireroad.runs.stages.build.setup import Setup, points_of
 from tireroad.runs.stages.greens import GreensStage
 from tireroad.runs.stages.modes import Fields, ModesStage, Motions
 from tireroad.runs.stages.rotating import FullMatrices, RotatingStage
@@ -59,6 +59,11 @@ class CoarserStatic(StaticStage):
 def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
     """The job of a run with elements of twice the size, and what is done of it, from the static state on. Collective."""
     job, done = coarser_job(run), dict[str, Done]()
+    if (
+        contact := job.scene.contact
+    ) is not None:  # points of the run, not such as its own footprint asks for
+        contact = replace(contact, points=points_of(run, static.product))
+        job = replace(job, scene=replace(job.scene, contact=contact))
     on_root(job.comm, lambda: make_folder(job.directory))
     chain: tuple[type[Part], ...] = (StaticStage, *STATIC_TO_GREENS)
     for kind in chain:

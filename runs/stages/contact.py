@@ -97,6 +97,10 @@ class ContactStage(Stage[ContactHistory]):
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
         observe.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
+        if patch.weights is None and spec.law.compliant and self.job.speed:
+            observe.say(
+                '  points are nodes: contact.points = "auto" takes as many as the footprint needs'
+            )
         while True:
             try:
                 return self._attempt(key, record, setup, slip, plan, chosen)

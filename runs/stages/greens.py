@@ -19,7 +19,7 @@ from tireroad.runs.scene.tables.cavity import has_air
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build import cavity, corner
-from tireroad.runs.stages.build.setup import components, probes
+from tireroad.runs.stages.build.setup import components, points_of, probes
 from tireroad.runs.stages.build.turning import turning_of
 from tireroad.runs.stages.stored.responses import fill_response, read_responses
 
@@ -60,7 +60,7 @@ class GreensStage(Computed[Responses]):
             "greens": asdict(scene.greens),
             "forces": [asdict(force) for force in scene.force],
             "points": setup.patch.index.tolist() if setup else [],
-            "pitch": scene.contact.points if setup else None,
+            "pitch": points_of(self.job, self.static.product) if setup else None,
             "components": components(self.job) if setup else (),
         }
 

@@ -20,6 +20,7 @@ from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import available_memory
 from tireroad.runs.scene.extent.estimate import estimate
+from tireroad.runs.stages.base import kept
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done, Shared
 from tireroad.runs.stages.build import cavity, corner
@@ -49,8 +50,10 @@ class Motions(Shared[SmallMotions]):
 
     def make(self) -> SmallMotions:
         """Nothing yet: matrices are made when they are asked for."""
-        modal = self.job.scene.modal
-        return SmallMotions(self.job.tire, self.static.product, rim=modal.rim, road=modal.road)
+        tire, static, modal = self.job.tire, self.static.product, self.job.scene.modal
+        rim, road = modal.rim, modal.road
+        key = self.static.key, rim, road
+        return kept.once("matrices", key, lambda: SmallMotions(tire, static, rim=rim, road=road))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,14 +154,12 @@ class Fields(Shared[ModalBasis]):
 
     def make(self) -> ModalBasis:
         """Collective."""
-        wanted = self.job.scene.modal
-        basis = self.modes.product
+        wanted, basis = self.job.scene.modal, self.modes.product
         if basis.modes is not None:
             return basis
         motions, air = self.motions.product, self.air.product
         given = self.job, self.modes.key, motions.operators
-        known = fields_file.kept(*given, basis)
-        if known is not None:
+        if (known := fields_file.kept(*given, basis)) is not None:
             return replace(basis, modes=known, column=air)
         again = with_fields(
             basis,

@@ -13,16 +13,16 @@ import numpy as np
 from tireroad.contact.results.error_bars import measured
 from tireroad.contact.results.spectra import distance
 from tireroad.fem.timing import by_processor
-from tireroad.runs.bench.accuracy.rough_road import Mesh, Rolled, rolled
+from tireroad.runs.bench.accuracy.rough_road import TEXTURE, Mesh, Rolled, rolled
 from tireroad.runs.files.cache import Cache
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
 
 ABOUT = "contact and axle force over mesh, points, modes, step and residual, on three roads; and by default"
 ROADS = {
-    "smooth": ("road.kind=sine", "road.amplitude=2e-4", "road.wavelength=0.15"),
-    "cleat": ("road.kind=cleat", "road.height=0.004", "road.length=0.02", "road.position=0.35"),
-    "rough": (),
+    "smooth": 'kind = "sine"\namplitude = 2e-4\nwavelength = 0.15',
+    "cleat": 'kind = "cleat"\nheight = 0.004\nlength = 0.02\nposition = 0.35',
+    "rough": TEXTURE,
 }
 SPEED, DURATION = 50.0, 0.16  # rad/s, s
 BANDS = (20.0, 1000.0)  # Hz
@@ -34,7 +34,7 @@ BASE = {"modes": 500, "residual": "static", "pitch": 0.003, "step": 5e-5}
 """The converged run, from which one thing at a time is made coarser, or finer where that shows that it is one."""
 DEFAULT = "default settings"
 CHANGES: dict[str, tuple[dict, ...]] = {
-    DEFAULT: ({}, {"pitch": 0.003}, {"pitch": 0.004}, {"residual": "attachment"}),
+    DEFAULT: ({}, {"pitch": "auto"}, {"pitch": 0.003}),
     "mesh": (
         {"segments": 22, "arc": 12, "order": 3},
         {"segments": 28, "arc": 15, "order": 3},
@@ -142,7 +142,8 @@ def _each(changes: dict) -> Iterator[tuple[str, dict]]:
 
 def _named(keys: dict) -> str:
     return ", ".join(
-        f"{key} {value:g}" if not isinstance(value, str) else value for key, value in keys.items()
+        f"{key} {value}" if isinstance(value, str) else f"{key} {value:g}"
+        for key, value in keys.items()
     )
 
 
@@ -152,8 +153,10 @@ def _rolled(folder: Path, road: str, finest: dict, base: dict, changed: dict) ->
     keys = base | {key: value for key, value in changed.items() if key in base}
     name = "-".join(str(value) for value in (*mesh.values(), keys["modes"]))
     order = () if mesh["order"] is None else (f"tire.order={mesh['order']}",)
-    sets = (*order, "static.error_estimate=false", *ROADS[road])
+    sets = (*order, "static.error_estimate=false")
+    if keys["pitch"] == "auto":
+        keys, sets = keys | {"pitch": None}, (*sets, "contact.points=auto")
     given = Mesh(mesh["segments"], mesh["arc"], mesh["footprint"])
-    keys |= {"speed": SPEED, "duration": DURATION}
+    keys |= {"speed": SPEED, "duration": DURATION, "road": ROADS[road]}
     with by_processor():
         return rolled(folder / name, given, *sets, cache=Cache(folder / "cache"), **keys)

@@ -27,6 +27,7 @@ from tireroad.runs.validation.histories import History, Trial, follow
 BAND = 500.0  # Hz, up to which errors are told
 SPEED = 100.0  # rad/s
 
+TEXTURE = 'kind = "texture"\nrms = 2e-4\nroll_off = 0.2\ncut_off = 0.03'
 SCENE = """
 name = "bench"
 [tire]
@@ -49,10 +50,7 @@ residual = "{residual}"
 points = {{ dx = {pitch}, dy = {pitch} }}
 youngs_modulus = 1e7
 [road]
-kind = "texture"
-rms = 2e-4
-roll_off = 0.2
-cut_off = 0.03
+{road}
 [time]
 duration = {duration}
 step = {step}
@@ -73,9 +71,10 @@ class Mesh:
 
 def write_scene(file: Path, mesh: Mesh, **keys: object) -> Path:
     """The scene with some of its keys changed: speed, modes, residual, pitch, duration, step; one that is None has no
-    line in it, and so the program's default."""
+    line in it, and so the program's default. `road`: the lines of its table."""
     values: dict[str, object] = {"speed": SPEED, "modes": 100, "residual": "static"}
-    values |= {"pitch": 0.008, "duration": 0.2, "step": 1e-4} | vars(mesh) | keys
+    values |= {"pitch": 0.008, "duration": 0.2, "step": 1e-4, "road": TEXTURE}
+    values |= vars(mesh) | keys
     absent = {name for name, value in values.items() if value is None}
     lines = [line for line in SCENE.splitlines(True) if not absent & set(_named(line))]
     file.write_text("".join(lines).format(**values))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tireroad.contact.spacing import ON_A_NODE
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.runs.scene.rules.road import least_travel, made
@@ -156,7 +157,9 @@ def _points(scene: Scene, free: int) -> tuple[int, int]:
     along *= graded / (tire.along * mesh.order)
     nodes = max(min(int(area / (around * along)), free // 6), 9)
     pitch = contact.points
-    return nodes, int(area / (pitch.dx * pitch.dy)) if isinstance(pitch, Pitch) else nodes
+    if isinstance(pitch, Pitch):
+        return nodes, int(area / (pitch.dx * pitch.dy))
+    return nodes, nodes if contact.on_nodes else int(ON_A_NODE**2 * nodes)
 
 
 def _area_within(section: SectionMesh, depth: float) -> float:

@@ -20,7 +20,10 @@ class Contact(Variants):
     )
     law: TreadLaw = variant("tread", TREADS)
     points: str | Pitch = points(
-        "contact points: the nodes of the mesh, or a grid of this pitch", least=1e-5, most=1
+        "contact points: the nodes of the mesh, or a grid of this pitch; auto: a grid as fine as the footprint and the "
+        "waves up to accuracy.up_to need, and the nodes under a tread that does not give way or bristles counted by point",
+        least=1e-5,
+        most=1,
     )
     brush_stiffness: float | None = number(
         None,
@@ -73,6 +76,12 @@ class Contact(Variants):
     )
 
     @property
+    def on_nodes(self) -> bool:
+        """Whether the points are nodes whatever the footprint."""
+        counted = self.brush_stiffness is not None or not self.law.compliant
+        return self.points == "nodes" or (self.points == "auto" and counted)
+
+    @property
     def rubs(self) -> bool:
         """Whether the road pulls on the tire horizontally."""
         bristles = (self.brush_stiffness, self.brush_stiffness_per_area) != (None, None)
@@ -88,7 +97,7 @@ class Contact(Variants):
 
 def check_tread(contact: Contact, standing: bool, error: Where, rubs: bool) -> None:
     """Raise InputError for treads and brushes that cannot be; `rubs`: the static state has friction."""
-    if contact.law.creep is not None and contact.points == "nodes":
+    if contact.law.creep is not None and contact.on_nodes:
         raise error(
             ("contact", "tread"),
             "= a tread that creeps needs a grid: contact.points = { dx, dy } (m)",

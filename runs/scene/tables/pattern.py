@@ -60,7 +60,7 @@ def check_pattern(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     wanted = scene.pattern
     if wanted is None:
         return
-    if scene.contact is None or scene.contact.points == "nodes":
+    if scene.contact is None or scene.contact.on_nodes:
         raise error(
             ("pattern",), "needs [contact] on a grid that sees it: contact.points = { dx, dy } (m)"
         )

@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from scipy import sparse
 
 from tireroad.contact.roads.motion import make_motion
 from tireroad.contact.roads.road import placed
-from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
+from tireroad.contact.setup import ContactSetup, Rolled, contact_setup, nodes_within
+from tireroad.contact.spacing import spacing
 from tireroad.contact.tread.free_rolling import shape_slip
 from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.scene.rules.road import made
 from tireroad.runs.scene.schema import Pitch
+from tireroad.runs.stages.base import kept
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.stage import Done, Shared
 from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.pattern import make_pattern
 from tireroad.runs.stages.build.rolling.stepping import run_time
 from tireroad.runs.stages.build.turning import wheel_slip
+
+if TYPE_CHECKING:
+    from tireroad.fem.static.tread_surface import TreadSurface
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,13 +39,24 @@ class Setup(Shared[ContactSetup | None]):
     def make(self) -> ContactSetup | None:
         """From the static state and the scene's road."""
         job = self.job
-        return scene_setup(job, self.static.product) if job.scene.contact else None
+        if not job.scene.contact:
+            return None
+        state, on_grid = self.static.product, isinstance(job.scene.contact.points, Pitch)
+        surface = tread_surface(job, state, self.static.key) if on_grid else None
+        return scene_setup(job, state, surface)
 
 
-def scene_setup(job: Job, state: StaticState) -> ContactSetup:
-    """The patch and the road of the job's scene."""
+def tread_surface(job: Job, state: StaticState, key: str) -> TreadSurface:
+    """The deformed tread of the static state of this key."""
+    from tireroad.fem.static.tread_surface import TreadSurface  # not needed by points at nodes
+
+    return kept.once("surface", key, lambda: TreadSurface(job.tire.lattice, state.seen))
+
+
+def scene_setup(job: Job, state: StaticState, surface: TreadSurface | None = None) -> ContactSetup:
+    """The patch and the road of the job's scene; `surface`: the tread, where it is known."""
     scene, motion = job.scene, job.scene.road.motion
-    points = scene.contact.points
+    points = points_of(job, state)
     setup = contact_setup(
         state,
         job.tire.lattice,
@@ -54,8 +70,24 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
         spacing=(points.dx, points.dy) if isinstance(points, Pitch) else None,
         reach=scene.contact.reach,
         pattern=make_pattern(scene.pattern, rolling_radius(job, state)),
+        surface=surface,
     )
     return _slipping(job, state, setup) if scene.contact.rubs else setup
+
+
+def points_of(job: Job, state: StaticState) -> str | Pitch:
+    """The scene's contact points, by this state where it leaves them to the program: "nodes", or the pitch of a grid."""
+    contact = job.scene.contact
+    if contact.on_nodes:
+        return "nodes"
+    if contact.points != "auto":
+        return contact.points
+    extent = replace(
+        state, fine_extent=None
+    ).footprint()  # the same with and without an estimate of the load
+    speed = rolling_speed(job, state)
+    found = spacing(extent, nodes_within(state, 0.0), speed, job.scene.accuracy.up_to)
+    return "nodes" if found is None else Pitch(found, found)
 
 
 def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup:

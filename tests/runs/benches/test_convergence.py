@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tireroad.runs.bench.accuracy import convergence, rough_road
+from tireroad.runs.scene.load import load
 
 
 @pytest.mark.long
@@ -41,7 +42,17 @@ def test_default_settings_are_a_scene_without_their_keys(tmp_path, monkeypatch) 
     assert scene["static"] == {"load": 500.0} and scene["rotation"] == {"speed": 50.0}
     assert scene["contact"] == {"points": {"dx": 0.004, "dy": 0.004}, "youngs_modulus": 1e7}
     assert scene["modal"] == scene["greens"] == {} and scene["time"] == {"duration": 0.16}
-    assert taken["sets"] == ("static.error_estimate=false", *convergence.ROADS["cleat"])
+    assert taken["sets"] == ("static.error_estimate=false",)
+
+
+@pytest.mark.parametrize("road", convergence.ROADS)
+def test_the_scene_of_each_road_is_one(tmp_path, road) -> None:
+    """A table of the texture's keys under another kind of road was refused."""
+    keys = {"pitch": 0.004, "road": convergence.ROADS[road]}
+    scene = load(
+        rough_road.write_scene(tmp_path / "scene.toml", rough_road.Mesh(20, 8, 0.3), **keys)
+    )
+    assert scene.road.kind == tomllib.loads(convergence.ROADS[road])["kind"]
 
 
 def test_bands_are_compared_where_both_have_them_and_force_is() -> None:

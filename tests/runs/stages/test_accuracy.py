@@ -1,6 +1,7 @@
 """Error bars of a run: companions that are the runs they stand for, and where the bars go."""
 
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -12,8 +13,9 @@ from tireroad.contact.tread.kernel import KernelTread
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.base.job import Job
+from tireroad.runs.stages.build.setup import points_of
 from tireroad.runs.stages.build.wall import backed
-from tireroad.runs.stages.coarser import coarser_job
+from tireroad.runs.stages.coarser import coarser, coarser_job
 from tireroad.runs.stages.companions import Given, companions
 from tireroad.runs.stages.pipeline import run_scene
 
@@ -165,6 +167,21 @@ def test_what_cannot_be_estimated_is_said_not_to_be(run):
     folder, _ = run("nodes", "accuracy", "contact.points=nodes", "contact.reach=")
     told = json.loads((folder / "summary.json").read_text())["stages"]["accuracy"]["headline"]
     assert "take a grid" in told["error by the points"]["value"]
+
+
+@pytest.mark.long
+def test_points_chosen_are_those_of_a_scene_that_names_them(run):
+    """To the last bit; and the coarser mesh's companion has them too, whatever its own footprint asks for."""
+    _, auto = run("auto", "contact", "contact.points=auto")
+    own = auto.done["setup"].product.patch
+    dx, dy = own.places.spacing
+    _, named = run("named", "contact", f"contact.points={{ dx = {dx}, dy = {dy} }}")
+    forces = [one.done["contact"].product.total_force[:] for one in (auto, named)]
+    assert np.array_equal(*forces) and forces[0].any()
+    job, done = coarser(auto.job, auto.done["static"])
+    assert done["setup"].product.patch.places.spacing == (dx, dy)
+    alone = points_of(replace(job, scene=auto.job.scene), done["static"].product)
+    assert (alone.dx, alone.dy) != (dx, dy)
 
 
 def test_it_can_be_left_out(run):
