@@ -105,7 +105,7 @@ def points(doc: str, *, least: float, most: float) -> Any:
             values=f'"nodes", "auto" or {{dx, dy}}, {limits}',
             limits=limits,
         ),
-        "nodes",
+        "auto",
     )
 
 
