@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tireroad.contact.grid_patch import make_grid_patch, settle, spread_pull
+from tireroad.contact.grid_patch import Surface, make_grid_patch, settle, spread_pull
 from tireroad.contact.model import Spec, static_solver
 from tireroad.contact.patch import Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
@@ -167,6 +167,7 @@ def contact_setup(
     spacing: tuple[float, float] | None = None,
     reach: float | None = None,
     pattern: Pattern | None = None,
+    surface: Surface | None = None,
 ) -> ContactSetup:
     """Patch and road of a run: points at the nodes, or on a grid of the `spacing` (m).
 
@@ -179,7 +180,7 @@ def contact_setup(
         from tireroad.fem.static.tread_surface import TreadSurface
 
         assert face.road_height is not None, "contact needs a tire that stands on a road"
-        surface = TreadSurface(lattice, face.seen)
+        surface = surface or TreadSurface(lattice, face.seen)
         patch = make_grid_patch(surface, face.road_height, patch, spacing, reach)
     patch = on_shape(patch, face.road)
     if pattern is not None:

@@ -24,6 +24,7 @@ class TreadSurface:
     def __init__(self, lattice: Lattice, positions: np.ndarray) -> None:
         self._lattice, self._positions = lattice, positions
         self._shape = lattice.face_shape
+        self._located: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def weights(self, ring: np.ndarray, arc: np.ndarray) -> sparse.csr_matrix:
         """Shape functions (k, s) of the face's nodes at angles around the axle and the section, rad."""
@@ -82,8 +83,15 @@ class TreadSurface:
     def locate(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles (rad) of the places seen from below at x, y (k,) m, and which were found (k,) bool.
 
-        Newton's method on the deformed surface from the linear inverse between the nodes.
+        Newton's method on the deformed surface from the linear inverse between the nodes; once for the same places.
         """
+        key = x.tobytes() + y.tobytes()
+        if key not in self._located:
+            self._located[key] = self._found(x, y)
+        ring, arc, found = self._located[key]
+        return ring.copy(), arc.copy(), found.copy()
+
+    def _found(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         target = np.stack([x, y], axis=-1)
         place = self._guess(target)
         found = np.isfinite(place).all(axis=1)

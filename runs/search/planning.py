@@ -123,5 +123,5 @@ class _Costs:
     def _estimated(self, settings: Settings) -> Mapping[str, float]:
         key = str(settings)
         if key not in self._model:
-            self._model[key] = estimate(applied(self._scene, settings)).seconds
+            self._model[key] = estimate(applied(self._scene, settings)).work
         return self._model[key]

@@ -143,9 +143,9 @@ class AccuracyStage(Computed[Accuracy]):
 
     def _window(self, start: int, steps: int) -> int:
         """Up to which step companions go on, for `SHARE` of the run's estimated cost."""
-        seconds = estimate(self.job.scene).seconds
-        loop = seconds["contact loop"]
-        before = sum(seconds.values()) - loop
+        work = estimate(self.job.scene).work
+        loop = work["contact loop"]
+        before = sum(work.values()) - loop
         part = (SHARE * (before + loop) - _COARSE * before) / (_LOOPS * loop)
         count = int(np.clip(round(part * steps), min(start + _FEWEST, steps), steps))
         return count - count % 2

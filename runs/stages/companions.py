@@ -24,13 +24,13 @@ from tireroad.contact.results.error_bars import (
 from tireroad.contact.setup import ContactSetup, on_shape
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.state import StaticState
-from tireroad.fem.static.tread_surface import TreadSurface
 from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process import observe
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.stage import Done
 from tireroad.runs.stages.build.rolling.loop import Forces, bristles, forces
+from tireroad.runs.stages.build.setup import tread_surface
 from tireroad.runs.stages.build.wall import Normal, backed
 from tireroad.runs.stages.coarser import coarser
 
@@ -126,7 +126,7 @@ def other_points(given: Given) -> Forces:
     if coarser:
         patch = thinned(patch)
     else:
-        surface = TreadSurface(job.tire.lattice, given.static.product.seen)
+        surface = tread_surface(job, given.static.product, given.static.key)
         height = given.static.product.road_height
         assert height is not None
         patch = halved(patch, surface, height, given.setup.reach)

@@ -51,8 +51,9 @@ class Motions(Shared[SmallMotions]):
     def make(self) -> SmallMotions:
         """Nothing yet: matrices are made when they are asked for."""
         tire, static, modal = self.job.tire, self.static.product, self.job.scene.modal
-        key = self.static.key, modal.rim, modal.road
-        return kept.once(key, lambda: SmallMotions(tire, static, rim=modal.rim, road=modal.road))
+        rim, road = modal.rim, modal.road
+        key = self.static.key, rim, road
+        return kept.once("matrices", key, lambda: SmallMotions(tire, static, rim=rim, road=road))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,8 +159,7 @@ class Fields(Shared[ModalBasis]):
             return basis
         motions, air = self.motions.product, self.air.product
         given = self.job, self.modes.key, motions.operators
-        known = fields_file.kept(*given, basis)
-        if known is not None:
+        if (known := fields_file.kept(*given, basis)) is not None:
             return replace(basis, modes=known, column=air)
         again = with_fields(
             basis,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tireroad.runs.scene.extent.cost import operations, seconds
 from tireroad.runs.scene.extent.sizes import Sizes, road_memory, sizes
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.tables.scene import Scene
@@ -59,22 +60,28 @@ KEYS = {
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
     """`memory` of one process at the highest, `disk` of the result folder at the highest (bytes),
-    `seconds` of one core, each by part, and the `sizes` they follow from."""
+    `seconds` of one core, each by part, and the `sizes` they follow from. `work`: operations, of which the seconds are a
+    measured share; what is chosen by cost goes by these, and stays when seconds are measured anew."""
 
     sizes: Sizes
     memory: dict[str, float]
     disk: dict[str, float]
+    work: dict[str, float]
     seconds: dict[str, float]
 
 
 def estimate(scene: Scene, until: str | None = None) -> Estimate:
     """What the stages up to `until` take. Memory within a factor of 1.5 where measured, the rest rougher."""
     size, left_out = sizes(scene), skipped(scene, until)
+    column = _unknowns_through(scene.tire.proportions().through, scene.tire.order)
+    dense = "contact" not in left_out and bool(_matrices_of_points(scene, size))
+    work = operations(scene, size, left_out, column, dense)
     return Estimate(
         sizes=size,
         memory=_memory(scene, size, left_out),
         disk=_disk(scene, size, left_out),
-        seconds=_seconds(scene, size, left_out),
+        work=work,
+        seconds=seconds(work, size, column),
     )
 
 
@@ -199,35 +206,6 @@ def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, floa
             size.steps * (4 * k + 3 + _each_step(scene, k)) + 2 * size.frequencies * k * k
         )
     return parts
-
-
-# Seconds of one core of 2020, measured on the quickstart (27,900 unknowns, 9 a column of nodes, 200 modes, 277
-# nodes) and scaled by the operations that grow fastest. The passenger tire has 27 a column: each unknown then meets
-# three times as many, which its stages show (36, 15, 12 s where without it 9, 7, 3 s came out).
-def _seconds(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
-    count = size.modes / 200
-    mesh = (size.free / 27_900) ** 1.2 * _column(scene) / 9
-    parts = {"static": 8.0 * mesh}
-    if "modes" not in left_out:
-        parts["modes"] = 7.0 * mesh * count
-    if "rotating" not in left_out:
-        parts["rotating"] = 0.8 * count**3 * (1 + size.speeds)
-    if "contact" not in left_out:
-        loads = size.nodes * (3 if scene.contact.rubs else 1)
-        parts["greens"] = 3.0 * mesh * loads / 277
-        dense = size.points**2 if _matrices_of_points(scene, size) else 300 * size.points
-        step = 2e-4 + 1e-9 * (4 * loads * size.modes + dense)
-        if scene.time.scheme == "convolution":
-            step += 1e-9 * 0.5 * size.steps * loads**2
-        parts["contact loop"] = size.steps * step
-    if "response" not in left_out:
-        parts["response"] = size.steps * 2e-5 + size.frequencies * (2e-5 + 5e-8 * size.modes)
-    return parts
-
-
-def _column(scene: Scene) -> int:
-    """Unknowns of one column of nodes through the wall."""
-    return _unknowns_through(scene.tire.proportions().through, scene.tire.order)
 
 
 def _unknowns_through(through: int, order: int) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from scipy import sparse
@@ -17,12 +17,16 @@ from tireroad.fem.matrices import probe
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.scene.rules.road import made
 from tireroad.runs.scene.schema import Pitch
+from tireroad.runs.stages.base import kept
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.stage import Done, Shared
 from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.pattern import make_pattern
 from tireroad.runs.stages.build.rolling.stepping import run_time
 from tireroad.runs.stages.build.turning import wheel_slip
+
+if TYPE_CHECKING:
+    from tireroad.fem.static.tread_surface import TreadSurface
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,11 +39,22 @@ class Setup(Shared[ContactSetup | None]):
     def make(self) -> ContactSetup | None:
         """From the static state and the scene's road."""
         job = self.job
-        return scene_setup(job, self.static.product) if job.scene.contact else None
+        if not job.scene.contact:
+            return None
+        state, on_grid = self.static.product, isinstance(job.scene.contact.points, Pitch)
+        surface = tread_surface(job, state, self.static.key) if on_grid else None
+        return scene_setup(job, state, surface)
 
 
-def scene_setup(job: Job, state: StaticState) -> ContactSetup:
-    """The patch and the road of the job's scene."""
+def tread_surface(job: Job, state: StaticState, key: str) -> TreadSurface:
+    """The deformed tread of the static state of this key."""
+    from tireroad.fem.static.tread_surface import TreadSurface  # not needed by points at nodes
+
+    return kept.once("surface", key, lambda: TreadSurface(job.tire.lattice, state.seen))
+
+
+def scene_setup(job: Job, state: StaticState, surface: TreadSurface | None = None) -> ContactSetup:
+    """The patch and the road of the job's scene; `surface`: the tread, where it is known."""
     scene, motion = job.scene, job.scene.road.motion
     points = points_of(job, state)
     setup = contact_setup(
@@ -55,6 +70,7 @@ def scene_setup(job: Job, state: StaticState) -> ContactSetup:
         spacing=(points.dx, points.dy) if isinstance(points, Pitch) else None,
         reach=scene.contact.reach,
         pattern=make_pattern(scene.pattern, rolling_radius(job, state)),
+        surface=surface,
     )
     return _slipping(job, state, setup) if scene.contact.rubs else setup
 

@@ -25,6 +25,7 @@ speed = 40.0
 [contact]
 youngs_modulus = 1e7
 reach = 0.02
+points = { dx = 0.008, dy = 0.008 }
 [road]
 kind = "sine"
 amplitude = 0.5e-3
@@ -58,7 +59,7 @@ def test_the_last_two_are_kept() -> None:
     made = []
 
     def once(key: str) -> str:
-        return kept.once(key, lambda: made.append(key) or key)
+        return kept.once("kind", key, lambda: made.append(key) or key)
 
     once("alone"), once("alone")
     assert made == ["alone", "alone"]  # of a run by itself nothing is

@@ -54,13 +54,13 @@ def file(tmp_path):
 
 
 def modelled(scene, settings: Settings) -> Trial:
-    """A trial whose errors fall by their orders, and whose seconds are those estimated."""
+    """A trial whose errors fall by their orders, and whose seconds are the work estimated."""
     first = Ladders.of(scene).first()
     history = {
         cause: AT_FIRST[cause] * size_ratio(cause, first, settings) ** orders(settings.order)[cause]
         for cause in CAUSES
     }
-    seconds = estimate(applied(scene, settings)).seconds
+    seconds = estimate(applied(scene, settings)).work
     found = Found(history, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ()))
     return Trial(settings, seconds, sum(seconds.values()), found, "linear")
 

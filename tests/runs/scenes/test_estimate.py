@@ -48,10 +48,10 @@ def test_quickstart_is_as_measured(quickstart: Path) -> None:
 
 
 def test_passenger_is_as_measured(root: Path) -> None:
-    """Measured on one process without error bars: 92 s of one core and 1.69 GB; the pivot's matrices are in it."""
+    """Measured on one process without error bars: 43 s of one core and 1.69 GB; the pivot's matrices are in it."""
     scene = root / "runs" / "scenes" / "passenger.toml"
     wanted = estimate(load(scene, ["accuracy.estimate=false"]))
-    assert 92 / 1.6 < sum(wanted.seconds.values()) < 92 * 1.6
+    assert 43 / 1.6 < sum(wanted.seconds.values()) < 43 * 1.6
     assert 1.69 / 1.6 < sum(wanted.memory.values()) / 1e9 < 1.69 * 1.6
     assert wanted.sizes.points == pytest.approx(1631, rel=0.3)
     product = estimate(load(scene, ["accuracy.estimate=false", 'contact.solver="projected-cg"']))

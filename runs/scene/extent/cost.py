@@ -1,0 +1,47 @@
+"""What the stages of a scene cost: operations, and seconds of one core."""
+
+from tireroad.runs.scene.extent.sizes import Sizes
+from tireroad.runs.scene.tables.scene import Scene
+
+
+def seconds(work: dict[str, float], size: Sizes, column: int) -> dict[str, float]:
+    """Processor time (s) of `operations` by stage, `column` unknowns in a column of nodes through the wall.
+
+    Of a core of a shared server (Intel Xeon), one BLAS thread, on 2026-11-23; from 7,020 to 98,100 unknowns (the static
+    state: 224,100) within a factor of 1.6 (tests/runs/scenes/test_estimated_time.py). What goes through the wall is done
+    in blocks, the faster the thicker it is; so are modes, in larger ones on larger meshes.
+    """
+    thicker, larger = column / 9, size.free / 27_900
+    share = {
+        "static": 1.45 * larger**0.08 / thicker,
+        "modes": 1.4 / (thicker**0.5 * larger**0.2),
+        "greens": 1.1 / thicker**0.5,
+    }
+    return {name: share.get(name, 1.0) * each for name, each in work.items()}
+
+
+def operations(
+    scene: Scene, size: Sizes, left_out: dict[str, str], column: int, dense: bool
+) -> dict[str, float]:
+    """By stage, in seconds of one core of 2020, of the quickstart (27,900 unknowns, 9 a column of nodes, 200 modes, 277
+    nodes), scaled by the operations that grow fastest: an unknown meets all those of the columns beside it. `dense`: the
+    contact points have a matrix.
+    """
+    count = size.modes / 200
+    mesh = (size.free / 27_900) ** 1.2 * column / 9
+    parts = {"static": 8.0 * mesh}
+    if "modes" not in left_out:
+        parts["modes"] = 7.0 * mesh * count
+    if "rotating" not in left_out:
+        parts["rotating"] = 0.8 * count**3 * (1 + size.speeds)
+    if "contact" not in left_out:
+        loads = size.nodes * (3 if scene.contact.rubs else 1)
+        parts["greens"] = 3.0 * mesh * loads / 277
+        points = size.points**2 if dense else 300 * size.points
+        step = 2e-4 + 1e-9 * (4 * loads * size.modes + points)
+        if scene.time.scheme == "convolution":
+            step += 1e-9 * 0.5 * size.steps * loads**2
+        parts["contact loop"] = size.steps * step
+    if "response" not in left_out:
+        parts["response"] = size.steps * 2e-5 + size.frequencies * (2e-5 + 5e-8 * size.modes)
+    return parts

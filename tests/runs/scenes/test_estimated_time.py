@@ -1,0 +1,49 @@
+"""Processor time before it is taken: against measured runs, and in its growth."""
+
+from pathlib import Path
+
+import pytest
+
+from tireroad.runs.scene.extent.estimate import Estimate, estimate
+from tireroad.runs.scene.load import load
+
+SMALL = ["tire.segments=26", "tire.elements_arc=8", "modal.count=100"]
+LARGE = ["tire.segments=150", "tire.elements_arc=42"]
+FINE = ["tire.segments=30", "tire.elements_arc=26", "modal.up_to=547.3"]
+# Processor time (s) by stage of one core of a shared server (Intel Xeon) beside other work, one BLAS thread, 2026-11-23,
+# without error bars.
+MEASURED = [
+    ("quickstart", SMALL, {"static": 2.67, "modes": 1.73, "contact loop": 1.48}),
+    ("quickstart", [], {"static": 13.9, "modes": 9.21, "greens": 2.57, "contact loop": 1.81}),
+    ("quickstart", LARGE, {"static": 199.0}),
+    ("passenger", [], {"static": 9.12, "modes": 12.7, "greens": 9.44, "contact loop": 8.84}),
+    ("passenger", FINE, {"static": 39.3, "modes": 69.7}),
+]
+
+
+def told(root: Path, scene: str, settings: list[str]) -> Estimate:
+    """Of a scene with all its stages."""
+    return estimate(load(root / "runs" / "scenes" / f"{scene}.toml", settings))
+
+
+@pytest.mark.parametrize(("scene", "settings", "taken"), MEASURED)
+def test_seconds_are_as_measured(root: Path, scene: str, settings: list[str], taken: dict) -> None:
+    seconds = told(root, scene, settings).seconds
+    for stage, measured in taken.items():
+        assert measured / 1.6 < seconds[stage] < 1.6 * measured, stage
+
+
+@pytest.mark.parametrize(
+    ("settings", "stages"),
+    [
+        ("tire.segments={}", ("static", "modes", "greens")),
+        ("tire.elements_arc={}", ("static", "modes", "greens")),
+        ("modal.count={}", ("modes", "rotating", "contact loop")),
+    ],
+)
+def test_more_takes_longer(root: Path, settings: str, stages: tuple[str, ...]) -> None:
+    growing = [told(root, "quickstart", [settings.format(k)]) for k in (40, 80, 160, 320)]
+    for stage in stages:
+        for kind in ("seconds", "work"):
+            times = [getattr(one, kind)[stage] for one in growing]
+            assert times == sorted(times) and times[-1] > 1.2 * times[0], (stage, kind)
