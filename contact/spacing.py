@@ -8,11 +8,11 @@ much closer than the nodes that carry them tell no more of the tire.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from tireroad.contact.patch import Patch
-from tireroad.fem.static.footprint import Footprint
+if TYPE_CHECKING:  # `check` asks for ON_A_NODE, and needs no finite elements
+    from tireroad.contact.patch import Patch
+    from tireroad.fem.static.footprint import Footprint
 
 ACROSS, ON_A_WAVE = (
     5.0,
@@ -25,7 +25,7 @@ def spacing(footprint: Footprint, nodes: Patch, speed: float, highest: float) ->
     """Distance (m) of the points from the `footprint` as solved, the `nodes` in it, and the road's `speed` (m/s) over the
     `highest` frequency (Hz) that is told, two digits of it; None where nothing touches.
     """
-    between = math.sqrt(float(np.prod(nodes.spacing)))
+    between = math.sqrt(float(nodes.spacing.prod()))
     if not between or not min(footprint.length, footprint.width) > 0:
         return None
     wanted = min(footprint.length, footprint.width) / ACROSS
