@@ -27,6 +27,7 @@ mass = 5000.0
 [modal]
 count = 4751
 [contact]
+points = "nodes"
 youngs_modulus = 3.4e8
 reach = 0.013
 [road]

@@ -51,6 +51,7 @@ speed = 80.0
 [modal]
 count = {modes}
 [contact]
+points = "nodes"
 youngs_modulus = 1e7
 [road]
 {road}

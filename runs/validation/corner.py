@@ -31,6 +31,7 @@ stiffness = [1e6, 1e6, 8e3, 4e4, 4e4, 4e4]
 damping = [100.0, 100.0, 600.0, 5.0, 5.0, 5.0]
 locked = []
 [contact]
+points = "nodes"
 youngs_modulus = 1e7
 [road]
 {road}

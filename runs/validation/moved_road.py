@@ -22,6 +22,7 @@ mass = 500.0
 [modal]
 count = {modes}
 [contact]
+points = "nodes"
 youngs_modulus = 1e7
 [road]
 kind = "flat"

@@ -25,6 +25,7 @@ speed = 100.0
 [modal]
 count = {modes}
 [contact]
+points = "nodes"
 youngs_modulus = 1e7
 [road]
 {road}

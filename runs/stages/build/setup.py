@@ -41,7 +41,7 @@ class Setup(Shared[ContactSetup | None]):
         job = self.job
         if not job.scene.contact:
             return None
-        state, on_grid = self.static.product, isinstance(job.scene.contact.points, Pitch)
+        state, on_grid = self.static.product, not job.scene.contact.on_nodes
         surface = tread_surface(job, state, self.static.key) if on_grid else None
         return scene_setup(job, state, surface)
 
