@@ -54,6 +54,7 @@ mass = 500.0
 [rotation]
 speed = 40.0
 [contact]
+points = "nodes"
 youngs_modulus = 2e7
 [road]
 kind = "sine"

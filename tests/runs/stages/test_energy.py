@@ -79,6 +79,7 @@ def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run) -> None:
 STIFF = (
     "greens.residual=none",
     "contact.youngs_modulus=3.4e8",
+    'contact.points="nodes"',
     "road.motion.frequency=150",
     "road.motion.amplitude=5e-4",
     "time.step=4e-4",
