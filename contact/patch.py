@@ -39,7 +39,8 @@ class Patch:
     def resultant(self, force: np.ndarray, horizontal: np.ndarray) -> np.ndarray:
         """(3,) N in the wheel's axes of forces normal to the road (c,) and along and across it (c, 2)."""
         if self.frames is None:
-            return np.array([*horizontal.sum(axis=0), force.sum()])
+            # A product: sum(axis=0) of so narrow an array takes ten times as long, 2 % of a step.
+            return np.array([*(np.ones(len(force)) @ horizontal), force.sum()])
         return np.einsum("ci,cij->j", np.column_stack([horizontal, force]), self.frames)
 
     def at_points(self, values: np.ndarray) -> np.ndarray:

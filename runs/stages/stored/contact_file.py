@@ -239,5 +239,6 @@ def _columns(instants: list[Instant]) -> dict[str, np.ndarray]:
     }
     steps["normal_force"] = steps.pop("force")
     steps["horizontal_force"] = steps.pop("horizontal")
-    sums = steps["horizontal_force"].sum(axis=1), steps["normal_force"].sum(axis=1)[:, None]
+    normal = steps["normal_force"]
+    sums = np.ones(normal.shape[1]) @ steps["horizontal_force"], normal.sum(axis=1)[:, None]
     return steps | {"total_force": np.concatenate(sums, axis=1)}
