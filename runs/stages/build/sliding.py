@@ -29,8 +29,8 @@ def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curv
     """The curves by the names of `AXES`, `start` the force's rate with all that sticks at first; none without friction.
     The body is left in another state. Collective."""
     wanted, friction = job.scene.stiffness, job.scene.static.friction
-    if state.pull is None or friction is None or not wanted.slide_steps:
-        return {}
+    if state.pull is None or not friction or not wanted.slide_steps:
+        return {}  # friction 0 holds nothing back: there is no way to slide by
     found: dict[str, Curve] = {}
     for axis, name in enumerate(AXES):
         slide = Slide(job.tire.body, state, friction, axis)

@@ -1,5 +1,7 @@
 """[stiffness]: its file, its figures, what is reused, and what is refused."""
 
+from types import SimpleNamespace
+
 import h5py
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.stiffness import Stiffness, deflections
+from tireroad.runs.stages.build.sliding import slides
 
 TIRE = """
 [tire]
@@ -132,3 +135,12 @@ def test_force_over_the_way_with_friction(run, rolls):
     assert "Force along and across the road with friction" in (folder / "report.html").read_text()
     _, again = run(f"slide-{rolls}", text + more)
     assert again["stiffness"]["status"] == "reused"
+
+
+def test_nothing_slides_where_friction_is_zero() -> None:
+    """The way to slide by would be 0, and its tangents 0/0."""
+    scene = SimpleNamespace(
+        stiffness=SimpleNamespace(slide_steps=4), static=SimpleNamespace(friction=0.0)
+    )
+    state = SimpleNamespace(pull=np.zeros((3, 2)))
+    assert slides(SimpleNamespace(scene=scene), state, None) == {}
