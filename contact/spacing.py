@@ -14,10 +14,8 @@ if TYPE_CHECKING:  # `check` asks for ON_A_NODE, and needs no finite elements
     from tireroad.contact.patch import Patch
     from tireroad.fem.static.footprint import Footprint
 
-ACROSS, ON_A_WAVE = (
-    5.0,
-    10.0,
-)  # points on the footprint's width or length, and on the shortest wave told
+ACROSS = 5.0  # points on the footprint's width or length
+ON_A_WAVE = 10.0  # points on the shortest wave told
 ON_A_NODE = 2.0  # points from node to node at most
 
 

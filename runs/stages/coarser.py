@@ -59,9 +59,8 @@ class CoarserStatic(StaticStage):
 def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
     """The job of a run with elements of twice the size, and what is done of it, from the static state on. Collective."""
     job, done = coarser_job(run), dict[str, Done]()
-    if (
-        contact := job.scene.contact
-    ) is not None:  # points of the run, not such as its own footprint asks for
+    if (contact := job.scene.contact) is not None:
+        # Points of the run, not such as its own footprint asks for.
         contact = replace(contact, points=points_of(run, static.product))
         job = replace(job, scene=replace(job.scene, contact=contact))
     on_root(job.comm, lambda: make_folder(job.directory))

@@ -97,7 +97,7 @@ class ContactStage(Stage[ContactHistory]):
         spec, patch = self.job.scene.contact, setup.patch
         count = f"{len(patch.points)} contact points on {len(patch.index)} nodes"
         observe.say(f"  {count}, tread {spec.tread}, solver {solver_name(spec, patch)}")
-        if patch.weights is None and spec.law.compliant and self.job.speed:
+        if spec.points == "nodes" and spec.law.compliant and self.job.speed:
             observe.say(
                 '  points are nodes: contact.points = "auto" takes as many as the footprint needs'
             )

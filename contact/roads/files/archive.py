@@ -39,9 +39,8 @@ def read_header(stream: IO[bytes], info: zipfile.ZipInfo, name: str) -> Header:
         read = np.lib.format.read_array_header_2_0
     try:
         shape, by_columns, kind = read(stream)
-    except (
-        Exception
-    ) as problem:  # numpy parses it as Python text, and lets errors of the parser out
+    # numpy parses it as Python text, and lets errors of the parser out.
+    except Exception as problem:
         raise ValueError(f"the header of {name} is damaged: {problem}") from problem
     if kind.kind not in "iuf" or 0 in shape:
         raise ValueError(f"{name} is {kind} of shape {shape}")

@@ -82,9 +82,8 @@ def points_of(job: Job, state: StaticState) -> str | Pitch:
         return "nodes"
     if contact.points != "auto":
         return contact.points
-    extent = replace(
-        state, fine_extent=None
-    ).footprint()  # the same with and without an estimate of the load
+    # The same with and without an estimate of the load.
+    extent = replace(state, fine_extent=None).footprint()
     speed = rolling_speed(job, state)
     found = spacing(extent, nodes_within(state, 0.0), speed, job.scene.accuracy.up_to)
     return "nodes" if found is None else Pitch(found, found)
