@@ -65,9 +65,9 @@ def apart(exact: Rolled, found: Rolled, force: str, duration: float) -> Apart:
     top = 0.5 * min(run.figure("modes", "highest") for run in (exact, found))
     values = [run.forces[force][:, 2:] for run in (exact, found)]
     one, other = (measured(v, step, top) for v, step in zip(values, steps, strict=True))
-    varying = (v - v.mean(axis=0) for v in values)
+    reference, varying = (v - v.mean(axis=0) for v in values)
     return Apart(
-        100 * distance(*varying, duration, top).mean,
+        100 * distance(reference, varying, duration, top).mean,
         100 * abs(float(other.mean[0] / one.mean[0]) - 1),
         100 * abs(float(other.deviation[0] / one.deviation[0]) - 1),
         *levels((one.centre, one.level[:, 0]), (other.centre, other.level[:, 0])),
