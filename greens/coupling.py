@@ -12,7 +12,6 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.cavity.column import Column
-from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
     LoadedShapes,
@@ -169,9 +168,10 @@ class Wheel:
         if self._drifts:
             return self.standing_attachments(modes, probes)[0].couple(probes, probes)
         weights, loads = fewest(probes)
-        loads, rows = on_own_rows(self.operators, loads), self._beside(basis.of_hub(probes))
+        loads = on_own_rows(self.operators, loads)
+        rows = sparse.csr_matrix(self._beside(basis.of_hub(probes)))
         shapes = LoadedShapes(self.operators, self.rotating_stiffness, self.air)
-        answers = shapes.readings(sparse.vstack([loads.T, sparse.csr_matrix(rows)], format="csr"), loads)
+        answers = shapes.readings(sparse.vstack([loads.T, rows], format="csr"), loads)
         flexibility = weights @ (weights @ answers[: loads.shape[1]].T).T
         beside = (weights @ answers[loads.shape[1] :].T).T
         # Few of the shapes join the basis: solving for these once more takes less than holding all until it is known which.

@@ -38,12 +38,13 @@ def solve_parts(
 ) -> Iterator[tuple[slice, np.ndarray]]:
     """The same some columns a time, with where they stand: all of a fine mesh's need not fit in memory. Collective."""
     factor = pc.getFactorMatrix()
-    columns = columns.tocsc() if sparse.issparse(columns) else columns
+    if not isinstance(columns, np.ndarray):
+        columns = columns.tocsc()
     for start in range(0, columns.shape[1], _CHUNK):
         part = slice(start, min(start + _CHUNK, columns.shape[1]))
         loads = columns[:, part]
-        loads = loads.toarray() if sparse.issparse(loads) else loads
-        yield part, _solve(factor, matrix, loads)
+        dense = loads if isinstance(loads, np.ndarray) else loads.toarray()
+        yield part, _solve(factor, matrix, dense)
     factor.destroy()  # this hold on it, which petsc4py would keep for ever
 
 
