@@ -102,17 +102,17 @@ def run_scene(
         # A road file that cannot be used should be reported before hours of solving, not after.
         share(scene.road.surface, comm)
         on_root(comm, lambda: check_road(scene))
-    wanted = _say_demand(scene, directory, comm, until)
+    wanted = on_root(comm, lambda: estimate(scene, until))  # it may read the road's file
+    on_disk = on_root(comm, lambda: out_of_core(wanted, comm.size))
+    each = 1e-9 * sum(memory_of(wanted, comm.size, on_disk).values()) / comm.size
+    _say_demand(wanted, each, directory, comm)
     reasons = skipped(scene, until)
     if petsc_options:
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
-    with _factors(wanted, directory, comm):
+    with _factors(on_disk, directory, comm):
         done = _parts(job, reasons, summary)
     _check_options(petsc_options)
-    most = _peak(comm)
-    observe.say(
-        f"memory: {most:.2g} GB of a process at most, {_each(wanted, comm):.2g} GB estimated"
-    )
+    observe.say(f"memory: {_peak(comm):.2g} GB of a process at most, {each:.2g} GB estimated")
     if "report" in reasons:
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))
     else:
@@ -131,9 +131,9 @@ def _parts(job: Job, reasons: Mapping[str, str], summary: Summary) -> dict[str, 
 
 
 @contextmanager
-def _factors(wanted: Estimate, directory: Path, comm: MPI.Comm) -> Iterator[None]:
-    """While inside, factors that memory does not hold are on disk. Collective."""
-    if not on_root(comm, lambda: out_of_core(wanted, comm.size)):
+def _factors(on_disk: bool, directory: Path, comm: MPI.Comm) -> Iterator[None]:
+    """While inside, factors are `on_disk`. Collective."""
+    if not on_disk:
         yield
         return
     on_root(comm, lambda: make_folder(directory / FACTORS))
@@ -142,22 +142,15 @@ def _factors(wanted: Estimate, directory: Path, comm: MPI.Comm) -> Iterator[None
     on_root(comm, lambda: remove_factors(directory))
 
 
-def _each(wanted: Estimate, comm: MPI.Comm) -> float:
-    """Memory of one process, GB, by estimate."""
-    return 1e-9 * sum(memory_of(wanted, comm.size).values()) / comm.size
-
-
-def _say_demand(scene: Scene, directory: Path, comm: MPI.Comm, until: str | None) -> Estimate:
-    """What the run will take; InputError where the machine has too little by far. Collective."""
-    wanted = on_root(comm, lambda: estimate(scene, until))  # it may read the road's file
+def _say_demand(wanted: Estimate, each: float, directory: Path, comm: MPI.Comm) -> None:
+    """What the run will take, `each` process so many GB; InputError where the machine has too little by far. Collective."""
     for text in on_root(comm, lambda: check_demand(wanted, directory, comm.size)):
         observe.warn(text)
     observe.say(
-        f"estimated: {_each(wanted, comm):.2g} GB a process, "
+        f"estimated: {each:.2g} GB a process, "
         f"{sum(wanted.disk.values()) / 1e9:.2g} GB of disk, "
         f"{duration(sum(wanted.seconds.values()))} of one core"
     )
-    return wanted
 
 
 def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done | None:

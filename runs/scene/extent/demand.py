@@ -21,9 +21,8 @@ def check_demand(wanted: Estimate, directory: Path, processes: int = 1) -> list[
 
     `directory`: where results go (it may not exist yet). Where memory is short, factors are kept on disk.
     """
-    taken = memory_of(wanted, processes)
-    if on_disk := out_of_core(wanted, processes):
-        taken[FACTOR] *= 1 - ON_DISK
+    on_disk = out_of_core(wanted, processes)
+    taken = memory_of(wanted, processes, on_disk)
     memory, free = sum(taken.values()), available_memory()
     room = shutil.disk_usage(_existing(directory)).free
     warnings = []
@@ -53,11 +52,12 @@ def check_demand(wanted: Estimate, directory: Path, processes: int = 1) -> list[
     return warnings
 
 
-def memory_of(wanted: Estimate, processes: int) -> dict[str, float]:
-    """Bytes by part, of all processes of a run together."""
-    return {
+def memory_of(wanted: Estimate, processes: int, on_disk: bool = False) -> dict[str, float]:
+    """Bytes by part, of all processes of a run together, with factors in memory or `on_disk`."""
+    parts = {
         name: size if name in SPREAD else processes * size for name, size in wanted.memory.items()
     }
+    return parts | {FACTOR: parts[FACTOR] * (1 - ON_DISK)} if on_disk else parts
 
 
 def out_of_core(wanted: Estimate, processes: int) -> bool:

@@ -22,6 +22,10 @@ COLUMNS = 250
 of 220,500 unknowns took 2.3 GB on each of two processes; 1.8 come out, 1.4 without them. Gone before the modes."""
 BASES = 3
 """Copies of all modes held at the highest: slices, the sorted vectors, their products."""
+ANSWERS = 6 * 64
+"""Columns that solving for the flexibility of the patch takes (fem.matrices.direct.solve_parts): loads, answers, their copies."""
+SHAPES = {"attachment": 3, "second-order": 5}
+"""By residual, columns a force on the patch, of fields held at the highest; of the others the answers at the patch are all."""
 DENSE = 1000
 """Contact points up to which a tread's matrix is kept (contact.model.DENSE_POINTS)."""
 BLOCK = 512
@@ -47,7 +51,7 @@ KEYS = {
     "modes": "modal.count or modal.up_to, and the mesh",
     FOOTPRINT: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     "rotating pencil": "modal.count or modal.up_to",
-    "flexibility of the patch": "contact.points or the mesh, contact.reach, the road's height",
+    "flexibility of the patch": "greens.residual, the mesh, contact.reach, the road's height",
     "contact": "contact.points, contact.reach, the road's height",
     "receptances": "output.receptance.step, output.receptance.to, the number of forces",
     "time series": "time.duration, time.step",
@@ -166,8 +170,9 @@ def _each_step(scene: Scene, points: int) -> int:
 def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
     directions = 3 if scene.contact.rubs else 1
     loads = directions * size.nodes
+    shapes = SHAPES.get(scene.greens.residual, 0)
     parts = {
-        "flexibility of the patch": 8.0 * 2 * size.free * loads,
+        "flexibility of the patch": 8.0 * size.free * (ANSWERS + shapes * loads),
         "contact": 16.0 * 4 * loads * 2 * size.modes
         + 8.0 * 3 * loads**2
         + 8.0 * _matrices_of_points(scene, size) * size.points**2
