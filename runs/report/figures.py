@@ -41,6 +41,7 @@ STYLE = {
 }
 styled = matplotlib.rc_context(STYLE)  # decorates every picture
 RANGE_DB = 100.0  # what lies further below the highest line of a spectrum is not drawn
+LEAST_RANGE_DB = 20.0  # over less, hairs between bars look like mountains
 
 
 SILENT = -1000.0  # dB: nothing at all, rounded
@@ -132,7 +133,7 @@ def level_range(level: NDArray) -> tuple[float, float]:
     heard = level[level > SILENT]
     top = float(heard.max(initial=0.0))
     least = max(float(heard.min(initial=top)), top - RANGE_DB)
-    return 10.0 * float(np.floor(least / 10.0)), top
+    return 10.0 * float(np.floor(min(least, top - LEAST_RANGE_DB) / 10.0)), top
 
 
 @styled

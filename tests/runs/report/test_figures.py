@@ -116,6 +116,12 @@ def test_bands_have_their_bars_at_their_names(count: int) -> None:
     assert low < -0.5 and high >= max(count, 8) - 0.5
 
 
+@pytest.mark.parametrize("levels", [[20.36], [20.1, 20.4, 23.0], [-3.0, -12.0]])
+def test_bars_that_differ_little_do_not_look_as_if_they_differed_much(levels: list) -> None:
+    floor, top = figures.level_range(np.array(levels))
+    assert floor % 10 == 0 and floor <= top - 20 and floor <= min(levels) and top >= max(levels)
+
+
 def test_a_picture_says_how_wide_it_was_drawn() -> None:
     """Lines and coloured surfaces alike; an image that does not say has no least width."""
     figure, _ = figures.bare_canvas(7.5, 2.0)
