@@ -12,11 +12,10 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.cavity.column import Column
-from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import (
+    LoadedShapes,
     compliance,
-    loaded_shapes,
     on_own_rows,
     rotating_damping,
     rotating_stiffness,
@@ -166,20 +165,23 @@ class Wheel:
     def _attached(self, basis: Basis, modes: Modes, probes: Probes) -> Response:
         """Response of the modes and the attachment modes of all probes. Collective."""
         self._check_same(basis, modes)
-        if not self._drifts:
-            weights, loads = fewest(probes)
-            full = self.operators, self.rotating_stiffness
-            shapes, flexibility = loaded_shapes(*full, loads, self.air)
-            flexibility = weights @ (weights @ flexibility.T).T
-            columns = shapes @ (weights.T @ self._foremost(basis, probes, flexibility))
-            grown, _ = self._grown(modes, columns, basis.projection, every=False)
-            rows, comm = self._beside(basis.of_hub(probes)), self.operators.body.comm
-            beside = (weights @ summed(comm, rows @ shapes).T).T
-            if self.beyond is not None:
-                lacking = regained(grown.held, *self._pencils(grown.projection), probes, probes)
-                flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
-            return self._completed(grown, probes, probes, flexibility, beside)
-        return self.standing_attachments(modes, probes)[0].couple(probes, probes)
+        if self._drifts:
+            return self.standing_attachments(modes, probes)[0].couple(probes, probes)
+        weights, loads = fewest(probes)
+        loads = on_own_rows(self.operators, loads)
+        rows = sparse.csr_matrix(self._beside(basis.of_hub(probes)))
+        shapes = LoadedShapes(self.operators, self.rotating_stiffness, self.air)
+        answers = shapes.readings(sparse.vstack([loads.T, rows], format="csr"), loads)
+        flexibility = weights @ (weights @ answers[: loads.shape[1]].T).T
+        beside = (weights @ answers[loads.shape[1] :].T).T
+        # Few of the shapes join the basis: solving for these once more takes less than holding all until it is known which.
+        columns = shapes.whole(loads @ (weights.T @ self._foremost(basis, probes, flexibility)))
+        shapes.destroy()
+        grown, _ = self._grown(modes, columns, basis.projection, every=False)
+        if self.beyond is not None:
+            lacking = regained(grown.held, *self._pencils(grown.projection), probes, probes)
+            flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
+        return self._completed(grown, probes, probes, flexibility, beside)
 
     def _foremost(self, basis: Basis, probes: Probes, flexibility: Array) -> Array:
         """By which loads (p, k) of the probes shapes are made: of those that move something."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,8 +11,8 @@ from scipy import sparse
 
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.collective import summed
-from tireroad.fem.matrices.direct import multiply, solve_all, symmetric
-from tireroad.fem.matrices.inertia_relief import statics
+from tireroad.fem.matrices.direct import factorise, multiply, solve_all, solve_parts, symmetric
+from tireroad.fem.matrices.inertia_relief import relieved, statics
 from tireroad.fem.matrices.operators import Operators, Rotation
 
 
@@ -86,18 +87,54 @@ class StaticShapes:
     momentum: np.ndarray
 
 
-def loaded_shapes(
-    operators: Operators,
-    stiffness: PETSc.Mat,
-    probes: sparse.csr_matrix,
-    air: Column | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Own rows (n, p) of K_Omega^-1 b for the probes b (p, 3 s), and b^T K_Omega^-1 b (p, p) m/N. Collective."""
-    loads = on_own_rows(operators, probes)
-    pushed = loads if air is None else sparse.hstack([loads, air.pushed], format="csc")
-    x = statics(operators, stiffness, pushed)
-    x = x if air is None else air.with_air(x)
-    return x, summed(operators.body.comm, loads.T @ x)
+class LoadedShapes:
+    """The shapes K_Omega^-1 b under constant loads b, the air's with them, by one factorisation that is kept until
+    `destroy`. Loads are own rows (n, p); they are solved some at a time, since thousands of them on a fine mesh would
+    not fit in memory. Relieved with a free rim, whose tire has to stand. All of it is collective.
+    """
+
+    def __init__(
+        self, operators: Operators, stiffness: PETSc.Mat, air: Column | None = None
+    ) -> None:
+        self._operators, self._stiffness, self._air = operators, stiffness, None
+        self._factor = factorise(stiffness) if operators.unknowns.rim is None else None
+        if air is not None:
+            self._pushed = self.whole(air.pushed)
+            self._air = air
+
+    def parts(self, loads: np.ndarray | sparse.spmatrix) -> Iterator[tuple[slice, np.ndarray]]:
+        """Which of the loads, and own rows (n, q) of their shapes."""
+        for part, shapes in self._without_air(loads):
+            if self._air is not None:
+                shapes = self._air.with_air(np.hstack([shapes, self._pushed]))
+            yield part, shapes
+
+    def _without_air(
+        self, loads: np.ndarray | sparse.spmatrix
+    ) -> Iterator[tuple[slice, np.ndarray]]:
+        if self._factor is not None:
+            yield from solve_parts(self._factor, self._stiffness, loads)
+        else:
+            yield slice(None), relieved(self._operators, sparse.csr_matrix(loads))
+
+    def whole(self, loads: np.ndarray | sparse.spmatrix) -> np.ndarray:
+        """Own rows (n, p) of all shapes."""
+        out = np.empty(loads.shape)
+        for part, shapes in self.parts(loads):
+            out[:, part] = shapes
+        return out
+
+    def readings(self, rows: sparse.csr_matrix, loads: sparse.spmatrix) -> np.ndarray:
+        """rows^T K_Omega^-1 loads (r, p) of own `rows` (r, n), on every process."""
+        out = np.empty((rows.shape[0], loads.shape[1]))
+        for part, shapes in self.parts(loads):
+            out[:, part] = rows @ shapes
+        return summed(self._operators.body.comm, out)
+
+    def destroy(self) -> None:
+        """Gives the factor's memory back."""
+        if self._factor is not None:
+            self._factor.destroy()
 
 
 def static_shapes(
@@ -170,7 +207,9 @@ def compliance(
     if air is not None:
         rows = sparse.vstack([rows, air.pushed.T], format="csr")
         columns = sparse.hstack([columns, air.pushed], format="csc")
-    answers = summed(operators.body.comm, rows @ statics(operators, stiffness, columns))
+    shapes = LoadedShapes(operators, stiffness)
+    answers = shapes.readings(rows, columns)
+    shapes.destroy()
     return answers if air is None else air.mended(answers)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
@@ -13,21 +15,37 @@ RESIDUAL_TOLERANCE = 1e-8
 _SUMS = 4  # by which a chunk is checked: all of its products took as long as its solves
 
 
-def solve_all(matrix: PETSc.Mat, loads: sparse.csc_matrix) -> np.ndarray:
+def solve_all(matrix: PETSc.Mat, loads: sparse.spmatrix) -> np.ndarray:
     """Own rows of matrix^-1 loads (n, p), by one factorisation. Collective."""
     pc = factorise(matrix)
-    solution = solve_columns(pc, matrix, loads.toarray())
+    solution = solve_columns(pc, matrix, loads)
     pc.destroy()
     return solution
 
 
-def solve_columns(pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray) -> np.ndarray:
+def solve_columns(
+    pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray | sparse.spmatrix
+) -> np.ndarray:
     """Own rows of matrix^-1 columns, (n, k), by the matrix's factorisation; checked. Collective."""
-    factor = pc.getFactorMatrix()
-    chunks = range(0, columns.shape[1], _CHUNK)
-    out = np.hstack([_solve(factor, matrix, columns[:, k : k + _CHUNK]) for k in chunks])
-    factor.destroy()  # this hold on it, which petsc4py would keep for ever
+    out = np.empty(columns.shape)
+    for part, solved in solve_parts(pc, matrix, columns):
+        out[:, part] = solved
     return out
+
+
+def solve_parts(
+    pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray | sparse.spmatrix
+) -> Iterator[tuple[slice, np.ndarray]]:
+    """The same some columns a time, with where they stand: all of a fine mesh's need not fit in memory. Collective."""
+    factor = pc.getFactorMatrix()
+    if not isinstance(columns, np.ndarray):
+        columns = columns.tocsc()
+    for start in range(0, columns.shape[1], _CHUNK):
+        part = slice(start, min(start + _CHUNK, columns.shape[1]))
+        loads = columns[:, part]
+        dense = loads if isinstance(loads, np.ndarray) else loads.toarray()
+        yield part, _solve(factor, matrix, dense)
+    factor.destroy()  # this hold on it, which petsc4py would keep for ever
 
 
 def symmetric(matrix: PETSc.Mat) -> bool:

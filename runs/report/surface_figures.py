@@ -197,13 +197,10 @@ def footprints(points: NDArray, maps: Sequence[NDArray], titles: Sequence[str], 
         here.plot(*place[~active].T, ".", ms=2.0, color="#c3cbd4")
         dots = here.scatter(*place[active].T, s=9, c=values[active], cmap=PRESSURE, norm=scale)
         dots.set(edgecolor="#3e4c59", linewidth=0.4)
-        here.set(title=title, aspect="equal")
+        here.set(title=title, xlabel="x (forward) in mm", ylabel="y (axle) in mm", aspect="equal")
+        here.label_outer()
         here.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         here.grid(visible=False)
-    for here in axes[-1]:
-        here.set_xlabel("x (forward) in mm")
-    for here in axes[:, 0]:
-        here.set_ylabel("y (axle) in mm")
     figure.colorbar(ScalarMappable(scale, PRESSURE), ax=axes, label=unit, pad=0.01)
     return encode(figure, "png")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.path.carried_over import carried_over
@@ -39,6 +40,7 @@ class CoarserStatic(StaticStage):
     """The coarser mesh's static state by a few steps from that of the `run`; from the beginning at a deflection,
     which counts from its own first touch, and where those steps find no balance."""
 
+    forgets: ClassVar[bool] = False  # the run's own matrices serve the next member
     run: Job
     near: Done[StaticState]
 

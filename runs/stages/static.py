@@ -20,6 +20,7 @@ from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.base import kept
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed
@@ -48,6 +49,8 @@ class StaticStage(Computed[StaticState]):
     """The tire inflated, and pressed on the road where the scene has one."""
 
     name: ClassVar[str] = "static"
+    forgets: ClassVar[bool] = True
+    """Whether what an earlier run of the family left makes room: it belongs to another state."""
 
     def inputs(self) -> dict:
         """The tire without its air, the static loads, and the rolling terms where they take part."""
@@ -140,6 +143,8 @@ class StaticStage(Computed[StaticState]):
 
     def produce(self, key: str, record: Record) -> StaticState:
         """As any stage; the last state of a run that failed is of no use then. Collective."""
+        if self.forgets:
+            kept.forget()
         product = super().produce(key, record)
         on_root(self.job.comm, lambda: self.job.path("static_last").unlink(missing_ok=True))
         forget(self.job, self.name)

@@ -10,7 +10,6 @@ from tireroad.fem.garbage import collect
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.stages.base import kept
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Done, Stage
 
@@ -36,8 +35,6 @@ def obtained(stage: Stage) -> Obtained:
             return Obtained(done=Done(key, stage.stored), reused=source, known=known)
         if reason != "absent":
             observe.say(f"{name:9s} computed anew: {path.name} is there, but {reason}")
-        if name == "static":
-            kept.forget()
         record = Record()
         product = stage.produce(key, record)
         collect(job.comm)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tireroad.runs.bench.accuracy import convergence, rough_road
+from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.scene.load import load
 
 
@@ -43,6 +44,23 @@ def test_default_settings_are_a_scene_without_their_keys(tmp_path, monkeypatch) 
     assert scene["contact"] == {"points": {"dx": 0.004, "dy": 0.004}, "youngs_modulus": 1e7}
     assert scene["modal"] == scene["greens"] == {} and scene["time"] == {"duration": 0.16}
     assert taken["sets"] == ("static.error_estimate=false",)
+
+
+def test_a_road_that_was_kept_is_not_run_again(tmp_path, monkeypatch) -> None:
+    made = []
+
+    def table(folder, road, *given) -> Table:
+        made.append(road)
+        return Table(road, [("cost", "s")], [["converged", 1.5]], ["note"])
+
+    monkeypatch.setattr(convergence, "table", table)
+    first, again = (convergence.run(tmp_path / "bench.kept") for _ in range(2))
+    assert first == [table(tmp_path, road) for road in convergence.ROADS]
+    assert [one.rows for one in again] == [one.rows for one in first]
+    assert made == [*convergence.ROADS] * 2
+    monkeypatch.setattr(convergence, "BASE", convergence.BASE | {"modes": 400})
+    convergence.run(tmp_path / "bench.kept")
+    assert len(made) == 9
 
 
 @pytest.mark.parametrize("road", convergence.ROADS)
