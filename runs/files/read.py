@@ -1,10 +1,7 @@
 """The result files of one folder, for reading, and one section of the report made of them."""
 
-import re
-from base64 import b64decode
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import h5py
@@ -29,21 +26,6 @@ class Picture:
     image: str
     caption: str
     live: dict | None = None
-
-    @cached_property
-    def width(self) -> float:
-        """The width (inches) it was drawn in: on a phone it may not become so small that its letters are lost. 0 where
-        the image does not say."""
-        kind, _, data = self.image.partition(";base64,")
-        head = b64decode(data[:2048])
-        if kind.endswith("svg+xml"):
-            points = re.search(rb'<svg [^>]*?width="([0-9.]+)pt"', head, re.DOTALL)
-            return float(points[1]) / 72 if points else 0.0
-        place = head.find(b"pHYs")
-        if place < 0:
-            return 0.0
-        pixels, per_metre = (int.from_bytes(head[k : k + 4], "big") for k in (16, place + 4))
-        return pixels / (0.0254 * per_metre)
 
 
 @dataclass

@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
 from tireroad.runs.report.differences import Row
-from tireroad.runs.report.figures import CYCLE, canvas, encode, styled
+from tireroad.runs.report.figures import CYCLE, WIDE, canvas, encode, styled
 from tireroad.runs.report.surface_figures import PRESSURE, frame
 from tireroad.runs.report.thinned import envelope
 
@@ -27,7 +27,7 @@ def pen(number: int) -> dict[str, str]:
 def levels(rows: Sequence[Row], names: Sequence[str]) -> str:
     """Third octaves of every run, and below them the difference from the first, dB."""
     values = np.array([[np.nan if v is None else v for v in row.values] for row in rows])
-    figure, axes = canvas(9.5, 5.0, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
+    figure, axes = canvas(WIDE, 5.0, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
     place = np.arange(len(rows))
     for number, name in enumerate(names):
         axes[0, 0].plot(place, values[:, number], marker="o", ms=3, label=name, **pen(number))
@@ -45,7 +45,7 @@ def levels(rows: Sequence[Row], names: Sequence[str]) -> str:
 @styled
 def histories(runs: Mapping[str, tuple[Array, Array]]) -> str:
     """Forces (nt,) N over time (nt,) s."""
-    figure, axes = canvas(9.5, 3.0)
+    figure, axes = canvas(WIDE, 3.0)
     for number, (name, (time, force)) in enumerate(runs.items()):
         axes[0, 0].plot(*envelope(time, force), lw=0.9, label=name, **pen(number))
     axes[0, 0].set(xlabel="time in s", ylabel="vertical contact force in N")
@@ -56,9 +56,9 @@ def histories(runs: Mapping[str, tuple[Array, Array]]) -> str:
 @styled
 def footprints(runs: Mapping[str, tuple[Array, Array]]) -> str:
     """Pressure (c,) Pa at contact points (c, 3) m, one scale for all."""
-    columns = min(len(runs), 4)
+    columns = min(len(runs), 3)
     rows = -(-len(runs) // columns)
-    figure, axes = canvas(10.0, 2.8 * rows, rows, columns, sharex=True, sharey=True)
+    figure, axes = canvas(WIDE, 2.6 * rows, rows, columns, sharex=True, sharey=True)
     top = 1e-3 * max(pressure.max() for _, pressure in runs.values())
     scale = Normalize(0.0, top)
     every = np.concatenate([points[pressure > 0, :2] for points, pressure in runs.values()])

@@ -40,7 +40,11 @@ STYLE = {
     "path.simplify_threshold": 0.5,
 }
 styled = matplotlib.rc_context(STYLE)  # decorates every picture
+WIDE = (
+    6.3  # inches of the widest picture: its letters can still be read where a phone shows it whole
+)
 RANGE_DB = 100.0  # what lies further below the highest line of a spectrum is not drawn
+LEAST_RANGE_DB = 20.0  # over less, hairs between bars look like mountains
 
 
 SILENT = -1000.0  # dB: nothing at all, rounded
@@ -95,7 +99,7 @@ def decibels(amplitude: NDArray) -> NDArray:
 def forces(time: NDArray, contact: NDArray, axle: NDArray | None, active: NDArray | None) -> str:
     """Contact and axle force (nt, 3) N over time (nt) s, and the number of points in contact."""
     rows = 3 + (active is not None)
-    figure, axes = line_canvas(9.5, 1.45 * rows + 0.4, rows, sharex=True)
+    figure, axes = line_canvas(WIDE, 1.45 * rows + 0.4, rows, sharex=True)
     for row, name in enumerate(COMPONENTS):
         here: Axes = axes[row, 0]
         here.plot(*envelope(time, contact[:, row]), color=COLOURS[0], label="contact", lw=0.8)
@@ -115,7 +119,7 @@ def forces(time: NDArray, contact: NDArray, axle: NDArray | None, active: NDArra
 @styled
 def spectrum(frequency: NDArray, axle: NDArray, of: str = "axle force") -> str:
     """Amplitude spectrum (nf, 3) N of a force, named `of`, over frequency (nf) Hz."""
-    figure, axes = line_canvas(9.5, 3.4)
+    figure, axes = line_canvas(WIDE, 3.4)
     here, kept = axes[0, 0], frequency > 0
     levels = decibels(axle[kept])
     for column, name in enumerate(COMPONENTS):
@@ -132,7 +136,7 @@ def level_range(level: NDArray) -> tuple[float, float]:
     heard = level[level > SILENT]
     top = float(heard.max(initial=0.0))
     least = max(float(heard.min(initial=top)), top - RANGE_DB)
-    return 10.0 * float(np.floor(least / 10.0)), top
+    return 10.0 * float(np.floor(min(least, top - LEAST_RANGE_DB) / 10.0)), top
 
 
 @styled
@@ -141,7 +145,7 @@ def third_octaves(
 ) -> str:
     """Third-octave levels (nb, 3) dB as bars over band centres (nb) Hz, with their errors (nb, 3) dB; pale where
     a band holds `few` (nb) lines."""
-    figure, axes = line_canvas(9.5, 3.2, below=0.62)
+    figure, axes = line_canvas(WIDE, 3.2, below=0.62)
     here, place = axes[0, 0], np.arange(len(centre))
     finite = np.where(level > SILENT, level, -np.inf)
     floor, _ = level_range(level)
@@ -168,7 +172,7 @@ def lines(
     x: NDArray, curves: Mapping[str, NDArray], labels: tuple[str, str], colours: Sequence[str]
 ) -> str:
     """Named curves (n,) dB over frequency x (n,) Hz > 0, on a logarithmic axis."""
-    figure, ((here,),) = line_canvas(9.5, 3.0)
+    figure, ((here,),) = line_canvas(WIDE, 3.0)
     for (name, values), colour in zip(curves.items(), colours, strict=False):
         here.plot(*peak_hold(x, values), color=colour, label=name)
     here.set(xscale="log", xlabel=labels[0], ylabel=labels[1])
@@ -182,7 +186,7 @@ def lines(
 def driven_points(time: NDArray, force: NDArray | None, moved: NDArray, names: list[str]) -> str:
     """Displacement (nt, k, 3) m, and force (nt, k) N, of k driven points over time (nt) s."""
     rows = len(names)
-    figure, axes = canvas(9.5, 1.9 * rows + 0.4, rows, sharex=True)
+    figure, axes = canvas(WIDE, 1.9 * rows + 0.4, rows, sharex=True)
     for point, name in enumerate(names):
         here: Axes = axes[point, 0]
         for column, component in enumerate(COMPONENTS):
@@ -204,7 +208,7 @@ def driven_points(time: NDArray, force: NDArray | None, moved: NDArray, names: l
 @styled
 def receptance(frequency: NDArray, pairs: Sequence[tuple[str, NDArray]]) -> str:
     """Magnitude (dB re 1 m/N) and phase (degrees) of named receptances (nf) m/N."""
-    figure, axes = canvas(9.5, 4.4, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
+    figure, axes = canvas(WIDE, 4.4, 2, sharex=True, gridspec_kw={"height_ratios": (2, 1)})
     kept = frequency > 0
     levels = decibels(np.stack([values[kept] for _, values in pairs]))
     for number, (name, values) in enumerate(pairs):

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tireroad.modal.states import growing
 from tireroad.runs.report import live
-from tireroad.runs.report.figures import COLOURS, MUTED, canvas, encode, line_canvas, styled
+from tireroad.runs.report.figures import COLOURS, MUTED, WIDE, canvas, encode, line_canvas, styled
 
 _ORDERS = range(1, 9)
 
@@ -15,7 +15,7 @@ _ORDERS = range(1, 9)
 @styled
 def eigenvalues(eigenvalue: NDArray) -> str:
     """Growth rate Re s over frequency Im s / 2π of eigenvalues (n) 1/s, from 0 Hz up."""
-    figure, axes = line_canvas(9.5, 3.0)
+    figure, axes = line_canvas(WIDE, 3.0)
     here = axes[0, 0]
     shown = eigenvalue[eigenvalue.imag >= 0.0]
     unstable = growing(eigenvalue)[eigenvalue.imag >= 0.0]
@@ -38,7 +38,7 @@ def campbell(
 ) -> str:
     """Branches (v, b) Hz over speed (v,) rad/s, and in km/h where the rolling `radius` (m) is known; behind them the
     lines n Omega / 2 pi, n = 1, 2, ..., of a standing road."""
-    figure, ((axes,),) = canvas(7.6, 4.2)
+    figure, ((axes,),) = canvas(WIDE, 4.2)
     x, label, scale = _axis(speed, radius)
     highest = 1.05 * np.nanmax(damped if undamped is None else np.fmax(damped, undamped))
     for n in _ORDERS:

@@ -15,7 +15,7 @@ from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
 from tireroad.runs.report.drawn import once
-from tireroad.runs.report.figures import COLOURS, MUTED, bare_canvas, canvas, encode, styled
+from tireroad.runs.report.figures import COLOURS, MUTED, WIDE, bare_canvas, canvas, encode, styled
 
 PRESSURE = LinearSegmentedColormap.from_list(
     "pressure", ("#ffffff", "#fdd9a0", "#f59053", "#d4402f", "#7f1d3f", "#2b0a2e")
@@ -83,9 +83,13 @@ def carry(field: NDArray, ends: NDArray, weight: NDArray) -> NDArray:
 @once
 @styled
 def deformed(points: NDArray, moved: NDArray, quads: NDArray, road: float | None) -> str:
-    """The loaded tire in three panels: surface, side view and section; road (m) or None."""
-    figure, axes = bare_canvas(10.2, 3.9, 1, 3, gridspec_kw={"width_ratios": (1.25, 1.0, 0.75)})
-    figure.subplots_adjust(0.01, 0.16, 0.99, 0.93, 0.22)
+    """The loaded tire in three panels: surface, side view and, below, section; road (m) or None."""
+    figure, axes = bare_canvas(
+        WIDE, 4.7, 2, 2, gridspec_kw={"width_ratios": (1.2, 1.0), "height_ratios": (1.45, 1)}
+    )
+    figure.subplots_adjust(0.01, 0.1, 0.97, 0.94, 0.25, 0.5)
+    for here in axes[1]:
+        here.remove()
     size = 1e3 * np.linalg.norm(moved, axis=1)
     scale = ScalarMappable(Normalize(size.min(), max(size.max(), 1e-9)), "YlGnBu")
     if road is not None:
@@ -101,8 +105,9 @@ def deformed(points: NDArray, moved: NDArray, quads: NDArray, road: float | None
     bottom = cut(points, quads, points[:, 0], lower)
     top = cut(points, quads, points[:, 0], ~lower)
     shown = [(top, COLOURS[1], "opposite (turned)"), (bottom, COLOURS[0], "over the road")]
-    _profile(axes[0, 2], points, moved, (1, 2), shown, road)
-    axes[0, 2].set(title="section under the axle", xlabel="y in mm")
+    section = figure.add_subplot(axes[1, 0].get_gridspec()[1, :])
+    _profile(section, points, moved, (1, 2), shown, road)
+    section.set(title="section under the axle", xlabel="y in mm", ylabel="z in mm")
     return encode(figure, "png")
 
 
@@ -136,9 +141,9 @@ def _profile(
 def modes(points: NDArray, quads: NDArray, shapes: NDArray, titles: Sequence[str]) -> str:
     """Mode shapes (m, s, 3), m ≤ 6, exaggerated; coloured by the displacement along the normal."""
     rows = 1 + (len(titles) > 3)
-    height = 3.35 * rows
+    height = 2.3 * rows
     # Axes without labels need no layout, which takes as long as the drawing.
-    figure, axes = bare_canvas(9.8, height, rows, 3)
+    figure, axes = bare_canvas(WIDE, height, rows, 3)
     figure.subplots_adjust(0.0, 0.6 / height, 1.0, 1 - 0.25 / height, 0.05, 0.1)
     radius = np.hypot(points[:, 0], points[:, 2]).max()
     normal = outward(points, quads)
@@ -173,19 +178,15 @@ def outward(points: NDArray, quads: NDArray) -> NDArray:
 
 @once
 @styled
-def footprints(
-    points: NDArray, maps: Sequence[NDArray], titles: Sequence[str], unit: str, wide: float
-) -> str:
-    """Maps (n of (c)) of pressure or force on contact points (c, 3) m, one colour scale for all.
-
-    `wide` is the width of the picture in inches; its height follows from the footprint's.
-    """
+def footprints(points: NDArray, maps: Sequence[NDArray], titles: Sequence[str], unit: str) -> str:
+    """Maps (n of (c)) of pressure or force on contact points (c, 3) m, two in a row, one colour scale for all."""
     place = 1e3 * points[:, :2]
     touched = np.any([values > 0 for values in maps], axis=0)
     low, high = frame(place[touched] if touched.any() else place)
-    panel = (wide - 1.6) / len(maps)
+    columns = min(len(maps), 2)
+    rows, panel = -(-len(maps) // columns), (WIDE - 1.6) / columns
     height = np.clip(panel * (high[1] - low[1]) / (high[0] - low[0]) + 0.8, 1.7, 4.5)
-    figure, axes = canvas(wide, height, 1, len(maps), sharey=True)
+    figure, axes = canvas(WIDE, rows * height, rows, columns, sharex=True, sharey=True)
     top = max(np.nan_to_num(values).max(initial=0.0) for values in maps)
     scale, mesh = Normalize(0.0, max(top, 1e-12)), triangles(place)
     for here, values, title in zip(axes.flat, maps, titles, strict=True):
@@ -196,10 +197,10 @@ def footprints(
         here.plot(*place[~active].T, ".", ms=2.0, color="#c3cbd4")
         dots = here.scatter(*place[active].T, s=9, c=values[active], cmap=PRESSURE, norm=scale)
         dots.set(edgecolor="#3e4c59", linewidth=0.4)
-        here.set(title=title, xlabel="x (forward) in mm", aspect="equal")
+        here.set(title=title, xlabel="x (forward) in mm", ylabel="y (axle) in mm", aspect="equal")
+        here.label_outer()
         here.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         here.grid(visible=False)
-    axes[0, 0].set_ylabel("y (axle) in mm")
     figure.colorbar(ScalarMappable(scale, PRESSURE), ax=axes, label=unit, pad=0.01)
     return encode(figure, "png")
 
@@ -231,7 +232,7 @@ def space_time(time: NDArray, points: NDArray, force: NDArray) -> str:
     centres = np.linspace(place[0], place[-1], count)
     width = centres[1] - centres[0]
     share = np.maximum(1.0 - np.abs(1e3 * points[:, :1] - centres) / width, 0.0)
-    figure, axes = canvas(9.5, 2.6)
+    figure, axes = canvas(WIDE, 2.6)
     picture = axes[0, 0].imshow(
         (np.nan_to_num(force) @ share).T / width,
         extent=(time[0], time[-1], place[0] - width / 2, place[-1] + width / 2),

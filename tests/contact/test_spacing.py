@@ -1,5 +1,6 @@
 """How far apart contact points are that the program chooses, and what they settle to on the nodes of the mesh."""
 
+from operator import is_
 from types import SimpleNamespace
 
 import numpy as np
@@ -115,4 +116,4 @@ def test_nodes_settle_on_their_tread(wheel) -> None:
 def test_nodes_without_a_tread_have_their_static_state(wheel) -> None:
     setup, response, face = wheel
     settled, rise = setup.settled(response, face, Contact(tread="none"))
-    assert rise == 0.0 and settled.patch == setup.patch
+    assert rise == 0.0 and all(map(is_, vars(settled.patch).values(), vars(setup.patch).values()))

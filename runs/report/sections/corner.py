@@ -43,7 +43,7 @@ def wheel(results: Results, section: Section, time: NDArray) -> None:
 
 @figures.styled
 def _drawn(time: NDArray, lines: dict[str, NDArray]) -> str:
-    figure, axes = figures.canvas(9.5, 2.6)
+    figure, axes = figures.canvas(figures.WIDE, 2.6)
     for colour, (name, line) in zip(figures.COLOURS, lines.items(), strict=False):
         axes[0, 0].plot(*envelope(time, line), color=colour, label=name)
     axes[0, 0].set(xlabel="time in s", ylabel="height in mm", xlim=(time[0], time[-1]))

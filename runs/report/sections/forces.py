@@ -76,7 +76,7 @@ def pressure_maps(results: Results, section: Section, time: NDArray, vertical: N
     ]
     points = results.array("contact.h5", "points")
     maps = [values for values, _ in shown]
-    picture = surface_figures.footprints(points, maps, titles, shown[0][1], 10.2)
+    picture = surface_figures.footprints(points, maps, titles, shown[0][1])
     caption = "The footprint while rolling; in the still picture when the force is least, mean, greatest, last."
     section.show(picture, caption, rolling(points, time, normal, area))
 

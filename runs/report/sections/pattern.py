@@ -31,7 +31,7 @@ def tread(results: Results, section: Section) -> None:
 
 @figures.styled
 def _drawn(s: NDArray, y: NDArray, depth: NDArray, points: NDArray, begun: NDArray) -> str:
-    figure, axes = figures.canvas(9.5, 3.0, 1, 2)
+    figure, axes = figures.canvas(figures.WIDE, 3.0, 1, 2)
     around, patch = axes[0]
     part = s <= _SHOWN
     around.pcolormesh(1e3 * s[part], 1e3 * y, 1e3 * depth[part].T, cmap="Greys", shading="nearest")

@@ -28,7 +28,7 @@ def texture(results: Results, section: Section) -> None:
 
 @figures.styled
 def _drawn(wavelength: NDArray, level: NDArray, labels: tuple[str, str]) -> str:
-    figure, axes = figures.canvas(9.5, 2.6)
+    figure, axes = figures.canvas(figures.WIDE, 2.6)
     axes[0, 0].step(wavelength, level, where="mid", color=figures.COLOURS[0])
     axes[0, 0].set(xlabel=labels[0], ylabel=labels[1], xscale="log")
     axes[0, 0].set_xlim(wavelength[0], wavelength[-1])

@@ -109,7 +109,7 @@ def footprint(results: Results, section: Section) -> None:
         section.facts.append(("mean contact pressure", quantity(mean, "Pa")))
     if area is not None:
         caption = f"Contact pressure of {quantity(float(force[:, 2].sum()), 'N')}"
-    picture = surface_figures.footprints(points, [values], ["footprint at rest"], unit, 6.2)
+    picture = surface_figures.footprints(points, [values], ["footprint at rest"], unit)
     section.show(picture, caption + ". Grey dots: surface points that do not touch.")
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.runs.files.read import Results, Section
-from tireroad.runs.report.figures import COLOURS, COMPONENTS, canvas, encode, styled
+from tireroad.runs.report.figures import COLOURS, COMPONENTS, WIDE, canvas, encode, styled
 from tireroad.runs.report.quantities import quantity
 
 POINTS = 3  # drawn at most
@@ -51,7 +51,7 @@ def transmissibilities(
 ) -> str:
     """Magnitudes of (f, 3, k) in dB of the `reference`, a row a point."""
     rows = min(found.shape[2], POINTS)
-    figure, axes = canvas(9.5, 2.4 * rows + 0.4, rows, sharex=True)
+    figure, axes = canvas(WIDE, 2.4 * rows + 0.4, rows, sharex=True)
     floor = LEAST * np.abs(found).max()
     for point in range(rows):
         here = axes[point, 0]

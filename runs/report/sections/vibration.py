@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from tireroad.contact.results.levels import nominal
 from tireroad.runs.files.read import Results, Section
 from tireroad.runs.report import live
-from tireroad.runs.report.figures import COLOURS, RANGE_DB, encode, line_canvas, styled
+from tireroad.runs.report.figures import COLOURS, RANGE_DB, WIDE, encode, line_canvas, styled
 
 
 def vibration(results: Results) -> Section:
@@ -40,7 +40,7 @@ def vibration(results: Results) -> Section:
 @styled
 def level_lines(frequency: NDArray, level: NDArray, unit: str) -> str:
     """A level (f,) over frequency (f,) Hz."""
-    figure, ((axes,),) = line_canvas(9.5, 2.8)
+    figure, ((axes,),) = line_canvas(WIDE, 2.8)
     axes.plot(frequency, level, color=COLOURS[0], linewidth=1.0)
     top = float(level.max())
     axes.set(xlabel="frequency in Hz", ylabel=f"level in {unit}", ylim=(top - RANGE_DB, top + 5))
@@ -51,7 +51,7 @@ def level_lines(frequency: NDArray, level: NDArray, unit: str) -> str:
 @styled
 def radiated_power(centre: NDArray, plain: NDArray, weighted: NDArray) -> str:
     """Levels (b,) dB re 1 pW, as they are and A-weighted, over band centres (b,) Hz."""
-    figure, ((axes,),) = line_canvas(9.5, 3.0, below=0.62)
+    figure, ((axes,),) = line_canvas(WIDE, 3.0, below=0.62)
     place, top = np.arange(len(centre)), float(plain.max())
     floor = 10.0 * np.floor((top - RANGE_DB) / 10.0)
     for column, (level, name) in enumerate(((plain, "unweighted"), (weighted, "A-weighted"))):

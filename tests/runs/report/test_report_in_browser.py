@@ -45,6 +45,9 @@ LATE = """<script>addEventListener("load", async () => {
     asked: performance.getEntriesByType("resource").map(r => r.name).filter(n => !n.startsWith("data:")),
     live: figures.filter(f => f.querySelector("script")).length,
     drawn: figures.filter(f => f.dataset.drawn).length,
+    aside: [...document.querySelectorAll("figure, figure *")].filter(e => e.scrollWidth > e.clientWidth + 1
+      && getComputedStyle(e).overflowX != "visible").length,
+    widest: Math.max(...figures.map(f => f.querySelector("img").naturalWidth)),
     blank: figures.filter(f => !f.querySelector("img").naturalWidth).length,
     canvases: document.querySelectorAll(".live canvas").length,
   });
@@ -90,6 +93,8 @@ def test_the_page_is_drawn_and_fits(measured: dict[int, dict], width: int) -> No
     assert found["asked"] == []
     assert found["scroll"] == found["client"] == width
     assert found["blank"] == 0
+    # Whole at any width, and drawn for no more than 6.3 inches at 130 dots, so that a phone leaves letters to read.
+    assert found["aside"] == 0 and found["widest"] <= 820
     assert found["drawn"] == found["live"] >= 5
     assert found["canvases"] >= found["live"]
     assert found["first"] < 2 * 844
