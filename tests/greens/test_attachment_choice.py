@@ -1,11 +1,14 @@
 """Attachment modes of many points: those that are left out cost no more than the stated tolerance."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.fem.matrices import probe
+from tireroad.fem.matrices import direct, probe
+from tireroad.fem.matrices.compliance import LoadedShapes, compliance, on_own_rows
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.path.loading import Loader
@@ -67,6 +70,25 @@ def test_what_is_left_out_is_within_the_tolerance(tire, speed, monkeypatch):
     assert error[0] < 1e-9
     assert error.max() < 1.5e-3
     assert len(reduced.eigenvalue) < 0.9 * len(every.eigenvalue)
+
+
+@pytest.mark.long
+@pytest.mark.mpi
+def test_fields_of_all_loads_are_never_held(tire, monkeypatch):
+    """The flexibility of 200 loads, solved four at a time, takes a third of their fields at most, and is that of all fields."""
+    operators, _, probes = tire
+    few = sparse.identity(probes.shape[1], format="csr")[::7][:200]
+    monkeypatch.setattr(direct, "_CHUNK", 4)
+    tracemalloc.start()
+    flexibility = compliance(operators, operators.stiffness, few, few)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    loads = on_own_rows(operators, few)
+    assert flexibility.shape == (200, 200) and peak < 8 * loads.shape[0] * 200 / 3
+    shapes = LoadedShapes(operators, operators.stiffness)
+    fields = shapes.whole(loads)
+    shapes.destroy()
+    np.testing.assert_allclose(flexibility, COMM.allreduce(loads.T @ fields), atol=1e-18)
 
 
 def test_directions_that_are_left_out_add_up_to_less_than_the_tolerance():

@@ -6,7 +6,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.fem.matrices.direct import factorise, solve_all, solve_columns
+from tireroad.fem.matrices.direct import factorise, solve_all, solve_columns, solve_parts
 
 
 def chain(stiffness: float) -> tuple[PETSc.Mat, sparse.csr_matrix]:
@@ -25,7 +25,11 @@ def test_many_right_hand_sides() -> None:
     matrix, whole = chain(1.0)
     loads = np.random.default_rng(1).normal(size=(40, 150))
     exact = np.linalg.solve(whole.toarray(), loads)
-    assert np.allclose(solve_all(matrix, sparse.csc_matrix(loads)), exact, rtol=1e-10, atol=1e-12)
+    whole = solve_all(matrix, sparse.csc_matrix(loads))
+    assert np.allclose(whole, exact, rtol=1e-10, atol=1e-12)
+    parts = list(solve_parts(factorise(matrix), matrix, loads))
+    assert [part.stop - part.start for part, _ in parts] == [64, 64, 22]
+    assert np.array_equal(np.hstack([solved for _, solved in parts]), whole)
 
 
 def test_one_wrong_answer_of_many_is_noticed() -> None:
