@@ -163,8 +163,9 @@ def _steps(mu: float) -> float:
     """Steps a period of the oscillation of that mu."""
     if mu <= 0.0:
         return math.inf
-    cosine = (1 - 4 * mu) / (1 + 2 * mu) if math.isfinite(mu) else -2.0
-    return 2 * math.pi / math.acos(max(cosine, -1.0))
+    # cos a = (1 - 4 mu) / (1 + 2 mu) for the angle a of a step, by its half: a cosine of 1 says nothing of a small one.
+    half = 3 * mu / (1 + 2 * mu) if math.isfinite(mu) else 1.0
+    return math.pi / math.asin(math.sqrt(min(half, 1.0)))
 
 
 def warning(share: float) -> str:

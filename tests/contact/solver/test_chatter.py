@@ -66,6 +66,7 @@ def test_steps_of_an_oscillation(theta: float, steps: float) -> None:
     mu = (1 - np.cos(theta)) / (4 + 2 * np.cos(theta))
     assert _steps(mu) == pytest.approx(steps, rel=1e-3)
     assert _steps(0.1**2 / 12) == pytest.approx(62.83, rel=1e-2)
+    assert _steps(1e-18) == pytest.approx(np.pi / np.sqrt(3e-18))
     assert _steps(1.3) == 2.0 and _steps(np.inf) == 2.0 and _steps(0.0) == np.inf
 
 
