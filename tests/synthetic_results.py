@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from synthetic_scene import SCENE
 
-from tireroad.runs.files.checksum import BLOCK, seal
+from tireroad.runs.files.checksum import BLOCK, seal, signed
 
 CROWN, SECTION, HALF_ARC, ROAD = 0.32, 0.10, np.radians(120.0), -0.309
 
@@ -222,7 +222,7 @@ def write_results(
 ) -> Path:
     """Fills `directory` with every file of the contract; returns it."""
     directory.mkdir(parents=True, exist_ok=True)
-    (directory / "scene.toml").write_text(SCENE)
+    (directory / "scene.toml").write_text(signed(SCENE))
     (directory / "summary.json").write_text(json.dumps(summary()))
     touching = write_static(directory / "static.h5", around, across)
     write_modes(directory / "modes.h5", around, across, modes)

@@ -60,9 +60,9 @@ def signed(text: str) -> str:
 
 
 def is_as_signed(text: str) -> bool:
-    """Whether a text is what `signed` made; so is one that it never saw."""
+    """Whether a text is what `signed` made: one cut before its last line is not."""
     lines, found, digest = text.rpartition(_SIGNATURE)
-    return not found or digest.strip() == _text_digest(lines)
+    return bool(found) and digest.strip() == _text_digest(lines)
 
 
 def signed_table(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -77,9 +77,11 @@ def test_a_changed_scene_is_not_resumed(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(signed("load = 300.0\n"))
     check_kept_scene(tmp_path)
-    path.write_text(path.read_text().replace("300", "700"))
-    with pytest.raises(InputError, match="has changed since the run wrote it"):
-        check_kept_scene(tmp_path)
+    whole = path.read_text()
+    for changed in (whole.replace("300", "700"), "load = 300.0\n", "load = 30"):
+        path.write_text(changed)
+        with pytest.raises(InputError, match="has changed since the run wrote it"):
+            check_kept_scene(tmp_path)
 
 
 def test_a_changed_summary_is_not_believed(tmp_path: Path) -> None:
