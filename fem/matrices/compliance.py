@@ -125,7 +125,7 @@ class LoadedShapes:
         return out
 
     def readings(self, rows: sparse.csr_matrix, loads: sparse.spmatrix) -> np.ndarray:
-        """rows^T K_Omega^-1 loads (r, p) of own `rows` (r, n), on every process."""
+        """rows K_Omega^-1 loads (r, p) of own columns of `rows` (r, n), on every process."""
         out = np.empty((rows.shape[0], loads.shape[1]))
         for part, shapes in self.parts(loads):
             out[:, part] = rows @ shapes
