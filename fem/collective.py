@@ -49,4 +49,9 @@ def alike(comm: MPI.Comm, value: object) -> bool:
 
 def broadcast(comm: MPI.Comm, value: T, root: int = 0) -> T:
     """The object that `root` has, on every process; its arrays are sent as they are. Collective."""
-    return value if comm.size == 1 else pkl5.Intracomm(comm).bcast(value, root)
+    if comm.size == 1:
+        return value
+    sent = pkl5.Intracomm(comm).bcast(value, root)
+    return (
+        value if comm.rank == root else sent
+    )  # what others open by way of root's object stays open

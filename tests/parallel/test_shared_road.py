@@ -92,6 +92,14 @@ def test_one_process_reads_and_all_have_the_same_bits(monkeypatch, folder, kind:
     assert COMM.allreduce(len(read)) == 1
 
 
+def test_the_process_that_reads_keeps_its_own(folder: Path) -> None:
+    """A copy in its place would close the temporary file that the others are about to open by its number."""
+    surface = written(folder, "csv")
+    own = made(surface) if COMM.rank == 0 else None
+    share(surface, COMM)
+    assert own is None or made(surface) is own
+
+
 def test_a_file_written_anew_is_read_anew(folder: Path) -> None:
     surface = written(folder, "npz")
     share(surface, COMM)

@@ -36,8 +36,13 @@ def share(surface: RoadKind, comm: MPI.Comm) -> None:
 
 
 def _sent(road: Road | None, node: MPI.Comm) -> Road | None:
-    """What the first process of a machine has, where this one can open it. Collective."""
+    """What the first process of a machine has, where this one can open it. Collective.
+
+    No process leaves before all have opened it: the first one may close its temporary file from then on.
+    """
     try:
         return broadcast(node, road)
     except OSError:
         return None
+    finally:
+        node.Barrier()
