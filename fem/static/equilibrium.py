@@ -57,9 +57,8 @@ class Equilibrium(Forces):
         return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
 
     def _make_contact(self) -> LinearContact | None:
-        """Settles the sets of contact within a step; None where the tangent is not symmetric, or the road not flat."""
-        settles = self.shape.flat and not self._damped
-        return LinearContact(self.body.comm, self._system, self.road) if settles else None
+        """Settles the sets of contact within a step; None where the road is not flat."""
+        return LinearContact(self.body.comm, self._system, self.road) if self.shape.flat else None
 
     @property
     def _in_its_coordinates(self) -> Unrolled | None:

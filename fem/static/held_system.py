@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import Timing
 
+_CHUNK = 64  # columns solved for at a time
 _SINGULAR = (-6, -10)  # MUMPS's INFOG(1): structurally, numerically
 
 
@@ -71,7 +72,8 @@ class HeldSystem:
         self._comm, self._timing = comm, timing
         self._ksp = _solver(comm, matrix, factorisation)
         self._right, self._x = matrix.createVecs()
-        self._reaction: PETSc.Mat | None = None
+        self._reaction: PETSc.Mat | None = None  # rows of the held dofs, and their columns
+        self._pull: PETSc.Mat | None = None
 
     def take(
         self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
@@ -97,10 +99,15 @@ class HeldSystem:
         return self._checked()
 
     def _keep_reaction(self, matrix: PETSc.Mat, rows: np.ndarray) -> None:
-        if self._reaction is not None:
-            self._reaction.destroy()
+        for part in (self._reaction, self._pull):
+            if part is not None:
+                part.destroy()
+        first, last = matrix.getOwnershipRange()
+        every = PETSc.IS().createStride(last - first, first, 1, comm=self._comm)
         own = PETSc.IS().createGeneral(rows, comm=self._comm)
-        self._reaction = matrix.createSubMatrix(own, None)
+        self._reaction = matrix.createSubMatrix(own, every)
+        self._pull = matrix.createSubMatrix(every, own)
+        every.destroy()
         own.destroy()
 
     def _moved(self, matrix: PETSc.Mat, at_held: np.ndarray) -> Moved:
@@ -148,43 +155,57 @@ class HeldSystem:
         """Motion (m) of the owned dofs and force (N) at the held ones, by a unit force on each of some dofs, or by a unit
         motion of those that are held: (owned, count), (held, count).
 
-        `numbers` (k,) of this process's `dofs` (k,) among the `count` of all. The matrix is taken for symmetric.
+        `numbers` (k,) of this process's `dofs` (k,) among the `count` of all.
         """
-        assert self._reaction is not None, "columns() before take()"
+        motion = np.empty((self._x.getLocalSize(), count))
+        force = np.empty((len(self._held), count))
         with self._timing("columns"):
-            right, x = self._dense(count), self._dense(count)
-            self._fill(right, numbers, dofs)
-            factors = self._ksp.getPC().getFactorMatrix()
-            factors.matSolve(right, x)
-            factors.destroy()
-            held = np.isin(dofs, self._held)
-            x.getDenseArray()[dofs[held], numbers[held]] = 1.0
-            forces = self._reaction.matMult(x)
-            found = x.getDenseArray().copy(), forces.getDenseArray().copy()
-            for part in (right, x, forces):
-                part.destroy()
+            for start in range(0, count, _CHUNK):
+                stop = min(start + _CHUNK, count)
+                some = (numbers >= start) & (numbers < stop)
+                found = self._columns(numbers[some] - start, dofs[some], stop - start)
+                motion[:, start:stop], force[:, start:stop] = found
+        return motion, force
+
+    def _columns(
+        self, numbers: np.ndarray, dofs: np.ndarray, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As many as fit in memory several times over."""
+        assert self._reaction is not None, "columns() before take()"
+        right, x = self._dense(count), self._dense(count)
+        self._fill(right, numbers, dofs)
+        factors = self._ksp.getPC().getFactorMatrix()
+        factors.matSolve(right, x)
+        factors.destroy()
+        held = np.isin(dofs, self._held)
+        x.getDenseArray()[dofs[held], numbers[held]] = 1.0
+        forces = self._reaction.matMult(x)
+        found = x.getDenseArray().copy(), forces.getDenseArray().copy()
+        for part in (right, x, forces):
+            part.destroy()
         return found
 
     def _fill(self, right: PETSc.Mat, numbers: np.ndarray, dofs: np.ndarray) -> None:
         """Unit forces, and of held dofs what their unit motion takes at the free ones."""
-        assert self._reaction is not None, "columns() before take()"
-        begin, first = self._x.getOwnershipRange()[0], self._reaction.getOwnershipRange()[0]
-        for number, dof in zip(numbers.tolist(), dofs.tolist(), strict=True):
-            row = int(np.searchsorted(self._held, dof))
-            if row < len(self._held) and self._held[row] == dof:
-                where, values = self._reaction.getRow(first + row)
-                right.setValues(where, number, -values)
-            else:
-                right.setValue(begin + dof, number, 1.0)
-        right.assemble()
+        assert self._pull is not None, "columns() before take()"
+        held = np.isin(dofs, self._held)
+        moved = self._dense(right.getSize()[1], self._pull.getSizes()[1])
+        moved.getDenseArray()[np.searchsorted(self._held, dofs[held]), numbers[held]] = -1.0
+        moved.assemble()
+        forces = self._pull.matMult(moved)
+        right.getDenseArray()[:] = forces.getDenseArray()
         right.getDenseArray()[self._held] = 0.0
+        right.getDenseArray()[dofs[~held], numbers[~held]] = 1.0
+        right.assemble()
+        moved.destroy()
+        forces.destroy()
 
     def spread(self, motion: np.ndarray) -> np.ndarray:
         """The motion of all owned dofs, those included that follow others."""
         return motion
 
-    def _dense(self, count: int) -> PETSc.Mat:
-        rows = self._x.getSizes()
+    def _dense(self, count: int, rows: tuple | None = None) -> PETSc.Mat:
+        rows = rows or self._x.getSizes()
         matrix = PETSc.Mat().createDense((rows, (None, count)), comm=self._comm)
         matrix.setUp()
         return matrix

@@ -8,13 +8,17 @@ from tireroad.fem.static import linear_contact
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.linear_contact import LinearContact, held_step
 from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.material import compound
 
 SOFT = compound("neo-hookean", 1100.0, youngs_modulus=5e6, poisson_ratio=0.49)
+# Its tangent is not symmetric: columns of the matrix are not its rows.
+ROLLING = Rolling(speed=40.0, damping=2000.0, stiffness_damping=0.0)
 
 
-def inflated(make_body, comm=MPI.COMM_SELF):
-    loader = Loader(Equilibrium(make_body(segments=9, material=SOFT, comm=comm)), lambda _: None)
+def inflated(make_body, comm=MPI.COMM_SELF, rolling=AT_REST):
+    body = make_body(segments=9, material=SOFT, comm=comm)
+    loader = Loader(Equilibrium(body, rolling), lambda _: None)
     loader.inflate(1.5e5)
     return loader
 
@@ -28,10 +32,10 @@ def taken(equilibrium, active):
 
 @pytest.mark.slow
 @pytest.mark.mpi
-@pytest.mark.parametrize("load", [None, 300.0])
-def test_columns_are_as_good_as_a_factorisation(make_body, monkeypatch, load):
+@pytest.mark.parametrize(("load", "rolling"), [(None, AT_REST), (300.0, AT_REST), (300.0, ROLLING)])
+def test_columns_are_as_good_as_a_factorisation(make_body, monkeypatch, load, rolling):
     """Nodes added and nodes let go, with and without a load: the step, forces and height of a fresh factor."""
-    loader = inflated(make_body, MPI.COMM_WORLD)
+    loader = inflated(make_body, MPI.COMM_WORLD, rolling)
     problem, road = loader.equilibrium, loader.equilibrium.road
     height = loader.touch + 4e-3
     road.height = height
@@ -74,13 +78,14 @@ def test_the_step_leaves_no_node_pulled_and_none_below_the_road(make_body):
 
 
 @pytest.mark.slow
-def test_the_same_state_with_no_more_tangents(make_body, monkeypatch):
+@pytest.mark.parametrize("rolling", [AT_REST, ROLLING])
+def test_the_same_state_with_no_more_tangents(make_body, monkeypatch, rolling):
     """As where each change of the sets costs a tangent."""
     ways = []
     for settle in (True, False):
         if not settle:
             monkeypatch.setattr(Equilibrium, "_make_contact", lambda self: None)
-        loader = inflated(make_body)
+        loader = inflated(make_body, rolling=rolling)
         loader.carry(400.0)
         ways.append(loader)
     settled, plain = ways
