@@ -14,7 +14,7 @@ from tireroad.fem.static.equilibrium import Equilibrium, Step
 from tireroad.fem.static.path.stepping import Attempt, Show, march
 from tireroad.fem.static.path.way import Way
 from tireroad.fem.static.symmetry.half_turn import HalfTurnEquilibrium, looks_the_same
-from tireroad.fem.static.symmetry.round import RoundEquilibrium
+from tireroad.fem.static.symmetry.round import RoundEquilibrium, inflated
 from tireroad.fem.static.tread_surface import TreadSurface
 
 
@@ -61,10 +61,11 @@ class Loader:
     def _start_round(self, pressure: float) -> bool:
         """Whether equilibrium is found from the round shape. Collective."""
 
-        def shape() -> np.ndarray:
-            section = RoundEquilibrium(self.body, self.equilibrium.rolling)
+        def inflate(section: RoundEquilibrium) -> None:
             Loader(section, self.report)._inflate_in_steps(pressure)
-            return section.on(self.body.lattice)
+
+        def shape() -> np.ndarray:
+            return inflated(self.body, self.equilibrium.rolling, inflate).on(self.body.lattice)
 
         before = self.body.u.x.array.copy()
         self.body.set_displacement(on_root(self.body.comm, shape))

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from tireroad.fem.errors import LoadingStopped
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.path.loading import Loader
-from tireroad.fem.static.virtual_work import Rolling
+from tireroad.fem.static.symmetry.round import RoundEquilibrium, inflated
+from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cords import Cords
 from tireroad.fem.tire.material import compound
 
@@ -68,3 +70,41 @@ def test_any_number_of_processes_inflates_alike(belted):
         loader.inflate(PRESSURE)
     wanted = alone.body.displacement()
     np.testing.assert_allclose(shared.body.displacement(), wanted, atol=1e-10 * abs(wanted).max())
+
+
+def _inflate(section: RoundEquilibrium) -> None:
+    Loader(section, lambda progress: None)._inflate_in_steps(PRESSURE)
+
+
+@pytest.mark.slow
+def test_a_tire_that_does_not_inflate_while_it_turns_turns_when_it_is_inflated(belted):
+    """Steps of pressure stop at 0 Pa at 120 rad/s; the state is that to which steps of the speed lead from rest."""
+    body, tried = belted(), []
+
+    def inflate(section: RoundEquilibrium) -> None:
+        tried.append(section.rolling.speed)
+        _inflate(section)
+
+    found = inflated(body, Rolling(speed=120.0), inflate)
+    assert tried == [120.0, 0.0, 120.0]
+    assert found.out_of_balance() < 1e-9 * found.force_scale
+    wanted = np.zeros_like(found.body.u.x.array)
+    for speed in (0.0, 60.0, 100.0, 120.0):
+        section = RoundEquilibrium(body, Rolling(speed=speed))
+        section.body.u.x.array[:] = wanted
+        _inflate(section)
+        wanted = section.body.u.x.array.copy()
+    np.testing.assert_allclose(found.body.u.x.array, wanted, atol=1e-9 * abs(wanted).max())
+
+
+@pytest.mark.parametrize(("rolling", "tried"), [(AT_REST, [0.0]), (ROLLING, [60.0, 0.0])])
+def test_what_does_not_inflate_at_rest_is_an_error(belted, rolling, tried):
+    speeds = []
+
+    def stops(section: RoundEquilibrium) -> None:
+        speeds.append(section.rolling.speed)
+        raise LoadingStopped("static: stops")
+
+    with pytest.raises(LoadingStopped):
+        inflated(belted(), rolling, stops)
+    assert speeds == tried
