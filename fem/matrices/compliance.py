@@ -29,10 +29,9 @@ def rotating_stiffness(
         stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # not every copy knows it
         return stiffness
     assert rotation is not None, "a speed needs the matrices of the rotating frame"
-    different = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
     convective = rotation.convective if inertia == "full" else rotation.body_convective
-    stiffness.axpy(speed**2, convective, different)
-    stiffness.axpy(speed * damping[0], rotation.body, different)
+    add_part(stiffness, speed**2, convective)
+    add_part(stiffness, speed * damping[0], rotation.body)
     if damping[1]:
         scaled = rotation.body.copy()
         inverse_mass = scaled.createVecLeft()
@@ -57,10 +56,19 @@ def rotating_damping(
     if speed:
         assert rotation is not None, "a speed needs the matrices of the rotating frame"
         gyroscopic = rotation.gyroscopic if inertia == "full" else rotation.body
-        matrix.axpy(2 * speed, gyroscopic, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        add_part(matrix, 2 * speed, gyroscopic)
     add_diagonal(matrix, damping[0] * operators.mass)
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, speed == 0)
     return matrix
+
+
+def add_part(matrix: PETSc.Mat, factor: float, part: PETSc.Mat) -> None:
+    """matrix += factor part, whose entries are all among those of `matrix`: where they are the same ones, as of all matrices of
+    one mesh on one process, a sum of the numbers alone takes a tenth of the time. Collective."""
+    structure = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
+    if matrix.comm.size == 1 and all(map(np.array_equal, matrix.getRowIJ(), part.getRowIJ())):
+        structure = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+    matrix.axpy(factor, part, structure)
 
 
 def add_diagonal(matrix: PETSc.Mat, values: np.ndarray) -> None:

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.matrices import probe
-from tireroad.fem.matrices.compliance import compliance, rotating_stiffness
+from tireroad.fem.matrices.compliance import add_part, compliance, rotating_stiffness
 from tireroad.fem.matrices.operators import Operators
 
 
@@ -76,3 +77,19 @@ def test_a_tire_that_nothing_holds_has_no_compliance(make_body):
     load = probe.nodes(np.array([7]), len(body.surface.ids))
     with pytest.raises(ConvergenceError, match="singular"):
         compliance(operators, operators.stiffness, load, load)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_a_part_with_other_entries_is_added_where_they_belong(share: float) -> None:
+    """A sum of the numbers alone would put them elsewhere."""
+    whole = sparse.random(60, 60, 0.2, format="csr", random_state=1) + sparse.identity(60)
+    part = whole.multiply(sparse.random(60, 60, share, random_state=3) > 0).tocsr()
+    matrices = []
+    for given in (whole, part):
+        given.sort_indices()
+        csr = given.indptr, given.indices, given.data
+        matrices.append(PETSc.Mat().createAIJ(given.shape, csr=csr, comm=PETSc.COMM_SELF))
+    add_part(matrices[0], 2.5, matrices[1])
+    starts, columns, values = matrices[0].getValuesCSR()
+    found = sparse.csr_matrix((values, columns, starts))
+    assert abs(found - (whole + 2.5 * part)).max() < 1e-15
