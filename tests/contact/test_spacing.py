@@ -35,7 +35,7 @@ def nodes(apart: float):
     ("width", "speed", "apart", "expected"),
     [
         (0.0161, 15.9, 0.0057, 3.2e-3),  # a fifth of the width
-        (0.13, 22.0, 0.008, 5.5e-3),  # a tenth of the shortest wave told, 22 m/s over 400 Hz
+        (0.13, 22.2, 0.0072, 4.6e-3),  # a twelfth of the shortest wave told, 22.2 m/s over 400 Hz
         (0.13, 0.0, 0.008, 2.6e-2),  # of a tire that stands
         (0.0161, 15.9, 0.012, 6.0e-3),  # half of what nodes are apart
     ],
