@@ -21,6 +21,7 @@ from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator
 
 from tireroad.contact.patch import Patch
+from tireroad.contact.rolling import looking_ahead
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -198,7 +199,7 @@ class OnPoints:
         self._transposed = self._weights.T.tocsr()
         self.comm = tire.comm
         self.same_step = self._same_step()
-        self.inertia_force = tire.inertia_force
+        self.inertia_force, self.look_ahead = tire.inertia_force, looking_ahead(tire)
         self.snapshot, self.restore = tire.snapshot, tire.restore
 
     def start(self, force: np.ndarray) -> None:

@@ -3,7 +3,6 @@
 from typing import Protocol
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from tireroad.contact.patch import Patch
@@ -107,18 +106,14 @@ def _spread(patch: Patch, tire: Array) -> Array:
     return tire if patch.weights is None else patch.weights @ (patch.weights @ tire.T).T
 
 
-def step_solver(
-    spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0, comm: MPI.Comm = MPI.COMM_SELF
-) -> ContactSolver:
+def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> ContactSolver:
     """The solver for A = W tire W^T + C~, `tire` (p, p) m/N between the patch's nodes; C~ times `at_once`.
-
-    The processes of `comm` share its products: they call it together, and each finds the same bits.
 
     InputError when the matrix of that many points is not affordable, or A not positive definite.
     """
     name, count = solver_name(spec, patch), len(patch.points)
     if patch.places is not None and count > DENSE_POINTS:
-        product = _product(spec, patch, tire, at_once, comm)
+        product = _product(spec, patch, tire, at_once)
         return make_solver(name, product)
     if count > MOST_DENSE:
         raise InputError(
@@ -127,7 +122,7 @@ def step_solver(
             'solver = "auto"'
         )
     matrix = _spread(patch, tire) + at_once * tread_matrix(spec, patch)
-    return make_solver(name, matrix, comm)
+    return make_solver(name, matrix)
 
 
 def tread_matrix(spec: Spec, patch: Patch, index: slice | NDArray[np.intp] = slice(None)) -> Array:
@@ -169,7 +164,7 @@ def _out_of_reach(patch: Patch) -> InputError | None:
     )
 
 
-def _product(spec: Spec, patch: Patch, tire: Array, at_once: float, comm: MPI.Comm) -> Compliance:
+def _product(spec: Spec, patch: Patch, tire: Array, at_once: float) -> Compliance:
     """A as a product. A grid has more points than nodes: without a tread A would be singular."""
     if not spec.law.compliant:
         raise InputError(
@@ -182,7 +177,7 @@ def _product(spec: Spec, patch: Patch, tire: Array, at_once: float, comm: MPI.Co
     def influence(x: Array, y: Array, a: Array, b: Array) -> Array:
         return at_once * plain(x, y, a, b)
 
-    return SpreadCompliance(tire, patch.weights, KernelTread(patch.places, influence), comm)
+    return SpreadCompliance(tire, patch.weights, KernelTread(patch.places, influence))
 
 
 def _farthest(patch: Patch) -> float:

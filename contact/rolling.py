@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -19,6 +20,7 @@ from mpi4py import MPI
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.friction import Friction
+from tireroad.contact.solver.together import Solved, Together
 from tireroad.contact.tread.creep import TreadMemory
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 
@@ -46,6 +48,13 @@ class Tire(Protocol):
     def snapshot(self) -> dict[str, np.ndarray]: ...
 
     def restore(self, kept: dict[str, np.ndarray]) -> None: ...
+
+
+@runtime_checkable
+class AheadTire(Tire, Protocol):
+    """A tire that can do part of its next step before it knows the force of this one (greens.recursion)."""
+
+    def look_ahead(self) -> None: ...
 
 
 @runtime_checkable
@@ -122,15 +131,16 @@ def roll(
     friction: Friction | None = None,
     done: int = 0,
     memory: TreadMemory | None = None,
+    motion: bool = True,
 ) -> Iterator[Instant]:
     """Yield the state after each of `steps` steps of `step` seconds. Collective when the tire is.
 
     `done` of them were taken before, and tire, solver and friction are as they were then.
 
-    The solver was made for A + C~. Every process solves the same small contact problem on the same bits; the rows of the
-    products in it are shared by the processes of `tire.comm`. With `friction`, the tire's forces and
+    The solver was made for A + C~. Of the processes of `tire.comm` the root solves the contact problem, and all have its
+    answer; solver and friction of the others stay as they were, the tire and `memory` go on in each. With `friction`, the tire's forces and
     displacements are three times as many: z, then x, then y of all points. `memory`: of a tread that creeps,
-    whose part within the step the solver knows.
+    whose part within the step the solver knows. Without `motion` nothing is `moved`, for callers that want forces alone.
     """
     count = len(patch.points)
     horizontal = np.zeros((count, 2)) if patch.pull is None else patch.pull
@@ -138,20 +148,18 @@ def roll(
     touching = None if done else patch.force > 0
     answer = LoadedColumns.of(tire.same_step, tire.comm)
     settle = tire.settle if isinstance(tire, NonlinearTire) else None
+    together = Together(tire.comm, count, looking_ahead(tire))
     for time, road in _roads(drive, patch, step, steps, done):
         free = tire.predict()
         tread = memory.predict() if memory else np.zeros((1, count))
-        beside = tread[1:].ravel() if len(tread) > 1 else 0.0
         past = friction.state() if friction and settle else {}
         while True:
-            q = patch.gap + free[:count] + tread[0] - road
-            if friction is None:
-                force = solver.solve(q, touching, reference=patch.force)
-                change = force - patch.force
-            else:
-                given = q, touching, patch.force, free[count:] + beside
-                force, horizontal = friction.solve(solver, *given)
-                change = np.concatenate([force - patch.force, *horizontal.T])
+            given = patch, free, tread, road, touching
+            found = together(partial(_contact, solver, friction, *given), friction is not None)
+            change = found.force - patch.force
+            if friction:
+                horizontal = found.horizontal
+                change = np.concatenate([change, *horizontal.T])
             touching = None
             again = settle(change) if settle else None
             if again is None:
@@ -159,25 +167,51 @@ def roll(
             free = again
             if friction:
                 friction.set_state(past)
+        moved = free + answer @ change if motion else free[:0]
         tire.advance(change)
         if memory:
             memory.advance(change)
-        moved = free + answer @ change
         axle = -tire.inertia_force()
-        axle += patch.resultant(force, horizontal)
+        axle += patch.resultant(found.force, horizontal)
         yield Instant(
             time,
-            force,
+            found.force,
             horizontal,
-            solver.gap,
+            found.gap,
             moved[:count],
             axle,
-            solver.residual,
-            solver.penetration,
-            int(np.count_nonzero(force)),
+            found.residual,
+            found.penetration,
+            int(np.count_nonzero(found.force)),
             change,
             moved,
         )
+
+
+def looking_ahead(tire: Tire) -> Callable[[], None]:
+    """What a tire does before it knows the force of a step: nothing where it cannot."""
+    return tire.look_ahead if isinstance(tire, AheadTire) else lambda: None
+
+
+def _contact(
+    solver: ContactSolver,
+    friction: Friction | None,
+    patch: Patch,
+    free: np.ndarray,
+    tread: np.ndarray,
+    road: np.ndarray,
+    touching: np.ndarray | None,
+) -> Solved:
+    """The contact of a step: the tire's motion `free` and the tread's `tread` from past forces, m."""
+    count = len(road)
+    q = patch.gap + free[:count] + tread[0] - road
+    if friction is None:
+        force, horizontal = solver.solve(q, touching, reference=patch.force), np.zeros((0, 2))
+    else:
+        beside = tread[1:].ravel() if len(tread) > 1 else 0.0
+        given = q, touching, patch.force, free[count:] + beside
+        force, horizontal = friction.solve(solver, *given)
+    return Solved(force, solver.gap, horizontal, solver.residual, solver.penetration)
 
 
 def _roads(

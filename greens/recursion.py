@@ -10,31 +10,37 @@ and b1 = h phi1. Cost: one pass over output and input, 4 q (r + k) flops and 16 
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from mpi4py import MPI
-from scipy import linalg
 
 from tireroad.fem.collective import joined
+from tireroad.greens.one_step import NO_BLOCK, Block, weights
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 from tireroad.greens.response import Response
 
 
 class Recursion:
-    """Response states of a `Response`, spread over the processes of `comm` by eigenvalue.
+    """Response states of a `Response`, spread over the processes of `comm` by eigenvalue; with `ahead`, over all but the
+    root, which solves the contact problem while they look ahead.
 
     `predict` gives the displacement at the end of the next step if the new force were zero (without
     the residual); `advance` takes the new force. `same_step` (r, k) m/N is what a unit new force
     adds to it at once, the residual included. A step reads the output matrix once and of the input
     matrix the columns of the forces that are not zero. The rate of momentum is three more outputs,
     so that processes meet once a step.
+
+    Looking ahead: with z_n = e^{sh} z_{n-1} + b0 P f_{n-1} + b1 P f_n = y_n + b1 P f_n the displacement C y_{n+1} at the end of
+    the step after is C e^{sh} y_n, known before f_n is, and C (e^{sh} b1 + b0) P f_n, of which the root reads the columns
+    of the forces that are not zero.
     """
 
-    def __init__(self, *, response: Response, step: float, scheme: str, comm: MPI.Comm) -> None:
+    def __init__(
+        self, *, response: Response, step: float, scheme: str, comm: MPI.Comm, ahead: bool = False
+    ) -> None:
         self.comm = comm
         self.step = step
-        mine = np.arange(comm.rank, len(response.eigenvalue), comm.size)
+        self._idle = int(ahead and comm.size > 1)  # processes without states, from the root on
+        mine = self._mine(np.arange(len(response.eigenvalue)))
         s = response.eigenvalue[mine]
         self._decay = np.exp(s * step)
         self._old, self._new = weights(s * step, step, scheme)
@@ -44,13 +50,15 @@ class Recursion:
         into = np.ascontiguousarray(response.input[mine])
         self._output = np.ascontiguousarray(output.conj()).view(float)
         self._block = None
-        if comm.rank == 0 and len(response.block):
-            self._block = _Block(response, step, scheme)
+        if comm.rank == self._idle and len(response.block):
+            self._block = Block(response, step, scheme)
         self.state = np.zeros(len(mine), complex)
         self._push = np.zeros(len(mine), complex)  # P f of the step before
         self._free = self.state
         self._begun = response.direct_momentum_rate()
         self._add_same_step(response, into)
+        self._known: np.ndarray | None = None
+        self._next = self._answers_next(into) if self._idle else None
         self._late = None
         if response.pulse and scheme == "linear":
             # A pulse one step long answers the mean of a linear force over the step.
@@ -69,7 +77,27 @@ class Recursion:
         direct = self._reduce(direct)
         self.same_step = response.residual + direct[:-3]
         pushes = np.ascontiguousarray(into.T).view(float).T
-        self._input = LoadedColumns(np.vstack([pushes, direct[-3:] + self._begun]))
+        self._input = LoadedColumns(pushes)
+        # By itself, or processes with other numbers of states would round it otherwise.
+        self._into_rate = direct[-3:] + self._begun
+
+    def _answers_next(self, into: np.ndarray) -> LoadedColumns | None:
+        """What a unit force does by the end of the step after its own, on the root process. Collective."""
+        pushed = (self._decay * self._new + self._old)[:, None] * into
+        direct = self._output @ np.ascontiguousarray(pushed.T).view(float).T
+        if self._block:
+            direct += self._block.direct_next()
+        direct = self._reduce(direct)
+        return LoadedColumns(direct) if self.comm.rank == 0 else None
+
+    def _mine(self, every: np.ndarray) -> np.ndarray:
+        """Of all states (q, ...) those of this process."""
+        return self._of(self.comm.rank, every)
+
+    def _of(self, rank: int, every: np.ndarray) -> np.ndarray:
+        """Of all states (q, ...) those of a process, a view."""
+        owners = self.comm.size - self._idle
+        return every[rank - self._idle :: owners] if rank >= self._idle else every[:0]
 
     def _reduce(self, values: np.ndarray) -> np.ndarray:
         if self.comm.size == 1:
@@ -81,7 +109,7 @@ class Recursion:
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
         self._force = force
-        self._push = (self._input @ force)[:-3].view(complex)
+        self._push = (self._input @ force).view(complex)
         self._rate = self._begun @ force
         if self._block:
             self._block.start(force)
@@ -89,21 +117,40 @@ class Recursion:
     def predict(self) -> np.ndarray:
         """Displacement (r,) m at the end of the step with no new force. Collective."""
         self._free = self._decay * self.state + self._old * self._push
-        out = self._output @ self._free.view(float)
         if self._block:
-            out += self._block.predict()
-        out = self._reduce(out)
+            self._block.move()
+        out = self._reduce(self._seen() if self._known is None else self._known_of_next())
         self._rate = out[-3:]
         out = out[:-3]
         return out if self._late is None else out + self._late @ self._force
 
+    def _seen(self) -> np.ndarray:
+        """This process's part of the outputs with no new force."""
+        out = self._output @ self._free.view(float)
+        if self._block:
+            out += self._block.seen()
+        return out
+
+    def _known_of_next(self) -> np.ndarray:
+        """The same in two parts: what was known ahead, and of the root process what the force just taken adds."""
+        known, self._known = self._known, None
+        assert known is not None, "after look_ahead()"
+        return known if self._next is None else self._next @ self._force
+
+    def look_ahead(self) -> None:
+        """Find what of the next outputs does not depend on the force of this step; between `predict` and `advance`."""
+        if not self._idle:
+            return
+        self._known = self._output @ (self._decay * self._free).view(float)
+        if self._block:
+            self._known += self._block.seen_next()
+
     def advance(self, force: np.ndarray) -> None:
         """Take the force (k,) N at the end of the step; after `predict`. Local to each process."""
         self._force = force
-        pushed = self._input @ force
-        self._push = pushed[:-3].view(complex)
+        self._push = (self._input @ force).view(complex)
         self.state = self._free + self._new * self._push
-        self._rate = self._rate + pushed[-3:]
+        self._rate = self._rate + self._into_rate @ force
         if self._block:
             self._block.advance(force)
 
@@ -125,23 +172,22 @@ class Recursion:
         out = np.empty((len(own), len(every)), complex)
         first = 0
         for rank in range(self.comm.size):
-            share = out[:, rank :: self.comm.size]
-            share[:] = every[first : first + share.shape[1]].T
-            first += share.shape[1]
+            share = self._of(rank, out.T)
+            share[:] = every[first : first + len(share)]
+            first += len(share)
         return out
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """All states in the order of the response, the same for any number of processes. Collective."""
         kept = {"state": self._gathered(self.state), "push": self._gathered(self._push)}
         kept["push_force"] = self._force
-        block = self._block.snapshot() if self._block else _NO_BLOCK
-        return kept | self.comm.bcast(block)
+        block = self._block.snapshot() if self._block else NO_BLOCK
+        return kept | self.comm.bcast(block, root=self._idle)
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from a snapshot, between `advance` and `predict`."""
-        mine = slice(self.comm.rank, None, self.comm.size)
-        self.state, self._push = kept["state"][mine].copy(), kept["push"][mine].copy()
-        self._force = kept["push_force"]
+        self.state, self._push = (self._mine(kept[name]).copy() for name in ("state", "push"))
+        self._force, self._known = kept["push_force"], None
         if self._block:
             self._block.restore(kept)
 
@@ -149,88 +195,9 @@ class Recursion:
         parts = self.comm.allgather(values)
         out = np.empty(sum(map(len, parts)), complex)
         for rank, part in enumerate(parts):
-            out[rank :: self.comm.size] = part
+            self._of(rank, out)[:] = part
         return out
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N: sum_k (int rho phi_k) eta_k'', after `advance`."""
         return self._rate
-
-
-class _Block:
-    """The same recursion for the dense block of near-defective states, on the root process only.
-
-    Its last three outputs are the rate of momentum, the jump with the force left out.
-    """
-
-    def __init__(self, response: Response, step: float, scheme: str) -> None:
-        block, push = response.block, response.block_input
-        self._output = np.vstack([response.block_output, response.block_momentum @ block @ block])
-        self._decay, self._old, self._new = block_steps(block, push, step, scheme)
-        size, forces = push.shape
-        self.state = np.zeros(size)
-        self._force = np.zeros(forces)
-
-    def direct(self) -> np.ndarray:
-        return self._output @ self._new
-
-    def start(self, force: np.ndarray) -> None:
-        self._force = force
-
-    def predict(self) -> np.ndarray:
-        self._free = self._decay @ self.state + self._old @ self._force
-        return self._output @ self._free
-
-    def advance(self, force: np.ndarray) -> None:
-        self._force = force
-        self.state = self._free + self._new @ force
-
-    def snapshot(self) -> dict[str, np.ndarray]:
-        return {"block_state": self.state, "block_force": self._force}
-
-    def restore(self, kept: dict[str, np.ndarray]) -> None:
-        self.state, self._force = kept["block_state"], kept["block_force"]
-
-
-def block_steps(
-    block: np.ndarray, push: np.ndarray, step: float, scheme: str
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """e^{Th} (b, b), and b0 P and b1 P (b, k) of the block T with its input P."""
-    size, forces = push.shape
-    # expm of [[T, P, 0], [0, 0, I/h], [0, 0, 0]] h carries e^{Th}, h phi1 P and h phi2 P at once.
-    wide = np.zeros((size + 2 * forces, size + 2 * forces))
-    wide[:size, :size] = block * step
-    wide[:size, size : size + forces] = push * step
-    wide[size : size + forces, size + forces :] = np.eye(forces)
-    moved = linalg.expm(wide)[:size]
-    first, second = moved[:, size : size + forces], moved[:, size + forces :]
-    old, new = (first - second, second) if scheme == "linear" else (0 * first, first)
-    return moved[:, :size], old, new
-
-
-_NO_BLOCK = {"block_state": np.zeros(0), "block_force": np.zeros(0)}
-
-
-def weights(x: np.ndarray, step: float, scheme: str) -> tuple[np.ndarray, np.ndarray]:
-    """b0 and b1 for x = s h."""
-    phi1, phi2 = _phi(x)
-    if scheme == "linear":
-        return step * (phi1 - phi2), step * phi2
-    return np.zeros_like(x), step * phi1
-
-
-def _phi(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """phi1 and phi2; by their series below 0.3, where the closed forms cancel."""
-    small = np.abs(x) < 0.3
-    safe = np.where(small, 1.0, x)
-    phi1 = np.where(small, _series(x, 1), np.expm1(safe) / safe)
-    phi2 = np.where(small, _series(x, 2), (phi1 - 1) / safe)
-    return phi1, phi2
-
-
-def _series(x: np.ndarray, order: int) -> np.ndarray:
-    """phi_order(x) = sum_k x^k / (k + order)!, for |x| < 0.3 to full precision."""
-    out = np.zeros_like(x)
-    for k in range(14, -1, -1):
-        out = out * x + 1 / math.factorial(k + order)
-    return out

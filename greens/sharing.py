@@ -15,10 +15,9 @@ _LIBRARY = "user_api", "internal_api", "version", "architecture"
 def sharers(response: Response, comm: MPI.Comm) -> MPI.Comm:
     """The processes that a loop by this response is worth spreading over: all of `comm`, or each one by itself.
 
-    They share the matrices' rows too, those of the tire's answer within the step and of the contact's solver; what is left
-    to each is the factor of the points that touch. 625 points and 410 states have 8 MB, 1,296 and 1,010 42 MB. Each
-    decides by its own numbers what to ask the others for next: processes whose BLAS rounds otherwise, on nodes of
-    another kind, would wait for each other for ever, so they do not share. Collective.
+    The root solves the contact problem while the others look ahead (greens.recursion). 625 points and 410 states have 8 MB,
+    1,296 and 1,010 42 MB. From what the loop gives each decides for itself whether it goes on: processes whose BLAS rounds
+    otherwise, on nodes of another kind, would wait for each other for ever, so they do not share. Collective.
     """
     size = response.output.nbytes + response.input.nbytes
     return comm if size >= SHARED_FROM and alike(comm, _kernels()) else MPI.COMM_SELF

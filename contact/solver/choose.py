@@ -1,7 +1,6 @@
 """The contact solver that a scene names."""
 
 import numpy as np
-from mpi4py import MPI
 
 from tireroad.contact.solver.complementarity import ActiveSet
 from tireroad.contact.solver.conditions import Array, ContactSolver, checked_compliance
@@ -11,13 +10,10 @@ from tireroad.contact.solver.usual_set import UsualSet
 from tireroad.fem.errors import InputError
 
 
-def make_solver(
-    name: str, matrix: Array | Compliance, comm: MPI.Comm = MPI.COMM_SELF
-) -> ContactSolver:
+def make_solver(name: str, matrix: Array | Compliance) -> ContactSolver:
     """The solver named "active-set", "projected-cg" or "snes-vi" (`contact.solver`). InputError for another.
 
-    The active set of a product is found from the set that usually touches: a matrix is kept of points that do. The
-    processes of `comm` share products with a matrix, and call the first two solvers together.
+    The active set of a product is found from the set that usually touches: a matrix is kept of points that do.
     """
     if name == "snes-vi":
         from tireroad.contact.solver.snes_vi import SnesVI  # PETSc only where it is asked for
@@ -28,6 +24,6 @@ def make_solver(
             f'contact.solver = "{name}" is unknown: take "active-set", "projected-cg" or "snes-vi"'
         )
     if isinstance(matrix, np.ndarray):
-        whole = MatrixCompliance(checked_compliance(matrix), comm)
+        whole = MatrixCompliance(checked_compliance(matrix))
         return ActiveSet(whole) if name == "active-set" else ProjectedCG(whole)
     return UsualSet(matrix) if name == "active-set" else ProjectedCG(matrix)

@@ -10,7 +10,6 @@ slip it is sure for mu ||A_zz^-1 A_zh|| < 1, where the answer is unique too.
 from __future__ import annotations
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -34,8 +33,7 @@ class Friction:
 
     `weights` W (c, p) takes nodes to points (None: they are the same). `shear` of the tread, None: the tread is rigid to
     horizontal forces; `pressed` (c,) N, the forces from which it is sheared by pressure, None: the static ones.
-    `horizontal` (c, 2) N is the last answer, `turns` its number of rounds. The processes of `comm` share the products
-    with `tire` and solve together.
+    `horizontal` (c, 2) N is the last answer, `turns` its number of rounds.
     """
 
     def __init__(
@@ -45,7 +43,6 @@ class Friction:
         weights: sparse.csr_matrix | None,
         shear: Shear | None = None,
         pressed: Array | None = None,
-        comm: MPI.Comm = MPI.COMM_SELF,
     ) -> None:
         p = len(tire) // 3
         self._nodal = weights is None
@@ -53,8 +50,8 @@ class Friction:
         self._brush, self._shear, self._pressed = brush, shear, pressed
         self._w, self._w2 = w, sparse.block_diag([w, w], format="csr")
         self._down, self._down2 = self._w.T.tocsr(), self._w2.T.tocsr()
-        self._zh, self._hz = LoadedColumns(tire[:p, p:], comm), LoadedColumns(tire[p:, :p], comm)
-        self._hh = LoadedColumns(tire[p:, p:], comm)
+        self._zh, self._hz = LoadedColumns(tire[:p, p:]), LoadedColumns(tire[p:, :p])
+        self._hh = LoadedColumns(tire[p:, p:])
         self.horizontal = self._before = np.zeros((w.shape[0], 2))
         self.turns = 0
         self._key = b""

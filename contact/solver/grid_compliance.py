@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
 from tireroad.contact.tread.kernel import KernelTread
-from tireroad.greens.residual.sparse_columns import LoadedColumns, SharedRows
+from tireroad.greens.residual.sparse_columns import LoadedColumns
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -57,19 +56,11 @@ class _ProductAround:
 class SpreadCompliance:
     """`tire` (p, p) m/N between nodes, `weights` W (c, p), the tread a convolution; nothing dense.
 
-    Preconditioned by the tread alone: the tire adds few large eigenvalues, one iteration each. The processes of `comm`
-    share the product with `tire`.
+    Preconditioned by the tread alone: the tire adds few large eigenvalues, one iteration each.
     """
 
-    def __init__(
-        self,
-        tire: Array,
-        weights: sparse.csr_matrix,
-        tread: KernelTread,
-        comm: MPI.Comm = MPI.COMM_SELF,
-    ) -> None:
+    def __init__(self, tire: Array, weights: sparse.csr_matrix, tread: KernelTread) -> None:
         self._tire, self._weights, self._tread = tire, weights, tread
-        self._rows = SharedRows(len(tire), comm)
         self._transposed = weights.T.tocsr()
         own = weights.multiply(weights @ tire).sum(axis=1)
         self.diagonal = tread.diagonal + np.asarray(own).ravel()
@@ -86,16 +77,15 @@ class SpreadCompliance:
 
     def apply(self, force: Array) -> Array:
         """Approach (c,) m under forces (c,) N."""
-        moved = self._tire[self._rows.mine] @ (self._transposed @ force)
-        return self._weights @ self._rows.gathered(moved) + self._tread.apply(force)
+        moved = self._tire @ (self._transposed @ force)
+        return self._weights @ moved + self._tread.apply(force)
 
 
 class MatrixCompliance:
-    """A given matrix (c, c) m/N, preconditioned by its diagonal; products are shared by the processes of `comm`."""
+    """A given matrix (c, c) m/N, preconditioned by its diagonal."""
 
-    def __init__(self, matrix: Array, comm: MPI.Comm = MPI.COMM_SELF) -> None:
-        self._matrix, self._rows = matrix, SharedRows(len(matrix), comm)
-        self._columns = LoadedColumns(matrix, comm)
+    def __init__(self, matrix: Array) -> None:
+        self._matrix, self._columns = matrix, LoadedColumns(matrix)
         self.diagonal = matrix.diagonal().copy()
 
     def block(self, rows: Index, columns: Index) -> Array:
@@ -110,7 +100,7 @@ class MatrixCompliance:
 
     def apply(self, force: Array) -> Array:
         """Approach (c,) m under forces (c,) N."""
-        return self._rows.gathered(self._matrix[self._rows.mine] @ force)
+        return self._matrix @ force
 
     def precondition(self, approach: Array) -> Array:
         """Forces (c,) N of an approach (c,) m, point by point."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tireroad.greens.recursion import block_steps, weights
+from tireroad.greens.one_step import block_steps, weights
 from tireroad.greens.response import Response
 
 

@@ -10,9 +10,9 @@ from scipy.sparse.linalg import LinearOperator
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Loaded entries in a run, on average, from which each run is a product of its own: it costs as much as copying so many
-# columns of a thousand numbers less one.
-LONG = 3
+# Numbers of the columns in a run, on average, from which each run is a product of its own, in place of copying all
+# columns side by side first: 16 columns of 430 numbers, 7 of 1,000, 3 of 2,000. No fewer columns than two.
+LONG, FEWEST = 7000, 2
 
 
 class SharedRows:
@@ -59,7 +59,8 @@ class LoadedColumns:
         """This process's rows of A f for f (k,)."""
         index = force.nonzero()[0]
         breaks = np.flatnonzero(index[1:] - index[:-1] > 1)
-        if len(index) < LONG * (len(breaks) + 1):
+        loaded, runs = len(index), len(breaks) + 1
+        if loaded < FEWEST * runs or loaded * self._own.shape[1] < LONG * runs:
             return force[index] @ self._own[index]
         begins = [index[0], *index[breaks + 1].tolist()]
         ends = [*(index[breaks] + 1).tolist(), index[-1] + 1]
@@ -79,22 +80,22 @@ class LoadedColumns:
 
 
 class ColumnsAround:
-    """Columns of A (n, n) at `index` (a,), copied once for many products: half of a product is to find and copy them."""
+    """Columns of A (n, n), of which no rows are shared, at `index` (a,), copied once for many products: half of a product is
+    to find and copy them."""
 
     def __init__(self, whole: LoadedColumns, index: Index) -> None:
         self._whole, self._index = whole, index
         self._columns = whole.columns.take(index, axis=0)
-        self._own = self._columns[:, whole.rows.mine]
 
     def block(self) -> Array:
         """A (a, a) between them, column-major."""
         return self._columns.take(self._index, axis=1).T
 
     def spread(self, force: Array) -> Array:
-        """A f (n,) for f (n,), best of forces at `index` and few others. Collective where the rows are shared."""
-        moved = force[self._index] @ self._own
+        """A f (n,) for f (n,), best of forces at `index` and few others."""
+        moved = force[self._index] @ self._columns
         rest = force.copy()
         rest[self._index] = 0.0
         if rest.any():
             moved += self._whole.product(rest)
-        return self._whole.rows.gathered(moved)
+        return moved

@@ -1,4 +1,4 @@
-"""The contact loop on several processes: states and the rows of the solver's products spread over them."""
+"""The contact loop on several processes: one solves for the contact, the states are spread over the others."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def run() -> list[Table]:
         ("difference of the mean load", "-"),
     ]
     notes = [
-        "Medians over blocks of steps on a wavy road; one BLAS thread a process. States and rows are spread where the "
+        "Medians over blocks of steps on a wavy road; one BLAS thread a process. States are spread where the "
         f"two matrices between points and states have {SHARED_FROM / 1e6:.0f} MB or more: below, processes do not wait "
         "for each other."
     ]
@@ -76,10 +76,10 @@ def measured(states: int, side: int, comm: MPI.Comm) -> dict:
     patch = oval_patch((side, side), (0.16 / side, 0.12 / side), 500.0)
     response = Strip(speed=SPEED).response(patch.points, max(states // 20, 1), 10)
     sharing = sharers(response, comm)
-    tire = Recursion(response=response, step=STEP, scheme="linear", comm=sharing)
+    tire = Recursion(response=response, step=STEP, scheme="linear", comm=sharing, ahead=True)
     tread = half_space_compliance(patch.points[:, :2], patch.half_sizes, 5e6, 0.45)
     drive = Drive(_wavy, lambda t: 0.0, SPEED)
-    solver = make_solver("active-set", tire.same_step + tread, sharing)
+    solver = make_solver("active-set", tire.same_step + tread)
     instants = roll(tire, solver, patch, drive, STEP, STEPS)
     blocks, load = [], 0.0
     for _ in range(STEPS // BLOCK):

@@ -9,10 +9,8 @@ from scipy import linalg
 from systems import make
 
 from tireroad.fem.errors import InputError
-from tireroad.greens import sharing
 from tireroad.greens.convolution import Convolution
 from tireroad.greens.recursion import Recursion
-from tireroad.greens.sharing import sharers
 
 STEPS = 60
 
@@ -149,51 +147,6 @@ def test_inertia_force_is_the_rate_of_momentum() -> None:
 def test_too_long_a_convolution_is_refused() -> None:
     with pytest.raises(InputError, match="needs no history"):
         Convolution(response=make().response(), step=1e-6, steps=10**8)
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("scheme", ["linear", "constant"])
-def test_the_same_on_any_number_of_processes(scheme) -> None:
-    system = make(m=11)
-    force = some_force(4)
-    response = system.response()
-    alone, spread = (
-        Recursion(response=response, step=1e-3, scheme=scheme, comm=c)
-        for c in (MPI.COMM_SELF, MPI.COMM_WORLD)
-    )
-    one, all_of_them = march(alone, force), march(spread, force)
-    assert np.abs(one - all_of_them).max() < 1e-12 * np.abs(one).max()
-    assert np.abs(alone.inertia_force() - spread.inertia_force()).max() < 1e-10
-
-
-@pytest.mark.mpi
-def test_a_small_loop_is_not_shared_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each process takes all of it, and a large one its part: the same motion, the same states at a checkpoint."""
-    response, force = make(speed=60.0).response(), some_force(4)
-    assert sharers(response, MPI.COMM_WORLD).size == 1
-    monkeypatch.setattr(sharing, "SHARED_FROM", 0.0)
-    found = []
-    for comm in (MPI.COMM_SELF, sharers(response, MPI.COMM_WORLD)):
-        tire = Recursion(response=response, step=1e-3, scheme="linear", comm=comm)
-        moved = march(tire, force)
-        states = [tire.state, 2 * tire.state]
-        found.append((moved, tire.snapshot()["state"], tire.everywhere(states)))
-    assert comm.size == MPI.COMM_WORLD.size
-    for alone, shared in zip(*found, strict=True):
-        np.testing.assert_allclose(shared, alone, atol=1e-12 * np.abs(alone).max())
-    np.testing.assert_allclose(found[1][2][1], 2 * found[1][1], rtol=1e-13)
-
-
-@pytest.mark.mpi
-def test_processes_that_round_otherwise_do_not_share_a_loop(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Nodes of two kinds: each process would go on by its own rounding, and wait for messages that never come."""
-    response = make(speed=60.0).response()
-    monkeypatch.setattr(sharing, "SHARED_FROM", 0.0)
-    assert sharers(response, MPI.COMM_WORLD).size == MPI.COMM_WORLD.size
-    monkeypatch.setattr(sharing, "_kernels", lambda: f"kernels of {MPI.COMM_WORLD.rank}")
-    assert sharers(response, MPI.COMM_WORLD).size == 1
 
 
 def test_dirac_residual_answers_with_a_pulse_of_one_step() -> None:

@@ -8,8 +8,10 @@ from tireroad.contact.rolling import Drive, roll
 from tireroad.contact.solver.choose import make_solver
 from tireroad.contact.solver.friction import Friction
 from tireroad.contact.solver.grid_compliance import MatrixCompliance
+from tireroad.contact.solver.together import Solved, Together
 from tireroad.contact.tread.brush import Brush, BrushLaw
 from tireroad.contact.tread.compliance import half_space_compliance
+from tireroad.fem.errors import ConvergenceError
 from tireroad.greens.recursion import Recursion
 from tireroad.runs.measure.synthetic import Strip, oval_patch
 
@@ -24,14 +26,14 @@ def rolled(comm: MPI.Comm, solver: str, rubs: bool) -> np.ndarray:
     response = strip.response(PATCH.points, 6, 4, 4)
     if rubs:
         response = strip.horizontal_response(PATCH.points, 6, 4, 3.0)
-    tire = Recursion(response=response, step=STEP, scheme="linear", comm=comm)
+    tire = Recursion(response=response, step=STEP, scheme="linear", comm=comm, ahead=True)
     tread = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
-    normal = make_solver(solver, tire.same_step[:COUNT, :COUNT] + tread, comm)
+    normal = make_solver(solver, tire.same_step[:COUNT, :COUNT] + tread)
     friction = None
     if rubs:
         brush = Brush(BrushLaw(3e4, 0.6, (0.02, 0.01)), PATCH.points[:, 0], PATCH.line, SPEED, STEP)
         brush.begin(PATCH.force > 0)
-        friction = Friction(brush, tire.same_step, None, comm=comm)
+        friction = Friction(brush, tire.same_step, None)
     drive = Drive(lambda x, y: 1e-4 * np.sin(80 * x + 10 * y), lambda t: 0.0, SPEED)
     steps = roll(tire, normal, PATCH, drive, STEP, STEPS, friction)
     parts = ([s.force, s.horizontal.ravel(), s.moved, s.gap, s.axle_force] for s in steps)
@@ -55,11 +57,29 @@ def test_processes_find_together_what_each_finds_alone(solver: str, rubs: bool) 
 
 
 @pytest.mark.mpi
-def test_the_parts_of_a_shared_matrix_are_those_of_the_whole() -> None:
+def test_what_stops_the_root_process_stops_all() -> None:
+    """And a number that is no number from one solve leaves none behind for the next."""
+    comm, looked = MPI.COMM_WORLD, []
+    together = Together(comm, 2, lambda: looked.append(comm.rank))
+    force, gap = np.array([1.0, 0.0]), np.array([0.0, 2.0])
+    answer = Solved(force, gap, np.zeros((0, 2)), 1e-12, 3e-13)
+
+    def refused() -> Solved:
+        raise ConvergenceError("no consistent set")
+
+    for _ in range(2):
+        with pytest.raises(ConvergenceError, match="no consistent set"):
+            together(refused, horizontal=False)
+        found = together(lambda: answer if comm.rank == 0 else refused(), horizontal=False)
+        assert all(np.array_equal(*pair) for pair in zip(found, answer, strict=True))
+    assert looked == ([] if comm.size == 1 else [comm.rank] * 4)
+
+
+def test_the_parts_of_a_matrix_are_those_of_the_whole() -> None:
     """Rows or columns, whichever are fewer, are picked first."""
     rng = np.random.default_rng(3)
     matrix = rng.standard_normal((12, 12))
-    compliance = MatrixCompliance(matrix, MPI.COMM_WORLD)
+    compliance = MatrixCompliance(matrix)
     few, many = np.array([1, 7]), np.array([0, 3, 4, 9, 11])
     for rows, columns in ((few, many), (many, few), (many, many), (few[:0], many)):
         block = compliance.block(rows, columns)

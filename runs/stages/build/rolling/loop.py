@@ -39,7 +39,7 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
     p = len(patch.index)
     memory = tread_memory(spec, patch, setup.rolled.speed, step)
     at_once = memory.at_once if memory else 1.0
-    solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once, tire.comm)
+    solver = step_solver(spec, patch, tire.same_step[:p, :p], at_once)
     friction = None
     if spec.rubs:
         friction = _friction(spec, setup, tire, step, at_once)
@@ -71,7 +71,7 @@ def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> F
     law = BrushLaw(stiffness, spec.friction, setup.slips, spec.brush)
     brush = Brush(law, patch.points[:, 0], patch.line, setup.rolled.speed, step)
     brush.begin(patch.force > 0, moved)
-    return Friction(brush, tire.same_step, patch.weights, shear, pressed, tire.comm)
+    return Friction(brush, tire.same_step, patch.weights, shear, pressed)
 
 
 def freely_rolling(
@@ -115,16 +115,16 @@ def forces(
     """
     kept = response.resolved(step)
     comm = sharers(kept, job.comm)
-    tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm)
+    tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm, ahead=True)
     spec = contact or job.scene.contact
     loop = make_loop(spec, setup, driven_tire(job, tire, step, steps) or tire, step)
-    total, axle = np.zeros((2, steps, 3))
+    (total, axle), every = np.zeros((2, steps, 3)), np.ones(len(setup.patch.points))
     given = setup.patch, setup.drive, step, steps
     with threadpool_limits(1, "blas"):
         for k, instant in enumerate(
-            roll(loop.tire, loop.solver, *given, loop.friction, 0, loop.memory)
+            roll(loop.tire, loop.solver, *given, loop.friction, 0, loop.memory, motion=False)
         ):
-            total[k, :2] = instant.horizontal.sum(axis=0)
+            total[k, :2] = every @ instant.horizontal
             total[k, 2], axle[k] = instant.force.sum(), instant.axle_force
             if instant.force[setup.patch.edge].any():
                 setup.patch.check_edge(instant.force[None], np.array([instant.time]), setup.reach)

@@ -84,7 +84,9 @@ def integration(job: Job, plan: Planned, scheme: str) -> Integration:
         tire = Convolution(response=plan.response, step=plan.step, steps=plan.steps)
     else:
         comm = sharers(plan.response, job.comm)
-        tire = Recursion(response=plan.response, step=plan.step, scheme=scheme, comm=comm)
+        tire = Recursion(
+            response=plan.response, step=plan.step, scheme=scheme, comm=comm, ahead=True
+        )
         if comm.size < job.comm.size:
             observe.say("  each process takes the whole loop: too small to share out")
     return Integration(tire, plan.step, plan.steps, scheme)

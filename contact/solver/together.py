@@ -1,0 +1,62 @@
+"""A step's contact problem, solved by one process of those that take a loop together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from tireroad.contact.solver.conditions import Array
+from tireroad.fem.errors import ConvergenceError, InputError
+
+
+class Solved(NamedTuple):
+    """Of the contact points: `force` (c,) N, `gap` (c,) m, `horizontal` (c, 2) N, (0, 2) without friction; the residual
+    and the `penetration` (m) as solved."""
+
+    force: Array
+    gap: Array
+    horizontal: Array
+    residual: float
+    penetration: float
+
+
+class Together:
+    """The root process of `comm` solves for `count` points and tells the others, which look `ahead` meanwhile. On one
+    process nothing is sent, and nobody looks ahead.
+    """
+
+    def __init__(self, comm: MPI.Comm, count: int, ahead: Callable[[], None]) -> None:
+        self._comm, self._count, self._ahead = comm, count, ahead
+
+    def __call__(self, solve: Callable[[], Solved], horizontal: bool) -> Solved:
+        """What `solve` finds on the root process, with `horizontal` forces or without; where it raises ConvergenceError or
+        InputError all do. Collective."""
+        if self._comm.size == 1:
+            return solve()
+        self._ahead()
+        values, failed = np.empty(2 + (4 if horizontal else 2) * self._count), None
+        if self._comm.rank == 0:
+            try:
+                values = _packed(solve())
+            except (ConvergenceError, InputError) as error:
+                values[0], failed = np.nan, error
+        self._comm.Bcast(values)
+        if np.isnan(values[0]):
+            failed = self._comm.bcast(failed)
+            assert failed is not None, "what stopped the root process"
+            raise failed
+        return self._unpacked(values)
+
+    def _unpacked(self, values: Array) -> Solved:
+        c = self._count
+        force, gap = values[2 : 2 + c], values[2 + c : 2 + 2 * c]
+        residual, penetration = values[:2].tolist()
+        return Solved(force, gap, values[2 + 2 * c :].reshape(-1, 2), residual, penetration)
+
+
+def _packed(found: Solved) -> Array:
+    scalars = found.residual, found.penetration
+    return np.concatenate([scalars, found.force, found.gap, found.horizontal.ravel()])
