@@ -75,7 +75,7 @@ def _demand(scene: Scene) -> list[str]:
     """Memory, disk and time, and what the machine has too little of (InputError where by far)."""
     wanted = estimate(scene)
     size, parts = wanted.sizes, wanted.memory
-    counts = [f"{size.free} unknowns", f"{size.modes} modes"]
+    counts = [f"{size.free} unknowns not held by the rim", f"{size.modes} modes"]
     if scene.contact is not None:
         counts.append(f"about {size.points} contact points")
     if scene.time is not None:

@@ -13,7 +13,7 @@ def seconds(work: dict[str, float], size: Sizes, column: int) -> dict[str, float
     """
     thicker, larger = column / 9, size.free / 27_900
     share = {
-        "static": 1.45 * larger**0.08 / thicker,
+        "static": larger**0.08 / thicker,
         "modes": 1.4 / (thicker**0.5 * larger**0.2),
         "greens": 1.1 / thicker**0.5,
     }
