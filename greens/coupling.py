@@ -177,7 +177,9 @@ class Wheel:
         # Few of the shapes join the basis: solving for these once more takes less than holding all until it is known which.
         columns = shapes.whole(loads @ (weights.T @ self._foremost(basis, probes, flexibility)))
         shapes.destroy()
-        grown, _ = self._grown(modes, columns, basis.projection, every=False)
+        joined = with_attachments(modes, columns, self.operators)
+        del columns  # used up: what follows needs the memory
+        grown, _ = self._grown(joined, basis.projection, len(modes.squares))
         if self.beyond is not None:
             lacking = regained(grown.held, *self._pencils(grown.projection), probes, probes)
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
@@ -208,21 +210,19 @@ class Wheel:
 
     def standing_attachments(self, modes: Modes, probes: Probes) -> tuple[Basis, Array]:
         """Modes with the static shapes, relieved where nothing holds the tire, of K; their fields, own rows. Collective."""
-        loads = on_own_rows(self.operators, probes)
-        return self._grown(modes, statics(self.operators, self.operators.stiffness, loads))
+        operators = self.operators
+        columns = statics(operators, operators.stiffness, on_own_rows(operators, probes))
+        return self._grown(with_attachments(modes, columns, operators))
 
     def _grown(
-        self, modes: Modes, columns: np.ndarray, known: Projection | None = None, every: bool = True
+        self, grown: Modes, known: Projection | None = None, modes: int | None = None
     ) -> tuple[Basis, Array]:
-        """The basis with attachment modes, or those that are more than static, and their fields; `known` is the projection
-        on the modes. Collective.
-        """
-        operators, comm = self.operators, self.operators.body.comm
-        grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
-        loss = None if self.beyond is None else self._loss
+        """The basis of modes with their attachment modes, and their fields; `known`: on the first of so many `modes`, beside
+        which those stay that are more than static. Collective."""
+        operators, comm, loss = self.operators, self.operators.body.comm, self.beyond and self._loss
         projection = project(grown, self.rotation, operators.carried, comm, known, loss)
-        if not every:
-            stays = dynamic(projection, self.speed, len(modes.squares))
+        if modes is not None:
+            stays = dynamic(projection, self.speed, modes)
             projection, grown = projection.among(stays), grown.among(stays)
         projection = self.with_air(projection, grown)
         projection = self.corner(projection, grown) if self.corner else projection

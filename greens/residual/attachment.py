@@ -17,12 +17,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from mpi4py import MPI
-from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.collective import summed
+from tireroad.fem.matrices.operators import Operators
 from tireroad.modal.basis import Projection
-from tireroad.modal.solver.fields import gram, multiply
+from tireroad.modal.solver.fields import between, gram
 from tireroad.modal.solver.modes import Modes
 
 # Of each point's own static flexibility: what the shapes left out may add up to. At 90 rad/s the receptance up
@@ -35,34 +35,50 @@ FEW = 100  # pseudo-modes that are kept in any case: they cost less than is wort
 
 # Share of the largest squared length below which a direction is rounding of the orthogonalisation.
 _ROUNDING = 1e-12
+_ROWS = 4096  # of all fields at a time, when they are changed in place
 
 
-def with_attachments(
-    modes: Modes, stiffness: PETSc.Mat, mass: np.ndarray, columns: np.ndarray, comm: MPI.Comm
-) -> Modes:
-    """Modes followed by pseudo-modes, ascending among themselves. Collective.
+def with_attachments(modes: Modes, columns: np.ndarray, operators: Operators) -> Modes:
+    """Modes of K and M (not K_Omega) followed by pseudo-modes, ascending among themselves. Collective.
 
-    `stiffness` K (not K_Omega) and `mass` (own rows) of the modes, `columns` own rows (n, p) of R.
+    `columns` own rows (n, p) of R, which are used up: of a thousand loads on a fine mesh every copy takes a gigabyte.
     """
-    root = np.sqrt(mass)[:, None]
-    basis, extra = root * modes.vectors, root * columns
-    whole = np.diag(gram(comm, extra, extra))
-    # A load on the clamped rim moves nothing.
-    extra = extra[:, whole > 0] / np.sqrt(whole[whole > 0])
+    comm, root = operators.body.comm, np.sqrt(operators.mass)[:, None]
+    basis, extra = root * modes.vectors, columns
+    extra *= root
+    whole = summed(comm, np.einsum("ij,ij->j", extra, extra))
+    extra /= np.sqrt(np.where(whole > 0, whole, 1.0))  # a load on the clamped rim moves nothing
     for _ in range(2):  # once leaves what the first pass's rounding brought back
-        extra = extra - basis @ gram(comm, basis, extra)
+        _take_off(extra, basis, gram(comm, basis, extra))
     lengths, directions = np.linalg.eigh(gram(comm, extra, extra))
     kept = lengths > _ROUNDING
-    extra = extra @ (directions[:, kept] / np.sqrt(lengths[kept]))
-    extra = extra - basis @ gram(comm, basis, extra)
-    extra = extra @ np.linalg.inv(np.linalg.cholesky(gram(comm, extra, extra))).T
-    shapes = extra / root
-    squares, turn = np.linalg.eigh(gram(comm, shapes, multiply(stiffness, shapes)))
-    return replace(
-        modes,
-        squares=np.concatenate([modes.squares, squares]),
-        vectors=np.hstack([modes.vectors, shapes @ turn]),
-    )
+    extra = _combined(extra, directions[:, kept] / np.sqrt(lengths[kept]), extra)
+    _take_off(extra, basis, gram(comm, basis, extra))
+    del basis
+    extra = _combined(extra, np.linalg.inv(np.linalg.cholesky(gram(comm, extra, extra))).T, extra)
+    extra /= root
+    squares, turn = np.linalg.eigh(between(comm, extra, operators.stiffness, extra))
+    count = len(modes.squares)
+    vectors = np.empty((len(extra), count + len(squares)))
+    vectors[:, :count] = modes.vectors
+    _combined(extra, turn, vectors[:, count:])
+    return replace(modes, squares=np.concatenate([modes.squares, squares]), vectors=vectors)
+
+
+def _take_off(fields: np.ndarray, basis: np.ndarray, shares: np.ndarray) -> None:
+    """fields (n, p) -= basis (n, m) shares (m, p), in place."""
+    for start in range(0, len(fields), _ROWS):
+        rows = slice(start, start + _ROWS)
+        fields[rows] -= basis[rows] @ shares
+
+
+def _combined(fields: np.ndarray, change: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """fields (n, p) change (p, k) in the first columns of `out`, which may be the fields themselves."""
+    out = out[:, : change.shape[1]]
+    for start in range(0, len(fields), _ROWS):
+        rows = slice(start, start + _ROWS)
+        out[rows] = fields[rows] @ change
+    return out
 
 
 def fewest(probes: sparse.csr_matrix) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:

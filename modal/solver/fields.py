@@ -96,6 +96,15 @@ def gram(comm: MPI.Comm, left: np.ndarray, right: np.ndarray) -> np.ndarray:
     return summed(comm, left.T @ right)
 
 
+def between(comm: MPI.Comm, left: np.ndarray, matrix: PETSc.Mat, right: np.ndarray) -> np.ndarray:
+    """left^T matrix right (m, k) over all processes, some columns at a time: no copy of all of them. Collective."""
+    out = np.empty((left.shape[1], right.shape[1]))
+    for start in range(0, right.shape[1], CHUNK):
+        some = slice(start, start + CHUNK)
+        out[:, some] = left.T @ multiply(matrix, right[:, some])
+    return summed(comm, out)
+
+
 def orthonormalise(comm: MPI.Comm, vectors: np.ndarray, part: np.ndarray) -> float:
     """Worst entry of V^T V - 1 after a correction where slices meet, in place. Collective.
 
@@ -122,7 +131,7 @@ def projected(
     """V^T X V (m, m), symmetric (sign 1) or skew (-1); `known` (k, k) is its upper left part."""
     m, k = vectors.shape[1], 0 if known is None else len(known)
     out = np.empty((m, m))
-    out[:, k:] = gram(comm, vectors, multiply(matrix, vectors[:, k:]))
+    out[:, k:] = between(comm, vectors, matrix, vectors[:, k:])
     own = out[k:, k:]
     out[k:, k:] = (own + sign * own.T) / 2
     out[k:, :k] = sign * out[:k, k:].T

@@ -91,7 +91,7 @@ def _shaped(table: Any, counted: dict[str, int]) -> dict:
     words = [any(isinstance(row[k], str) for row in table.rows) for k in range(len(table.columns))]
     return {
         "title": table.title,
-        "notes": table.notes,
+        "notes": table.remarks,
         "image": image,
         "number": counted["tables"],
         "figure": counted["figures"],

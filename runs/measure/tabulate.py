@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import ModuleType
 
-from tireroad.fem.errors import InputError
+from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.process import observe
 from tireroad.runs.version import PROGRAM, VERSION
@@ -22,7 +22,7 @@ from tireroad.runs.version import PROGRAM, VERSION
 class Table:
     """Rows under (name, unit) columns; notes say what was measured and what the target is.
 
-    `plot`: what runs.measure.plots draws of it.
+    `plot`: what runs.measure.plots draws of it. `failed`: what could not be measured, a line each with the reason.
     """
 
     title: str
@@ -30,6 +30,12 @@ class Table:
     rows: list[list]
     notes: list[str] = field(default_factory=list)
     plot: dict | None = None
+    failed: list[str] = field(default_factory=list)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What stands under the table."""
+        return [*self.notes, *(f"not measured: {line}" for line in self.failed)]
 
 
 def modules(package: str) -> dict[str, ModuleType]:
@@ -44,7 +50,8 @@ def modules(package: str) -> dict[str, ModuleType]:
 
 
 def run_all(package: str, names: list[str], out: Path | None, large: bool = False) -> None:
-    """Run the named modules of a package (all by default), show their tables, keep them in files.
+    """Run the named modules of a package (all by default), show their tables, keep them in files. ConvergenceError at the end
+    where something could not be measured.
 
     With `large` those that can run at full size, and by default only those.
     """
@@ -65,6 +72,9 @@ def run_all(package: str, names: list[str], out: Path | None, large: bool = Fals
         results[name] = tables
     if out is not None:
         _keep(results, {name: known[name].ABOUT for name in results}, out)
+    failed = [line for tables in results.values() for table in tables for line in table.failed]
+    if failed:
+        raise ConvergenceError(f"not measured: {'; '.join(failed)}")
 
 
 def _run(module: ModuleType, out: Path | None) -> list[Table]:
@@ -90,8 +100,8 @@ def show(table: Table) -> None:
     text = io.StringIO()
     Console(file=text, width=120).print(grid)
     observe.say(text.getvalue().rstrip())
-    for note in table.notes:
-        observe.say(f"  {note}")
+    for line in table.remarks:
+        observe.say(f"  {line}")
 
 
 def _shown(value) -> str:

@@ -147,7 +147,7 @@ def test_attachments_keep_the_modes_and_the_orthonormality() -> None:
     comm = operators.body.comm
     idle = np.zeros((len(shapes.columns), 1))  # a load on the rim
     columns = np.hstack([idle, shapes.columns])
-    grown = with_attachments(modes, operators.stiffness, operators.mass, columns, comm)
+    grown = with_attachments(modes, columns, operators)
     assert len(grown.squares) == COUNT + len(SPOTS)
     assert grown.squares[COUNT:].min() > modes.squares[-1]
     weighted = operators.mass[:, None] * grown.vectors

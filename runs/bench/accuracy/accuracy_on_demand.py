@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
 from pathlib import Path
@@ -14,7 +14,8 @@ from mpi4py import MPI
 from tireroad.contact.results.error_bars import Measured, bars, measured
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import by_processor
-from tireroad.runs.bench.parts.kept import read_kept, write_kept
+from tireroad.runs.bench.parts import apart
+from tireroad.runs.bench.parts.kept import Records
 from tireroad.runs.bench.parts.rolling_cases import (
     CASES,
     DURATION,
@@ -30,7 +31,6 @@ from tireroad.runs.bench.parts.rolling_cases import (
     told_settings,
 )
 from tireroad.runs.files.cache import Cache
-from tireroad.runs.files.identity import identity
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
 from tireroad.runs.search.journal import Journal, Trial
@@ -81,20 +81,20 @@ def run(kept: Path | None = None) -> list[Table]:
 
 def tables(folder: Path, cases: Iterable[Case], grid: Mapping, kept: Path) -> list[Table]:
     """Of the cases, with the rungs of the exhaustive search. On one process."""
-    found = []
-    for case in by_wheel(cases):
-        file = kept / "accuracy_on_demand" / f"{case.wheel}-{case.road}.json"
-        of = [identity("accuracy").code, TARGET, UP_TO, DURATION, FINE, dict(grid)]
-        known = read_kept(file, of)
-        if known is None:
-            observe.say(f"  {case} ...")
-            with by_processor():
-                outcome = _outcome(folder / case.wheel, case, grid, kept / "forces")
-            known = [asdict(outcome)]
-            write_kept(file, of, known)
-        found.append(Outcome(**known[0]))
-        observe.say(f"    {found[-1]}")
-    return [_summary(found), _every(found)]
+
+    def settings(_: Case) -> tuple:
+        return TARGET, UP_TO, DURATION, FINE, dict(grid)
+
+    records, failed = apart.every(by_wheel(cases), folder, kept, judged, settings, str)
+    found = [Outcome(**one) for some in records.values() for one in some]
+    return [_summary(found, failed), _every(found)]
+
+
+def judged(case: Case, folder: Path, kept: Path, *settings) -> Records:
+    """The outcome of a case, of the settings that this module has. On one process."""
+    *_, grid = settings
+    with by_processor():
+        return [asdict(_outcome(folder, case, grid, kept / "forces"))]
 
 
 def _outcome(folder: Path, case: Case, grid: Mapping, forces: Path) -> Outcome:
@@ -181,11 +181,11 @@ def _measured(run: Recorded) -> Measured:
     return measured(force[len(force) // 4 :], run.step, UP_TO, UP_TO)
 
 
-def _summary(found: list[Outcome]) -> Table:
+def _summary(found: list[Outcome], failed: Sequence[str] = ()) -> Table:
     solved = [one for one in found if one.best is not None]
     ratio = [one.cost / one.best for one in solved if one.best]
     whole = [one.search / one.best for one in solved if one.best]
-    met = 100 * float(np.mean([one.met for one in found]))
+    met = 100 * float(np.mean([float(one.met) for one in found] or [np.nan]))
     rows = (
         [
             ["target met, of the cases", met, ASKED["met"], "%"],
@@ -212,6 +212,7 @@ def _summary(found: list[Outcome]) -> Table:
         [("what", ""), ("found", ""), ("asked", ""), ("unit", "")],
         rows,
         notes,
+        failed=list(failed),
     )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.contact.results.error_bars import Bars, bars, measured
+from tireroad.runs.bench.parts import apart
 from tireroad.runs.bench.parts.effectivity import (
     ALL,
     FORCES,
@@ -19,7 +20,7 @@ from tireroad.runs.bench.parts.effectivity import (
     every,
     shares,
 )
-from tireroad.runs.bench.parts.kept import read_kept, write_kept
+from tireroad.runs.bench.parts.kept import Records
 from tireroad.runs.bench.parts.rolling_cases import (
     CASES,
     DURATION,
@@ -35,9 +36,7 @@ from tireroad.runs.bench.parts.rolling_cases import (
     told_settings,
 )
 from tireroad.runs.files.cache import Cache
-from tireroad.runs.files.identity import identity
 from tireroad.runs.measure.tabulate import Table
-from tireroad.runs.process import observe
 
 ABOUT = "estimated over true error of mean, deviation and third octaves: 3 tires, 4 roads, 2 speeds"
 RUN = {"segments": 18, "arc": 8, "order": 3, "modes": 100, "pitch": 0.008, "step": 2e-4}
@@ -54,24 +53,29 @@ def tables(
     folder: Path, cases: Iterable[Case], coarse: dict, fine: dict, duration: float, kept: Path
 ) -> list[Table]:
     """Of the `cases`; settings of the run and of the far finer one. On one process."""
-    found: list[Effectivity] = []
-    for case in by_wheel(cases):
+
+    def settings(case: Case) -> tuple:
         tire = TIRES[case.tire]
-        given = {**coarse, **tire.run}, {**fine, **tire.fine}
-        where = _Where(folder / case.wheel, kept, case, duration, *given)
-        file = kept / "error_bars" / f"{case.wheel}-{case.road}.json"
-        of = [identity("accuracy").code, *given, duration]
-        known = read_kept(file, of)
-        if known is None:
-            observe.say(f"  {case} ...")
-            known = [asdict(one) for one in _judged(where)]
-            write_kept(file, of, known)
-        some = [Effectivity(**one) for one in known]
-        found += some
-        good = np.mean([one.good for one in some if one.cause == ALL])
-        observe.say(f"  {case}: {100 * good:.3g} % good")
+        return {**coarse, **tire.run}, {**fine, **tire.fine}, duration
+
+    records, failed = apart.every(by_wheel(cases), folder, kept, judged, settings, _told)
+    found = [Effectivity(**one) for some in records.values() for one in some]
     note = f"{told_settings(coarse, 'run')}; true: against {told_settings(fine, 'fine')}."
-    return [shares(found, note), by_cause(found), every(found)]
+    return [shares(found, note, failed), by_cause(found), every(found)]
+
+
+def judged(
+    case: Case, folder: Path, kept: Path, coarse: dict, fine: dict, duration: float
+) -> Records:
+    """The figures of a case (Effectivity) with its error bars and against its finer runs. On one process."""
+    where = _Where(folder, kept, case, duration, coarse, fine)
+    return [asdict(one) for one in _judged(where)]
+
+
+def _told(records: Records) -> str:
+    """What is said of a case that is done."""
+    good = [one.good for one in (Effectivity(**record) for record in records) if one.cause == ALL]
+    return f"{sum(good)} of {len(good)} figures good"
 
 
 @dataclass(frozen=True)

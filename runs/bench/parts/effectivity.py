@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -47,7 +48,7 @@ class Effectivity:
 def _judgement(some: list[Effectivity]) -> list[float]:
     """Number, share that is good (%), median and tenths of estimated over true where there is an error."""
     ratio = [one.estimated / one.true for one in some if one.true > one.small] or [float("nan")]
-    good = 100 * float(np.mean([one.good for one in some]))
+    good = 100 * float(np.mean([float(one.good) for one in some] or [np.nan]))
     return [len(some), good, *map(float, np.quantile(ratio, [0.5, 0.1, 0.9]))]
 
 
@@ -60,8 +61,8 @@ _JUDGED = [
 ]
 
 
-def shares(found: list[Effectivity], note: str) -> Table:
-    """All causes together; `note` says what of and against what."""
+def shares(found: list[Effectivity], note: str, failed: Sequence[str] = ()) -> Table:
+    """All causes together; `note` says what of and against what, `failed` which cases are not among them, and why."""
     some = [one for one in found if one.cause == ALL]
     kinds = ("mean", "deviation", "history", "third octaves")
     parts = {kind: [one for one in some if one.kind == kind] for kind in kinds}
@@ -74,6 +75,7 @@ def shares(found: list[Effectivity], note: str) -> Table:
             f"{len({one.case for one in found})} cases; asked: {ASKED:g} % within. {note} Where both are below {SMALL['mean']:g} of the load, {SMALL['deviation']:g} of the "
             f"deviation, {SMALL['history']:g} % of the history or {SMALL['level']:g} dB a figure counts as good.",
         ],
+        failed=list(failed),
     )
 
 

@@ -8,8 +8,10 @@ from typing import Any
 
 from tireroad.runs.files.disk import write_text
 
+Records = list[dict[str, Any]]
 
-def read_kept(file: Path, of: list[Any]) -> list[dict[str, Any]] | None:
+
+def read_kept(file: Path, of: list[Any]) -> Records | None:
     """Records that an earlier bench kept of the same program and settings; None where there are none."""
     if not file.exists():
         return None
@@ -17,7 +19,7 @@ def read_kept(file: Path, of: list[Any]) -> list[dict[str, Any]] | None:
     return data["found"] if data["of"] == _plain(of) else None
 
 
-def write_kept(file: Path, of: list[Any], found: list[dict[str, Any]]) -> None:
+def write_kept(file: Path, of: list[Any], found: Records) -> None:
     """Keep records, and the program and settings they are `of`."""
     file.parent.mkdir(parents=True, exist_ok=True)
     write_text(file, json.dumps({"of": of, "found": found}, indent=1) + "\n")

@@ -1,0 +1,99 @@
+"""Cases of a bench, each in a process of its own: its memory goes back as a whole, and one that fails leaves the others to
+go on."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.runs.bench.parts.kept import Records, read_kept, write_kept
+from tireroad.runs.bench.parts.rolling_cases import Case
+from tireroad.runs.files.identity import identity
+from tireroad.runs.process import mpi, observe, signals
+from tireroad.runs.process.statuses import BUG, DONE
+
+Task = Callable[..., Records]
+"""task(case, folder, kept, *settings): a function of a module."""
+
+
+def every(
+    cases: Iterable[Case],
+    folder: Path,
+    kept: Path,
+    task: Task,
+    settings: Callable[[Case], tuple],
+    told: Callable[[Records], str],
+) -> tuple[dict[Case, Records], list[str]]:
+    """What the task gives of each case, or what is kept of the same program and settings (text and numbers); and a line on
+    each case that failed. Cases work in a folder by wheel; `told` of what was found is shown. On one process.
+    """
+    found, failed = dict[Case, Records](), list[str]()
+    for case in cases:
+        name = (task.__module__ or "").rpartition(".")[2]
+        file = kept / name / f"{case.wheel}-{case.road}.json"
+        of = [identity("accuracy").code, *settings(case)]
+        known = read_kept(file, of)
+        if known is None:
+            observe.say(f"  {case} ...")
+            try:
+                known = apart(task, case, folder / case.wheel, kept, *settings(case))
+            except ConvergenceError as error:
+                failed.append(f"{case}: {error}")
+                observe.say(f"  {failed[-1]}")
+                continue
+            write_kept(file, of, known)
+        found[case] = known
+        observe.say(f"  {case}: {told(known)}")
+    return found, failed
+
+
+def apart(task: Callable[..., Any], *given: Any) -> Any:
+    """task(*given) of another process, whose results are pickled. ConvergenceError with its reason where it fails, in whatever
+    way. On one process."""
+    with tempfile.TemporaryDirectory() as folder:
+        asked, answer = Path(folder) / "asked", Path(folder) / "answer"
+        asked.write_bytes(pickle.dumps((task, given)))
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", __name__, str(asked), str(answer)],
+            env=dict(os.environ),  # without what MPI has set in this process
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+        )
+        if done.returncode == DONE:
+            return pickle.loads(answer.read_bytes())
+    if done.returncode == BUG:
+        observe.say(done.stderr.rstrip())
+    raise ConvergenceError(_reason(done.returncode, done.stderr))
+
+
+def _reason(status: int, said: str) -> str:
+    """Why a process ended with a status other than 0."""
+    if status < 0:
+        name = signal.Signals(-status).name
+        return f"ended by {name}" + (", as for want of memory" if name == "SIGKILL" else "")
+    last = said.strip().splitlines()[-1:]
+    return f"exit status {status}: {''.join(last).removeprefix('error: ')}"
+
+
+def _answered(asked: Path, answer: Path) -> None:
+    """Work, in the other process."""
+    mpi.start_petsc([])
+    task, given = pickle.loads(asked.read_bytes())
+    answer.write_bytes(pickle.dumps(task(*given)))
+
+
+if __name__ == "__main__":
+    signals.stop_on_signals()
+    status, message = mpi.judged(lambda: _answered(*map(Path, sys.argv[1:])))
+    if message:
+        print(message, file=sys.stderr)
+    sys.exit(status)
