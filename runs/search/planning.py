@@ -38,7 +38,7 @@ def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
     if trial.found is None:
         return _after_failure(ladders, trial, processes)
     over, now = trial.found.over(scene.accuracy), trial.settings
-    costs = _Costs(scene, trial)
+    costs, rates = _Costs(scene, trial), orders(now.order, trial.scheme)
     begun = now.rungs
     while worst(over)[0] > AIM:
         choices = [
@@ -49,8 +49,8 @@ def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
         choices = _worthwhile(over, choices)
         if not choices:
             break
-        cause, finer = max(choices, key=lambda one: _worth(over, one[0], now, one[1], costs))
-        over, now = _finer(over, cause, now, finer), finer
+        cause, finer = max(choices, key=lambda one: _worth(over, *one, now, costs, rates))
+        over, now = _finer(over, cause, now, finer, rates), finer
     return now if now != trial.settings else None
 
 
@@ -81,22 +81,31 @@ def _after_failure(ladders: Ladders, trial: Trial, processes: int) -> Settings |
     return found if found is not None and fits(ladders.scene, found, processes) else None
 
 
-def _worth(over: np.ndarray, cause: str, now: Settings, finer: Settings, costs: _Costs) -> float:
+def _worth(
+    over: np.ndarray,
+    cause: str,
+    finer: Settings,
+    now: Settings,
+    costs: _Costs,
+    rates: Mapping[str, float],
+) -> float:
     """Squared error that the finer settings take away, for the seconds that they add."""
     row, figure = CAUSES.index(cause), worst(over)[1]
     if not np.isfinite(over[row, figure]):
         return np.inf
-    after = _finer(over, cause, now, finer)
+    after = _finer(over, cause, now, finer, rates)
     gain = over[row, figure] ** 2 - after[row, figure] ** 2
     return float(gain) / max(costs(finer) - costs(now), _LEAST)
 
 
-def _finer(over: np.ndarray, cause: str, now: Settings, finer: Settings) -> np.ndarray:
-    """Predicted errors with a cause's size made smaller; one that was unknown is hoped to be as asked for."""
+def _finer(
+    over: np.ndarray, cause: str, now: Settings, finer: Settings, rates: Mapping[str, float]
+) -> np.ndarray:
+    """Predicted errors with a cause's size made smaller, by the `rates` of all; one that was unknown is hoped to be as asked for."""
     after = over.copy()
     row = CAUSES.index(cause)
     known = np.isfinite(after[row])
-    ratio = size_ratio(cause, now, finer) ** orders(now.order)[cause]
+    ratio = size_ratio(cause, now, finer) ** rates[cause]
     after[row] = np.where(known, after[row] * ratio, 0.0)
     return after
 

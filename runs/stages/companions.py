@@ -214,5 +214,5 @@ def companions(cause: str, given: Given) -> list[Companion]:
 def _share(cause: str, given: Given) -> float:
     points = ratio(given.settled.patch) if cause == "points" else 2.0
     size = {"step": 2.0, "points": points, "modes": 1 / FEWER, "mesh": 2.0}[cause]
-    order = orders(given.job.tire.section.order)[cause]
+    order = orders(given.job.tire.section.order, given.scheme)[cause]
     return (random_share if cause == "points" else share)(size, order)

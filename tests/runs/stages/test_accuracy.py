@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tireroad.contact.results.error_bars import CAUSES
+from tireroad.contact.results.error_bars import CAUSES, bars, measured
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
@@ -99,6 +99,22 @@ def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
     assert part == pytest.approx(wanted[cause])
     found = forces.contact
     assert found[:, 2] == pytest.approx(contact_force(other)[:, 2], rel=1e-8)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scheme", ["linear", "constant"])
+def test_the_step_is_told_by_the_order_of_the_scheme(whole, scheme):
+    """Against steps an eighth as long with linear forces, which are as good as none."""
+    limit, step = 200.0, 4e-4
+    given = replace(_given(whole), scheme=scheme, step=step, steps=70)
+    fine = replace(given, scheme="linear", step=step / 8, steps=8 * 70)
+    own, exact = (
+        measured(found.contact, found.step, limit)
+        for found in (one.repeated(one.settled, one.response, coarser=1) for one in (given, fine))
+    )
+    (told,) = companions("step", given)
+    estimated = told.bars({"contact_force": own}, 0.0, limit, limit)["contact_force"].history[2]
+    assert 0.5 < estimated / bars(own, exact, 1.0).history[2] < 2.0
 
 
 @pytest.mark.long
