@@ -13,10 +13,10 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.fem.collective import joined
 from tireroad.greens.one_step import NO_BLOCK, Block, weights
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 from tireroad.greens.response import Response
+from tireroad.greens.spread import Spread
 
 
 class Recursion:
@@ -48,7 +48,8 @@ class Recursion:
         self.comm = comm
         self.step = step
         self._idle = int(look_ahead and comm.size > 1)  # processes without states, from the root on
-        mine = self._mine(np.arange(len(response.eigenvalue)))
+        self._spread = Spread(comm, self._idle)
+        mine = self._spread.mine(np.arange(len(response.eigenvalue)))
         s = response.eigenvalue[mine]
         self._decay = np.exp(s * step)
         self._old, self._new = weights(s * step, step, scheme)
@@ -104,15 +105,6 @@ class Recursion:
             direct += self._block.direct_next()
         direct = self._reduce(direct)
         return LoadedColumns(direct) if self.comm.rank == 0 else None
-
-    def _mine(self, every: np.ndarray) -> np.ndarray:
-        """Of all states (q, ...) those of this process."""
-        return self._of(self.comm.rank, every)
-
-    def _of(self, rank: int, every: np.ndarray) -> np.ndarray:
-        """Of all states (q, ...) those of a process, a view."""
-        owners = self.comm.size - self._idle
-        return every[rank - self._idle :: owners] if rank >= self._idle else every[:0]
 
     def _reduce(self, values: np.ndarray) -> np.ndarray:
         if self.comm.size == 1:
@@ -216,21 +208,14 @@ class Recursion:
 
     def everywhere(self, samples: list[np.ndarray]) -> np.ndarray:
         """Samples of n steps as (n, q), all states in the order of the response. Collective."""
-        own = np.array(samples)
-        if self.comm.size == 1:
-            return own
-        every = joined(self.comm, np.ascontiguousarray(own.T))
-        out = np.empty((len(own), len(every)), complex)
-        first = 0
-        for rank in range(self.comm.size):
-            share = self._of(rank, out.T)
-            share[:] = every[first : first + len(share)]
-            first += len(share)
-        return out
+        return self._spread.everywhere(np.array(samples).T).T
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """All states in the order of the response, the same for any number of processes. Collective."""
-        kept = {"state": self._gathered(self.state), "push": self._gathered(self._push)}
+        kept = {
+            "state": self._spread.everywhere(self.state),
+            "push": self._spread.everywhere(self._push),
+        }
         kept["push_force"] = self._force
         kept["known_ahead"] = self._known if self.ahead else self._known[:0]
         block = self._block.snapshot() if self._block else NO_BLOCK
@@ -238,7 +223,9 @@ class Recursion:
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         """Go on from a snapshot, between `advance` and `predict`. Collective when looking ahead."""
-        self._state, self._push = (self._mine(kept[name]).copy() for name in ("state", "push"))
+        self._state, self._push = (
+            self._spread.mine(kept[name]).copy() for name in ("state", "push")
+        )
         self._force = self._unknown = kept["push_force"]
         self._moved, self._taken = False, True
         if self._block:
@@ -247,13 +234,6 @@ class Recursion:
             self._known = kept["known_ahead"]
         else:
             self._begin()
-
-    def _gathered(self, values: np.ndarray) -> np.ndarray:
-        parts = self.comm.allgather(values)
-        out = np.empty(sum(map(len, parts)), complex)
-        for rank, part in enumerate(parts):
-            self._of(rank, out)[:] = part
-        return out
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N: sum_k (int rho phi_k) eta_k'', after `advance`."""
