@@ -26,7 +26,7 @@ class Driven:
         self._count = tire.same_step.shape[1] - history.shape[1]
         self._same = tire.same_step
         self.same_step, self.comm = self._same[: self._count, : self._count], tire.comm
-        self.look_ahead = looking_ahead(tire)
+        self.ahead = looking_ahead(tire)
         self._beside = LoadedColumns(self._same[self._count :])
         self._step = 0
         self._along = np.zeros(history.shape[1])

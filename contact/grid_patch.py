@@ -199,7 +199,7 @@ class OnPoints:
         self._transposed = self._weights.T.tocsr()
         self.comm = tire.comm
         self.same_step = self._same_step()
-        self.inertia_force, self.look_ahead = tire.inertia_force, looking_ahead(tire)
+        self.inertia_force, self.ahead = tire.inertia_force, looking_ahead(tire)
         self.snapshot, self.restore = tire.snapshot, tire.restore
 
     def start(self, force: np.ndarray) -> None:

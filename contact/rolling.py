@@ -20,7 +20,7 @@ from mpi4py import MPI
 from tireroad.contact.patch import Patch
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.solver.friction import Friction
-from tireroad.contact.solver.together import Solved, Together
+from tireroad.contact.solver.together import Ahead, Solved, Together
 from tireroad.contact.tread.creep import TreadMemory
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 
@@ -52,9 +52,9 @@ class Tire(Protocol):
 
 @runtime_checkable
 class AheadTire(Tire, Protocol):
-    """A tire that can do part of its next step before it knows the force of this one (greens.recursion)."""
+    """A tire that may look ahead: None where it does not."""
 
-    def look_ahead(self) -> None: ...
+    ahead: Ahead | None
 
 
 @runtime_checkable
@@ -150,12 +150,12 @@ def roll(
     settle = tire.settle if isinstance(tire, NonlinearTire) else None
     together = Together(tire.comm, count, looking_ahead(tire))
     for time, road in _roads(drive, patch, step, steps, done):
-        free = tire.predict()
+        predict = tire.predict
         tread = memory.predict() if memory else np.zeros((1, count))
         past = friction.state() if friction and settle else {}
         while True:
-            given = patch, free, tread, road, touching
-            found = together(partial(_contact, solver, friction, *given), friction is not None)
+            solve = partial(_contact, solver, friction, patch, tread, road, touching)
+            free, found = together(predict, solve, friction is not None)
             change = found.force - patch.force
             if friction:
                 horizontal = found.horizontal
@@ -164,7 +164,7 @@ def roll(
             again = settle(change) if settle else None
             if again is None:
                 break
-            free = again
+            predict = partial(np.asarray, again)
             if friction:
                 friction.set_state(past)
         moved = free + answer @ change if motion else free[:0]
@@ -188,19 +188,19 @@ def roll(
         )
 
 
-def looking_ahead(tire: Tire) -> Callable[[], None]:
-    """What a tire does before it knows the force of a step: nothing where it cannot."""
-    return tire.look_ahead if isinstance(tire, AheadTire) else lambda: None
+def looking_ahead(tire: Tire) -> Ahead | None:
+    """What knows part of a step ahead, where there is such a thing."""
+    return tire.ahead if isinstance(tire, AheadTire) else None
 
 
 def _contact(
     solver: ContactSolver,
     friction: Friction | None,
     patch: Patch,
-    free: np.ndarray,
     tread: np.ndarray,
     road: np.ndarray,
     touching: np.ndarray | None,
+    free: np.ndarray,
 ) -> Solved:
     """The contact of a step: the tire's motion `free` and the tread's `tread` from past forces, m."""
     count = len(road)

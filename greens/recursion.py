@@ -13,14 +13,14 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.fem.collective import joined
 from tireroad.greens.one_step import NO_BLOCK, Block, weights
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 from tireroad.greens.response import Response
+from tireroad.greens.spread import Spread
 
 
 class Recursion:
-    """Response states of a `Response`, spread over the processes of `comm` by eigenvalue; with `ahead`, over all but the
+    """Response states of a `Response`, spread over the processes of `comm` by eigenvalue; with `look_ahead`, over all but the
     root, which solves the contact problem while they look ahead.
 
     `predict` gives the displacement at the end of the next step if the new force were zero (without
@@ -31,16 +31,25 @@ class Recursion:
 
     Looking ahead: with z_n = e^{sh} z_{n-1} + b0 P f_{n-1} + b1 P f_n = y_n + b1 P f_n the displacement C y_{n+1} at the end of
     the step after is C e^{sh} y_n, known before f_n is, and C (e^{sh} b1 + b0) P f_n, of which the root reads the columns
-    of the forces that are not zero.
+    of the forces that are not zero. So it predicts by itself; the others get its prediction with the force, when they give it
+    what they know of the next step, and states take a force only when something is asked of them: nobody waits for P f_n.
+    `ahead` is the recursion itself then, else None.
     """
 
     def __init__(
-        self, *, response: Response, step: float, scheme: str, comm: MPI.Comm, ahead: bool = False
+        self,
+        *,
+        response: Response,
+        step: float,
+        scheme: str,
+        comm: MPI.Comm,
+        look_ahead: bool = False,
     ) -> None:
         self.comm = comm
         self.step = step
-        self._idle = int(ahead and comm.size > 1)  # processes without states, from the root on
-        mine = self._mine(np.arange(len(response.eigenvalue)))
+        self._idle = int(look_ahead and comm.size > 1)  # processes without states, from the root on
+        self._spread = Spread(comm, self._idle)
+        mine = self._spread.mine(np.arange(len(response.eigenvalue)))
         s = response.eigenvalue[mine]
         self._decay = np.exp(s * step)
         self._old, self._new = weights(s * step, step, scheme)
@@ -52,12 +61,15 @@ class Recursion:
         self._block = None
         if comm.rank == self._idle and len(response.block):
             self._block = Block(response, step, scheme)
-        self.state = np.zeros(len(mine), complex)
+        self._state = np.zeros(len(mine), complex)
         self._push = np.zeros(len(mine), complex)  # P f of the step before
-        self._free = self.state
+        self._free = self._state  # at the end of the step, if it had no force
+        self._moved = False  # whether `_free` is that of this step yet
+        self._taken = True  # whether `_state` knows the last force
+        self._samples: list[tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
         self._begun = response.direct_momentum_rate()
         self._add_same_step(response, into)
-        self._known: np.ndarray | None = None
+        self.ahead = self if self._idle else None
         self._next = self._answers_next(into) if self._idle else None
         self._late = None
         if response.pulse and scheme == "linear":
@@ -67,6 +79,10 @@ class Recursion:
             self.same_step -= self._late
         self._force = np.zeros(response.residual.shape[1])
         self._rate = np.zeros(3)
+        # Outputs at the end of this step, and what is known of those at the end of the next: here, on all processes.
+        self._out = np.zeros(len(self._output))
+        self._part = self._known = self._out
+        self._unknown = self._force  # whose answer `_known` lacks
 
     def _add_same_step(self, response: Response, into: np.ndarray) -> None:
         """What a unit new force adds at once, to the displacements and to the rate of momentum."""
@@ -90,15 +106,6 @@ class Recursion:
         direct = self._reduce(direct)
         return LoadedColumns(direct) if self.comm.rank == 0 else None
 
-    def _mine(self, every: np.ndarray) -> np.ndarray:
-        """Of all states (q, ...) those of this process."""
-        return self._of(self.comm.rank, every)
-
-    def _of(self, rank: int, every: np.ndarray) -> np.ndarray:
-        """Of all states (q, ...) those of a process, a view."""
-        owners = self.comm.size - self._idle
-        return every[rank - self._idle :: owners] if rank >= self._idle else every[:0]
-
     def _reduce(self, values: np.ndarray) -> np.ndarray:
         if self.comm.size == 1:
             return values
@@ -107,22 +114,53 @@ class Recursion:
         return total
 
     def start(self, force: np.ndarray) -> None:
-        """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
+        """Begin with a force (k,) N that is already there at t = 0, the tire still at rest. Collective when looking ahead."""
         self._force = force
         self._push = (self._input @ force).view(complex)
         self._rate = self._begun @ force
         if self._block:
             self._block.start(force)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Know all of the first step's outputs."""
+        if self.ahead:
+            self._move()
+            self._known, self._unknown = self._reduce(self._seen()), np.zeros_like(self._force)
 
     def predict(self) -> np.ndarray:
-        """Displacement (r,) m at the end of the step with no new force. Collective."""
-        self._free = self._decay * self.state + self._old * self._push
+        """Displacement (r,) m at the end of the step with no new force. Collective; looking ahead, the root is first, and the
+        others may call it after `exchange`."""
+        if not self.ahead:
+            self._move()
+            self._out = self._reduce(self._seen())
+        elif self._next is not None:
+            self._out = self._known + self._next @ self._unknown
+        self._rate = self._out[-3:]
+        out = self._out[:-3]
+        return out if self._late is None else out + self._late @ self._force
+
+    def _move(self) -> None:
+        """States to the end of the step, with no new force."""
+        if self._moved:
+            return
+        self._take()
+        self._free = self._decay * self._state + self._old * self._push
         if self._block:
             self._block.move()
-        out = self._reduce(self._seen() if self._known is None else self._known_of_next())
-        self._rate = out[-3:]
-        out = out[:-3]
-        return out if self._late is None else out + self._late @ self._force
+        self._moved = True
+
+    def _take(self) -> None:
+        """The force that `advance` was given, into the states."""
+        if self._taken:
+            return
+        self._push = (self._input @ self._force).view(complex)
+        self._state = self._free + self._new * self._push
+        if self._block:
+            self._block.advance(self._force)
+        self._taken = True
+        if self._samples is not None:
+            self._samples.append((self._state, self._push, self._force))
 
     def _seen(self) -> np.ndarray:
         """This process's part of the outputs with no new force."""
@@ -131,72 +169,71 @@ class Recursion:
             out += self._block.seen()
         return out
 
-    def _known_of_next(self) -> np.ndarray:
-        """The same in two parts: what was known ahead, and of the root process what the force just taken adds."""
-        known, self._known = self._known, None
-        assert known is not None, "after look_ahead()"
-        return known if self._next is None else self._next @ self._force
-
     def look_ahead(self) -> None:
-        """Find what of the next outputs does not depend on the force of this step; between `predict` and `advance`."""
-        if not self._idle:
-            return
-        self._known = self._output @ (self._decay * self._free).view(float)
+        """Find what of the next outputs does not depend on the force of this step."""
+        self._move()
+        self._part = self._output @ (self._decay * self._free).view(float)
         if self._block:
-            self._known += self._block.seen_next()
+            self._part += self._block.seen_next()
+
+    def exchange(self) -> None:
+        """What the root predicted, to the others, and what they looked ahead to, to it; before `advance`. Collective."""
+        self._out = self._out if self._next is not None else np.empty_like(self._out)
+        self.comm.Bcast(self._out)
+        self._known = self._reduce(self._part)
 
     def advance(self, force: np.ndarray) -> None:
         """Take the force (k,) N at the end of the step; after `predict`. Local to each process."""
-        self._force = force
-        self._push = (self._input @ force).view(complex)
-        self.state = self._free + self._new * self._push
+        self._move()
+        self._force = self._unknown = force
         self._rate = self._rate + self._into_rate @ force
-        if self._block:
-            self._block.advance(force)
-
-    def sample(self) -> tuple[np.ndarray, np.ndarray]:
-        """This process's states and pushes (mine,), after `advance`."""
-        return self.state, self._push
+        self._moved = self._taken = False
 
     @property
-    def force(self) -> np.ndarray:
-        """The force (k,) N that `advance` took last."""
-        return self._force
+    def state(self) -> np.ndarray:
+        """This process's states (mine,), after `advance`."""
+        self._take()
+        return self._state
+
+    def keep_samples(self) -> None:
+        """Have `samples` of each step from now on."""
+        self._samples = []
+
+    def samples(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """States and pushes (mine,) of this process and force (k,) N at the end of each step since the last call."""
+        self._take()
+        kept, self._samples = self._samples, []
+        assert kept is not None, "samples() before keep_samples()"
+        return kept
 
     def everywhere(self, samples: list[np.ndarray]) -> np.ndarray:
         """Samples of n steps as (n, q), all states in the order of the response. Collective."""
-        own = np.array(samples)
-        if self.comm.size == 1:
-            return own
-        every = joined(self.comm, np.ascontiguousarray(own.T))
-        out = np.empty((len(own), len(every)), complex)
-        first = 0
-        for rank in range(self.comm.size):
-            share = self._of(rank, out.T)
-            share[:] = every[first : first + len(share)]
-            first += len(share)
-        return out
+        return self._spread.everywhere(np.array(samples).T).T
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """All states in the order of the response, the same for any number of processes. Collective."""
-        kept = {"state": self._gathered(self.state), "push": self._gathered(self._push)}
+        kept = {
+            "state": self._spread.everywhere(self.state),
+            "push": self._spread.everywhere(self._push),
+        }
         kept["push_force"] = self._force
+        kept["known_ahead"] = self._known if self.ahead else self._known[:0]
         block = self._block.snapshot() if self._block else NO_BLOCK
         return kept | self.comm.bcast(block, root=self._idle)
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from a snapshot, between `advance` and `predict`."""
-        self.state, self._push = (self._mine(kept[name]).copy() for name in ("state", "push"))
-        self._force, self._known = kept["push_force"], None
+        """Go on from a snapshot, between `advance` and `predict`. Collective when looking ahead."""
+        self._state, self._push = (
+            self._spread.mine(kept[name]).copy() for name in ("state", "push")
+        )
+        self._force = self._unknown = kept["push_force"]
+        self._moved, self._taken = False, True
         if self._block:
             self._block.restore(kept)
-
-    def _gathered(self, values: np.ndarray) -> np.ndarray:
-        parts = self.comm.allgather(values)
-        out = np.empty(sum(map(len, parts)), complex)
-        for rank, part in enumerate(parts):
-            self._of(rank, out)[:] = part
-        return out
+        if len(kept.get("known_ahead", ())):
+            self._known = kept["known_ahead"]
+        else:
+            self._begin()
 
     def inertia_force(self) -> np.ndarray:
         """Rate of the tire's momentum (3,), N: sum_k (int rho phi_k) eta_k'', after `advance`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -23,24 +23,42 @@ class Solved(NamedTuple):
     penetration: float
 
 
+class Ahead(Protocol):
+    """What knows part of the next step before it knows the force of this one (greens.recursion)."""
+
+    def look_ahead(self) -> None: ...
+
+    def exchange(self) -> None: ...
+
+
 class Together:
-    """The root process of `comm` solves for `count` points and tells the others, which look `ahead` meanwhile. On one
-    process nothing is sent, and nobody looks ahead.
+    """The root process of `comm` solves for `count` points and tells the others, which look `ahead` meanwhile where the tire
+    can. On one process nothing is sent, and nobody looks ahead.
     """
 
-    def __init__(self, comm: MPI.Comm, count: int, ahead: Callable[[], None]) -> None:
+    def __init__(self, comm: MPI.Comm, count: int, ahead: Ahead | None) -> None:
         self._comm, self._count, self._ahead = comm, count, ahead
 
-    def __call__(self, solve: Callable[[], Solved], horizontal: bool) -> Solved:
-        """What `solve` finds on the root process, with `horizontal` forces or without; where it raises ConvergenceError or
-        InputError all do. Collective."""
+    def __call__(
+        self, predict: Callable[[], Array], solve: Callable[[Array], Solved], horizontal: bool
+    ) -> tuple[Array, Solved]:
+        """What the tire predicts, and what `solve` finds for that on the root process, with `horizontal` forces or without;
+        where it raises ConvergenceError or InputError all do. Collective."""
         if self._comm.size == 1:
-            return solve()
-        self._ahead()
+            return (free := predict()), solve(free)
+        if self._ahead is None:
+            return (free := predict()), self._told(solve, free, horizontal)
+        free = predict() if self._comm.rank == 0 else np.empty(0)
+        self._ahead.look_ahead()
+        found = self._told(solve, free, horizontal)
+        self._ahead.exchange()
+        return free if self._comm.rank == 0 else predict(), found
+
+    def _told(self, solve: Callable[[Array], Solved], free: Array, horizontal: bool) -> Solved:
         values, failed = np.empty(2 + (4 if horizontal else 2) * self._count), None
         if self._comm.rank == 0:
             try:
-                values = _packed(solve())
+                values = _packed(solve(free))
             except (ConvergenceError, InputError) as error:
                 values[0], failed = np.nan, error
         self._comm.Bcast(values)

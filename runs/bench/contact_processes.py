@@ -76,7 +76,7 @@ def measured(states: int, side: int, comm: MPI.Comm) -> dict:
     patch = oval_patch((side, side), (0.16 / side, 0.12 / side), 500.0)
     response = Strip(speed=SPEED).response(patch.points, max(states // 20, 1), 10)
     sharing = sharers(response, comm)
-    tire = Recursion(response=response, step=STEP, scheme="linear", comm=sharing, ahead=True)
+    tire = Recursion(response=response, step=STEP, scheme="linear", comm=sharing, look_ahead=True)
     tread = half_space_compliance(patch.points[:, :2], patch.half_sizes, 5e6, 0.45)
     drive = Drive(_wavy, lambda t: 0.0, SPEED)
     solver = make_solver("active-set", tire.same_step + tread)

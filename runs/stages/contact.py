@@ -194,7 +194,6 @@ class ContactStage(Stage[ContactHistory]):
             threadpool_limits(1, "blas"),
         ):
             for instant in instants:
-                losses.sample()
                 full = file.add(instant, driven.reading if driven else None)
                 bar.advance()
                 stop, due = watch(deferred.asked)

@@ -47,7 +47,7 @@ def works(scheme: str, contact: Work, driven: Driven | None) -> Works:
 
 
 class Losses:
-    """Samples of a rolling tire's states, and their losses; nothing of one whose losses are not known."""
+    """The losses of a rolling tire, of its states at each step; nothing of one whose losses are not known."""
 
     def __init__(self, tire, response: Response, rolling: RollingModes, step: float) -> None:
         self._tire = tire
@@ -57,7 +57,7 @@ class Losses:
             inputs = response.residual.shape[1]
             left_out = response.resolved(step).residual[:inputs]
             self._circulation = Circulation(left_out * (not response.pulse))
-        self._samples: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+            tire.keep_samples()
 
     @property
     def found(self) -> tuple[float, float, float, float] | None:
@@ -69,19 +69,13 @@ class Losses:
         losses, beyond = self._motion.losses, self._circulation
         return losses.lost, losses.drive, beyond.work, beyond.lead
 
-    def sample(self) -> None:
-        """Keep the states at the end of a step."""
-        if self._motion is not None:
-            self._samples.append((*self._tire.sample(), self._tire.force))
-
     def flush(self) -> None:
-        """Count what was kept. Collective."""
-        if not self._samples:
+        """Count the steps since the last time. Collective."""
+        if self._motion is None or not (samples := self._tire.samples()):
             return
-        states, pushes, forces = zip(*self._samples, strict=True)
+        states, pushes, forces = zip(*samples, strict=True)
         self._motion.add(self._tire.everywhere(states), self._tire.everywhere(pushes))
         self._circulation.add(np.array(forces))
-        self._samples.clear()
 
     def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint keeps."""

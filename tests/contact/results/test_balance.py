@@ -51,15 +51,14 @@ def terms(tire: RollingModes, steps: int, comm=MPI.COMM_SELF, counted: RollingMo
     force = (
         np.sin(np.array([90.0, 250.0, 400.0]) * time + np.array([0.0, 1.0, 2.0])) * time / DURATION
     )
-    moved, states, pushes = [], [], []
+    march.keep_samples()
+    moved = []
     for f in force:
         free = march.predict()
         march.advance(f)
         moved.append(free + march.same_step @ f)
-        state, push = march.sample()
-        states.append(state)
-        pushes.append(push)
     work.add(force, np.array(moved))
+    states, pushes, _ = zip(*march.samples(), strict=True)
     everywhere = march.everywhere(states), march.everywhere(pushes)
     for block in range(0, steps, 37):
         motion.add(*(part[block : block + 37] for part in everywhere))

@@ -26,7 +26,7 @@ def rolled(comm: MPI.Comm, solver: str, rubs: bool) -> np.ndarray:
     response = strip.response(PATCH.points, 6, 4, 4)
     if rubs:
         response = strip.horizontal_response(PATCH.points, 6, 4, 3.0)
-    tire = Recursion(response=response, step=STEP, scheme="linear", comm=comm, ahead=True)
+    tire = Recursion(response=response, step=STEP, scheme="linear", comm=comm, look_ahead=True)
     tread = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
     normal = make_solver(solver, tire.same_step[:COUNT, :COUNT] + tread)
     friction = None
@@ -56,23 +56,47 @@ def test_processes_find_together_what_each_finds_alone(solver: str, rubs: bool) 
     assert np.array_equal(first, together)  # or processes would take different decisions
 
 
+class Looking:
+    """What is asked of a tire that looks ahead."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def look_ahead(self) -> None:
+        self.asked.append("look")
+
+    def exchange(self) -> None:
+        self.asked.append("exchange")
+
+
 @pytest.mark.mpi
 def test_what_stops_the_root_process_stops_all() -> None:
-    """And a number that is no number from one solve leaves none behind for the next."""
-    comm, looked = MPI.COMM_WORLD, []
-    together = Together(comm, 2, lambda: looked.append(comm.rank))
+    """And a number that is no number from one solve leaves none behind for the next. The root predicts before it solves,
+    the others once they have met."""
+    comm, ahead = MPI.COMM_WORLD, Looking()
+    together = Together(comm, 2, ahead)
     force, gap = np.array([1.0, 0.0]), np.array([0.0, 2.0])
     answer = Solved(force, gap, np.zeros((0, 2)), 1e-12, 3e-13)
 
-    def refused() -> Solved:
+    def predict() -> np.ndarray:
+        ahead.asked.append("predict")
+        return gap
+
+    def refused(free: np.ndarray) -> Solved:
         raise ConvergenceError("no consistent set")
+
+    def solved(free: np.ndarray) -> Solved:
+        return answer if comm.rank == 0 and free is gap else refused(free)
 
     for _ in range(2):
         with pytest.raises(ConvergenceError, match="no consistent set"):
-            together(refused, horizontal=False)
-        found = together(lambda: answer if comm.rank == 0 else refused(), horizontal=False)
+            together(predict, refused, horizontal=False)
+        free, found = together(predict, solved, horizontal=False)
         assert all(np.array_equal(*pair) for pair in zip(found, answer, strict=True))
-    assert looked == ([] if comm.size == 1 else [comm.rank] * 4)
+        assert free is gap
+    root, other = ["predict", "look", "exchange"], ["look", "exchange", "predict"]
+    expected = ["predict"] if comm.size == 1 else other if comm.rank else root
+    assert ahead.asked[-len(expected) :] == expected
 
 
 def test_the_parts_of_a_matrix_are_those_of_the_whole() -> None:

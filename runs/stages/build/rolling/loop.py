@@ -115,7 +115,7 @@ def forces(
     """
     kept = response.resolved(step)
     comm = sharers(kept, job.comm)
-    tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm, ahead=True)
+    tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm, look_ahead=True)
     spec = contact or job.scene.contact
     loop = make_loop(spec, setup, driven_tire(job, tire, step, steps) or tire, step)
     (total, axle), every = np.zeros((2, steps, 3)), np.ones(len(setup.patch.points))

@@ -85,7 +85,7 @@ def integration(job: Job, plan: Planned, scheme: str) -> Integration:
     else:
         comm = sharers(plan.response, job.comm)
         tire = Recursion(
-            response=plan.response, step=plan.step, scheme=scheme, comm=comm, ahead=True
+            response=plan.response, step=plan.step, scheme=scheme, comm=comm, look_ahead=True
         )
         if comm.size < job.comm.size:
             observe.say("  each process takes the whole loop: too small to share out")

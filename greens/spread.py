@@ -1,0 +1,38 @@
+"""Which process has which states of a loop that several take together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from tireroad.fem.collective import joined
+
+
+@dataclass(frozen=True)
+class Spread:
+    """States one after the other to the processes of `comm` in turn, but for the first `idle` of them, which have none."""
+
+    comm: MPI.Comm
+    idle: int
+
+    def mine(self, every: np.ndarray) -> np.ndarray:
+        """Of all states (q, ...) those of this process, a view."""
+        return self._of(self.comm.rank, every)
+
+    def everywhere(self, own: np.ndarray) -> np.ndarray:
+        """All states (q, ...) from those of each process. Collective."""
+        if self.comm.size == 1:
+            return own
+        every = joined(self.comm, np.ascontiguousarray(own))
+        out, first = np.empty_like(every), 0
+        for rank in range(self.comm.size):
+            share = self._of(rank, out)
+            share[:] = every[first : first + len(share)]
+            first += len(share)
+        return out
+
+    def _of(self, rank: int, every: np.ndarray) -> np.ndarray:
+        owners = self.comm.size - self.idle
+        return every[rank - self.idle :: owners] if rank >= self.idle else every[:0]
