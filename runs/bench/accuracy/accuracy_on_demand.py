@@ -37,6 +37,7 @@ from tireroad.runs.search.journal import Journal, Trial
 from tireroad.runs.search.search import Search, seconds
 from tireroad.runs.search.settings import Ladders, Settings, applied
 from tireroad.runs.search.shares import worst
+from tireroad.runs.stages.build.rolling.run_in import run_in
 
 ABOUT = "a search for settings beside an exhaustive one: 3 tires, 4 roads, 2 speeds"
 TARGET, UP_TO = 0.15, 100.0  # -, Hz
@@ -105,13 +106,14 @@ def _outcome(folder: Path, case: Case, grid: Mapping, forces: Path) -> Outcome:
     ladders = Ladders.of(scene)
     ended, trials = _searched(folder / case.road, scene)
     last = min(trials, key=lambda trial: worst(trial.found.over(scene.accuracy))[0])
-    true = _true(exact, _driven(folder, ladders, last.settings))
-    best = _cheapest(folder, ladders, grid, exact)
+    chosen = _driven(folder, ladders, last.settings)
+    truth = _Truth(exact, run_in(chosen.done.setup, scene.road))
+    true, best = truth.error(chosen), _cheapest(folder, ladders, grid, truth)
     estimated = TARGET * worst(last.found.over(scene.accuracy))[0]
     return Outcome(str(case), ended, estimated, true, _cost(last.seconds), best, _spent(trials))
 
 
-def _cheapest(folder: Path, ladders: Ladders, grid: Mapping, exact: Recorded) -> float | None:
+def _cheapest(folder: Path, ladders: Ladders, grid: Mapping, truth: _Truth) -> float | None:
     """Seconds of the cheapest of all settings of the grid that meet the target; those whose stages before the loop
     alone are known to cost more are not run."""
     best: float | None = None
@@ -124,7 +126,7 @@ def _cheapest(folder: Path, ladders: Ladders, grid: Mapping, exact: Recorded) ->
         tried = _driven(folder, ladders, ladders.at(at))
         spent = seconds(folder / "grid")
         known |= {key: spent.get(key[0], 0.0) for key in keys}
-        if _true(exact, tried) <= TARGET:
+        if truth.error(tried) <= TARGET:
             best = min(best or np.inf, _cost(spent))
     return best
 
@@ -168,17 +170,22 @@ def _spent(trials: list[Trial]) -> float:
     return sum(once.values())
 
 
-def _true(exact: Recorded, run: Recorded) -> float:
-    """The error that is asked for: of the history and of the mean, relative, the larger one."""
-    one, other = _measured(exact), _measured(run)
-    far = bars(one, other, 1.0)
-    return float(max(far.history[2], far.mean[2] / abs(one.mean[2])))
+@dataclass(frozen=True)
+class _Truth:
+    """An `exact` run, and from when on (s) it is compared: what a run's own error bars leave out is left out."""
 
+    exact: Recorded
+    since: float
 
-def _measured(run: Recorded) -> Measured:
-    """Of the axle force after the first quarter, in which all roads have begun."""
-    force = run.forces["axle_force"]
-    return measured(force[len(force) // 4 :], run.step, UP_TO, UP_TO)
+    def error(self, run: Recorded) -> float:
+        """The error that is asked for: of the history and of the mean of the axle force, relative, the larger one."""
+        one, other = self._measured(self.exact), self._measured(run)
+        far = bars(one, other, 1.0)
+        return float(max(far.history[2], far.mean[2] / abs(one.mean[2])))
+
+    def _measured(self, run: Recorded) -> Measured:
+        force = run.forces["axle_force"]
+        return measured(force[round(self.since / run.step) :], run.step, UP_TO, UP_TO)
 
 
 def _summary(found: list[Outcome], failed: Sequence[str] = ()) -> Table:
