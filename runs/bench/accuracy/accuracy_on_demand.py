@@ -14,8 +14,7 @@ from mpi4py import MPI
 from tireroad.contact.results.error_bars import Measured, bars, measured
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import by_processor
-from tireroad.runs.bench.parts import apart
-from tireroad.runs.bench.parts.kept import Records
+from tireroad.runs.bench.parts.kept import Records, every_case
 from tireroad.runs.bench.parts.rolling_cases import (
     CASES,
     DURATION,
@@ -86,7 +85,7 @@ def tables(folder: Path, cases: Iterable[Case], grid: Mapping, kept: Path) -> li
     def settings(_: Case) -> tuple:
         return TARGET, UP_TO, DURATION, FINE, dict(grid)
 
-    records, failed = apart.every(by_wheel(cases), folder, kept, judged, settings, str)
+    records, failed = every_case(by_wheel(cases), folder, kept, judged, settings, str)
     found = [Outcome(**one) for some in records.values() for one in some]
     return [_summary(found, failed), _every(found)]
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from tireroad.contact.results.error_bars import Bars, bars, measured
-from tireroad.runs.bench.parts import apart
 from tireroad.runs.bench.parts.effectivity import (
     ALL,
     FORCES,
@@ -20,7 +19,7 @@ from tireroad.runs.bench.parts.effectivity import (
     every,
     shares,
 )
-from tireroad.runs.bench.parts.kept import Records
+from tireroad.runs.bench.parts.kept import Records, every_case
 from tireroad.runs.bench.parts.rolling_cases import (
     CASES,
     DURATION,
@@ -58,7 +57,7 @@ def tables(
         tire = TIRES[case.tire]
         return {**coarse, **tire.run}, {**fine, **tire.fine}, duration
 
-    records, failed = apart.every(by_wheel(cases), folder, kept, judged, settings, _told)
+    records, failed = every_case(by_wheel(cases), folder, kept, judged, settings, _told)
     found = [Effectivity(**one) for some in records.values() for one in some]
     note = f"{told_settings(coarse, 'run')}; true: against {told_settings(fine, 'fine')}."
     return [shares(found, note, failed), by_cause(found), every(found)]

@@ -1,5 +1,4 @@
-"""Cases of a bench, each in a process of its own: its memory goes back as a whole, and one that fails leaves the others to
-go on."""
+"""Work in a process of its own, whose memory goes back as a whole, and whose failure ends nothing else."""
 
 from __future__ import annotations
 
@@ -9,50 +8,13 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import ConvergenceError
-from tireroad.runs.bench.parts.kept import Records, read_kept, write_kept
-from tireroad.runs.bench.parts.rolling_cases import Case
-from tireroad.runs.files.identity import identity
 from tireroad.runs.process import mpi, observe, signals
 from tireroad.runs.process.statuses import BUG, DONE
-
-Task = Callable[..., Records]
-"""task(case, folder, kept, *settings): a function of a module."""
-
-
-def every(
-    cases: Iterable[Case],
-    folder: Path,
-    kept: Path,
-    task: Task,
-    settings: Callable[[Case], tuple],
-    told: Callable[[Records], str],
-) -> tuple[dict[Case, Records], list[str]]:
-    """What the task gives of each case, or what is kept of the same program and settings (text and numbers); and a line on
-    each case that failed. Cases work in a folder by wheel; `told` of what was found is shown. On one process.
-    """
-    found, failed = dict[Case, Records](), list[str]()
-    for case in cases:
-        name = (task.__module__ or "").rpartition(".")[2]
-        file = kept / name / f"{case.wheel}-{case.road}.json"
-        of = [identity("accuracy").code, *settings(case)]
-        known = read_kept(file, of)
-        if known is None:
-            observe.say(f"  {case} ...")
-            try:
-                known = apart(task, case, folder / case.wheel, kept, *settings(case))
-            except ConvergenceError as error:
-                failed.append(f"{case}: {error}")
-                observe.say(f"  {failed[-1]}")
-                continue
-            write_kept(file, of, known)
-        found[case] = known
-        observe.say(f"  {case}: {told(known)}")
-    return found, failed
 
 
 def apart(task: Callable[..., Any], *given: Any) -> Any:

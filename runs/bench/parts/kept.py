@@ -1,14 +1,54 @@
-"""Results of a bench that goes on where it was stopped: a JSON file a case, with what they are of."""
+"""Results of a bench that goes on where it was stopped: a JSON file a case, with what they are of; each case is computed in a
+process of its own."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from tireroad.fem.errors import ConvergenceError
+from tireroad.runs.bench.parts import apart
+from tireroad.runs.bench.parts.rolling_cases import Case
 from tireroad.runs.files.disk import write_text
+from tireroad.runs.files.identity import identity
+from tireroad.runs.process import observe
 
 Records = list[dict[str, Any]]
+Task = Callable[..., Records]
+"""task(case, folder, kept, *settings): a function of a module."""
+
+
+def every_case(
+    cases: Iterable[Case],
+    folder: Path,
+    kept: Path,
+    task: Task,
+    settings: Callable[[Case], tuple],
+    told: Callable[[Records], str],
+) -> tuple[dict[Case, Records], list[str]]:
+    """What the task gives of each case, or what is kept of the same program and settings (text and numbers); and a line on
+    each case that failed. Cases work in a folder by wheel; `told` of what was found is shown. On one process.
+    """
+    found, failed = dict[Case, Records](), list[str]()
+    for case in cases:
+        name = (task.__module__ or "").rpartition(".")[2]
+        file = kept / name / f"{case.wheel}-{case.road}.json"
+        of = [identity("accuracy").code, *case.given, *settings(case)]
+        known = read_kept(file, of)
+        if known is None:
+            observe.say(f"  {case} ...")
+            try:
+                known = apart.apart(task, case, folder / case.wheel, kept, *settings(case))
+            except ConvergenceError as error:
+                failed.append(f"{case}: {error}")
+                observe.say(f"  {failed[-1]}")
+                continue
+            write_kept(file, of, known)
+        found[case] = known
+        observe.say(f"  {case}: {told(known)}")
+    return found, failed
 
 
 def read_kept(file: Path, of: list[Any]) -> Records | None:

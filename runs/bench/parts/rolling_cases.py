@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 from mpi4py import MPI
 
+from tireroad.runs.bench.parts.apart import apart
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.process import observe
@@ -129,19 +130,19 @@ class Case:
         """What all roads share."""
         return f"{self.tire}-{self.speed:g}"
 
+    @property
+    def given(self) -> tuple[str, str]:
+        """Tire and road as in a scene."""
+        return TIRES[self.tire].text, ROADS[self.road]
+
     def scene(self, folder: Path, duration: float, *sets: str) -> Scene:
         """The scene, with keys of --set laid over it; its file goes to the folder."""
         from tireroad.runs.scene.load import load
 
         folder.mkdir(parents=True, exist_ok=True)
-        text = SCENE.format(
-            tire=TIRES[self.tire].text,
-            road=ROADS[self.road],
-            speed=self.speed,
-            residual=TIRES[self.tire].residual,
-            reach=REACH,
-            duration=duration,
-        )
+        (tire, road), residual = self.given, TIRES[self.tire].residual
+        keys = {"tire": tire, "road": road, "speed": self.speed, "residual": residual}
+        text = SCENE.format(**keys, reach=REACH, duration=duration)
         (folder / "given.toml").write_text(text)
         return load(folder / "given.toml", sets)
 
@@ -228,14 +229,19 @@ def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> D
 
 def recorded(scene: Scene, folder: Path, kept: Path, cache: Cache = NO_CACHE) -> Recorded:
     """The forces of a run in the folder, from the folder `kept` where a bench left those of the same scene: by
-    whatever state of the program, until they are removed there. On one process."""
+    whatever state of the program, until they are removed there. In a process of its own."""
     bare = replace(scene, accuracy=Accuracy(estimate=False))
     file = kept / f"{hashlib.sha256(dumps(bare).encode()).hexdigest()[:16]}.npz"
     if not file.exists():
-        run = driven(bare, folder, "contact", cache)
-        kept.mkdir(parents=True, exist_ok=True)
-        with replacing(file) as part, part.open("wb") as opened:
-            forces = [run.forces[name] for name in NAMES]
-            np.savez_compressed(opened, step=run.step, forces=np.array(forces))
+        apart(_record, bare, folder, file, cache)  # of a fine run's gigabytes not all come back
     with np.load(file) as found:
         return Recorded(dict(zip(NAMES, found["forces"], strict=True)), float(found["step"]))
+
+
+def _record(scene: Scene, folder: Path, file: Path, cache: Cache) -> None:
+    """The forces of a run into a file. On one process."""
+    run = driven(scene, folder, "contact", cache)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(file) as part, part.open("wb") as opened:
+        forces = [run.forces[name] for name in NAMES]
+        np.savez_compressed(opened, step=run.step, forces=np.array(forces))

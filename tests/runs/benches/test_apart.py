@@ -8,7 +8,7 @@ import pytest
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.bench.accuracy import error_bars
-from tireroad.runs.bench.parts import apart
+from tireroad.runs.bench.parts import apart, kept
 from tireroad.runs.bench.parts.effectivity import shares
 from tireroad.runs.bench.parts.rolling_cases import CASES, Case
 from tireroad.runs.measure import tabulate
@@ -51,10 +51,12 @@ def test_a_case_that_fails_is_named_and_the_others_go_on(tmp_path, monkeypatch) 
         lambda case: (case.speed, {"a": (1, 2)}),
         str,
     )
-    found, failed = apart.every(cases, *given)
+    found, failed = kept.every_case(cases, *given)
     assert begun == list(cases) and list(found) == [cases[0], cases[2]]
     assert failed == [f"{cases[1]}: exit status 2: too little memory"]
-    found, failed = apart.every(cases, *given)  # what was found is kept, what failed is tried again
+    found, failed = kept.every_case(
+        cases, *given
+    )  # what was found is kept, what failed is tried again
     assert begun[3:] == [cases[1]] and list(found) == list(cases) and not failed
 
 
@@ -64,6 +66,6 @@ def test_what_was_not_measured_ends_with_a_status(tmp_path, monkeypatch) -> None
     monkeypatch.setattr(tabulate, "modules", lambda package: {"it": module})
     with pytest.raises(ConvergenceError, match="not measured: a tire: too little memory"):
         tabulate.run_all("tireroad.runs.bench", ["it"], tmp_path / "out.json")
-    (kept,) = json.loads((tmp_path / "out.json").read_text())["results"]["it"]
-    assert kept["failed"] == table.failed
+    (table_kept,) = json.loads((tmp_path / "out.json").read_text())["results"]["it"]
+    assert table_kept["failed"] == table.failed
     assert "not measured: a tire: too little memory" in page({"it": [table]}, {"it": "it"})
