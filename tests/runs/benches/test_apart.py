@@ -8,7 +8,7 @@ import pytest
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.bench.accuracy import error_bars
-from tireroad.runs.bench.parts import apart, kept
+from tireroad.runs.bench.parts import apart, kept, rolling_cases
 from tireroad.runs.bench.parts.effectivity import shares
 from tireroad.runs.bench.parts.rolling_cases import CASES, Case
 from tireroad.runs.measure import tabulate
@@ -58,6 +58,9 @@ def test_a_case_that_fails_is_named_and_the_others_go_on(tmp_path, monkeypatch) 
         cases, *given
     )  # what was found is kept, what failed is tried again
     assert begun[3:] == [cases[1]] and list(found) == list(cases) and not failed
+    monkeypatch.setitem(rolling_cases.ROADS, cases[0].road, 'kind = "flat"')
+    kept.every_case(cases, *given)  # another road: nothing that was kept is of it
+    assert begun[4:] == [case for case in cases if case.road == cases[0].road]
 
 
 def test_what_was_not_measured_ends_with_a_status(tmp_path, monkeypatch) -> None:
