@@ -75,6 +75,13 @@ def _scene(command: argparse.ArgumentParser) -> None:
     command.add_argument("--set", action="append", default=[], metavar="a.b=value", help=SET_HELP)
 
 
+def _check(command: argparse.ArgumentParser) -> None:
+    _scene(command)
+    command.add_argument(
+        "-n", type=_count, metavar="N", dest="processes", default=1, help="of a run on N processes"
+    )
+
+
 def _directory(command: argparse.ArgumentParser) -> None:
     command.add_argument("directory", type=Path, metavar="DIR")
 
@@ -144,6 +151,12 @@ def _test(test: argparse.ArgumentParser) -> None:
     test.add_argument("arguments", nargs="*", metavar="PYTEST ARGUMENTS")
 
 
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 9999:
+        raise argparse.ArgumentTypeError(f"{text}: must be a number of processes, 1 to 9999")
+    return int(text)
+
+
 def _folder(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("the name of the folder is empty")
@@ -158,7 +171,7 @@ COMMANDS = {
         f"{PROGRAM} run SCENE.toml [options] [-- PETSc options]",
     ),
     "resume": Command("go on from the last checkpoint of a result folder", _resume),
-    "check": Command("validate a scene; show it resolved, its stages, its memory", _scene),
+    "check": Command("validate a scene; show it resolved, its stages, its memory", _check),
     "report": Command("(re)make report.html of a result folder", _directory),
     "export": Command(
         "XDMF for ParaView and CSV for spreadsheets from a result folder", _directory

@@ -115,7 +115,7 @@ def _check(args: argparse.Namespace) -> None:
     from tireroad.runs.scene.load import load
 
     scene = load(args.scene, args.set)
-    print(explain(scene))
+    print(explain(scene, args.processes))
     print(write_section(scene, Path("results") / scene.name))
 
 

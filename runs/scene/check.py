@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from tireroad.runs.scene.extent.demand import check_demand, duration
+from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
 from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
@@ -48,8 +48,8 @@ def _aligned(rows: list[Row], widths: list[int]) -> list[str]:
     ]
 
 
-def explain(scene: Scene) -> str:
-    """What `check` prints. InputError where the road cannot be used."""
+def explain(scene: Scene, processes: int = 1) -> str:
+    """What `check` prints of a run on that many processes. InputError where the road cannot be used."""
     check_road(scene)
     groups = _rows(scene, "", "scene")
     everything = [HEAD, *(row for _, rows in groups for row in rows)]
@@ -68,13 +68,14 @@ def explain(scene: Scene) -> str:
     if scene.accuracy.searches:
         lines += ["", *bounds(scene)]
         scene = applied(scene, Ladders.of(scene).first())
-    return "\n".join([*lines, *_demand(scene)])
+    return "\n".join([*lines, *_demand(scene, processes)])
 
 
-def _demand(scene: Scene) -> list[str]:
+def _demand(scene: Scene, processes: int) -> list[str]:
     """Memory, disk and time, and what the machine has too little of (InputError where by far)."""
     wanted = estimate(scene)
-    size, parts = wanted.sizes, wanted.memory
+    on_disk = out_of_core(wanted, processes)
+    size, parts = wanted.sizes, memory_of(wanted, processes, on_disk)
     counts = [f"{size.free} unknowns not held by the rim", f"{size.modes} modes"]
     if scene.contact is not None:
         counts.append(f"about {size.points} contact points")
@@ -90,7 +91,12 @@ def _demand(scene: Scene) -> list[str]:
         f"estimated sizes   {', '.join(counts)}",
         f"estimated time    {duration(sum(wanted.seconds.values()))} of one core",
         f"estimated disk    {sum(wanted.disk.values()) / 1e9:.2g} GB",
-        f"estimated memory  {sum(parts.values()) / 1e9:.2f} GB in one process",
-        *(f"  {name:26}{part / 1e9:6.2f} GB" for name, part in parts.items()),
+        f"estimated memory  {sum(parts.values()) / processes / 1e9:.2f} GB in {_each(processes)}"
+        + (", factors on disk" if on_disk else ""),
+        *(f"  {name:26}{part / processes / 1e9:6.2f} GB" for name, part in parts.items()),
     ]
-    return lines + [f"warning: {text}" for text in check_demand(wanted, Path.cwd())]
+    return lines + [f"warning: {text}" for text in check_demand(wanted, Path.cwd(), processes)]
+
+
+def _each(processes: int) -> str:
+    return "one process" if processes == 1 else f"each of {processes} processes"

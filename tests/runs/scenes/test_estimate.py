@@ -107,6 +107,17 @@ def test_what_cannot_succeed_is_refused_by_its_key(
         assert word in str(caught.value)
 
 
+def test_check_tells_what_each_process_takes(quickstart: Path, monkeypatch) -> None:
+    """Two have more than one together, and each less; factors that do not fit are on disk."""
+    scene, told = load(quickstart), []
+    for count, free in ((1, 1e12), (2, 1e12), (2, 1.2e9)):
+        monkeypatch.setattr(demand, "available_memory", lambda free=free: free)
+        line = next(x for x in explain(scene, count).splitlines() if "estimated memory" in x)
+        told.append(float(line.split()[2]))
+    assert told[0] / 2 < told[1] < told[0]
+    assert told[2] < told[1] and line.endswith("GB in each of 2 processes, factors on disk")
+
+
 @pytest.mark.slow
 def test_run_refuses_what_check_refuses(quickstart: Path, launch, tmp_path: Path) -> None:
     out = ("--out", tmp_path / "out", "--set", "modal.count=27000")
