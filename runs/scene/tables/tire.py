@@ -121,7 +121,7 @@ class Tire(Variants):
     shape: SectionKind = variant("section", SECTIONS)
     segments: int | None = integer(
         None,
-        "number of elements around the axle; absent: 30, of order 2 in a torus 100, for a section from a file 60",
+        "number of elements around the axle; absent: 28, of order 2 in a torus 100, for a radial tire 40, for a section from a file 60",
         least=8,
         most=4000,
     )

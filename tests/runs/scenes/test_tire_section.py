@@ -22,7 +22,8 @@ def scene(tmp_path, text, *overrides):
         (("tire.segments=24",), (2, 24, 16, 1.0)),
         (("static.load=500",), (3, 28, 16, 0.2)),
         (("static.load=500", "tire.footprint_size=1"), (3, 28, 16, 1.0)),
-        (('tire.section="radial"',), (2, 30, 26, 1.0)),
+        (('tire.section="radial"',), (2, 40, 26, 1.0)),
+        (('tire.section="radial"', "static.load=4000"), (2, 40, 26, 0.2)),
     ],
 )
 def test_elements_where_the_scene_leaves_them_open(tmp_path, given, expected):
