@@ -52,6 +52,5 @@ def broadcast(comm: MPI.Comm, value: T, root: int = 0) -> T:
     if comm.size == 1:
         return value
     sent = pkl5.Intracomm(comm).bcast(value, root)
-    return (
-        value if comm.rank == root else sent
-    )  # what others open by way of root's object stays open
+    # Root keeps its own: what the others open by way of it stays open.
+    return value if comm.rank == root else sent

@@ -16,9 +16,7 @@ from tireroad.modal.solver.team import Team
 
 _AT_ONCE = 16  # vectors that one process holds whole
 CHUNK = 64  # columns a matrix product: no second copy of all vectors
-_BETWEEN = (
-    4 * CHUNK
-)  # columns of a product with all vectors: with 64 BLAS packs them half of the time
+_BETWEEN = 4 * CHUNK  # of a product with all vectors: with 64 BLAS packs them half of the time
 # Vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product.
 _REPAIR = 1e-12
 
