@@ -13,6 +13,7 @@ import shutil
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 from attack import command, content, differences, finished, started, told, write_scene
@@ -27,7 +28,9 @@ def attack(folder: Path, files: int, seed: int) -> list[str]:
     dice, failures = random.Random(seed), []
     warm()
     scene, whole, stopped = write_scene(folder), folder / "whole", folder / "stopped"
-    status, text = finished(command("run", scene, "--out", whole))
+    # In a fork like all that follows: what other tests of this process left behind is in both.
+    run = ["run", str(scene), "--out", str(whole)]
+    status, text, _ = forked(partial(_program, run), folder / "said.txt", LIMIT)
     if status:
         return [f"the undamaged run ended with {status}: {text}"]
     wanted = content(whole)
@@ -109,12 +112,7 @@ def _used(
     }.get(use, [use, str(out)])
     same = not victim.exists()
 
-    def program() -> int:
-        from tireroad.runs.cli import main
-
-        return main(arguments)
-
-    status, text, _ = forked(program, scene.with_name("said.txt"), LIMIT)
+    status, text, _ = forked(partial(_program, arguments), scene.with_name("said.txt"), LIMIT)
     if "Traceback" in text or status not in (0, 2):
         return [f"status {status}: {text}"]
     if status == 2 and not ("error: " in text and text.count("\n") < 40):
@@ -131,6 +129,12 @@ def _used(
     if status == 0 and use == "report" and shown and victim.name not in _page(out):
         return ["the page does not name the damaged file"]
     return []
+
+
+def _program(arguments: list[str]) -> int:
+    from tireroad.runs.cli import main
+
+    return main(arguments)
 
 
 def _page(out: Path) -> str:

@@ -24,8 +24,11 @@ def warm() -> None:
     """
     os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
     os.environ["TIREROAD_CACHE"] = "off"
+    from threadpoolctl import threadpool_limits
+
     from tireroad.runs.process import mpi
 
+    threadpool_limits(1)  # whatever this process began with
     mpi.start_petsc([])
     import tireroad.runs.cli
     import tireroad.runs.stages.build.rolling.watch  # noqa: F401
