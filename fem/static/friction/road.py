@@ -46,7 +46,8 @@ class Couplings:
 
 
 _ROUNDING, _BRINK = 1e-9, 1e-7  # of a node's bound
-_STIFFEST = 1e6  # k over c: a node on the brink of sticking
+# k over c of a node on the brink of sticking: of 1e6 the rounding of g kept it off balance
+_STIFFEST = 1e3
 
 
 class RubbingRoad(Road):
