@@ -28,11 +28,12 @@ from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Array, Basis, Pencil, Probes, regained
 from tireroad.greens.completed import completed
-from tireroad.greens.residual.attachment import dynamic, fewest, foremost, with_attachments
+from tireroad.greens.residual.attachment import dynamic, fewest, foremost
 from tireroad.greens.residual.second_order import Moments, second_order
 from tireroad.greens.response import Response
-from tireroad.modal.basis import Projection, project, same_fields, with_air
+from tireroad.modal.basis import Projection, project, same_fields
 from tireroad.modal.damping import Damping, StrainEnergy, tail_loss
+from tireroad.modal.joined import joined, with_air
 from tireroad.modal.rolling import decouple
 from tireroad.modal.rotating import StateModes, held_matrices
 from tireroad.modal.solver.modes import Modes
@@ -177,9 +178,9 @@ class Wheel:
         # Few of the shapes join the basis: solving for these once more takes less than holding all until it is known which.
         columns = shapes.whole(loads @ (weights.T @ self._foremost(basis, probes, flexibility)))
         shapes.destroy()
-        joined = with_attachments(modes, columns, self.operators)
+        grown_modes = joined(modes, columns, self.operators)
         del columns  # used up: what follows needs the memory
-        grown, _ = self._grown(joined, basis.projection, len(modes.squares))
+        grown, _ = self._grown(grown_modes, basis.projection)
         if self.beyond is not None:
             lacking = regained(grown.held, *self._pencils(grown.projection), probes, probes)
             flexibility, beside = flexibility + lacking.compliance, beside + lacking.momentum
@@ -212,17 +213,15 @@ class Wheel:
         """Modes with the static shapes, relieved where nothing holds the tire, of K; their fields, own rows. Collective."""
         operators = self.operators
         columns = statics(operators, operators.stiffness, on_own_rows(operators, probes))
-        return self._grown(with_attachments(modes, columns, operators))
+        return self._grown(joined(modes, columns, operators))
 
-    def _grown(
-        self, grown: Modes, known: Projection | None = None, modes: int | None = None
-    ) -> tuple[Basis, Array]:
-        """The basis of modes with their attachment modes, and their fields; `known`: on the first of so many `modes`, beside
-        which those stay that are more than static. Collective."""
+    def _grown(self, grown: Modes, known: Projection | None = None) -> tuple[Basis, Array]:
+        """The basis of modes with their attachment modes, and their fields; `known`: on the first of them, beside which
+        those stay that are more than static. Collective."""
         operators, comm, loss = self.operators, self.operators.body.comm, self.beyond and self._loss
         projection = project(grown, self.rotation, operators.carried, comm, known, loss)
-        if modes is not None:
-            stays = dynamic(projection, self.speed, modes)
+        if known is not None:
+            stays = dynamic(projection, self.speed, known.own)
             projection, grown = projection.among(stays), grown.among(stays)
         projection = self.with_air(projection, grown)
         projection = self.corner(projection, grown) if self.corner else projection

@@ -9,8 +9,9 @@ from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.turning import Turning
 from tireroad.greens.coupling import Wheel
-from tireroad.modal.basis import Projection, with_corner
+from tireroad.modal.basis import Projection
 from tireroad.modal.damping import StrainEnergy, beyond
+from tireroad.modal.joined import with_corner
 from tireroad.modal.solver.modes import Modes
 
 

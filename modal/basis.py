@@ -10,13 +10,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
-from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.operators import Rotation
-from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.modal.air import Air
-from tireroad.modal.corner import Corner, meeting
+from tireroad.modal.corner import Corner
 from tireroad.modal.solver.fields import loss_factors, projected
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import Labels
@@ -31,8 +29,9 @@ class Projection:
     `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad skew; `convective`, `body_convective`
     (m, m) 1/rad2 symmetric, all four None for a wheel that stands; `momentum` (3, m) kg^1/2:
     int rho phi_k, the mass each mode moves; `loss_factor` (m,) by strain energy (modal.damping), None where
-    no compound has one. What else takes part: `air`, a coordinates after the m, and a `corner`, c after them, none of a
-    wheel that is held, whose hub yet carries moments.
+    no compound has one. The last `shapes` of the m are static shapes that joined the modes (modal.joined). What else
+    takes part: `air`, a coordinates after the m, and a `corner`, c after them, none of a wheel that is held, whose hub
+    yet carries moments.
     """
 
     squares: np.ndarray
@@ -42,6 +41,7 @@ class Projection:
     body: np.ndarray | None = None
     body_convective: np.ndarray | None = None
     loss_factor: np.ndarray | None = None
+    shapes: int = 0
     air: Air | None = None
     corner: Corner | None = None
 
@@ -123,6 +123,11 @@ class Projection:
         """Coordinates of the tire itself, m."""
         return len(self.squares)
 
+    @property
+    def modes(self) -> int:
+        """How many of the coordinates are modes: the first ones."""
+        return self.own - self.shapes
+
     def rotating(self, inertia: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Factors (m, m) of 2 Omega, Omega^2 and Omega d_k. InputError for the modes of a wheel that stands."""
         full = inertia == "full"
@@ -133,10 +138,11 @@ class Projection:
         return gyroscopic, convective, self.body
 
     def first(self, count: int) -> Projection:
-        """On the first `count` modes alone."""
+        """On the first `count` coordinates alone."""
         cut: dict[str, Any] = {
             "squares": self.squares[:count],
             "momentum": self.momentum[:, :count],
+            "shapes": max(0, count - self.modes),
         }
         for item in fields(self):
             values = getattr(self, item.name)
@@ -153,17 +159,18 @@ class Projection:
         small: dict[str, Any] = {
             name: None if value is None else value[np.ix_(*[wanted] * value.ndim)]
             for name, value in vars(self).items()
-            if name not in ("momentum", "air", "corner")
+            if name not in ("momentum", "shapes", "air", "corner")
         }
-        return Projection(momentum=self.momentum[:, wanted], **small)
+        shapes = int(np.count_nonzero(wanted[self.modes :]))
+        return Projection(momentum=self.momentum[:, wanted], shapes=shapes, **small)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModalBasis:
-    """The standing modes as all later steps take them: m fields, M-orthonormal.
+    """The standing modes as all later steps take them: fields, M-orthonormal.
 
-    `frequency` (m,) Hz; `shape` kg^-1/2 of the outer face (3 s, m), of a free rim after it (+ 6);
-    `projection` the small matrices on these very fields. `modes`: the fields on all unknowns, where
+    `frequency` (m,) Hz; `shape` kg^-1/2 of the outer face (3 s, m + k), of a free rim after it (+ 6), k static shapes
+    that joined the m modes among them (modal.turning_shapes); `projection` the small matrices on these very fields. `modes`: the fields on all unknowns, where
     this process solved for them and they are not read from a file; `labels` of a round tire;
     `column`: the air that joined them, where this process made it. Signs of eigenvectors, and vectors
     of repeated frequencies, are of one solution only: never combine two bases' parts.
@@ -177,7 +184,8 @@ class ModalBasis:
     column: Column | None = None
 
     def first(self, count: int) -> ModalBasis:
-        """The first `count` modes."""
+        """The first `count` modes, no more than there are, without any shapes."""
+        count = min(count, len(self.frequency))
         return ModalBasis(
             frequency=self.frequency[:count],
             shape=self.shape[:, :count],
@@ -208,10 +216,11 @@ def project(
     fem.operators, or None. Collective.
     """
     moved = comm.allreduce(carried @ modes.vectors)
+    shapes = len(modes.squares) - modes.count
     done = None if known is None else known.loss_factor
     losing = None if loss is None else loss_factors(modes, loss, comm, done)
     if rotation is None:
-        return Projection(squares=modes.squares, momentum=moved, loss_factor=losing)
+        return Projection(squares=modes.squares, momentum=moved, loss_factor=losing, shapes=shapes)
 
     def reduced(name: str, sign: int) -> np.ndarray:
         old = None if known is None else getattr(known, name)
@@ -225,26 +234,5 @@ def project(
         body=reduced("body", -1),
         body_convective=reduced("body_convective", 1),
         loss_factor=losing,
+        shapes=shapes,
     )
-
-
-def with_corner(
-    projection: Projection,
-    modes: Modes,
-    axle: Axle | None,
-    rim: RimMotion | None,
-    places: np.ndarray,
-    comm: MPI.Comm,
-) -> Projection:
-    """The projection on the modes (all rows), joined by the wheel, one that is held where `axle` is None; `places` (s, 3) m
-    of the outer face in the static state; as it is without a `rim`. Collective."""
-    if rim is None:
-        return projection
-    return replace(
-        projection, corner=meeting(axle or Axle.held(), rim, modes.vectors, places, comm)
-    )
-
-
-def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projection:
-    """The projection on the modes (all rows), joined by the air where there is any. Collective."""
-    return replace(projection, air=Air(air.duct, air.coupling(modes.vectors)) if air else None)

@@ -57,7 +57,7 @@ def rates(damping: Damping, projection: Projection) -> np.ndarray:
 def beyond(damping: Damping, projection: Projection) -> Proportional:
     """What damps the motions that no mode has."""
     if isinstance(damping, StrainEnergy):
-        highest = np.sqrt(max(float(projection.squares.max()), 0.0))
+        highest = np.sqrt(max(float(projection.squares[: projection.modes].max()), 0.0))
         return Proportional(tail_loss(projection) * highest, 0.0)
     return Proportional(*damping)
 
@@ -65,4 +65,5 @@ def beyond(damping: Damping, projection: Projection) -> Proportional:
 def tail_loss(projection: Projection) -> float:
     """Loss factor eta_c of motions beyond the modes: the mean of the upper quarter."""
     assert projection.loss_factor is not None, "rates() refuses modes without loss factors"
-    return float(projection.loss_factor[-max(len(projection.squares) // 4, 1) :].mean())
+    count = projection.modes
+    return float(projection.loss_factor[count - max(count // 4, 1) : count].mean())

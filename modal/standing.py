@@ -10,10 +10,13 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.path.journal import Journal
-from tireroad.modal.basis import ModalBasis, project, with_air, with_corner
+from tireroad.fem.turning import Turning
+from tireroad.modal.basis import ModalBasis, project
+from tireroad.modal.joined import with_air, with_corner
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.symmetry import Sites
+from tireroad.modal.turning_shapes import with_turning
 
 _SAME = 1e-6  # relative distance of the frequencies of one mode in two solutions
 
@@ -26,15 +29,34 @@ def standing_modes(
     rotation: bool = True,
     air: Column | None = None,
     axle: Axle | None = None,
+    turning: Turning | None = None,
 ) -> ModalBasis:
     """The `count` lowest modes, or all below `up_to` (Hz), with their fields on all unknowns.
 
-    `rotation`: also project the matrices of the rotating frame; without them the wheel can only stand.
+    `rotation`: also project the matrices of the rotating frame; without them the wheel can only stand. `turning`: how it
+    does, so that the shapes of turning join the modes (modal.turning_shapes), which belts need.
     `air`: what is in the cavity joins the projected problem, and so does the wheel of an `axle` that moves.
     ConvergenceError when one is missing, inaccurate or unstable. Collective.
     """
     modes = solved(motions.operators, count=count, up_to=up_to)
-    return projected(motions, modes, rotation, air, axle)
+    return projected(motions, shaped(motions, modes, turning), rotation, air, axle)
+
+
+def shaped(motions: SmallMotions, modes: Modes, turning: Turning | None) -> Modes:
+    """The modes, joined by the shapes of `turning`. Collective."""
+    if turning is None or not turning.speed:
+        return modes
+    return with_turning(modes, motions.operators, motions.rotation, turning)
+
+
+def fewer(
+    basis: ModalBasis, motions: SmallMotions, count: int, turning: Turning, axle: Axle | None
+) -> ModalBasis:
+    """The basis of the first `count` modes, and of their shapes of turning where it has such. Collective."""
+    few = basis.first(count)
+    if not basis.projection.shapes or few.modes is None:
+        return few
+    return projected(motions, shaped(motions, few.modes, turning), True, basis.column, axle)
 
 
 def solved(
@@ -92,6 +114,7 @@ def with_fields(
     up_to: float | None,
     air: Column | None = None,
     axle: Axle | None = None,
+    turning: Turning | None = None,
 ) -> ModalBasis:
     """The basis with its fields on all unknowns: itself, or, of one read from a file, the `count` lowest modes
     or those below `up_to` (Hz) solved and projected once more, in place of all its parts. Collective.
@@ -99,7 +122,15 @@ def with_fields(
     if basis.modes is not None:
         return basis
     rotation = basis.projection.gyroscopic is not None
-    again = standing_modes(motions, count=count, up_to=up_to, rotation=rotation, air=air, axle=axle)
+    again = standing_modes(
+        motions,
+        count=count,
+        up_to=up_to,
+        rotation=rotation,
+        air=air,
+        axle=axle,
+        turning=turning,
+    )
     top = max(float(basis.frequency.max(initial=0.0)), 1e-300)
     alike = len(again.frequency) == len(basis.frequency)
     if not alike or np.abs(again.frequency - basis.frequency).max(initial=0.0) > _SAME * top:

@@ -1,10 +1,9 @@
 """Attachment modes: the static shapes under the probes' loads join the basis, with their inertia.
 
-    R = K_Omega^-1 B,  R <- R - Phi (Phi^T M R),  Psi = R V with Psi^T M Psi = I, Psi^T K Psi diagonal
+    R = K_Omega^-1 B,  which join the modes as modal.joined says.
 
-The pseudo-modes Psi are M-orthonormal to the modes and to each other, so all that is done with modes
-is done with them; coupled to the modes through G, S and B. (MacNeal 1971; Rubin, AIAA J. 13 (1975)
-995.) Exact at 0 Hz: the exact static answer lies in the basis, or joins it as a residual.
+(MacNeal 1971; Rubin, AIAA J. 13 (1975) 995.) Exact at 0 Hz: the exact static answer lies in the basis, or joins it as
+a residual.
 
 Many points close together ask for many shapes, most of which never answer otherwise than statically. Left
 out are those whose static share matters at no point (`foremost`) and pseudo-modes far above the highest
@@ -14,16 +13,10 @@ keeps its static answer and loses its inertia.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy import sparse
 
-from tireroad.fem.collective import summed
-from tireroad.fem.matrices.operators import Operators
 from tireroad.modal.basis import Projection
-from tireroad.modal.solver.fields import between, gram
-from tireroad.modal.solver.modes import Modes
 
 # Of each point's own static flexibility: what the shapes left out may add up to. At 90 rad/s the receptance up
 # to half the highest mode then changes by 1.2e-3, with 1e-3 by 5e-3.
@@ -32,53 +25,6 @@ TOLERANCE = 1e-4
 # between 187 points changes by 4e-4 up to half the highest mode then; at 3 by 1e-3, at 2 by 4e-3.
 FASTEST = 4.0
 FEW = 100  # pseudo-modes that are kept in any case: they cost less than is worth a thought
-
-# Share of the largest squared length below which a direction is rounding of the orthogonalisation.
-_ROUNDING = 1e-12
-_ROWS = 4096  # of all fields at a time, when they are changed in place
-
-
-def with_attachments(modes: Modes, columns: np.ndarray, operators: Operators) -> Modes:
-    """Modes of K and M (not K_Omega) followed by pseudo-modes, ascending among themselves. Collective.
-
-    `columns` own rows (n, p) of R, which are used up: of a thousand loads on a fine mesh every copy takes a gigabyte.
-    """
-    comm, root = operators.body.comm, np.sqrt(operators.mass)[:, None]
-    basis, extra = root * modes.vectors, columns
-    extra *= root
-    whole = summed(comm, np.einsum("ij,ij->j", extra, extra))
-    extra /= np.sqrt(np.where(whole > 0, whole, 1.0))  # a load on the clamped rim moves nothing
-    for _ in range(2):  # once leaves what the first pass's rounding brought back
-        _take_off(extra, basis, gram(comm, basis, extra))
-    lengths, directions = np.linalg.eigh(gram(comm, extra, extra))
-    kept = lengths > _ROUNDING
-    extra = _combined(extra, directions[:, kept] / np.sqrt(lengths[kept]), extra)
-    _take_off(extra, basis, gram(comm, basis, extra))
-    del basis
-    extra = _combined(extra, np.linalg.inv(np.linalg.cholesky(gram(comm, extra, extra))).T, extra)
-    extra /= root
-    squares, turn = np.linalg.eigh(between(comm, extra, operators.stiffness, extra))
-    count = len(modes.squares)
-    vectors = np.empty((len(extra), count + len(squares)))
-    vectors[:, :count] = modes.vectors
-    _combined(extra, turn, vectors[:, count:])
-    return replace(modes, squares=np.concatenate([modes.squares, squares]), vectors=vectors)
-
-
-def _take_off(fields: np.ndarray, basis: np.ndarray, shares: np.ndarray) -> None:
-    """fields (n, p) -= basis (n, m) shares (m, p), in place."""
-    for start in range(0, len(fields), _ROWS):
-        rows = slice(start, start + _ROWS)
-        fields[rows] -= basis[rows] @ shares
-
-
-def _combined(fields: np.ndarray, change: np.ndarray, out: np.ndarray) -> np.ndarray:
-    """fields (n, p) change (p, k) in the first columns of `out`, which may be the fields themselves."""
-    out = out[:, : change.shape[1]]
-    for start in range(0, len(fields), _ROWS):
-        rows = slice(start, start + _ROWS)
-        out[rows] = fields[rows] @ change
-    return out
 
 
 def fewest(probes: sparse.csr_matrix) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
@@ -106,18 +52,19 @@ def foremost(missing: np.ndarray, flexibility: np.ndarray) -> np.ndarray:
     return vectors[:, order[np.argmin(fits) if not fits.all() else len(order) :]]
 
 
-def dynamic(projection: Projection, speed: float, modes: int) -> np.ndarray:
-    """Which coordinates (m,) stay: the first `modes`, `FEW` pseudo-modes, and all that are more than static.
+def dynamic(projection: Projection, speed: float, known: int) -> np.ndarray:
+    """Which coordinates (m,) stay: the first `known`, `FEW` pseudo-modes, and all that are more than static.
 
     Beside its static answer a coordinate's at w has the part  (w^2 + 2 w Omega n) / (omega_k^2 - Omega^2 n^2),
     n = |S_kk|^1/2: inertia, and what the turning carries along. It is static when that is at half the
     highest mode no more than for a standing wheel's at `FASTEST` times the highest mode.
     """
-    highest, squares = np.sqrt(projection.squares[modes - 1]), projection.squares
+    squares = projection.squares
+    highest = np.sqrt(squares[projection.modes - 1])
     turning = np.zeros(len(squares))
     if projection.convective is not None:
         turning = abs(speed) * np.sqrt(np.maximum(-np.diag(projection.convective), 0.0))
     moving = highest**2 + 4 * highest * turning
     stays = squares - turning**2 <= FASTEST**2 * moving
-    stays[: modes + FEW] = True
+    stays[: known + FEW] = True
     return stays

@@ -31,9 +31,14 @@ class Modes:
     symmetries: tuple[str, ...] = ()
 
     @property
+    def count(self) -> int:
+        """How many modes, m: static shapes that joined them (modal.joined) come after."""
+        return len(self.residual)
+
+    @property
     def frequency(self) -> np.ndarray:
         """Natural frequencies (m,), Hz; 0 for rigid modes."""
-        return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * np.pi)
+        return np.sqrt(np.maximum(self.squares[: self.count], 0.0)) / (2 * np.pi)
 
     def first(self, count: int) -> Modes:
         """The `count` lowest of them."""

@@ -14,31 +14,21 @@ from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.damping import Damping, StrainEnergy
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.team import how_many
-from tireroad.modal.standing import projected, solved, with_fields
+from tireroad.modal.standing import projected, shaped, solved, with_fields
+from tireroad.modal.turning_shapes import up_to
 from tireroad.modal.waves import Labels, label
-from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import available_memory
 from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.stages.base import kept
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done, Shared
-from tireroad.runs.stages.build import cavity, corner
-from tireroad.runs.stages.build.turning import damping_of
-from tireroad.runs.stages.stored import fields_file
+from tireroad.runs.stages.build import cavity
+from tireroad.runs.stages.build.turning import damping_of, shapes_of
+from tireroad.runs.stages.stored import fields_file, modes_file
 from tireroad.runs.stages.stored.checkpoint import checkpointed, forget
 
 _NAMED = 8  # modes of a round tire shown by name
-
-_UNITS = {
-    "squares": "1/s2",
-    "gyroscopic": "1/rad",
-    "convective": "1/rad2",
-    "body": "1/rad",
-    "body_convective": "1/rad2",
-    "momentum": "kg^1/2",
-    "loss_factor": "-",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +60,15 @@ class ModesStage(Computed[ModalBasis]):
             "static": self.static.key,
             "modal": asdict(self.job.scene.modal),
             "rotating": self.job.speed != 0,
+            "shapes": self._shapes,
             "cavity": cavity.inputs(self.job),
         }
+
+    @property
+    def _shapes(self) -> tuple[float, str] | None:
+        """The speed (rad/s) up to which shapes of turning join the modes, and by which inertia."""
+        turning = shapes_of(self.job)
+        return (up_to(turning.speed), turning.inertia) if turning else None
 
     def compute(self, record: Record) -> ModalBasis:
         """Solve and project. Collective."""
@@ -88,10 +85,14 @@ class ModesStage(Computed[ModalBasis]):
             )
         with record.timing("air"):
             air = cavity.make_air(self.job, motions, float(modes.frequency[-1]))
+        with record.timing("shapes of turning"):
+            grown = shaped(motions, modes, shapes_of(self.job))
         with record.timing("projection"):
-            basis = projected(motions, modes, self.job.speed != 0, air, self.job.axle)
+            basis = projected(motions, grown, self.job.speed != 0, air, self.job.axle)
             labels = _labels(motions, modes.vectors)
         _describe(record, modes)
+        if self._shapes:
+            record.headline["shapes of turning that join them"] = (basis.projection.shapes, "-")
         record.headline["damping"] = (_damping(damping_of(self.job), basis.projection), "-")
         if air is not None:
             cavity.describe_air(record, basis.projection.air)
@@ -125,22 +126,11 @@ class ModesStage(Computed[ModalBasis]):
 
     def write(self, file, product: ModalBasis) -> None:
         """Frequencies, traces, the small matrices; not the fields on all unknowns."""
-        _fill(file, product, self.static.product.points)
+        modes_file.fill(file, product, self.static.product.points)
 
     def read(self, file) -> ModalBasis:
         """The basis without its fields on all unknowns."""
-        parts = [file["surface/shape"][:]]
-        if "rim" in file:
-            parts += [file["rim/translation"][:], file["rim/rotation"][:]]
-        shape = np.hstack([part.reshape(len(part), -1) for part in parts]).T.copy()
-        matrices = {name: values[:] for name, values in file["projected"].items()}
-        return ModalBasis(
-            frequency=file["frequency"][:],
-            shape=shape,
-            projection=Projection(
-                **matrices, air=cavity.read(file), corner=corner.read(file, self.job.axle)
-            ),
-        )
+        return modes_file.read(file, self.job.axle)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,6 +158,7 @@ class Fields(Shared[ModalBasis]):
             up_to=wanted.up_to,
             air=air,
             axle=self.job.axle,
+            turning=shapes_of(self.job),
         )
         assert again.modes is not None, "they were solved just now"
         fields_file.keep(*given, again.modes)
@@ -176,7 +167,7 @@ class Fields(Shared[ModalBasis]):
 
 def _describe(record: Record, modes: Modes) -> None:
     record.headline |= {
-        "modes": (len(modes.squares), "-"),
+        "modes": (modes.count, "-"),
         "lowest": (float(modes.frequency[0]), "Hz"),
         "highest": (float(modes.frequency[-1]), "Hz"),
     }
@@ -223,28 +214,3 @@ def _labels(motions: SmallMotions, vectors: np.ndarray) -> Labels | None:
     nodal = motions.operators.spread(vectors).reshape(-1, vectors.shape[1])
     points = body.lattice.points(body.ids)
     return label(body.comm, points, circles, body.nodal_mass(), nodal)
-
-
-def _fill(file, basis: ModalBasis, points: np.ndarray) -> None:
-    m, modes, labels = len(basis.frequency), basis.modes, basis.labels
-    put(file, "frequency", basis.frequency, "Hz")
-    put(file, "residual", modes.residual, "-")
-    if basis.projection.loss_factor is not None:
-        put(file, "loss_factor", basis.projection.loss_factor, "-")
-    put(file, "surface/points", points, "m")
-    face = 3 * len(points)
-    put(file, "surface/shape", basis.shape[:face].T.reshape(m, -1, 3), "kg^-1/2")
-    if len(basis.shape) > face:
-        put(file, "rim/translation", basis.shape[face : face + 3].T, "kg^-1/2")
-        put(file, "rim/rotation", basis.shape[face + 3 :].T, "rad/(m kg^1/2)")
-    if labels is not None:
-        put(file, "wave_number", labels.wave, "-")
-        put(file, "section_mode", labels.section, "-")
-        put(file, "wave_share", labels.share, "-")
-    for name, unit in _UNITS.items():
-        if getattr(basis.projection, name) is not None:
-            put(file, f"projected/{name}", getattr(basis.projection, name), unit)
-    cavity.fill(file, basis.projection.air)
-    corner.fill(file, basis.projection.corner)
-    file.attrs["inertia_count"] = modes.inertia_count
-    file.attrs["rigid_modes"] = modes.rigid

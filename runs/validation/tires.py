@@ -18,6 +18,7 @@ from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
 from tireroad.modal.damping import StrainEnergy, beyond, rates
 from tireroad.modal.rolling import RollingModes, rolling_modes
+from tireroad.modal.standing import fewer
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.build.setup import probes, scene_setup
@@ -122,8 +123,9 @@ class Tires:
     def response(self, count: int, residual: str, counted: bool = True) -> Response:
         """The response of the lowest modes, as the program's own stages make it; what is `counted` of it, or all."""
         if count not in self._rolling:
-            few = self.modes.first(count)
-            self._rolling[count] = rolling_modes(few, turning_of(self.job), self.job.comm)
+            turning = turning_of(self.job)
+            few = fewer(self.modes, self.motions, count, turning, self.job.axle)
+            self._rolling[count] = rolling_modes(few, turning, self.job.comm)
         rolling, points = self._rolling[count], self.probes
         points = points.on_face if counted else points
         given = points.outputs, points.loads, residual

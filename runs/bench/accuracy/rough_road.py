@@ -18,6 +18,7 @@ from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.greens.responses import make_response
 from tireroad.modal.rolling import rolling_modes
+from tireroad.modal.standing import fewer
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.store import opened
 from tireroad.runs.process import observe
@@ -157,7 +158,8 @@ def rolled(folder: Path, mesh: Mesh, *sets: str, cache: Cache = NO_CACHE, **keys
 def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
     """The response that the run would have with its first modes and another residual. Collective."""
     run, job = given.run, given.run.job
-    rolling = rolling_modes(run.fields.first(count), run.wheel.turning, job.comm)
+    few = fewer(run.fields, run.motions, count, run.wheel.turning, job.axle)
+    rolling = rolling_modes(few, run.wheel.turning, job.comm)
     points = nodes(given.trial.setup.patch.index, len(run.static.points), 2)
     pair = points, points, residual
     return make_response(lambda: run.wheel, rolling, *pair, lambda: rolling.basis).response

@@ -27,21 +27,21 @@ def operations(
     nodes), scaled by the operations that grow fastest: an unknown meets all those of the columns beside it. `dense`: the
     contact points have a matrix.
     """
-    count = size.modes / 200
+    count, pairs = size.modes / 200, size.coordinates / 200
     mesh = (size.free / 27_900) ** 1.2 * column / 9
     parts = {"static": 8.0 * mesh}
     if "modes" not in left_out:
         parts["modes"] = 7.0 * mesh * count
     if "rotating" not in left_out:
-        parts["rotating"] = 0.8 * count**3 * (1 + size.speeds)
+        parts["rotating"] = 0.8 * pairs**3 * (1 + size.speeds)
     if "contact" not in left_out:
         loads = size.nodes * (3 if scene.contact.rubs else 1)
         parts["greens"] = 3.0 * mesh * loads / 277
         points = size.points**2 if dense else 300 * size.points
-        step = 2e-4 + 1e-9 * (4 * loads * size.modes + points)
+        step = 2e-4 + 1e-9 * (4 * loads * size.coordinates + points)
         if scene.time.scheme == "convolution":
             step += 1e-9 * 0.5 * size.steps * loads**2
         parts["contact loop"] = size.steps * step
     if "response" not in left_out:
-        parts["response"] = size.steps * 2e-5 + size.frequencies * (2e-5 + 5e-8 * size.modes)
+        parts["response"] = size.steps * 2e-5 + size.frequencies * (2e-5 + 5e-8 * size.coordinates)
     return parts

@@ -105,7 +105,7 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
     unknowns of one column, kept in one triangle. MUMPS took 84 MB for 27,225 and 194 MB for 59,697
     unknowns of second order, this gives 88 MB and 211 MB. What it is for a turning tire's responses has both triangles.
     """
-    tire, free, count = scene.tire, size.free, size.modes
+    tire, free, count = scene.tire, size.free, size.coordinates
     through = tire.proportions().through
     tangents = _matrices(TANGENTS, free, through, tire.order)
     parts = {
@@ -173,7 +173,7 @@ def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
     shapes = SHAPES.get(scene.greens.residual, 0)
     parts = {
         "flexibility of the patch": 8.0 * size.free * (ANSWERS + shapes * loads),
-        "contact": 16.0 * 4 * loads * 2 * size.modes
+        "contact": 16.0 * 4 * loads * 2 * size.coordinates
         + 8.0 * 3 * loads**2
         + 8.0 * _matrices_of_points(scene, size) * size.points**2
         + 8.0 * BLOCK * size.points * (3 + directions),
@@ -200,11 +200,11 @@ def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, floa
     face = size.free / (3 * (through * scene.tire.order + 1)) * 3
     parts = {"static.h5": 40.0 * size.free}
     if "modes" not in left_out:
-        parts["modes.h5"] = 8.0 * size.modes * (face + 5 * size.modes)
+        parts["modes.h5"] = 8.0 * size.coordinates * (face + 5 * size.coordinates)
     if "contact" not in left_out:
         numbers = size.points * (3 + 2 * (scene.contact.rubs)) + 10
         parts["contact.h5"] = 2 * PACKED * 8.0 * size.steps * numbers
-        parts["greens.h5"] = 16.0 * 2 * size.nodes * (2 * size.modes + size.nodes)
+        parts["greens.h5"] = 16.0 * 2 * size.nodes * (2 * size.coordinates + size.nodes)
     if "response" not in left_out:
         k = max(size.driven, 1)
         parts["response.h5"] = 8.0 * (

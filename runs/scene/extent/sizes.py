@@ -17,16 +17,18 @@ from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.scene import Scene
 
 TURN = 0.3  # radians of the fastest mode in an automatic step, 200 steps at least (stages.build.stepping)
+SHAPES = 0.7, 0.1  # shapes of turning a mode: with cords, and without (modal.turning_shapes)
 MARGIN = 5e-3  # m: the reach of the patch beyond the road's height (stages.greens)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sizes:
-    """`free` unknowns, `modes`, `points` of contact on `nodes`, time `steps`, `frequencies` of
+    """`free` unknowns, `modes`, `coordinates` with the shapes that join them, `points` of contact on `nodes`, time `steps`, `frequencies` of
     receptances, `speeds` of a Campbell diagram, `driven` points."""
 
     free: int
     modes: int
+    coordinates: int
     nodes: int
     points: int
     steps: int
@@ -45,6 +47,7 @@ def sizes(scene: Scene) -> Sizes:
     return Sizes(
         free=free,
         modes=modes,
+        coordinates=modes + _shapes(scene, modes),
         nodes=nodes,
         points=points,
         steps=_steps(scene, modes),
@@ -106,6 +109,16 @@ def _modes(scene: Scene, free: int) -> int:
     if scene.modal.up_to is None:
         return scene.modal.count
     return max(min(int(_wall(scene).modes_below(scene.modal.up_to)), free // 3), 1)
+
+
+def _shapes(scene: Scene, modes: int) -> int:
+    """Number of shapes of turning that join the modes."""
+    rotation = scene.rotation
+    if rotation is None or not rotation.speed or scene.modal.rim == "free":
+        return 0
+    if not rotation.shapes or rotation.method == "full":
+        return 0
+    return int(SHAPES[not scene.tire.shape.angles(scene.tire)] * modes)
 
 
 def highest_frequency(scene: Scene, modes: int) -> float:

@@ -90,6 +90,11 @@ class Rotation:
         ("projected", "full"),
         "eigenproblem of the rotating tire: on the modes, or on the finite elements",
     )
+    shapes: bool = flag(
+        True,
+        "static shapes of the forces that turning exerts on the modes join these, as many as matter: of method projected, "
+        "with a fixed rim",
+    )
     count: int = integer(40, "number of pairs of method full", least=1, most=10000)
     window: tuple[float, float] = vector(
         (0.0, 0.0),

@@ -52,3 +52,12 @@ def turning_of(job: Job) -> Turning:
     """The scene's speed, damping and inertia."""
     inertia = job.scene.rotation.inertia if job.speed else "full"
     return Turning(speed=job.speed, damping=damping_of(job), inertia=inertia)
+
+
+def shapes_of(job: Job) -> Turning | None:
+    """How the wheel turns where shapes of turning join its modes (modal.turning_shapes), else None."""
+    scene = job.scene
+    if not job.speed or scene.modal.rim == "free":
+        return None
+    wanted = scene.rotation.shapes and scene.rotation.method == "projected"
+    return turning_of(job) if wanted else None

@@ -49,7 +49,7 @@ def keep(job: Job, key: str, operators: Operators, modes: Modes) -> None:
 def kept(job: Job, key: str, operators: Operators, basis: ModalBasis) -> Modes | None:
     """The modes of a basis with the hash `key` and their fields, from the cache; None where it has none, or those of
     another solution (fields and modes.h5 come to the cache one by one, of any number of processes). Collective."""
-    count = len(basis.frequency)
+    count = basis.projection.own
     if job.fresh or job.cache.folder is None or _size(operators, count) > LARGEST:
         return None
     path = job.path(NAME)

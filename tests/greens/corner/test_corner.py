@@ -24,7 +24,8 @@ from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Basis
 from tireroad.greens.blocked import disagreement
 from tireroad.greens.coupling import Wheel
-from tireroad.modal.basis import project, with_corner
+from tireroad.modal.basis import project
+from tireroad.modal.joined import with_corner
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import everywhere
 from tireroad.modal.standing import sites
