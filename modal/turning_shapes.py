@@ -20,13 +20,14 @@ from __future__ import annotations
 
 import numpy as np
 from petsc4py import PETSc
+from scipy.sparse.csgraph import connected_components
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import LoadedShapes
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.turning import Turning
 from tireroad.modal.joined import combined, joined, take_off
-from tireroad.modal.solver.fields import gram, multiply
+from tireroad.modal.solver.fields import between, gram, multiply
 from tireroad.modal.solver.modes import Modes
 
 Array = np.ndarray
@@ -35,6 +36,7 @@ TOLERANCE = 2e-3
 BLOCK = 32  # solutions at a time
 _SPARE = 16  # directions found beyond those that count, by which they are known to be all
 _ROUNDING = 1e-14  # of the largest of a block
+_COUPLED = 1e-7  # of the largest of what turning couples: less is rounding
 
 
 def up_to(speed: float) -> float:
@@ -74,17 +76,41 @@ class _Found:
 
     def foremost(self) -> Array:
         """Own rows (n, k) of the directions that count."""
-        random, width = np.random.default_rng(0), self._of.shape[1]
-        shapes = LoadedShapes(self._operators, self._operators.stiffness)
-        while True:
-            mix = random.standard_normal((width, min(BLOCK, width - len(self._of))))
-            self._take(shapes.whole(self._load(mix)))
-            turn, sizes, _ = np.linalg.svd(self._of, full_matrices=False)
-            counts = int((sizes**2 > TOLERANCE).sum())
-            if counts + _SPARE <= len(self._of) or len(self._of) + BLOCK > width:
-                break
+        shapes, random = (
+            LoadedShapes(self._operators, self._operators.stiffness),
+            np.random.default_rng(0),
+        )
+        for among in self._uncoupled():
+            self._search(shapes, random, np.tile(among, 2))
         shapes.destroy()
+        turn, counts = self._counting()
         return combined(self._fields, turn[:, :counts], self._fields)
+
+    def _uncoupled(self) -> list[Array]:
+        """Masks (m,) of modes that turning does not couple, as of a mirror's two kinds: mixed at random their shapes would have
+        no symmetry any more."""
+        coupled = np.zeros(2 * (len(self._modes.squares),))
+        for _, matrix in self._forces:
+            part = np.abs(between(self._comm, self._modes.vectors, matrix, self._modes.vectors))
+            coupled += part / max(part.max(), np.finfo(float).tiny)
+        count, label = connected_components(coupled > _COUPLED, directed=False)
+        return [label == k for k in range(count)]
+
+    def _search(self, shapes: LoadedShapes, random: np.random.Generator, among: Array) -> None:
+        """Find all that counts of the columns `among` (2 m,) those of X."""
+        known, counted, width = len(self._of), self._counting()[1], int(among.sum())
+        while True:
+            mix = np.zeros((len(among), min(BLOCK, width - (len(self._of) - known))))
+            mix[among] = random.standard_normal((width, mix.shape[1]))
+            self._take(shapes.whole(self._load(mix)))
+            found, counts = len(self._of) - known, self._counting()[1] - counted
+            if counts + _SPARE <= found or found + _SPARE > width:
+                return
+
+    def _counting(self) -> tuple[Array, int]:
+        """Singular directions of what X has of those found, and how many of them count."""
+        turn, sizes, _ = np.linalg.svd(self._of, full_matrices=False)
+        return turn, int((sizes**2 > TOLERANCE).sum())
 
     def _load(self, mix: Array) -> Array:
         """Own rows (n, b) of forces: [2 Omega G Phi, Omega^2 S Phi / w] mix."""

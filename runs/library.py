@@ -127,13 +127,16 @@ def modes(
     up_to: float | None = None,
     rim: str = "fixed",
     road: str = "forces",
+    turning: Turning | None = None,
 ) -> Standing:
     """The `count` lowest undamped modes at a static state, or all below `up_to` Hz; none is missing.
 
-    `rim` "fixed" or "free"; `road` "forces": replaced by its forces, or "held".
+    `rim` "fixed" or "free"; `road` "forces": replaced by its forces, or "held". `turning`: how the wheel will turn, so
+    that what belts couple then joins the modes (modal.turning_shapes), as in a run.
     """
     motions = SmallMotions(tire, static, rim=rim, road=road)
-    return Standing(motions=motions, basis=standing_modes(motions, count=count, up_to=up_to))
+    basis = standing_modes(motions, count=count, up_to=up_to, turning=turning)
+    return Standing(motions=motions, basis=basis)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -137,9 +137,14 @@ def other_points(given: Given) -> Forces:
 
 
 def fewer_modes(given: Given) -> Forces:
-    """States up to `FEWER` of the highest mode, those above following statically. Collective."""
-    limit = FEWER * given.rolling.highest
-    kept = given.response.keeping_where(lambda s: np.abs(s) <= limit)
+    """States up to `FEWER` of the highest mode, those from there to the highest following statically: what lies beyond are the
+    shapes that joined the modes, without which the band below would move. Collective."""
+    highest = given.rolling.highest
+    joined = given.rolling.basis.projection.shapes > 0
+    limits = FEWER * highest, highest if joined else np.inf
+    kept = given.response.keeping_where(
+        lambda s: (np.abs(s) <= limits[0]) | (np.abs(s) > limits[1])
+    )
     if len(kept.every) == len(given.response.every):
         raise InputError("all states are slower than the highest mode by far: none can be left out")
     return given.repeated(given.settled, kept)

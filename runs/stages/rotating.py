@@ -25,17 +25,7 @@ from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done, Shared
 from tireroad.runs.stages.build import cavity, corner
 from tireroad.runs.stages.build.turning import turning_of
-
-_UNITS = {
-    "eigenvalue": "1/s",
-    "right": "-",
-    "left": "s",
-    "block": "1/s",
-    "block_right": "-",
-    "block_left": "s",
-    "residual": "-",
-    "left_residual": "-",
-}
+from tireroad.runs.stages.stored import states_file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,9 +133,7 @@ class RotatingStage(Computed[RollingModes]):
 
     def read(self, file) -> tuple[StateModes, dict]:
         """The states, and fields of their own, shape and momentum, where they have them."""
-        values = {name: file[name][:] for name in _UNITS}
-        known = float(file.attrs["basis_condition"]), int(file.attrs["rigid_states"])
-        states = StateModes(condition=known[0], rigid=known[1], **values)
+        states = states_file.read(file)
         if "basis" not in file:
             return states, {}
         own = file["basis"]
@@ -174,7 +162,8 @@ def _beyond(speed: float, critical: float) -> str:
 
 def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
     states = rolling.states
-    oscillating = states.eigenvalue[states.eigenvalue.imag > 0]
+    own = states.eigenvalue[~states_file.of_shapes(rolling)]
+    oscillating = own[own.imag > 0]
     record.headline |= {
         "pairs": (len(oscillating), "-"),
         "speed": (rolling.turning.speed, "rad/s"),
@@ -213,15 +202,13 @@ def _growth(job: Job, rolling: RollingModes, basis: ModalBasis) -> str:
 
 def _fill(file, rolling: RollingModes) -> None:
     states, lines = rolling.states, rolling.campbell
-    for name, unit in _UNITS.items():
-        put(file, name, getattr(states, name), unit)
-    put(file, "frequency", states.eigenvalue.imag / (2 * np.pi), "Hz")
+    states_file.fill(file, rolling)
     if rolling.full:
         put(file, "basis/shape", rolling.basis.shape, "kg^-1/2")
         put(file, "basis/momentum", rolling.basis.projection.momentum, "kg^1/2")
         corner.fill(file["basis"], rolling.basis.projection.corner)
     if rolling.basis.projection.air is not None:
-        put(file, "air_share", cavity.share(rolling), "-")
+        put(file, "air_share", cavity.share(rolling)[~states_file.of_shapes(rolling)], "-")
     if lines is not None:
         put(file, "campbell/speed", lines.speed, "rad/s")
         put(file, "campbell/eigenvalue", lines.eigenvalue, "1/s")
@@ -229,6 +216,4 @@ def _fill(file, rolling: RollingModes) -> None:
         put(file, "campbell/similarity", lines.similarity, "-")
         put(file, "campbell/undamped", lines.undamped, "Hz")
     file.attrs["speed"] = rolling.turning.speed
-    file.attrs["basis_condition"] = states.condition
     file.attrs["first_unstable"] = states.unstable
-    file.attrs["rigid_states"] = states.rigid

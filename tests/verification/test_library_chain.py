@@ -79,8 +79,9 @@ def tire() -> TireModel:
 def test_the_chain_gives_what_the_program_gives(tire, tmp_path, launch) -> None:
     static = press(tire, inflation=2e5, load=300.0, rolling=Rolling(speed=SPEED, damping=500.0))
     motions = SmallMotions(tire, static)
-    modes = standing_modes(motions, count=20)
-    rolling = rolling_modes(modes, Turning(speed=SPEED, damping=(500.0, 0.0)), COMM)
+    turning = Turning(speed=SPEED, damping=(500.0, 0.0))
+    modes = standing_modes(motions, count=20, turning=turning)
+    rolling = rolling_modes(modes, turning, COMM)
     road = make_road(kind="sine", run_in=0.0, amplitude=5e-4, wavelength=0.15)
     speed, still = SPEED * static.rolling_radius(), make_motion("none")
     setup = contact_setup(

@@ -26,7 +26,7 @@ def fill(file, basis: ModalBasis, points: np.ndarray) -> None:
     put(file, "frequency", basis.frequency, "Hz")
     put(file, "residual", modes.residual, "-")
     if basis.projection.loss_factor is not None:
-        put(file, "loss_factor", basis.projection.loss_factor, "-")
+        put(file, "loss_factor", basis.projection.loss_factor[:m], "-")
     put(file, "surface/points", points, "m")
     face = 3 * len(points)
     shapes = basis.shape[:face].T.reshape(m + basis.projection.shapes, -1, 3)

@@ -42,7 +42,8 @@ def test_fields_come_back_as_they_were_solved(folder, rim: str, monkeypatch) -> 
     tire = tireroad.torus(youngs_modulus=48e6, segments=8, elements_arc=4, order=2)
     operators = SmallMotions(tire, tireroad.press(tire, inflation=2e5), rim=rim).operators
     modes = solved(operators, count=6)
-    basis = SimpleNamespace(frequency=np.zeros(6), shape=operators.trace(modes.vectors))
+    own = SimpleNamespace(own=6)
+    basis = SimpleNamespace(projection=own, shape=operators.trace(modes.vectors))
     assert fields_file.kept(job, "a", operators, basis) is None
     fields_file.keep(job, "a", operators, modes)
     again = fields_file.kept(job, "a", operators, basis)
@@ -58,7 +59,7 @@ def test_fields_come_back_as_they_were_solved(folder, rim: str, monkeypatch) -> 
     # What comes next brings files into the folder for a moment: none may begin before all have looked.
     COMM.Barrier()
     assert left == ["cache", "scene.toml"]
-    other = SimpleNamespace(frequency=np.zeros(6), shape=basis.shape * [1, 1, -1, 1, 1, 1])
+    other = SimpleNamespace(projection=own, shape=basis.shape * [1, 1, -1, 1, 1, 1])
     assert fields_file.kept(job, "a", operators, other) is None  # modes.h5 of another solution
     monkeypatch.setattr(fields_file, "LARGEST", 0.0)
     assert fields_file.kept(job, "a", operators, basis) is None
