@@ -36,6 +36,7 @@ TOLERANCE = 2e-3
 BLOCK = 32  # solutions at a time
 _SPARE = 16  # directions found beyond those that count, by which they are known to be all
 _ROUNDING = 1e-14  # of the largest of a block
+_NOTHING = 1e-6  # of the tolerance: what rounding leaves where the modes are all there are
 _COUPLED = 1e-7  # of the largest of what turning couples: less is rounding
 
 
@@ -66,7 +67,7 @@ class _Found:
     ) -> None:
         self._modes, self._operators, self._comm = modes, operators, operators.body.comm
         full, speed = turning.inertia == "full", up_to(turning.speed)
-        middle = np.sqrt(max(float(modes.squares[-1]), np.finfo(float).tiny)) / 2
+        middle = np.sqrt(max(float(modes.squares[-1]), speed**2)) / 2
         self._forces = (
             (2 * speed, rotation.gyroscopic if full else rotation.body),
             (speed**2 / middle, rotation.convective if full else rotation.body_convective),
@@ -83,7 +84,7 @@ class _Found:
         for among in self._uncoupled():
             self._search(shapes, random, np.tile(among, 2))
         shapes.destroy()
-        turn, counts = self._counting()
+        turn, counts = _counting(self._of)
         return combined(self._fields, turn[:, :counts], self._fields)
 
     def _uncoupled(self) -> list[Array]:
@@ -98,19 +99,15 @@ class _Found:
 
     def _search(self, shapes: LoadedShapes, random: np.random.Generator, among: Array) -> None:
         """Find all that counts of the columns `among` (2 m,) those of X."""
-        known, counted, width = len(self._of), self._counting()[1], int(among.sum())
-        while True:
-            mix = np.zeros((len(among), min(BLOCK, width - (len(self._of) - known))))
+        known, width = len(self._of), int(among.sum())
+        found = 0
+        while found < width:
+            mix = np.zeros((len(among), min(BLOCK, width - found)))
             mix[among] = random.standard_normal((width, mix.shape[1]))
             self._take(shapes.whole(self._load(mix)))
-            found, counts = len(self._of) - known, self._counting()[1] - counted
-            if counts + _SPARE <= found or found + _SPARE > width:
+            before, found = found, len(self._of) - known
+            if found == before or _counting(self._of[known:, among])[1] + _SPARE <= found:
                 return
-
-    def _counting(self) -> tuple[Array, int]:
-        """Singular directions of what X has of those found, and how many of them count."""
-        turn, sizes, _ = np.linalg.svd(self._of, full_matrices=False)
-        return turn, int((sizes**2 > TOLERANCE).sum())
 
     def _load(self, mix: Array) -> Array:
         """Own rows (n, b) of forces: [2 Omega G Phi, Omega^2 S Phi / w] mix."""
@@ -124,7 +121,7 @@ class _Found:
             take_off(more, vectors, gram(comm, vectors, ops.mass[:, None] * more))
             take_off(more, self._fields, gram(comm, self._fields, multiply(ops.stiffness, more)))
         sizes, turn = np.linalg.eigh(gram(comm, more, multiply(ops.stiffness, more)))
-        kept = sizes > _ROUNDING * sizes.max()
+        kept = sizes > max(_NOTHING * TOLERANCE, _ROUNDING * sizes.max())
         new = more @ (turn[:, kept] / np.sqrt(sizes[kept]))
         # Q^T K X = Q^T L, and L of one matrix and one direction is G^T q . phi.
         given = [f * self._read(matrix, new) for f, matrix in self._forces]
@@ -134,3 +131,9 @@ class _Found:
     def _read(self, matrix: PETSc.Mat, fields: Array) -> Array:
         """fields^T matrix Phi (k, m): G is skew and S symmetric, but for signs, which do not count."""
         return gram(self._comm, multiply(matrix, fields), self._modes.vectors)
+
+
+def _counting(of: Array) -> tuple[Array, int]:
+    """Singular directions of what X has of those found, and how many of them count."""
+    turn, sizes, _ = np.linalg.svd(of, full_matrices=False)
+    return turn, int((sizes**2 > TOLERANCE).sum())

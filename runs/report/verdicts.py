@@ -16,6 +16,7 @@ LIMITS: tuple[tuple[str, float, float], ...] = (
     ("residual in the static flexibility", 0.5, 1.0),
     ("worst complementarity residual", 1e-9, 1e-6),
     ("energy", inf, inf),  # in joules: whether it is much, the others say
+    ("residual states", inf, inf),  # how many
     ("residual", 1e-8, 1e-5),
     ("orthonormality", 1e-9, 1e-6),
     ("identity", 1e-9, 1e-6),

@@ -85,9 +85,14 @@ def coarser_job(job: Job) -> Job:
     InputError where the mesh is too coarse to be halved.
     """
     tire, static = job.scene.tire, job.scene.static
-    coarse = replace(tire, segments=tire.segments // 2, shape=tire.shape.coarser(tire))
-    if coarse.segments < LEAST[0] or coarse.proportions().along < LEAST[1]:
-        raise InputError("the mesh is too coarse to be halved")
+    coarse, segments = tire, tire.segments // 2
+    if segments >= LEAST[0]:
+        coarse = replace(tire, segments=segments, shape=tire.shape.coarser(tire))
+    if coarse is tire or coarse.proportions().along < LEAST[1]:
+        around, along = (2 * least for least in LEAST)
+        raise InputError(
+            f"the mesh is too coarse to be halved: it takes {around} elements around and {along} along"
+        )
     rotation = job.scene.rotation
     if rotation is not None:  # as fast as the run's own wheel, whatever the travel speed
         rotation = replace(rotation, speed=job.speed, travel_speed=None)

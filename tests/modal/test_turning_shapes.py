@@ -10,6 +10,7 @@ from steel_cords import cords
 
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.direct import solve_all
+from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
@@ -22,9 +23,10 @@ from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Basis
 from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.rolling import rolling_modes
+from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.standing import fewer, shaped, solved, standing_modes
-from tireroad.modal.turning_shapes import TOLERANCE, up_to
+from tireroad.modal.turning_shapes import TOLERANCE, up_to, with_turning
 from tireroad.runs.measure.torus import thesis_torus
 
 SOFT = compound("neo-hookean", 1200.0, youngs_modulus=6e6, poisson_ratio=0.45)
@@ -122,6 +124,18 @@ def test_a_wheel_that_stands_has_none() -> None:
     made = motions()
     basis = standing_modes(made, count=8, turning=Turning())
     assert basis.projection.shapes == 0 and basis.modes.vectors.shape[1] == 8
+
+
+def test_a_basis_of_one_mode_and_one_of_all() -> None:
+    """The smallest that there is; and all that there are, which lack nothing."""
+    ring = thesis_torus(segments=8, elements_arc=4, elements_thickness=1, order=1).ring()
+    body = Body(MPI.COMM_SELF, ring, SOFT)
+    operators = Operators(body, 0.0)
+    rotation, free = operators.rotation(), len(operators.mass)
+    for count in (1, free):
+        modes = undamped.solve(operators.stiffness, operators.mass, count)
+        grown = with_turning(modes, operators, rotation, ROLLING)
+        assert grown.vectors.shape[1] <= (3 if count == 1 else free)
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from synthetic_results import lattice
 
 from tireroad.runs.report import figures, surface_figures, thinned
 from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.verdicts import verdict
 
 
 @pytest.mark.parametrize(
@@ -119,3 +120,8 @@ def test_bands_have_their_bars_at_their_names(count: int) -> None:
 def test_bars_that_differ_little_do_not_look_as_if_they_differed_much(levels: list) -> None:
     floor, top = figures.level_range(np.array(levels))
     assert floor % 10 == 0 and floor <= top - 20 and floor <= min(levels) and top >= max(levels)
+
+
+def test_a_count_of_residual_states_is_no_residual() -> None:
+    assert verdict("worst residual", 1e-3) == "poor" and verdict("worst residual", 1e-9) == "good"
+    assert verdict("residual states faster than 3 times the highest mode, made static", 115) == ""

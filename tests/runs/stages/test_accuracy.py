@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from tireroad.contact.results.error_bars import CAUSES, bars, measured
 from tireroad.contact.tread.kernel import KernelTread
+from tireroad.fem.errors import InputError
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.base.job import Job
@@ -215,3 +216,13 @@ def test_the_coarser_tire_turns_as_fast(tmp_path) -> None:
     job.found["speed"] = 19.0
     other = coarser_job(job)
     assert other.speed == 19.0 and other.scene.rotation.travel_speed is None
+
+
+@pytest.mark.parametrize("sizes", [(12, 16), (24, 6)])
+def test_a_mesh_too_coarse_to_be_halved_is_said_to_be(tmp_path, sizes) -> None:
+    """Not that a key of the halved mesh, which no one wrote, is out of its range."""
+    mesh = "segments = {}\nelements_arc = {}\n".format(*sizes)
+    (tmp_path / "scene.toml").write_text(f"[tire]\n{mesh}[static]\nload = 300.0\n")
+    job = Job(load(tmp_path / "scene.toml"), tmp_path, MPI.COMM_SELF)
+    with pytest.raises(InputError, match="16 elements around and 8 along"):
+        coarser_job(job)
