@@ -170,8 +170,8 @@ class ModalBasis:
     """The standing modes as all later steps take them: fields, M-orthonormal.
 
     `frequency` (m,) Hz; `shape` kg^-1/2 of the outer face (3 s, m + k), of a free rim after it (+ 6), k static shapes
-    that joined the m modes among them (modal.turning_shapes); `projection` the small matrices on these very fields. `modes`: the fields on all unknowns, where
-    this process solved for them and they are not read from a file; `labels` of a round tire;
+    that joined the m modes among them (modal.turning_shapes); `projection` the small matrices on these very fields.
+    `modes`: the fields on all unknowns, where this process solved for them and they are not read from a file; `labels` of a round tire;
     `column`: the air that joined them, where this process made it. Signs of eigenvectors, and vectors
     of repeated frequencies, are of one solution only: never combine two bases' parts.
     """

@@ -44,7 +44,7 @@ def standing_modes(
 
 def shaped(motions: SmallMotions, modes: Modes, turning: Turning | None) -> Modes:
     """The modes, joined by the shapes of `turning`. Collective."""
-    if turning is None or not turning.speed:
+    if turning is None or not turning.speed:  # nor are the matrices of the rotating frame made
         return modes
     return with_turning(modes, motions.operators, motions.rotation, turning)
 

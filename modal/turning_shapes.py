@@ -77,10 +77,8 @@ class _Found:
 
     def foremost(self) -> Array:
         """Own rows (n, k) of the directions that count."""
-        shapes, random = (
-            LoadedShapes(self._operators, self._operators.stiffness),
-            np.random.default_rng(0),
-        )
+        random = np.random.default_rng(0)
+        shapes = LoadedShapes(self._operators, self._operators.stiffness)
         for among in self._uncoupled():
             self._search(shapes, random, np.tile(among, 2))
         shapes.destroy()
@@ -90,7 +88,8 @@ class _Found:
     def _uncoupled(self) -> list[Array]:
         """Masks (m,) of modes that turning does not couple, as of a mirror's two kinds: mixed at random their shapes would have
         no symmetry any more."""
-        coupled = np.zeros(2 * (len(self._modes.squares),))
+        count = len(self._modes.squares)
+        coupled = np.zeros((count, count))
         for _, matrix in self._forces:
             part = np.abs(between(self._comm, self._modes.vectors, matrix, self._modes.vectors))
             coupled += part / max(part.max(), np.finfo(float).tiny)
@@ -99,8 +98,7 @@ class _Found:
 
     def _search(self, shapes: LoadedShapes, random: np.random.Generator, among: Array) -> None:
         """Find all that counts of the columns `among` (2 m,) those of X."""
-        known, width = len(self._of), int(among.sum())
-        found = 0
+        known, width, found = len(self._of), int(among.sum()), 0
         while found < width:
             mix = np.zeros((len(among), min(BLOCK, width - found)))
             mix[among] = random.standard_normal((width, mix.shape[1]))

@@ -113,10 +113,7 @@ def _modes(scene: Scene, free: int) -> int:
 
 def _shapes(scene: Scene, modes: int) -> int:
     """Number of shapes of turning that join the modes."""
-    rotation = scene.rotation
-    if rotation is None or not rotation.speed or scene.modal.rim == "free":
-        return 0
-    if not rotation.shapes or rotation.method == "full":
+    if not scene.joins_shapes or not scene.rotation.speed:
         return 0
     return int(SHAPES[not scene.tire.shape.angles(scene.tire)] * modes)
 

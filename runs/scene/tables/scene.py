@@ -216,3 +216,11 @@ class Scene:
     time: Time | None = table(Time, "the run in time", optional=True)
     accuracy: Accuracy = table(Accuracy, "how sure the answer is")
     output: Output = table(Output, "what is computed and kept")
+
+    @property
+    def joins_shapes(self) -> bool:
+        """Whether shapes of turning join the modes of a wheel that turns (modal.turning_shapes)."""
+        rotation = self.rotation
+        if rotation is None or self.modal.rim == "free":
+            return False
+        return rotation.shapes and rotation.method == "projected"

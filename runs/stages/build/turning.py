@@ -56,8 +56,4 @@ def turning_of(job: Job) -> Turning:
 
 def shapes_of(job: Job) -> Turning | None:
     """How the wheel turns where shapes of turning join its modes (modal.turning_shapes), else None."""
-    scene = job.scene
-    if not job.speed or scene.modal.rim == "free":
-        return None
-    wanted = scene.rotation.shapes and scene.rotation.method == "projected"
-    return turning_of(job) if wanted else None
+    return turning_of(job) if job.speed and job.scene.joins_shapes else None

@@ -14,12 +14,7 @@ from tireroad.runs.files.store import put
 
 _STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}
 _BLOCK = {"block": "1/s", "block_right": "-", "block_left": "s"}
-_FIRST = (
-    "eigenvalue",
-    "left",
-    "residual",
-    "left_residual",
-)  # along whose first axis the states lie
+_LAST = ("right",)  # the states lie along its last axis; of all others along the first
 
 
 def of_shapes(rolling: RollingModes) -> np.ndarray:
@@ -41,7 +36,7 @@ def fill(file, rolling: RollingModes) -> None:
             continue
         for name, unit in _STATES.items():
             values = getattr(states, name)
-            put(file, group + name, values[mask] if name in _FIRST else values[:, mask], unit)
+            put(file, group + name, values[:, mask] if name in _LAST else values[mask], unit)
         put(file, f"{group}frequency", states.eigenvalue[mask].imag / (2 * np.pi), "Hz")
     if joined.any():
         put(file, "turning/place", np.flatnonzero(joined), "-")
@@ -60,7 +55,7 @@ def read(file) -> StateModes:
         joined[place] = True
         order = np.argsort(np.concatenate([np.flatnonzero(~joined), place]))
         for name in _STATES:
-            axis = 0 if name in _FIRST else 1
+            axis = -1 if name in _LAST else 0
             both = np.concatenate([values[name], file[f"turning/{name}"][:]], axis=axis)
             values[name] = np.ascontiguousarray(np.take(both, order, axis=axis))
     known = float(file.attrs["basis_condition"]), int(file.attrs["rigid_states"])
