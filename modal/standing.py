@@ -39,14 +39,7 @@ def standing_modes(
     ConvergenceError when one is missing, inaccurate or unstable. Collective.
     """
     modes = solved(motions.operators, count=count, up_to=up_to)
-    return projected(motions, shaped(motions, modes, turning), rotation, air, axle)
-
-
-def shaped(motions: SmallMotions, modes: Modes, turning: Turning | None) -> Modes:
-    """The modes, joined by the shapes of `turning`. Collective."""
-    if turning is None or not turning.speed:  # nor are the matrices of the rotating frame made
-        return modes
-    return with_turning(modes, motions.operators, motions.rotation, turning)
+    return projected(motions, modes, rotation, air, axle, turning)
 
 
 def fewer(
@@ -56,7 +49,7 @@ def fewer(
     few = basis.first(count)
     if not basis.projection.shapes or few.modes is None:
         return few
-    return projected(motions, shaped(motions, few.modes, turning), True, basis.column, axle)
+    return projected(motions, few.modes, True, basis.column, axle, turning)
 
 
 def solved(
@@ -87,12 +80,16 @@ def projected(
     rotation: bool,
     air: Column | None = None,
     axle: Axle | None = None,
+    turning: Turning | None = None,
 ) -> ModalBasis:
-    """The basis of these modes: what they project and show. Collective."""
+    """The basis of these modes and of the shapes of `turning`, where it is given: what they project and show. Collective."""
     operators = motions.operators
     matrices = motions.rotation if rotation else None
     comm, loss = operators.body.comm, operators.loss_stiffness()
     projection = project(modes, matrices, operators.carried, comm, loss=loss)
+    if turning is not None and turning.speed:
+        modes = with_turning(modes, projection, operators, matrices, turning)
+        projection = project(modes, matrices, operators.carried, comm, projection, loss)
     if loss is not None:
         loss.destroy()
     given = axle, motions.rim_motion(rotation), motions.static.positions, comm

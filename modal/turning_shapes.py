@@ -26,8 +26,9 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.compliance import LoadedShapes
 from tireroad.fem.matrices.operators import Operators, Rotation
 from tireroad.fem.turning import Turning
+from tireroad.modal.basis import Projection
 from tireroad.modal.joined import combined, joined, take_off
-from tireroad.modal.solver.fields import between, gram, multiply
+from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.solver.modes import Modes
 
 Array = np.ndarray
@@ -46,16 +47,20 @@ def up_to(speed: float) -> float:
 
 
 def with_turning(
-    modes: Modes, operators: Operators, rotation: Rotation | None, turning: Turning
+    modes: Modes,
+    projection: Projection,
+    operators: Operators,
+    rotation: Rotation | None,
+    turning: Turning,
 ) -> Modes:
-    """The modes followed by the shapes of turning up to `up_to` the speed; as they are of a wheel that stands, or with a
-    free rim, which has no static shapes. Collective."""
+    """The modes, `projection` what they project, followed by the shapes of turning up to `up_to` the speed; as they are of
+    a wheel that stands, or with a free rim, which has no static shapes. Collective."""
     if not turning.speed or operators.unknowns.rim is not None:
         return modes
     if rotation is None:
         raise InputError("shapes of turning: the matrices of the rotating frame are needed")
     found = _Found(modes, operators, rotation, turning)
-    columns = found.foremost()
+    columns = found.foremost(_uncoupled(projection, turning.inertia))
     return joined(modes, columns, operators) if columns.shape[1] else modes
 
 
@@ -66,35 +71,24 @@ class _Found:
         self, modes: Modes, operators: Operators, rotation: Rotation, turning: Turning
     ) -> None:
         self._modes, self._operators, self._comm = modes, operators, operators.body.comm
-        full, speed = turning.inertia == "full", up_to(turning.speed)
+        speed = up_to(turning.speed)
         middle = np.sqrt(max(float(modes.squares[-1]), speed**2)) / 2
         self._forces = (
-            (2 * speed, rotation.gyroscopic if full else rotation.body),
-            (speed**2 / middle, rotation.convective if full else rotation.body_convective),
+            (2 * speed, rotation.coriolis(turning.inertia)),
+            (speed**2 / middle, rotation.carrying(turning.inertia)),
         )
         self._fields = np.empty((len(modes.vectors), 0))
         self._of = np.empty((0, 2 * len(modes.squares)))
 
-    def foremost(self) -> Array:
-        """Own rows (n, k) of the directions that count."""
+    def foremost(self, classes: list[Array]) -> Array:
+        """Own rows (n, k) of the directions that count, found for each of the `classes` of modes by itself."""
         random = np.random.default_rng(0)
         shapes = LoadedShapes(self._operators, self._operators.stiffness)
-        for among in self._uncoupled():
+        for among in classes:
             self._search(shapes, random, np.tile(among, 2))
         shapes.destroy()
         turn, counts = _counting(self._of)
         return combined(self._fields, turn[:, :counts], self._fields)
-
-    def _uncoupled(self) -> list[Array]:
-        """Masks (m,) of modes that turning does not couple, as of a mirror's two kinds: mixed at random their shapes would have
-        no symmetry any more."""
-        count = len(self._modes.squares)
-        coupled = np.zeros((count, count))
-        for _, matrix in self._forces:
-            part = np.abs(between(self._comm, self._modes.vectors, matrix, self._modes.vectors))
-            coupled += part / max(part.max(), np.finfo(float).tiny)
-        count, label = connected_components(coupled > _COUPLED, directed=False)
-        return [label == k for k in range(count)]
 
     def _search(self, shapes: LoadedShapes, random: np.random.Generator, among: Array) -> None:
         """Find all that counts of the columns `among` (2 m,) those of X."""
@@ -129,6 +123,17 @@ class _Found:
     def _read(self, matrix: PETSc.Mat, fields: Array) -> Array:
         """fields^T matrix Phi (k, m): G is skew and S symmetric, but for signs, which do not count."""
         return gram(self._comm, multiply(matrix, fields), self._modes.vectors)
+
+
+def _uncoupled(projection: Projection, inertia: str) -> list[Array]:
+    """Masks (m,) of modes that turning does not couple, as of a mirror's two kinds: mixed at random their shapes would have
+    no symmetry any more."""
+    coupled = np.zeros(2 * projection.squares.shape)
+    for matrix in projection.rotating(inertia)[:2]:
+        part = np.abs(matrix)
+        coupled += part / max(part.max(), np.finfo(float).tiny)
+    count, label = connected_components(coupled > _COUPLED, directed=False)
+    return [label == k for k in range(count)]
 
 
 def _counting(of: Array) -> tuple[Array, int]:

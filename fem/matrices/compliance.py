@@ -29,8 +29,7 @@ def rotating_stiffness(
         stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # not every copy knows it
         return stiffness
     assert rotation is not None, "a speed needs the matrices of the rotating frame"
-    convective = rotation.convective if inertia == "full" else rotation.body_convective
-    add_part(stiffness, speed**2, convective)
+    add_part(stiffness, speed**2, rotation.carrying(inertia))
     add_part(stiffness, speed * damping[0], rotation.body)
     if damping[1]:
         scaled = rotation.body.copy()
@@ -55,8 +54,7 @@ def rotating_damping(
     matrix.scale(damping[1])
     if speed:
         assert rotation is not None, "a speed needs the matrices of the rotating frame"
-        gyroscopic = rotation.gyroscopic if inertia == "full" else rotation.body
-        add_part(matrix, 2 * speed, gyroscopic)
+        add_part(matrix, 2 * speed, rotation.coriolis(inertia))
     add_diagonal(matrix, damping[0] * operators.mass)
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, speed == 0)
     return matrix

@@ -66,6 +66,14 @@ class Rotation:
         rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
         return self._assemble(self._body.inertia(-ufl.inner(test_rate, rate)))
 
+    def coriolis(self, inertia: str) -> PETSc.Mat:
+        """What 2 Omega multiplies: G, or B of the doppler inertia, kg."""
+        return self.gyroscopic if inertia == "full" else self.body
+
+    def carrying(self, inertia: str) -> PETSc.Mat:
+        """What Omega^2 multiplies: S, or S_B of the doppler inertia, kg."""
+        return self.convective if inertia == "full" else self.body_convective
+
 
 class Operators:
     """Matrices on the unknowns of a body at its present displacement. Collective.

@@ -14,7 +14,7 @@ from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.damping import Damping, StrainEnergy
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.team import how_many
-from tireroad.modal.standing import projected, shaped, solved, with_fields
+from tireroad.modal.standing import projected, solved, with_fields
 from tireroad.modal.turning_shapes import up_to
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.process import observe
@@ -85,10 +85,9 @@ class ModesStage(Computed[ModalBasis]):
             )
         with record.timing("air"):
             air = cavity.make_air(self.job, motions, float(modes.frequency[-1]))
-        with record.timing("shapes of turning"):
-            grown = shaped(motions, modes, shapes_of(self.job))
-        with record.timing("projection"):
-            basis = projected(motions, grown, self.job.speed != 0, air, self.job.axle)
+        with record.timing("projection and shapes of turning"):
+            given = air, self.job.axle, shapes_of(self.job)
+            basis = projected(motions, modes, self.job.speed != 0, *given)
             labels = _labels(motions, modes.vectors)
         _describe(record, modes)
         if self._shapes:

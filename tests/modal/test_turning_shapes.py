@@ -22,10 +22,11 @@ from tireroad.fem.tire.wall import compounds
 from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Basis
 from tireroad.greens.small_motions import wheel_of
+from tireroad.modal.basis import project
 from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
-from tireroad.modal.standing import fewer, shaped, solved, standing_modes
+from tireroad.modal.standing import fewer, projected, solved, standing_modes
 from tireroad.modal.turning_shapes import TOLERANCE, up_to, with_turning
 from tireroad.runs.measure.torus import thesis_torus
 
@@ -91,7 +92,7 @@ def test_all_that_count_are_found() -> None:
     made = motions()
     operators, rotation = made.operators, made.rotation
     modes = solved(operators, count=COUNT)
-    grown = shaped(made, modes, ROLLING)
+    grown = projected(made, modes, True, turning=ROLLING).modes
     speed, middle = up_to(ROLLING.speed), np.sqrt(modes.squares[-1]) / 2
     forces = [
         2 * speed * multiply(rotation.gyroscopic, modes.vectors),
@@ -134,7 +135,8 @@ def test_a_basis_of_one_mode_and_one_of_all() -> None:
     rotation, free = operators.rotation(), len(operators.mass)
     for count in (1, free):
         modes = undamped.solve(operators.stiffness, operators.mass, count)
-        grown = with_turning(modes, operators, rotation, ROLLING)
+        projection = project(modes, rotation, operators.carried, body.comm)
+        grown = with_turning(modes, projection, operators, rotation, ROLLING)
         assert grown.vectors.shape[1] <= (3 if count == 1 else free)
 
 
