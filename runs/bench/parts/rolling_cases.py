@@ -26,11 +26,10 @@ from tireroad.runs.stages.pipeline import Finished, run_scene
 
 @dataclass(frozen=True, kw_only=True)
 class Tire:
-    """What a tire's scene has in `text`, and its `residual`: rolling belts couple kept modes with the rest (docs/method.md).
-    Of settings as of `sets`, `run` are those in which its runs, and `fine` those in which its reference differ."""
+    """What a tire's scene has in `text`. Of settings as of `sets`, `run` are those in which its runs, and `fine` those in
+    which its reference differ: of rolling belts, which couple kept modes with the rest (docs/method.md), attachment modes too."""
 
     text: str
-    residual: str = "static"
     run: Mapping[str, Any] = field(default_factory=dict)
     fine: Mapping[str, Any] = field(default_factory=dict)
 
@@ -65,13 +64,19 @@ error_estimate = false
 """
 TIRES = {
     "soft": Tire(text=_SOFT),
-    "belted": Tire(text=_SOFT + _BELT, residual="attachment"),
+    "belted": Tire(text=_SOFT + _BELT, fine={"residual": "attachment"}),
     # 205/60 R15 under its rated load: of order 2, several elements through its wall, its footprint ten times as wide.
     "radial": Tire(
         text=_RADIAL,
-        residual="attachment",
         run={"segments": 16, "arc": 14, "order": 2},
-        fine={"segments": 26, "arc": 24, "order": 2, "footprint": 0.1, "pitch": 0.004},
+        fine={
+            "segments": 26,
+            "arc": 24,
+            "order": 2,
+            "footprint": 0.1,
+            "pitch": 0.004,
+            "residual": "attachment",
+        },
     ),
 }
 # The cleat lies where the patch comes after its run-in, which no figure has in it. At both speeds a wave of the sine passes in more
@@ -103,8 +108,6 @@ name = "case"
 {tire}
 [rotation]
 speed = {speed}
-[greens]
-residual = "{residual}"
 [contact]
 youngs_modulus = 1e7
 reach = {reach}
@@ -141,8 +144,8 @@ class Case:
         from tireroad.runs.scene.load import load
 
         folder.mkdir(parents=True, exist_ok=True)
-        (tire, road), residual = self.given, TIRES[self.tire].residual
-        keys = {"tire": tire, "road": road, "speed": self.speed, "residual": residual}
+        tire, road = self.given
+        keys = {"tire": tire, "road": road, "speed": self.speed}
         text = SCENE.format(**keys, reach=REACH, duration=duration)
         (folder / "given.toml").write_text(text)
         return load(folder / "given.toml", sets)
@@ -165,8 +168,9 @@ def sets(
     pitch: float,
     step: float,
     footprint: float = 0.25,
+    residual: str = "static",
 ) -> tuple[str, ...]:
-    """Settings of mesh, modes, points and step as of --set."""
+    """Settings of mesh, modes, points, step and residual as of --set."""
     return (
         f"tire.segments={segments}",
         f"tire.elements_arc={arc}",
@@ -175,6 +179,7 @@ def sets(
         f"modal.count={modes}",
         f"contact.points={{ dx = {pitch}, dy = {pitch} }}",
         f"time.step={step}",
+        f"greens.residual={residual}",
     )
 
 
@@ -186,9 +191,10 @@ def told_settings(keys: Mapping[str, Any], part: Literal["run", "fine"]) -> str:
 
 
 def _told(keys: Mapping[str, Any]) -> str:
+    residual = f", residual {keys['residual']}" if "residual" in keys else ""
     return (
         f"{keys['segments']} x {keys['arc']} elements of order {keys['order']}, {keys['modes']} modes, points "
-        f"{1e3 * keys['pitch']:g} mm apart, steps of {1e3 * keys['step']:g} ms"
+        f"{1e3 * keys['pitch']:g} mm apart, steps of {1e3 * keys['step']:g} ms{residual}"
     )
 
 

@@ -236,3 +236,16 @@ def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
     assert load(out / "scene.toml") == load(out / "chosen.toml")
     assert not (out / "search").exists()
     assert len(Journal(out, load(file, smooth)).trials) == 1
+
+
+@pytest.mark.parametrize(
+    ("belted", "shapes", "wanted"),
+    [(True, "true", "static"), (True, "false", "attachment"), (False, "false", "static")],
+)
+def test_residual_of_rolling_belts(file, belted: bool, shapes: str, wanted: str) -> None:
+    """What belts couple as they roll is in the shapes of turning; of a scene without these attachment modes have it."""
+    cord = (
+        '{ name = "belt", depth = 0.006, arc = [-30.0, 30.0], angle = 0.0, youngs_modulus = 2e9 }'
+    )
+    sets = [f"rotation.shapes={shapes}", f"tire.cords=[{cord if belted else ''}]"]
+    assert Ladders.of(load(file, sets)).first().residual == wanted
