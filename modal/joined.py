@@ -3,7 +3,8 @@
     R <- R - Phi (Phi^T M R),  Psi = R V with Psi^T M Psi = I, Psi^T K Psi diagonal
 
 The pseudo-modes Psi are M-orthonormal to the modes and to each other, so all that is done with modes is done with
-them; coupled to the modes through G, S and B.
+them; coupled to the modes through G, S and B. Eigenvectors are K-orthogonal to all that they are M-orthogonal to;
+shapes are not: those that joined before and those that join now are one space, and K diagonal on all of it.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _ROWS = 4096  # of all fields at a time, when they are changed in place
 
 
 def joined(modes: Modes, columns: Array, operators: Operators) -> Modes:
-    """Modes of K and M (not K_Omega) followed by pseudo-modes, ascending among themselves. Collective.
+    """Modes of K and M (not K_Omega) followed by pseudo-modes, those of before among them, ascending. Collective.
 
     `columns` own rows (n, p) of R, which are used up: of a thousand loads on a fine mesh every copy takes a gigabyte.
     """
@@ -50,12 +51,13 @@ def joined(modes: Modes, columns: Array, operators: Operators) -> Modes:
     del basis
     extra = combined(extra, np.linalg.inv(np.linalg.cholesky(gram(comm, extra, extra))).T, extra)
     extra /= root
-    squares, turn = np.linalg.eigh(between(comm, extra, operators.stiffness, extra))
-    count = len(modes.squares)
-    vectors = np.empty((len(extra), count + len(squares)))
-    vectors[:, :count] = modes.vectors
-    combined(extra, turn, vectors[:, count:])
-    return replace(modes, squares=np.concatenate([modes.squares, squares]), vectors=vectors)
+    vectors = np.hstack([modes.vectors, extra])
+    del extra
+    shapes = vectors[:, modes.count :]
+    squares, turn = np.linalg.eigh(between(comm, shapes, operators.stiffness, shapes))
+    combined(shapes, turn, shapes)
+    squares = np.concatenate([modes.squares[: modes.count], squares])
+    return replace(modes, squares=squares, vectors=vectors)
 
 
 def take_off(fields: Array, basis: Array, shares: Array) -> None:

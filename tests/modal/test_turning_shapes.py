@@ -59,10 +59,15 @@ def motions() -> SmallMotions:
     return pressed(MPI.COMM_SELF)
 
 
+def loads_of(made: SmallMotions) -> sparse.csr_matrix:
+    """Vertical ones on six points of the footprint."""
+    spots = [probe.spot(made.lattice, a, b) for a in (-0.1, 0.0, 0.15) for b in (-0.2, 0.1)]
+    return sparse.csr_matrix(np.stack([probe.directed(one, (0, 0, 1.0)) for one in spots]))
+
+
 def receptances(made: SmallMotions, turning: Turning | None, option: str):
     """Of points of the footprint up to half the highest mode: by modes and shapes, and by the full matrices."""
-    spots = [probe.spot(made.lattice, a, b) for a in (-0.1, 0.0, 0.15) for b in (-0.2, 0.1)]
-    loads = sparse.csr_matrix(np.stack([probe.directed(one, (0, 0, 1.0)) for one in spots]))
+    loads = loads_of(made)
     basis = standing_modes(made, count=COUNT, turning=turning)
     wheel = wheel_of(made, ROLLING)
     states = Basis.of(rolling_modes(basis, ROLLING, made.body.comm))
@@ -84,6 +89,19 @@ def test_what_belts_couple_as_they_roll_is_in_the_states(option) -> None:
     without, there = (off(*receptances(motions(), given, option)) for given in (None, ROLLING))
     assert there < 0.06
     assert there < without / 4
+
+
+@pytest.mark.slow
+def test_attachment_modes_that_join_them_hold_the_static_answer() -> None:
+    """Of six loads the exact answers are in the basis: nothing is left. K knows shapes of turning and attachment modes from each
+    other, M does not: taken for orthogonal in both, they left answers of either sign, and contact that pulls."""
+    made = motions()
+    loads = loads_of(made)
+    basis = standing_modes(made, count=COUNT, turning=ROLLING)
+    states = Basis.of(rolling_modes(basis, ROLLING, made.body.comm))
+    found = wheel_of(made, ROLLING).respond(states, basis.modes, loads, loads, "attachment")
+    assert basis.projection.shapes > 10
+    assert np.abs(found.residual).max() < 1e-6 * np.abs(found.static()).max()
 
 
 @pytest.mark.slow
