@@ -114,7 +114,7 @@ def _judged(where: _Where) -> Iterator[Effectivity]:
     own = where.own()
     more = where.finer("modes")
     pairs: dict[str, tuple[Recorded, Recorded]] = {
-        ALL: (own, where.finer(*_MESH, "pitch", "step")),
+        ALL: (own, where.finer(*_MESH, "pitch", "step", "residual")),
         "step": (own, where.finer("step")),
         "points": (own, where.finer("pitch")),
         "modes": (own, more),
