@@ -217,11 +217,9 @@ class Wheel:
 
     def _grown(self, grown: Modes, known: Projection | None = None) -> tuple[Basis, Array]:
         """The basis of modes with their attachment modes, and their fields; `known`: on the first of them, beside which
-        those stay that are more than static. Collective."""
+        those stay that are more than static; of its shapes and those that join now none is as it was. Collective."""
         operators, comm, loss = self.operators, self.operators.body.comm, self.beyond and self._loss
-        same = known and known.first(
-            known.modes
-        )  # shapes that joined before are turned into those that join now
+        same = known and known.first(known.modes)
         projection = project(grown, self.rotation, operators.carried, comm, same, loss)
         if known is not None:
             stays = dynamic(projection, self.speed, known.own)

@@ -4,12 +4,14 @@ import errno
 import os
 import shutil
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tireroad.fem.errors import InputError
 
+_SLACK = 1.0  # s by which clocks of files and of processes may differ
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG}
 
@@ -65,19 +67,28 @@ def remove_leftovers(directory: Path) -> None:
     for part in directory.glob(".*.part"):
         rest, _, process = part.name.removesuffix(".part").rpartition(".")
         here = rest.endswith(f".{socket.gethostname()}")
-        if here and process.isdigit() and not _lives(int(process)):
-            with suppress(OSError):
+        with suppress(OSError):
+            if here and process.isdigit() and not _lives(int(process), part.stat().st_mtime):
                 part.unlink()
 
 
-def _lives(process: int) -> bool:
+def _lives(process: int, written: float) -> bool:
+    """Whether another process that wrote at this time (s since the epoch) still runs: one that is over and has not been waited
+    for does not, nor does a later one that has its number."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
     except PermissionError:
         pass
-    return process != os.getpid()
+    if process == os.getpid():
+        return False
+    try:
+        state, *rest = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return True
+    age = time.clock_gettime(time.CLOCK_BOOTTIME) - int(rest[18]) / os.sysconf("SC_CLK_TCK")
+    return state not in "ZX" and time.time() - age <= written + _SLACK
 
 
 @contextmanager

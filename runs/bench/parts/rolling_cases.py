@@ -62,21 +62,15 @@ inflation = 2.2e5
 load = 4000.0
 error_estimate = false
 """
+_ATTACHED = {"residual": "attachment"}
 TIRES = {
     "soft": Tire(text=_SOFT),
-    "belted": Tire(text=_SOFT + _BELT, fine={"residual": "attachment"}),
+    "belted": Tire(text=_SOFT + _BELT, fine=_ATTACHED),
     # 205/60 R15 under its rated load: of order 2, several elements through its wall, its footprint ten times as wide.
     "radial": Tire(
         text=_RADIAL,
         run={"segments": 16, "arc": 14, "order": 2},
-        fine={
-            "segments": 26,
-            "arc": 24,
-            "order": 2,
-            "footprint": 0.1,
-            "pitch": 0.004,
-            "residual": "attachment",
-        },
+        fine={"segments": 26, "arc": 24, "order": 2, "footprint": 0.1, "pitch": 0.004} | _ATTACHED,
     ),
 }
 # The cleat lies where the patch comes after its run-in, which no figure has in it. At both speeds a wave of the sine passes in more

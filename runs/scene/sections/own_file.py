@@ -131,15 +131,14 @@ def own_materials(tire: Tire) -> dict[str, Material]:
 def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
     """The material of one region.
 
-    A [[tire.region]] of it gives its dynamic modulus and loss factor where they are not 1 and 0.
+    Its dynamic modulus and loss factor are those of the [[tire.region]] where they are not 1 and 0, else likewise those
+    of the file's compound, else [tire]'s.
     """
     from tireroad.fem.tire.material import Material, compound
 
     region = region_of(tire, name)
     change = {"dynamic": tire.dynamic, "loss_factor": tire.loss_factor}
-    if rubber is not None:
-        change = {"dynamic": rubber.dynamic, "loss_factor": rubber.loss_factor}
-    change |= losses_of(region)
+    change |= losses_of(rubber) | losses_of(region)
     if region is not None and region.material is not None:
         return Material(law=region.material.law, density=region.material.density, **change)
     if rubber is None:

@@ -11,6 +11,7 @@ import numpy as np
 from tireroad.runs.scene.sections.kind import Proportions
 
 if TYPE_CHECKING:
+    from tireroad.fem.decks.compounds import Rubber
     from tireroad.fem.sections.mesh2d import SectionMesh
     from tireroad.fem.sections.ring import Ring
     from tireroad.fem.tire.cords import Cords
@@ -37,9 +38,9 @@ def region_of(tire: Tire, name: str) -> Region | None:
     return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)
 
 
-def losses_of(region: Region | None) -> dict[str, float]:
-    """Dynamic modulus and loss factor that a [[tire.region]] gives, where they are not 1 and 0."""
-    given = {} if region is None else {"dynamic": region.dynamic, "loss_factor": region.loss_factor}
+def losses_of(part: Region | Rubber | None) -> dict[str, float]:
+    """Dynamic modulus and loss factor that a [[tire.region]] or a file's compound gives, where they are not 1 and 0."""
+    given = {} if part is None else {"dynamic": part.dynamic, "loss_factor": part.loss_factor}
     neutral = {"dynamic": 1.0, "loss_factor": 0.0}
     return {key: value for key, value in given.items() if value != neutral[key]}
 

@@ -243,7 +243,6 @@ def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
     [(True, "true", "static"), (True, "false", "attachment"), (False, "false", "static")],
 )
 def test_residual_of_rolling_belts(file, belted: bool, shapes: str, wanted: str) -> None:
-    """What belts couple as they roll is in the shapes of turning; of a scene without these attachment modes have it."""
     cord = (
         '{ name = "belt", depth = 0.006, arc = [-30.0, 30.0], angle = 0.0, youngs_modulus = 2e9 }'
     )

@@ -12,7 +12,6 @@ import pytest
 from started import ROOT, environment
 
 from tireroad.runs.cli import main
-from tireroad.runs.files.disk import part_of, remove_leftovers
 from tireroad.runs.stages.modes import ModesStage
 
 pytestmark = pytest.mark.slow
@@ -179,20 +178,6 @@ def test_a_link_in_place_of_the_log_is_not_followed(scene: Path) -> None:
 def test_tight_limits_are_named(scene: Path, line: str, words: bytes) -> None:
     done = shell(line, "run", scene, "--out", scene.parent / "out")
     assert done.returncode == 2 and words in done.stderr, done.stderr
-
-
-def test_leftovers_of_the_dead_are_removed(tmp_path: Path) -> None:
-    """Of a process of this machine that has ended; not of one that lives, nor of another machine."""
-    dead = subprocess.Popen(["true"])
-    dead.wait()
-    own = part_of(tmp_path / "contact.h5")
-    gone = own.with_name(own.name.replace(f".{os.getpid()}.", f".{dead.pid}."))
-    alive = own.with_name(own.name.replace(f".{os.getpid()}.", f".{os.getppid()}."))
-    elsewhere = tmp_path / f".contact.h5.elsewhere.{dead.pid}.part"
-    for path in (gone, alive, elsewhere):
-        path.write_text("")
-    remove_leftovers(tmp_path)
-    assert sorted(tmp_path.iterdir()) == sorted([alive, elsewhere])
 
 
 @pytest.mark.parametrize("package", ["numpy", "mpi4py", "dolfinx"])

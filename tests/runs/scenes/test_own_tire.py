@@ -154,6 +154,22 @@ def test_materials_of_the_scene(folder):
     assert (np.degrees(belt.angle), belt.area) == (pytest.approx(30), 3e-7)
 
 
+def test_a_compound_without_losses_of_its_own_has_those_of_the_tire(folder):
+    """They were dropped without a word, and a run, whose damping was taken to be theirs, crashed."""
+    from tireroad.runs.scene.sections.own_file import own_materials
+
+    (folder / "own.toml").write_text(TIRE)
+    tire = load(folder / "own.toml", ["tire.loss_factor=0.2", "tire.dynamic=1.3"]).tire
+    (wall,) = own_materials(tire).values()
+    assert (wall.dynamic, wall.loss_factor) == (1.3, 0.2)
+    assert tire.shape.has_losses(tire)
+    assert not (plain := load(folder / "own.toml").tire).shape.has_losses(plain)
+    region = TIRE + '[[tire.region]]\nname = "WALL"\nloss_factor = 0.1\n'
+    (folder / "own.toml").write_text(region)
+    (wall,) = own_materials(load(folder / "own.toml", ["tire.loss_factor=0.2"]).tire).values()
+    assert wall.loss_factor == 0.1
+
+
 def test_documented_example(folder):
     """The first scene of docs/how-to/own-tire.md: half a deck in millimetres, tonnes and MPa."""
     page = Path(__file__).parents[3] / "docs" / "how-to" / "own-tire.md"

@@ -84,8 +84,7 @@ class FileSection(SectionKind):
         return self
 
     def has_losses(self, tire: Tire) -> bool:
-        rubbers = own_file.own_section(tire).rubbers
-        return super().has_losses(tire) or any(one and one.loss_factor for one in rubbers)
+        return any(one.loss_factor for one in self.rubbers(tire).values())
 
     def fingerprint(self, tire: Tire) -> str:
         return own_file.fingerprint(tire)
