@@ -95,14 +95,12 @@ class Ladders:
 
     @property
     def _residual(self) -> str:
-        """Rolling belts couple kept modes with the rest: shapes of turning tell of it, and of a scene without them
-        attachment modes do (docs/method.md)."""
-        scene = self.scene
-        turning = scene.rotation is not None and scene.rotation.speed > 0
-        belted = bool(scene.tire.cords) or scene.tire.section != "torus"
-        simple = scene.rotation is None or scene.rotation.method == "projected"
-        told = scene.joins_shapes or not belted
-        return "attachment" if turning and simple and not told else "static"
+        """Rolling belts: attachment modes, which have mass. Without it what is left out of a stiff tire's few modes lets the
+        contact ring above the band, where coarse steps do not resolve it (docs/verification.md)."""
+        turning = self.scene.rotation is not None and self.scene.rotation.speed > 0
+        belted = bool(self.scene.tire.cords) or self.scene.tire.section != "torus"
+        simple = self.scene.rotation is None or self.scene.rotation.method == "projected"
+        return "attachment" if turning and belted and simple else "static"
 
     @property
     def _pitch(self) -> float:

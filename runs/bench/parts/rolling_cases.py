@@ -27,7 +27,7 @@ from tireroad.runs.stages.pipeline import Finished, run_scene
 @dataclass(frozen=True, kw_only=True)
 class Tire:
     """What a tire's scene has in `text`. Of settings as of `sets`, `run` are those in which its runs, and `fine` those in
-    which its reference differ: of rolling belts, which couple kept modes with the rest (docs/method.md), attachment modes too."""
+    which its reference differ: rolling belts take attachment modes, as searches do."""
 
     text: str
     run: Mapping[str, Any] = field(default_factory=dict)
@@ -65,11 +65,11 @@ error_estimate = false
 _ATTACHED = {"residual": "attachment"}
 TIRES = {
     "soft": Tire(text=_SOFT),
-    "belted": Tire(text=_SOFT + _BELT, fine=_ATTACHED),
+    "belted": Tire(text=_SOFT + _BELT, run=_ATTACHED, fine=_ATTACHED),
     # 205/60 R15 under its rated load: of order 2, several elements through its wall, its footprint ten times as wide.
     "radial": Tire(
         text=_RADIAL,
-        run={"segments": 16, "arc": 14, "order": 2},
+        run={"segments": 16, "arc": 14, "order": 2} | _ATTACHED,
         fine={"segments": 26, "arc": 24, "order": 2, "footprint": 0.1, "pitch": 0.004} | _ATTACHED,
     ),
 }
