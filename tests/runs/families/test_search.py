@@ -240,6 +240,8 @@ def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
 
 @pytest.mark.parametrize(("cords", "wanted"), [(True, "attachment"), (False, "static")])
 def test_residual_of_rolling_belts(file, cords: bool, wanted: str) -> None:
-    belt = '{ name = "belt", depth = 0.006, arc = [-30.0, 30.0], angle = 0.0, youngs_modulus = 2e9 }'
+    belt = (
+        '{ name = "belt", depth = 0.006, arc = [-30.0, 30.0], angle = 0.0, youngs_modulus = 2e9 }'
+    )
     given = [f"tire.cords=[{belt if cords else ''}]"]
     assert Ladders.of(load(file, given)).first().residual == wanted
