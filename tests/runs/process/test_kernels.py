@@ -12,6 +12,15 @@ from tireroad.runs.process import kernels
 
 WIDE = "avx2 fma avx512f avx512cd avx512bw avx512dq avx512vl"
 ASK = "import os, tireroad, numpy; from threadpoolctl import threadpool_info; print([i.get('architecture') for i in threadpool_info()])"
+ASK_THREADS = """
+from tireroad.runs import start
+def status(arguments):
+    import numpy, threadpoolctl
+    print(*{lib["num_threads"] for lib in threadpoolctl.threadpool_info() if lib["user_api"] == "blas"})
+    return 0
+start._status = status
+start.program()
+"""
 
 
 @pytest.mark.parametrize(
@@ -55,3 +64,18 @@ def test_numpy_gets_them() -> None:
         check=True,
     ).stdout
     assert "Prescott" not in found
+
+
+@pytest.mark.parametrize(("given", "threads"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)])
+def test_the_program_takes_one_blas_thread_unless_told(given: dict, threads: int) -> None:
+    if (os.cpu_count() or 1) < threads:
+        pytest.skip("one core")
+    inherited = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
+    found = subprocess.run(
+        [sys.executable, "-P", "-c", ASK_THREADS],
+        env={**inherited, "PYTHONPATH": str(ROOT), **given},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert found.split() == [str(threads)]
