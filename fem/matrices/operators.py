@@ -17,6 +17,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from petsc4py import PETSc
+from scipy import sparse
 from ufl.core.expr import Expr
 
 from tireroad.fem import compat, kinematics
@@ -133,7 +134,7 @@ class Operators:
 
     def rotation(self) -> Rotation:
         """The matrices of the rotating frame."""
-        return Rotation(self.body, self._assemble)
+        return Rotation(self.body, lambda form: _without_zeros(self._assemble(form)))
 
     def consistent_mass(self) -> PETSc.Mat:
         """int rho phi_i . phi_j by full integration, kg: what the diagonal `mass` is compared to. Collective."""
@@ -163,3 +164,14 @@ class Operators:
         if self.unknowns.rim is None:
             return face
         return np.vstack([face, self.unknowns.rim_motion(values)])
+
+
+def _without_zeros(matrix: PETSc.Mat) -> PETSc.Mat:
+    """The matrix without entries that are zero, in the place of the one given. G and S couple like components alone, a third
+    of what the mesh couples: products take a third of the time, and memory too. Collective."""
+    sizes, comm = matrix.getSizes(), matrix.comm
+    indptr, indices, values = matrix.getValuesCSR()
+    matrix.destroy()
+    own = sparse.csr_matrix((values, indices, indptr), sizes[0])
+    own.eliminate_zeros()
+    return PETSc.Mat().createAIJ(sizes, csr=(own.indptr, own.indices, own.data), comm=comm)
