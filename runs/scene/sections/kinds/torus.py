@@ -91,7 +91,7 @@ class TorusSection(SectionKind):
             if region.name is not None:
                 source.add(
                     (*place, "name"),
-                    'is for section = "file": a part of a torus is told by arc, side and depth',
+                    'is for section = "file": a region of a torus is given by arc, side and depth',
                 )
             for key in ("arc", "depth"):
                 low, high = getattr(region, key)
