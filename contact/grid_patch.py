@@ -149,7 +149,7 @@ def settle(
     force = solver.solve(flat + rise)
     if not abs(force.sum() / load - 1.0) < LOAD_TOLERANCE:
         raise ConvergenceError(
-            f"contact: the points settle at {force.sum():.6g} N, not at {load:.6g} N; take a finer grid "
+            f"contact: the points carry {force.sum():.6g} N, not {load:.6g} N; take a finer grid "
             "(contact.points)"
         )
     gap = np.maximum(solver.gap, 0.0)

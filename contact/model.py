@@ -66,11 +66,11 @@ def check_creeps(patch: Patch) -> None:
     """InputError where a tread that creeps has no grid, or one too large for its static state."""
     if patch.places is None:
         raise InputError(
-            "contact.tread: a tread that creeps needs a grid of points: contact.points = { dx, dy }"
+            "contact.tread: a viscoelastic tread needs a grid of points: contact.points = { dx, dy }"
         )
     if len(patch.points) > MOST_DENSE:
         raise InputError(
-            f"contact.tread: a tread that creeps takes at most {MOST_DENSE} points, here are "
+            f"contact.tread: a viscoelastic tread takes at most {MOST_DENSE} points, here are "
             f"{len(patch.points)}: take a coarser contact.points or a smaller contact.reach"
         )
 

@@ -46,14 +46,18 @@ class Axle:
             if np.abs(matrix - matrix.T).max() > 1e-12 * np.abs(matrix).max() or (
                 least < -1e-9 * np.abs(matrix).max()
             ):
-                raise InputError(f"axle: {name} must be symmetric and not give energy (6 x 6)")
+                raise InputError(
+                    f"axle: {name} must be symmetric and positive semidefinite (6 x 6)"
+                )
             object.__setattr__(self, name, matrix)
         moving = (
             self.wheel_mass,
             *np.asarray(self.wheel_inertia)[[d - 3 for d in self.moving if d > 2]],
         )
         if min(moving) <= 0 or (self.body_mass is not None and self.body_mass <= 0):
-            raise InputError("axle: what moves needs a mass, and what turns an inertia, above 0")
+            raise InputError(
+                "axle: directions that are not locked need a mass or a moment of inertia above 0"
+            )
 
     @classmethod
     def held(cls) -> Axle:

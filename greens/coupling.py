@@ -107,7 +107,9 @@ class Wheel:
             moved = outputs.shape[0] - np.count_nonzero(basis.of_hub(outputs).getnnz(axis=1))
             return replace(whole, pulse=moved if option == "dirac" else 0)
         if option == "second-order" and basis.projection.moves:
-            raise InputError("greens.residual: second-order knows no wheel that moves")
+            raise InputError(
+                "greens.residual: second-order is not available for a wheel that moves"
+            )
         r, k, same = outputs.shape[0], loads.shape[0], outputs is loads
         probes = loads if same else sparse.vstack([outputs, loads], format="csr")
         if option == "attachment":

@@ -96,7 +96,7 @@ def _made(response: Response, figures: Figures | None = None) -> Made:
     warnings: tuple[str, ...] = ()
     if count:
         warnings = (
-            f"{count} state(s) of the response grow by themselves, the fastest at {rate:.3g} 1/s: lower the "
+            f"{count} state(s) of the response are unstable, the fastest growing at {rate:.3g} 1/s: lower the "
             "speed, or take another greens.residual",
         )
     return Made(response, figures or {}, warnings)

@@ -31,13 +31,11 @@ def wheel_of(
     if shape.speed and (shape.speed, shape.inertia) != (turning.speed, turning.inertia):
         raise InputError(
             f"the static state rolls at {shape.speed:g} rad/s with {shape.inertia} inertia, its small motions at "
-            f"{turning.speed:g} rad/s with {turning.inertia}: take one and the same, or a state at rest"
+            f"{turning.speed:g} rad/s with {turning.inertia}: take the same for both, or a static state at rest"
         )
     if isinstance(turning.damping, StrainEnergy):
         if projection is None:
-            raise InputError(
-                "damping by strain energy is known by the modes: give their projection"
-            )
+            raise InputError("damping by strain energy needs the modes: give their projection")
         tail = beyond(turning.damping, projection)
     rotation = motions.rotation if turning.speed else None
 

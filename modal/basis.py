@@ -134,7 +134,7 @@ class Projection:
         gyroscopic = self.gyroscopic if full else self.body
         convective = self.convective if full else self.body_convective
         if gyroscopic is None or convective is None or self.body is None:
-            raise InputError("modes: these are of a wheel that stands, and have no rotating states")
+            raise InputError("modes: these are of a standing wheel and have no rotating states")
         return gyroscopic, convective, self.body
 
     def first(self, count: int) -> Projection:

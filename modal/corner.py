@@ -117,8 +117,8 @@ class Corner:
         if values[0] < 0:
             worst = ", ".join(f"{DIRECTIONS[k]} {needed[i, i]:.4g}" for i, k in enumerate(part))
             raise InputError(
-                "axle.stiffness: the corner is unstable: its springs are softer than the static loads of "
-                f"the tire turn the wheel by, which takes more than (N m/rad): {worst}; or lock it"
+                "axle.stiffness: the corner is unstable: the static loads of the tire turn the wheel, and its "
+                f"springs must be stiffer than (N m/rad): {worst}; or lock these directions"
             )
 
     def adrift(self, momentum: np.ndarray, air_mass: float = 0.0) -> np.ndarray:

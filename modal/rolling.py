@@ -76,7 +76,7 @@ def _decoupled(projection: Projection, turning: Turning, comm: MPI.Comm) -> tupl
         return standing(projection, turning.damping), {}
     if turning.speed and projection.gyroscopic is None:
         raise InputError(
-            "these modes were projected for a wheel that stands: project the rotation too"
+            "these modes were projected for a standing wheel: project the rotation too"
         )
     if projection.moves:
         projection.wheel.check(turning.speed)

@@ -126,8 +126,8 @@ def checks(
     for name, figure in figures.items():
         if not figure <= limits["residual" not in name]:
             raise ConvergenceError(
-                f"rotating: {name} is {figure:.1e}: the second eigenproblem is too far from normal "
-                "for the number of digits. Take fewer modes, a lower speed or less damping."
+                f"rotating: {name} is {figure:.1e}: the rotating eigenproblem is too far from normal "
+                "for double precision. Take fewer modes, a lower speed or less damping."
             )
     return figures
 

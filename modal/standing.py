@@ -132,8 +132,8 @@ def with_fields(
     alike = len(again.frequency) == len(basis.frequency)
     if not alike or np.abs(again.frequency - basis.frequency).max(initial=0.0) > _SAME * top:
         raise ConvergenceError(
-            "modes: solved once more they are not those of modes.h5; run with --fresh, which "
-            "computes all of it anew"
+            "modes: computed again they differ from those of modes.h5; run with --fresh, which "
+            "computes every stage anew"
         )
     return again
 

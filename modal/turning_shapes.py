@@ -58,7 +58,7 @@ def with_turning(
     if not turning.speed or operators.unknowns.rim is not None:
         return modes
     if rotation is None:
-        raise InputError("shapes of turning: the matrices of the rotating frame are needed")
+        raise InputError("rotation shapes: the matrices of the rotating frame are needed")
     found = _Found(modes, operators, rotation, turning)
     columns = found.foremost(_uncoupled(projection, turning.inertia))
     return joined(modes, columns, operators) if columns.shape[1] else modes

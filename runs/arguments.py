@@ -10,16 +10,16 @@ from tireroad.runs.version import PROGRAM, VERSION
 
 EXIT = """\
 exit status:
-  0  done
-  2  the input is wrong: one message, nothing written over
+  0  finished
+  2  invalid input: one message, nothing overwritten
   3  a solver gave up: what, where, what to try; finished stages are kept
-  4  stopped on request (SIGINT, SIGTERM, SIGHUP); the same command, or resume, goes on
+  4  stopped on request (SIGINT, SIGTERM, SIGHUP); the same command, or resume, continues
   anything else is a bug
 """
 ABOUT = """\
 A rolling tire on a rough road: finite elements, modes, Green's functions, contact.
 
-`./tireroad COMMAND` installs on Debian what is missing and starts the program;
+`./tireroad COMMAND` installs missing packages on Debian and starts the program;
 `mpirun -n N python3 -m runs COMMAND` is the same program in a batch script.
 """
 RUN = """\
@@ -30,11 +30,11 @@ REPRODUCE = """\
 Computes the figures and tables of the thesis anew: a page with a picture beside what the thesis shows, what
 this program shows, and whether they agree; the same as reproduce.json and reproduce.csv. Without names all of
 them. Names: figure-4.2 to figure-4.5, figure-5.5, figure-6.2, figure-6.3, figure-6.5, figure-7.1 to figure-7.4,
-figure-C.1, figure-C.2, figure-D.1, table-B.1 to table-B.4. Figures that differ are no failure: status 0.
+figure-C.1, figure-C.2, figure-D.1, table-B.1 to table-B.4. Figures that differ are not a failure: status 0.
 """
 SET_HELP = (
-    "lay a value over the scene, in TOML or as a bare word: static.load=400, road.kind=flat,"
-    " force.0.amplitude=2; an empty value takes the key away: static.load=. May be repeated"
+    "override a value of the scene, in TOML or as a bare word: static.load=400, road.kind=flat,"
+    " force.0.amplitude=2; an empty value removes the key: static.load=. May be repeated"
 )
 
 
@@ -78,7 +78,12 @@ def _scene(command: argparse.ArgumentParser) -> None:
 def _check(command: argparse.ArgumentParser) -> None:
     _scene(command)
     command.add_argument(
-        "-n", type=_count, metavar="N", dest="processes", default=1, help="of a run on N processes"
+        "-n",
+        type=_count,
+        metavar="N",
+        dest="processes",
+        default=1,
+        help="memory of a run on N processes",
     )
 
 
@@ -94,14 +99,14 @@ def _processes(command: argparse.ArgumentParser) -> None:
 
 def _file(info: argparse.ArgumentParser) -> None:
     info.add_argument("file", type=Path, metavar="FILE")
-    info.add_argument("--json", action="store_true", help="for programs")
+    info.add_argument("--json", action="store_true", help="machine-readable output")
 
 
 def _sweep(sweep: argparse.ArgumentParser) -> None:
     sweep.add_argument("sweep", type=Path, metavar="SWEEP.toml")
     sweep.add_argument("--local", type=int, default=1, metavar="K", help="K members at a time")
     sweep.add_argument("--slurm", action="store_true", help="write job scripts and submit them")
-    sweep.add_argument("--gather", action="store_true", help="only gather what is there")
+    sweep.add_argument("--gather", action="store_true", help="only gather existing results")
     sweep.add_argument(
         "--out", type=Path, metavar="DIR", help="results/<name of the sweep> by default"
     )
@@ -117,13 +122,19 @@ def _cache(cache: argparse.ArgumentParser) -> None:
         "--clear", action="store_true", help="remove them; result folders keep theirs"
     )
     cache.add_argument(
-        "--unused-for", type=float, default=0.0, metavar="DAYS", help="with --clear: only these"
+        "--unused-for",
+        type=float,
+        default=0.0,
+        metavar="DAYS",
+        help="with --clear: only those unused for so long",
     )
 
 
 def _bench(bench: argparse.ArgumentParser) -> None:
     bench.add_argument("names", nargs="*", metavar="NAME", help="all by default")
-    bench.add_argument("--out", type=Path, metavar="FILE.json", help="also a page beside it")
+    bench.add_argument(
+        "--out", type=Path, metavar="FILE.json", help="results, with a page beside them"
+    )
 
 
 def _reproduce(reproduce: argparse.ArgumentParser) -> None:
@@ -165,32 +176,39 @@ def _folder(text: str) -> Path:
 
 COMMANDS = {
     "run": Command(
-        "the main job: a scene to its report",
+        "run a scene and write its report",
         _run,
         RUN,
         f"{PROGRAM} run SCENE.toml [options] [-- PETSc options]",
     ),
-    "resume": Command("go on from the last checkpoint of a result folder", _resume),
-    "check": Command("validate a scene; show it resolved, its stages, its memory", _check),
-    "report": Command("(re)make report.html of a result folder", _directory),
+    "resume": Command("continue from the last checkpoint of a result folder", _resume),
+    "check": Command(
+        "validate a scene; print it with all defaults, its stages and its memory", _check
+    ),
+    "report": Command("write report.html of a result folder again", _directory),
     "export": Command(
         "XDMF for ParaView and CSV for spreadsheets from a result folder", _directory
     ),
-    "sweep": Command("a family of runs that share what they can, in one table", _sweep),
-    "compare": Command("two to twelve runs in one page and one table", _compare),
-    "info": Command("what a result file holds: datasets, shapes, units, provenance", _file),
+    "sweep": Command("run a family of scenes that share stages, in one table", _sweep),
+    "compare": Command("compare two to twelve runs in one page and one table", _compare),
+    "info": Command(
+        "list the contents of a result file: datasets, shapes, units, provenance", _file
+    ),
     "cache": Command(
-        "finished stages that runs share, by TIREROAD_CACHE or in the user's cache", _cache
+        "list or clear the finished stages that runs share (TIREROAD_CACHE or the user's cache)",
+        _cache,
     ),
     "bench": Command(
-        "run time against error, scaling and floors, measured on this machine", _bench
+        "measure run time against error, scaling and lower bounds on this machine", _bench
     ),
     "reproduce": Command(
-        "the thesis's figures and tables, with what agrees and what does not",
+        "recompute the thesis's figures and tables, with what agrees and what does not",
         _reproduce,
         REPRODUCE,
     ),
-    "validate": Command("against full finite elements, closed forms and stress", _validate),
+    "validate": Command(
+        "compare with full finite elements and closed forms, and test extreme input", _validate
+    ),
     "test": Command(
         "the test suite, serial and on 2 and 3 processes (--all: the long ones too, --fast: the quick ones)",
         _test,

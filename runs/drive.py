@@ -88,7 +88,7 @@ def drive(
     motions, turning = tire.standing.motions, tire.states.turning
     static = motions.static
     if static.road_height is None:
-        raise InputError("drive: the tire stands on no road: press it on one first")
+        raise InputError("drive: the tire is not on a road: press it on one first")
     rolled = Rolled(
         speed=turning.speed * static.rolling_radius(), duration=duration, motion=lambda t: 0.0
     )
@@ -125,7 +125,7 @@ def _history(patch: Patch, instants: list[Instant], limit: Limit) -> History:
     }
     if (kept["force"][:, patch.edge] > 0).any():
         raise ConvergenceError(
-            "drive: the road touches at the edge of the patch of contact points: it is rougher than its "
-            "own highest spot says; take a smoother road or smaller steps"
+            "drive: the road touches the edge of the patch of contact points: it rises above the highest "
+            "point that it states; take a smoother road or smaller steps"
         )
     return History(**kept, patch=patch, limit=limit)

@@ -84,7 +84,7 @@ class Levelled(RoadKind):
     longest_wave: float | None = number(
         None,
         "m",
-        "longer waves are filtered out, as the axle follows them; absent: all stay",
+        "longer waves are filtered out, because the axle follows them; absent: none are",
         least=1e-3,
         most=1e4,
     )

@@ -102,7 +102,7 @@ class Friction:
                 self._finish(force, moved, horizontal)
                 return force, horizontal
         raise ConvergenceError(
-            f"contact: normal and horizontal forces do not settle in {TURNS} turns; the friction "
+            f"contact: normal and horizontal forces do not converge in {TURNS} iterations; the friction "
             "is too large for this step: lower contact.friction, the brush's stiffness or "
             "time.step"
         )

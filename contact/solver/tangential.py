@@ -125,7 +125,7 @@ def _gradients(stiffness: Stiffness, constant: Plane, bound: Array, guess: Plane
         ahead = new + (weight - 1.0) / later * (new - force)
         force, weight = new, later
     raise ConvergenceError(
-        "contact: stick and slip found no balance; take a smaller [time] step, a smaller friction "
+        "contact: no equilibrium of stick and slip was found; take a smaller [time] step, a smaller friction "
         "or a softer brush"
     )
 

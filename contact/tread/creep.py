@@ -106,7 +106,7 @@ class TreadMemory:
     ) -> None:
         if patch.places is None:
             raise InputError(
-                "contact.tread: a tread that creeps needs a grid of points: contact.points = { dx, dy }"
+                "contact.tread: a viscoelastic tread needs a grid of points: contact.points = { dx, dy }"
             )
         self._shape, self._place = patch.places.shape, patch.places.place
         self._size, lag = creep

@@ -54,7 +54,7 @@ def free_slip(drag: Callable[[float], float], load: float) -> float:
             at_low *= 0.5
         high, at_high = middle, found
     raise ConvergenceError(
-        f"contact: the slip of free rolling did not close in on {TOLERANCE:g} of the load in {_TRIALS} trials "
+        f"contact: the slip of free rolling did not converge to {TOLERANCE:g} of the load in {_TRIALS} trials "
         f"(last {high:.4g}: {at_high:.3g} N of drag): take a smaller time.step"
     )
 
@@ -69,6 +69,6 @@ def _bracket(drag: Callable[[float], float], at_rest: float) -> tuple[float, flo
         slip *= 4.0
     raise ConvergenceError(
         f"contact: no free rolling: the road pulls the tire by {at_rest:.4g} N without slip, and by {found:.4g} N at a "
-        f"slip of {slip / 4:.3g}: no speed of the wheel up to {100 * _LARGEST:g} % off takes that away. Raise "
+        f"slip of {slip / 4:.3g}: no slip up to {100 * _LARGEST:g} % cancels this force. Raise "
         "contact.friction, or leave out rotation.free_rolling"
     )

@@ -65,8 +65,8 @@ class LayerInfluence:
         total = half_space + h * corners / (np.pi * self._modulus * 4.0 * a * b)
         if np.any(total[(x == 0) & (y == 0)] < STIFFEST * half_space[(x == 0) & (y == 0)]):
             raise InputError(
-                f"layer tread: points {2e3 * np.min(a):.3g} x {2e3 * np.min(b):.3g} mm wide find a layer of "
-                f"{1e3 * h:.3g} mm rigid: take closer contact.points, or a smaller contact.poisson_ratio"
+                f"layer tread: for points {2e3 * np.min(a):.3g} x {2e3 * np.min(b):.3g} mm wide a layer of "
+                f"{1e3 * h:.3g} mm is nearly rigid: take closer contact.points, or a smaller contact.poisson_ratio"
             )
         return total
 

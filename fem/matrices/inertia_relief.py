@@ -80,8 +80,8 @@ def relieved(operators: Operators, loads: sparse.csr_matrix) -> np.ndarray:
     worst, size = comm.allreduce(np.array([(defect**2).sum(), (balanced**2).sum()]))
     if not worst <= RESIDUAL_TOLERANCE**2 * size:
         raise ConvergenceError(
-            f"greens: the balanced loads leave a relative force of {np.sqrt(worst / size):.1e} on what "
-            "holds the free tire: its rigid motions are not clearly apart from soft ones. Refine the mesh."
+            f"greens: the balanced loads leave a relative force of {np.sqrt(worst / size):.1e} on the "
+            "supports of the free tire: its rigid-body modes are not clearly separated from soft ones. Refine the mesh."
         )
     return answer - rigid @ summed(comm, weighted.T @ answer)
 

@@ -80,7 +80,7 @@ def road_stiffness(
     count = body.comm.allreduce(len(nodes))
     if count < 3:
         raise InputError(
-            f"stiffness: {count} node(s) touch the road, and no fewer than three can stick to a plate: "
+            f"stiffness: {count} node(s) touch the road, and at least three are needed to stick to a plate: "
             "raise static.load, or refine tire.segments, tire.elements_arc or tire.footprint_size"
         )
     unknowns = Unknowns(body, FIXED)

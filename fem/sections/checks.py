@@ -35,7 +35,7 @@ def check(mesh: SectionMesh) -> None:
 
 def _arrays(mesh: SectionMesh) -> None:
     if mesh.order not in (1, 2, 3):
-        raise InputError(f"section: elements of order {mesh.order}; 1, 2 and 3 are there")
+        raise InputError(f"section: elements of order {mesh.order}; 1, 2 and 3 are available")
     shapes = {
         "nodes": mesh.nodes.ndim == 2 and mesh.nodes.shape[1] == 2,
         "cells": mesh.cells.ndim == 2 and mesh.cells.shape[1] == (mesh.order + 1) ** 2,

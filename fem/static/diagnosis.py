@@ -31,6 +31,6 @@ def with_cause(
         f"{error.fact}. At rest the same tire converges, so its speed is the cause: "
         f"rotation.speed = {rolling.speed:g} rad/s lies beyond the critical speed, up to which it has a "
         "steady rolling shape. Lower the speed, raise the inflation or stiffen the material; "
-        "static.steady_rolling = false takes the shape at rest, whose rotating stage tells the critical "
+        "static.steady_rolling = false takes the shape at rest, whose rotating stage reports the critical "
         "speed."
     )

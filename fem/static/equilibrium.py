@@ -186,7 +186,7 @@ class Equilibrium(Forces):
         else:
             step = self._contact.step(*given, rise)
         if step is None:
-            return "the road meets nothing that resists"
+            return "the road meets no resistance"
         (change, reaction), field = step, self.body.u.x
         self._before.x.array[:] = field.array
         along = self._in_its_coordinates

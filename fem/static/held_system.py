@@ -123,9 +123,9 @@ class HeldSystem:
         if code < 0 and code not in _SINGULAR:
             raise ConvergenceError(
                 f"static: MUMPS could not factorise the tangent, INFOG(1) = {code}, INFOG(2) = "
-                f"{detail}. At -8 and -9 its workspace is too small: add -- -static_mat_mumps_icntl_14 "
-                "400. At -13 memory is: take more processes or fewer elements. The rest is in MUMPS's "
-                "users' guide."
+                f"{detail}. INFOG(1) = -8 or -9: its workspace is too small, add -- -static_mat_mumps_icntl_14 400. "
+                "-13: out of memory, take more processes or fewer elements. Other codes: see the users' guide of "
+                "MUMPS."
             )
         return code >= 0
 

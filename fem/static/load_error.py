@@ -32,7 +32,7 @@ CUBIC = 0.1  # error of elements of order 3 over that of order 2 on the same mes
 # 2, 4 and 12 mm: 0.7 to 2.0 in size; with the wrong sign in two of the nine, in which both parts all but cancel.
 REMAINS = 0.7
 ENOUGH = 1e-4  # of the load: what of it may be out of balance in a companion
-UNKNOWN = "cords are strained too much between the points that these elements look at; take smaller elements"
+UNKNOWN = "these elements strain the cords too much between their integration points; take smaller elements"
 CANCELS = 0.5  # of the larger part: what is left of both, below which its sign is not known
 
 

@@ -56,7 +56,7 @@ def place(
     given = {"load": load, "deflection": deflection, "road_height": road_height}
     named = [name for name, value in given.items() if value is not None]
     if len(named) > 1:
-        raise InputError(f"{' and '.join(named)} place the road each: give one of them")
+        raise InputError(f"{' and '.join(named)} each set the height of the road: give one of them")
     for name, value in given.items():
         if value is not None and not math.isfinite(value):
             raise InputError(f"{name} = {value:g} must be finite")

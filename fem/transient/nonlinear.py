@@ -61,7 +61,9 @@ class NonlinearTire(FullTire):
         turning: tuple[Rotation, Rolling] | None = None,
     ) -> None:
         if operators.unknowns.rim:
-            raise InputError('nonlinear tire in time: modal.rim = "free" is linear; take "fixed"')
+            raise InputError(
+                'nonlinear tire in time: modal.rim = "free" is not available; take "fixed"'
+            )
         rolling = turning[1] if turning else AT_REST
         super().__init__(
             operators=operators,
@@ -118,7 +120,7 @@ class NonlinearTire(FullTire):
         if self._tried > MOST_TURNS or not np.isfinite(off):
             raise ConvergenceError(
                 f"full finite elements: a step of {self._step:g} s leaves {off:.1e} m of "
-                f"{size:.1e} m out of balance after {self._tried} turns; the motion is too large for "
+                f"{size:.1e} m out of balance after {self._tried} iterations; the motion is too large for "
                 "the step or the tire buckles: take a smaller step or a smaller motion."
             )
         return self._freed(new - change - self._answer @ force)

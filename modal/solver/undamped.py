@@ -194,8 +194,8 @@ class _Problem:
         if not self.accurate(modes, defect):
             raise ConvergenceError(
                 f"modes: worst relative residual {modes.residual.max():.1e}, allowed "
-                f"{self._allowed(modes, defect):.0e}: the lowest mode is too soft against the stiffest "
-                "element for the number of digits. Use elements of more equal size."
+                f"{self._allowed(modes, defect):.0e}: the lowest mode is too soft compared with the stiffest "
+                "element for double precision. Use elements of more equal size."
             )
         if not modes.orthonormality <= ORTHONORMALITY_TOLERANCE:
             raise ConvergenceError(

@@ -119,7 +119,7 @@ def _road(results: Results) -> Iterator[str]:
     kind = results.scene.get("road", {}).get("kind")
     if thickness and kind not in _OBSTACLES and relief > thickness:
         yield (
-            f"a road with {quantity(relief, 'm')} between its lowest and highest spot under a wall "
+            f"a road with {quantity(relief, 'm')} between its lowest and highest point under a wall "
             f"{quantity(thickness, 'm')} thick (textures: below 10 mm; is the file in millimetres?)"
         )
 

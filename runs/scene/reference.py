@@ -18,10 +18,11 @@ from tireroad.runs.scene.tables.scene import Scene
 HEAD = """\
 # Keys of a scene
 
-Made from the schema by `python3 -m tireroad.runs.scene.reference docs/keys.md`; `tireroad check SCENE.toml`
-prints the same for the keys of one scene, with their values. Times are in s, lengths in m, forces in N,
-stresses in Pa, speeds of rotation in rad/s. A key that is absent has its default; a table that may be
-absent and is, is a stage that does not run. An unknown key is an error.
+All keys of a scene file with default, unit, range and meaning. The page is generated from the schema by
+`python3 -m tireroad.runs.scene.reference docs/keys.md`; `tireroad check SCENE.toml` prints the same for the keys
+of one scene, with their values. Times are in s, lengths in m, forces in N, stresses in Pa, speeds of rotation in
+rad/s. An absent key has its default. A table marked "absent by default" is optional, and the stage that needs it
+does not run without it. An unknown key is an error.
 """
 COLUMNS = "| key | default | unit | values | meaning |\n|---|---|---|---|---|\n"
 

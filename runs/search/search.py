@@ -165,7 +165,7 @@ class Search:
         ended = [trial for trial in tried if trial.found is not None]
         if not ended:
             raise ConvergenceError(
-                f"accuracy: no trial came to its end ({why}); the last: {tried[-1].failed}"
+                f"accuracy: no trial finished ({why}); the last: {tried[-1].failed}"
             )
         best = min(
             ended, key=lambda trial: worst(trial.found.over(wanted))[0] if trial.found else 0.0

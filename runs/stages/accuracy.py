@@ -84,12 +84,12 @@ class AccuracyStage(Computed[Accuracy]):
         """Companions one by one; a cause whose companion fails is reported, and the run goes on. Collective."""
         history, setup = self.contact.product, self.setup.product
         if self._at_rest:
-            return self._none("nothing drives the tire: what varies is rounding")
+            return self._none("nothing excites the tire: its forces vary by rounding only")
         start = first_step(setup, self.job.scene.road, history.time)
         start += start % 2  # where a step of the companion of twice the step begins
         steps = self._window(start, len(history.time))
         if steps - start < 2:
-            return self._none("the run is too short for a companion of twice the step")
+            return self._none("the run is too short for a companion run with twice the step")
         limit = model_limit(setup, self.rotating.product, history.step).frequency
         up_to = min(limit, self.job.scene.accuracy.up_to)
         given = self._given(steps)

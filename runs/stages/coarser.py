@@ -91,7 +91,7 @@ def coarser_job(job: Job) -> Job:
     if coarse is tire or coarse.proportions().along < LEAST[1]:
         around, along = (2 * least for least in LEAST)
         raise InputError(
-            f"the mesh is too coarse to be halved: it takes {around} elements around and {along} along"
+            f"the mesh is too coarse to be halved: that needs {around} elements around and {along} along"
         )
     rotation = job.scene.rotation
     if rotation is not None:  # as fast as the run's own wheel, whatever the travel speed

@@ -146,7 +146,7 @@ def fewer_modes(given: Given) -> Forces:
         lambda s: (np.abs(s) <= limits[0]) | (np.abs(s) > limits[1])
     )
     if len(kept.every) == len(given.response.every):
-        raise InputError("all states are slower than the highest mode by far: none can be left out")
+        raise InputError("all states lie far below the highest mode: none can be left out")
     return given.repeated(given.settled, kept)
 
 

@@ -218,6 +218,6 @@ def beyond_unique(friction: float | None, limit: float) -> list[str]:
     if friction is None or friction <= limit:
         return []
     return [
-        f"contact.friction = {friction:g} is more than {limit:.3g}, up to which a step is sure to have "
-        "one answer: where points slip there may be another; lower it, or take a softer tread"
+        f"contact.friction = {friction:g} is more than {limit:.3g}, up to which the solution of a step is "
+        "known to be unique: where points slip there may be others; lower it, or take a softer tread"
     ]

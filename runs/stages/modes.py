@@ -118,8 +118,8 @@ class ModesStage(Computed[ModalBasis]):
         record.headline["teams of processes"] = (teams, "-")
         if teams < comm.size:
             observe.say(
-                f"  {teams} team(s) of processes factorise: each factor with its matrices takes about "
-                f"{needed / 1e9:.2g} GB, and not {comm.size} of them fit"
+                f"  {teams} team(s) of processes, one factor each: a factor with its matrices takes about "
+                f"{needed / 1e9:.2g} GB, and {comm.size} of them do not fit"
             )
         return teams
 
@@ -188,7 +188,7 @@ def _describe(record: Record, modes: Modes) -> None:
 def _damping(given: Damping, projection: Projection) -> str:
     """Which damping acts, in words."""
     if not isinstance(given, StrainEnergy):
-        unused = "" if projection.loss_factor is None else "; the loss factors do not act"
+        unused = "" if projection.loss_factor is None else "; the loss factors are not used"
         mass, stiffness = given
         return f"γ1 = {mass:g} 1/s, γ2 = {stiffness:g} s{unused}"
     low, high = projection.loss_factor.min(), projection.loss_factor.max()

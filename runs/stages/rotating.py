@@ -155,7 +155,7 @@ def _beyond(speed: float, critical: float) -> str:
     """What to say of a speed beyond the critical one (rad/s)."""
     return (
         f"rotation.speed = {speed:g} rad/s lies beyond the tire's critical speed of {critical:.4g} "
-        "rad/s, at which a wave stands still on the road and grows without end: what follows has "
+        "rad/s, at which a wave is stationary on the road and grows without bound: the results have "
         "little meaning; take a lower speed, a higher static.inflation or a stiffer material"
     )
 
@@ -194,7 +194,7 @@ def _growth(job: Job, rolling: RollingModes, basis: ModalBasis) -> str:
         return onset(basis.projection, *given, turning.speed)
 
     return (
-        f"{states.unstable} motion(s) of the rolling tire grow by themselves, the fastest at "
+        f"{states.unstable} state(s) of the rolling tire are unstable, the fastest growing at "
         f"{states.fastest_growth:.3g} 1/s; on this static state that begins at {on_root(job.comm, first):.4g} "
         "rad/s: the wheel turns beyond its critical speed"
     )

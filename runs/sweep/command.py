@@ -44,7 +44,7 @@ def _run(family: Sweep, folder: Path, at_once: int, only_gather: bool) -> None:
     _gather(family, folder, failed)
     if failed:
         raise ConvergenceError(
-            f"sweep: {len(failed)} of {len(family.members)} members did not end well, see above. The "
+            f"sweep: {len(failed)} of {len(family.members)} members failed, see above. The "
             "others are kept; the same command runs these again"
         )
 

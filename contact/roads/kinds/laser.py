@@ -34,7 +34,7 @@ class LaserFile(Levelled):
     """The file, how it is read, cleaned, and extended across."""
 
     file: str | None = filename(
-        "measured line (.csv): a height a line, or x and a height; nan where it is missing"
+        "measured profile (.csv): one height per line, or x and a height; nan where it is missing"
     )
     pitch: float = number(
         4e-5, "m", "distance between heights, where the file has no x", least=1e-7, most=0.1
@@ -50,15 +50,15 @@ class LaserFile(Levelled):
         least=0, most=10,
     )  # fmt: skip
     shortest_wave: float = number(
-        0.002, "m", "shorter waves are filtered out, and the profile kept at a quarter of it",
+        0.002, "m", "shorter waves are filtered out, and the profile is sampled at a quarter of it",
         least=1e-5, most=1,
     )  # fmt: skip
     across: str = choice(
-        "isotropic", ("isotropic", "ruts"), "beside the line: a random surface as rough as it, which has "
-        "the line in its middle; or its heights all across",
+        "isotropic", ("isotropic", "ruts"), "beside the line: a random surface of the same roughness with the line in its middle; or its heights across the "
+        "whole width",
     )  # fmt: skip
     width: float = number(0.4, "m", "width of the road made of the line", least=0.01, most=5)
-    seed: int = integer(0, "seed of what is beside the line", least=0, most=2**31 - 1)
+    seed: int = integer(0, "seed of the surface beside the line", least=0, most=2**31 - 1)
     end: str = choice(
         "refuse", ("refuse", "mirror"), "a run longer than the road: an error, or the road mirrored"
     )

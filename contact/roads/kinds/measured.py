@@ -10,8 +10,8 @@ from tireroad.contact.roads.kind import Levelled, road_kind
 from tireroad.fem.parameters import ParameterError, choice, filename
 
 _LAYOUT = (
-    "measured road: .npz or .h5 with arrays x, y, z; or .csv, either a line of a corner and all y, then "
-    "lines of an x and its heights, or a line x,y,z, then a point a line"
+    "measured road: .npz or .h5 with arrays x, y, z; or .csv, either a matrix (first line a corner entry and all y, then "
+    "an x and its heights per line) or a list (first line x,y,z, then one point per line)"
 )
 
 

@@ -32,7 +32,7 @@ class TwoSlope(Levelled):
         0.004, "m", "shortest wavelength: the spectrum is cut there", least=1e-3, most=1
     )
     wavelengths: tuple[float, ...] = numbers(
-        "wavelengths of the levels; between them straight lines over their logarithm, beyond them constant",
+        "wavelengths of the levels; interpolated linearly over the logarithm of the wavelength, constant beyond",
         "m", Limits(least=1e-5, most=100), WAVELENGTHS,
     )  # fmt: skip
     levels: tuple[float, ...] = numbers(

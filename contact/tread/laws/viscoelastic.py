@@ -15,7 +15,8 @@ _TERMS = 3
 
 
 @tread_law(
-    "viscoelastic", "rubber that creeps, on a grid of points: past pressure travels with the tread"
+    "viscoelastic",
+    "viscoelastic rubber, on a grid of points: the history of the pressure travels with the tread",
 )
 class Viscoelastic(Elastic):
     """E(t) = E [1 - sum_k g_k (1 - exp(-t/t_k))], Poisson's ratio constant; E at once (contact.tread.creep)."""
@@ -24,11 +25,11 @@ class Viscoelastic(Elastic):
         None, "m", "thickness of a layer on a stiff base; absent: a half-space", least=1e-4, most=1
     )
     relaxation: tuple[float, ...] = numbers(
-        "shares of the modulus that relax, one to three, of a sum below 1", "-",
+        "one to three shares of the modulus that relax, with a sum below 1", "-",
         Limits(least=1e-6, most=0.999999), (0.3,),
     )  # fmt: skip
     relaxation_time: tuple[float, ...] = numbers(
-        "the time in which each does", "s", Limits(least=1e-9, most=1e6), (1e-3,)
+        "relaxation time of each share", "s", Limits(least=1e-9, most=1e6), (1e-3,)
     )
 
     def validate(self) -> None:

@@ -141,7 +141,7 @@ def _free(drag: Callable[[float], float], radius: float, load: float) -> float:
     left = drag(found.root)
     if not (found.converged and abs(left) < 1e-4 * load):
         raise ConvergenceError(
-            f"static: no free rolling with friction: at {found.root:.6g} m in a radian {left:.3g} N are left. "
+            f"static: no free rolling with friction: at a travel of {found.root:.6g} m per radian {left:.3g} N of drag remain. "
             "Give rotation.rolling_radius (m), or a smaller static.friction"
         )
     return float(found.root)
@@ -151,6 +151,6 @@ def _checked(rubbing: Loader, step: Step) -> None:
     rubbing.newton_steps += step.iterations
     if not step.converged:
         raise ConvergenceError(
-            f"static: with friction no balance is found ({step.reason}). {_ADVICE}"
+            f"static: no equilibrium with friction was found ({step.reason}). {_ADVICE}"
         )
     rubbing.tell("deflection with friction", rubbing.deflection, "m", step)

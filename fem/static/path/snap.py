@@ -47,4 +47,6 @@ def fall(equilibrium: Equilibrium, road_height: float, allowed: float = 0.0) -> 
     equilibrium.drag = None
     field.array[:], equilibrium.road_height = kept[0], kept[2]
     road.put_back(kept[1])
-    return Step(False, tangents, step.residual, "neither does a fall against a drag come to rest")
+    return Step(
+        False, tangents, step.residual, "pseudo-transient continuation does not converge either"
+    )

@@ -13,6 +13,6 @@ def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """What is solved on the full matrices needs a damping that they have."""
     if scene.damping is not None:
         return
-    advice = "needs full matrices of damping, and loss factors make none: add [damping]"
+    advice = "needs a full damping matrix, which loss factors do not give: add [damping]"
     if scene.rotation is not None and scene.rotation.method == "full":
         raise error(("rotation", "method"), f'= "full" {advice}')

@@ -19,27 +19,33 @@ Where = Callable[[tuple[str, ...], str], InputError]
 class Accuracy:
     estimate: bool = flag(
         True,
-        "error bars of contact and axle force by cheaper companions of the run: half the elements, fewer "
-        "modes, twice the step, twice the spacing of points",
+        "error bars of contact and axle force by cheaper companion runs: elements of twice the size, fewer modes, twice "
+        "the step, another spacing of points",
     )
     target: float | None = number(
         None,
         "-",
-        "largest estimated error wanted of the vertical force named by of: relative L2 norm of what varies up to "
-        "up_to, and relative error of the mean; mesh, modes, residual, points and step are then searched for",
+        "largest estimated error of the vertical force named by of: relative L2 norm of the error of its varying part up "
+        "to up_to, and relative error of its mean; mesh, modes, residual, points and step are then searched for",
         least=1e-3,
         most=1,
     )
     target_db: float | None = number(
         None,
         "dB",
-        "the same of every third octave below up_to; with target: both hold",
+        "largest estimated error of every third octave below up_to; together with target both must be met",
         least=0.05,
         most=20,
     )
-    of: str = choice("axle_force", ("axle_force", "contact_force"), "force whose error is wanted")
+    of: str = choice(
+        "axle_force", ("axle_force", "contact_force"), "force to which the target applies"
+    )
     up_to: float = number(
-        400.0, "Hz", "highest frequency of which the error is told", least=1, most=1e5
+        400.0,
+        "Hz",
+        'highest frequency of interest: of the error, and of the waves by which contact.points = "auto" is chosen',
+        least=1,
+        most=1e5,
     )
     search: bool = flag(
         True,
@@ -50,7 +56,7 @@ class Accuracy:
     budget: float | None = number(
         None,
         "s",
-        "duration of a search, its earlier part included, after which no further settings are tried",
+        "duration of a search, including its part before an interruption, after which no further settings are tried",
         least=1,
         most=1e8,
     )

@@ -93,13 +93,14 @@ class AxleTable:
     body_mass: float | None = number(
         None,
         "kg",
-        "of the car's body on this corner, which moves up and down; absent: springs to the ground",
+        "mass of the car body on this corner, which moves up and down; absent: springs to the ground",
         least=0.1,
         most=1e8,
         only_for=_SPRUNG,
     )
     locked: tuple[str, ...] = _directions(
-        _HELD, "directions in which the wheel is held; about y is its speed of rotation"
+        _HELD,
+        "directions in which the wheel is held; about y (ry) it is its speed of rotation that is held",
     )
 
 

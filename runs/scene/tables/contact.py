@@ -16,20 +16,22 @@ class Contact(Variants):
     tread: str = registered(
         TREADS,
         "half-space",
-        "local compliance of the tread; absent, on section radial or file: layer, as belts hardly give way",
+        "local compliance of the tread; absent, on section radial or file: layer, because belts hardly deform",
     )
     law: TreadLaw = variant("tread", TREADS)
     points: str | Pitch = points(
-        "contact points: the nodes of the mesh, or a grid of this pitch; auto: a grid as fine as the footprint and the "
-        "waves up to accuracy.up_to need, and the nodes under a tread that does not give way or bristles counted by point",
+        "contact points: the nodes of the mesh, or a grid with this spacing; auto: a grid as fine as the footprint and "
+        "the waves up to accuracy.up_to require, or the nodes under a tread without compliance or with bristles counted "
+        "per point",
         least=1e-5,
         most=1,
     )
     brush_stiffness: float | None = number(
         None,
         "N/m",
-        "tangential stiffness of a point's bristle, whatever its area: the force depends on the grid; absent, and "
-        "brush_stiffness_per_area too: no horizontal forces, but with friction on a tread that shears (shear)",
+        "tangential stiffness of the bristle of a point, independent of its area, so that the force depends on the grid; "
+        "absent, and brush_stiffness_per_area too: no horizontal forces, except with friction on a tread that shears "
+        "(shear)",
         least=1e-3,
         most=1e12,
     )
@@ -49,15 +51,15 @@ class Contact(Variants):
     friction: float | None = number(
         None,
         "-",
-        "coefficient of Coulomb friction; absent: the bristles never slip. Without bristles the tread alone gives way "
+        "coefficient of Coulomb friction; absent: the bristles never slip. Without bristles the tread alone deforms "
         "(shear)",
         least=0,
         most=10,
     )
     shear: bool = flag(
         True,
-        "with friction, an elastic or creeping tread gives way to horizontal forces too, and pressure moves it sideways; "
-        'bristles are in series with it. Not with brush = "spring"',
+        "with friction, an elastic or viscoelastic tread also deforms under horizontal forces, and pressure displaces it "
+        'sideways; bristles are in series with it. Not with brush = "spring"',
     )
     slip: tuple[float, float] = vector(
         (0.0, 0.0), "-", "slip of the tire: longitudinal (> 0 drives), lateral", least=-1, most=1

@@ -20,38 +20,54 @@ Where = Callable[[tuple[str, ...], str], InputError]
 @dataclass(frozen=True)
 class Groove:
     direction: str = choice(
-        "lateral", ("lateral", "circumferential"), "one in each pitch, or around the tire"
+        "lateral",
+        ("lateral", "circumferential"),
+        "lateral: one in each pitch; circumferential: around the tire",
     )
     position: float = number(
-        0.0, "-", "place in its pitch, 0 to 1; of a circumferential groove y in m", least=-1, most=1
+        0.0,
+        "-",
+        "position in its pitch, 0 to 1; of a circumferential groove y in m",
+        least=-1,
+        most=1,
     )
-    width: float = number(0.004, "m", "between the middles of its flanks", least=1e-6, most=1)
-    depth: float = number(0.008, "m", "under the outer face", least=1e-6, most=0.1)
-    flank: float = number(0.001, "m", "in which it comes to its depth", least=1e-5, most=0.1)
+    width: float = number(0.004, "m", "width between the middles of the flanks", least=1e-6, most=1)
+    depth: float = number(0.008, "m", "depth under the outer face", least=1e-6, most=0.1)
+    flank: float = number(
+        0.001,
+        "m",
+        "width of a flank, over which the groove reaches its depth",
+        least=1e-5,
+        most=0.1,
+    )
     angle: float = number(
-        0.0, "deg", "of a lateral groove from the axle's direction", least=-80, most=80
+        0.0, "deg", "angle of a lateral groove to the direction of the axle", least=-80, most=80
     )
     span: tuple[float, float] = vector(
-        (-1.0, 1.0), "m", "from, to: y between which a lateral groove lies", least=-10, most=10
+        (-1.0, 1.0), "m", "range of y covered by a lateral groove", least=-10, most=10
     )
 
 
 @dataclass(frozen=True)
 class PatternTable:
-    pitches: int = integer(60, "around the tire, of the lateral grooves", least=1, most=2000)
+    pitches: int = integer(
+        60, "number of pitches around the tire, for the lateral grooves", least=1, most=2000
+    )
     pitch_lengths: tuple[float, ...] = numbers(
-        "relative lengths of the pitches, in random order; one: all alike",
+        "relative lengths of the pitches, in random order; one value: all equal",
         "-",
         Limits(least=0.2, most=5),
         (1.0,),
     )
-    seed: int = integer(1, "of their order", least=0, most=2**31)
+    seed: int = integer(1, "seed of their random order", least=0, most=2**31)
     file: str | None = filename(
         "depths in place of grooves: .npz with depth (n, m) m around the tire and y (m) m, or an image (.png) from "
         "white, the outer face, to black, the full depth, its width around the tire"
     )
-    depth: float = number(0.008, "m", "of the black of an image", least=1e-6, most=0.1)
-    width: float = number(0.15, "m", "across the tire, of an image", least=1e-6, most=10)
+    depth: float = number(
+        0.008, "m", "depth that black stands for in an image", least=1e-6, most=0.1
+    )
+    width: float = number(0.15, "m", "width of an image, across the tire", least=1e-6, most=10)
     groove: tuple[Groove, ...] = tables(Groove, "a groove of the tread")
 
 

@@ -39,8 +39,8 @@ class Damping:
     mass: float = number(
         500.0,
         "1/s",
-        "Rayleigh damping γ1, times the mass: γ1/(2ω) of critical. The default, the thesis's, is 0.5 to 0.8 in "
-        "the lowest modes of a tire, which has some 0.05 (loss_factor = 0.1)",
+        "Rayleigh damping γ1, times the mass: a damping ratio of γ1/(2ω). The default is that of the thesis and gives "
+        "0.5 to 0.8 in the lowest modes, where a tire has about 0.05 (loss_factor = 0.1)",
         least=0,
         most=1e7,
     )
@@ -64,19 +64,20 @@ class Rotation:
     travel_speed: float | None = number(
         None,
         "m/s",
-        "speed over the road, instead of speed: the wheel turns as fast as it rolls freely; 25 m/s are 90 km/h",
+        "speed over the road, instead of speed: the wheel turns at the rate of free rolling; 25 m/s are 90 km/h",
         least=1e-6,
         most=500,
     )
     free_rolling: bool = flag(
         False,
-        "find the wheel's slip at which a smooth road does not drag on it, by the loop and its brush, which then feels "
-        "the static shape's own speeds; added to contact.slip",
+        "find the slip of the wheel at which a smooth road exerts no drag, with the time loop and its brush, which then "
+        "feels the local speeds of the static shape; added to contact.slip",
     )
     slip_angle: float = number(
         0.0,
         "deg",
-        "angle from the wheel's plane to where it goes, > 0 towards +y; its tangent is added to the lateral contact.slip",
+        "angle from the wheel's plane to its direction of travel, > 0 towards +y; its tangent is added to the lateral "
+        "contact.slip",
         least=-30,
         most=30,
     )
@@ -92,8 +93,8 @@ class Rotation:
     )
     shapes: bool = flag(
         True,
-        "static shapes of the forces that turning exerts on the modes join these, as many as matter: of method projected, "
-        "with a fixed rim",
+        "rotation shapes: static responses to the Coriolis and convective forces of the modes join these, as many as "
+        "matter; for method projected, with a fixed rim",
     )
     count: int = integer(40, "number of pairs of method full", least=1, most=10000)
     window: tuple[float, float] = vector(
@@ -120,7 +121,7 @@ class Greens:
     residual: str = choice(
         "static",
         ("none", "dirac", "static", "second-order", "attachment"),
-        "residual flexibility, which represents the modes that are left out",
+        "residual flexibility, which represents the truncated modes",
     )
     dynamic: int | None = integer(
         None,
@@ -203,18 +204,18 @@ class Scene:
         optional=True,
     )
     rotation: Rotation | None = table(Rotation, "rotation of the wheel", optional=True)
-    axle: AxleTable = table(AxleTable, "what holds the wheel")
+    axle: AxleTable = table(AxleTable, "support of the wheel")
     greens: Greens = table(Greens, "Green's functions")
     force: tuple[PointForce, ...] = tables(PointForce, "a prescribed force on the outer face")
     contact: Contact | None = table(Contact, "contact with the road in time", optional=True)
     pattern: PatternTable | None = table(
         PatternTable,
-        "grooves of the tread, which turn with the tire; absent: a slick",
+        "grooves of the tread, which rotate with the tire; absent: a slick",
         optional=True,
     )
     road: Road | None = table(Road, "the road driven over", optional=True)
     time: Time | None = table(Time, "the run in time", optional=True)
-    accuracy: Accuracy = table(Accuracy, "how sure the answer is")
+    accuracy: Accuracy = table(Accuracy, "error bars, and the search for settings")
     output: Output = table(Output, "what is computed and kept")
 
     @property

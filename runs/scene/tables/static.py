@@ -38,9 +38,9 @@ class Static:
     friction: float | None = number(
         None,
         "-",
-        "coefficient of Coulomb friction between tire and road in the static state; absent: none. A "
-        "tire that stands sticks and slips as it is pressed on, one that rolls as its tread passes, its wheel rolling freely "
-        "but for contact.slip and rotation.slip_angle",
+        "coefficient of Coulomb friction between tire and road in the static state; absent: none. A standing tire sticks "
+        "and slips as it is pressed on the road, a rolling one as its tread passes through the contact, with a wheel "
+        "that rolls freely except for contact.slip and rotation.slip_angle",
         least=0,
         most=10,
     )
@@ -56,8 +56,8 @@ class Static:
     )
     error_estimate: bool = flag(
         True,
-        "estimate of the load's discretisation error, by finer elements at the footprint, which tell its extent too, and "
-        "another order of all",
+        "estimate the discretisation error of the load, by finer elements at the footprint, which also give its extent, "
+        "and by elements of another order everywhere",
     )
 
     @property

@@ -52,26 +52,27 @@ class Stiffness:
     which: str = choice(
         "all",
         ("all", "vertical"),
-        "stiffnesses to compute: the vertical one, or also the longitudinal, lateral and torsional ones (all)",
+        "stiffnesses to compute: vertical, or all (also longitudinal, lateral and torsional)",
     )
     slide_steps: int = integer(
         8,
-        "with static.friction and all: steps of the curves of force over the way that the road is moved along and across a "
-        "standing tire, or over the slip of one that rolls, up to sliding; 0: none",
+        "with static.friction and which = all: steps of the curves of force over the displacement of the road along and "
+        "across a standing tire, or over the slip of a rolling one, up to sliding; 0: none",
         least=0,
         most=_MOST,
     )
     slide_to: float | None = number(
         None,
         "m",
-        "their largest way; absent: 2 friction times load over the stiffness that sticks",
+        "largest displacement of these curves; absent: 2 friction times load over the stiffness of the sticking footprint",
         least=1e-6,
         most=1,
     )
     slip_to: float | None = number(
         None,
         "-",
-        "their largest slip of a wheel that rolls; absent: 3 friction times load over the rate at none, at most 0.5",
+        "largest slip of these curves for a rolling wheel; absent: 3 friction times load over the initial slope, at most "
+        "0.5",
         least=1e-6,
         most=0.5,
     )

@@ -76,7 +76,8 @@ class Region:
 class Cords:
     name: str = text(
         "ply",
-        "name of this line of cords in results and messages; of a line that a file or a radial tire has: its cords are replaced",
+        "name of this line of cords in results and messages; the name of a line of a file or of the radial tire replaces "
+        "its cords",
     )
     depth: float = number(
         0.006, "m", "depth under the outer face of the undeformed wall", least=0, most=5

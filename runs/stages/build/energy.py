@@ -159,8 +159,8 @@ def _rolling(
     }
     observe.say(
         f"  energy: contact {work:.4g} J + drive {drive:.4g} J = in the tire {left:.4g} J + lost "
-        f"{lost:.4g} J + in modes left out {beyond:.2g} J + taken by the scheme {taken:.2g} J, "
-        f"but for {off:.2g} J"
+        f"{lost:.4g} J + lost in truncated modes {beyond:.2g} J + dissipated by the scheme {taken:.2g} J; "
+        f"imbalance {off:.2g} J"
     )
     if abs(off) > _UNBALANCED * moved + _LEAST:
         record.warnings.append(

@@ -50,7 +50,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
     contact, patch = job.scene.contact, setup.patch
     if patch.weights is None or patch.frames is not None or contact.rubs or contact.law.creep:
         raise InputError(
-            "what the elements near points miss is known for a grid of points on a plane road and normal forces"
+            "the compliance of the wall between nodes is known only for a grid of points on a plane road and normal forces"
         )
     wall = over_rectangles(_outer(job.scene.tire, job.tire.section))
     known = on_nodes(patch, static.area, wall)

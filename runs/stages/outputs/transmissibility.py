@@ -40,7 +40,7 @@ class Transmissibility(Output):
     step: float = number(2.0, "Hz", "step between two frequencies", least=1e-4, most=1e6)
     free_rim: int = integer(
         0,
-        "number of modes of the tire with a free rim, by which it is found a second way; 0: by momentum alone",
+        "number of modes of the tire with a free rim, by which it is computed a second time; 0: by momentum alone",
         least=0,
         most=100000,
     )

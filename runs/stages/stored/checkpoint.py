@@ -77,7 +77,7 @@ class _Parts:
         reason = "" if self._job.fresh else self._read(found)
         reasons = [one for one in self._job.comm.allgather(reason) if one not in ("", "absent")]
         if reasons:
-            observe.say(f"  {self._folder.name} is there, but {reasons[0]}: not all of it is taken")
+            observe.say(f"  {self._folder.name} exists, but {reasons[0]}: only part of it is used")
         return found
 
     def _read(self, found: list[Entry]) -> str:

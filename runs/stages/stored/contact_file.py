@@ -137,7 +137,7 @@ class ContactFile:
         """Whether there is a checkpoint to go on from; one that cannot serve is named."""
         reason = store.why_not(self._checkpoint, wanted, "contact")
         if reason and reason != "absent":
-            observe.say(f"  {CHECKPOINT} is there, but {reason}: the loop begins at t = 0")
+            observe.say(f"  {CHECKPOINT} exists, but {reason}: the loop begins at t = 0")
         return not reason
 
     def _lay_out(self) -> None:

@@ -34,7 +34,7 @@ def obtained(stage: Stage) -> Obtained:
         if not reason:
             return Obtained(done=Done(key, stage.stored), reused=source, known=known)
         if reason != "absent":
-            observe.say(f"{name:9s} computed anew: {path.name} is there, but {reason}")
+            observe.say(f"{name:9s} computed anew: {path.name} exists, but {reason}")
         record = Record()
         product = stage.produce(key, record)
         collect(job.comm)

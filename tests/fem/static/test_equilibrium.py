@@ -95,7 +95,7 @@ def test_a_road_below_the_tire_finds_no_height(make_body):
     equilibrium = Equilibrium(make_body(segments=8, arc=2))
     step = equilibrium.solve(-1.0, load=100.0)
     assert not step.converged
-    assert "meets nothing" in step.reason
+    assert "meets no resistance" in step.reason
 
 
 def test_a_factorisation_out_of_memory_says_so(make_body):

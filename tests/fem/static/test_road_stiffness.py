@@ -120,7 +120,7 @@ def test_slopes_of_a_known_curve():
 
 
 def test_too_few_nodes_are_refused(make_body):
-    with pytest.raises(InputError, match="no fewer than three"):
+    with pytest.raises(InputError, match="at least three"):
         road_stiffness(make_body(), PRESSURE, np.array([5]), np.zeros(3))
 
 

@@ -76,8 +76,11 @@ def test_unknowns_are_those_of_the_section(tmp_path, given):
             "one of cap ply, belt 2, belt 1, carcass",
         ),
         ('section = "radial"\n[[tire.region]]\narc = [0, 9]', "one of tread, skim"),
-        ('section = "radial"\n[[tire.region]]\nname = "ply"\ndepth = [0, 0.5]', "the size's"),
-        ('section = "radial"\n[tire.material]\ndensity = 1.0', "by its size"),
+        (
+            'section = "radial"\n[[tire.region]]\nname = "ply"\ndepth = [0, 0.5]',
+            "follows from the size",
+        ),
+        ('section = "radial"\n[tire.material]\ndensity = 1.0', "follow from its size"),
         ('section = "radial"\norder = 1', "take 2 or 3"),
         ('size = "205/60 R15"', "belongs to section = radial"),
     ],

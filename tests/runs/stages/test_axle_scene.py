@@ -107,7 +107,7 @@ def test_corner_free_wheel_and_the_fixed_axle_as_its_limit(run):
         ("stiffness = [0, 0, 0, 0, 0, 0]", "carries the static load: the corner is unstable"),
         ('locked = ["x", "y", "ry", "rz"]', "no spring along rx"),
         ("stiffness = [1, 2, 3]", "6 numbers"),
-        ("stiffness = [0, 0, -1.0, 0, 0, 0]", "symmetric and not give energy"),
+        ("stiffness = [0, 0, -1.0, 0, 0, 0]", "symmetric and positive semidefinite"),
         ('locked = ["w"]', "must be a list of x, y, z"),
         ('body_mass = 3.0\nlocked = ["x", "y", "z", "rx", "rz"]', "no part where z is locked"),
         ('body_mass = 3.0\n[greens]\nresidual = "second-order"', "knows no [axle]"),

@@ -95,7 +95,7 @@ def test_a_belted_tire_of_lossy_compounds(run):
 @pytest.mark.long
 def test_damping_in_proportion_where_the_scene_gives_it(run):
     folder, stages = run("--set", "damping.mass=100.0", "--until", "rotating")
-    assert "the loss factors do not act" in stages["modes"]["headline"]["damping"]["value"]
+    assert "the loss factors are not used" in stages["modes"]["headline"]["damping"]["value"]
     with h5py.File(folder / "rotating.h5") as file:
         s = np.concatenate([file["eigenvalue"][:], file["turning/eigenvalue"][:]])
     with h5py.File(folder / "modes.h5") as file:

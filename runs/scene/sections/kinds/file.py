@@ -28,7 +28,7 @@ class FileSection(SectionKind):
     file: str | None = filename(
         "Abaqus deck (.inp), Gmsh mesh (.msh) or section file (.toml, docs/section-file.md)"
     )
-    mesh: str | None = filename('the same as file; section = "file" need not be said then')
+    mesh: str | None = filename('same as file, and implies section = "file"')
     inner: str | None = text(None, "surface or node set that carries the inflation pressure")
     tread: str | None = text(None, "surface or node set that can touch the road")
     rim: tuple[str, ...] = texts("surfaces or node sets that are fixed to the wheel")

@@ -51,10 +51,10 @@ class RadialSection(SectionKind):
 
     def check(self, tire: Tire, source: Source) -> None:
         if tire.material != type(tire)().material:
-            text = "is of a torus: a radial tire has compounds by its size; [[tire.region]] changes one"
+            text = "is for a torus: the compounds of a radial tire follow from its size; [[tire.region]] changes one"
             source.add(("tire", "material"), text)
         if tire.order == 1:
-            text = "= 1: linear elements between cords do not bend, and no static state is found: take 2 or 3"
+            text = "= 1: linear elements between cords cannot bend, so no static state is found: take 2 or 3"
             source.add(("tire", "order"), text)
         try:
             construction = built(self.size)
@@ -128,7 +128,7 @@ def _known(table: str, given: Sequence[Region | Line], names: list[str], source:
             source.add((*path, "name"), f'= "{one.name}" is taken')
         for key in ("arc", "depth", "side"):
             if getattr(one, key, None) != getattr(default, key, None):
-                source.add((*path, key), "is the size's in a radial tire: leave it out")
+                source.add((*path, key), "follows from the size of a radial tire: leave it out")
 
 
 def _compound(region: Region | None, values: dict[str, float]) -> Material:

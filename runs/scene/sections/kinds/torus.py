@@ -62,7 +62,7 @@ class TorusSection(SectionKind):
         120.0, "deg", "angle of the section from the crown to each bead", least=10, most=175
     )
     elements_arc: int | None = integer(
-        None, "number of elements from bead to bead; absent: 14 of order 3", least=2, most=1000
+        None, "number of elements from bead to bead; absent: 16, of order 1 32", least=2, most=1000
     )
     elements_thickness: int = integer(1, "number of elements through the wall", least=1, most=20)
     grading: str = choice("bead", ("bead", "uniform"), "grading of the elements along the section")
@@ -91,7 +91,7 @@ class TorusSection(SectionKind):
             if region.name is not None:
                 source.add(
                     (*place, "name"),
-                    'is for section = "file": a part of a torus is told by arc, side and depth',
+                    'is for section = "file": a region of a torus is given by arc, side and depth',
                 )
             for key in ("arc", "depth"):
                 low, high = getattr(region, key)

@@ -67,11 +67,11 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
     moved = len(response.every) - len(kept.every)
     observe.say(
         f"  step {steps.size:.4g} s, {steps.count} steps; fastest mode {fastest:.4g} 1/s, "
-        f"{moved} states too fast for the step follow statically"
+        f"{moved} states too fast for the step respond statically"
     )
     if steps.duration > wanted.duration * (1 + 1e-9):
         observe.say(
-            f"  the run ends at {steps.duration:.6g} s: {wanted.duration:.6g} s is no multiple of the step"
+            f"  the run ends at {steps.duration:.6g} s: {wanted.duration:.6g} s is not a multiple of the step"
         )
     record.indicators["states moved to the residual"] = (moved, "-")
     return Planned(kept, steps.size, steps.count)
@@ -88,7 +88,7 @@ def integration(job: Job, plan: Planned, scheme: str) -> Integration:
             response=plan.response, step=plan.step, scheme=scheme, comm=comm, look_ahead=True
         )
         if comm.size < job.comm.size:
-            observe.say("  each process takes the whole loop: too small to share out")
+            observe.say("  each process computes the whole loop: it is too small to distribute")
     return Integration(tire, plan.step, plan.steps, scheme)
 
 
