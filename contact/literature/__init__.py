@@ -1,1 +1,3 @@
-"""Contact models of the literature, for comparison: asperities with Hertz springs, wedges with a look-up, fitted springs."""
+"""Contact models of the literature, for comparison: Hertz springs on asperities, wedges, fitted
+springs.
+"""

@@ -1,1 +1,3 @@
-"""Eigensolvers: SLEPc on each symmetric part and inertia slice, and the quadratic problem of the turning tire."""
+"""Eigensolvers: block Lanczos in inertia slices of symmetric parts, and SLEPc on the quadratic
+problem.
+"""
