@@ -129,13 +129,7 @@ class Distance:
 def distance(
     reference: np.ndarray, found: np.ndarray, duration: float, band: float = BAND
 ) -> Distance:
-    """Distance of `found` (n', k) from the variable part of `reference` (n, k), from 0 to `band`
-    Hz.
-
-    Both last `duration` s and are evaluated with their own step: after decimation to a common one,
-    force above half its sampling frequency would be aliased into the band (measured: 0.6 % where
-    there was 0.03 %). Hann window.
-    """
+    """Fourier coefficients of windowed values (n, k) at t = h ... duration, up to `band` Hz."""
     rest = reference.mean(axis=0)
     exact = low_part(reference - rest, duration, band)
     off = low_part(found - rest, duration, band) - exact
