@@ -73,8 +73,7 @@ def love_square_centre(pressure: float, half_side: float, modulus: float) -> flo
 def westergaard_pressure(
     x: np.ndarray, fraction: float, amplitude: float, wavelength: float, modulus: float
 ) -> np.ndarray:
-    """Pressure (Pa) at x (m) from a crest of rigid waves of `amplitude` (m), `fraction` of which is
-    in contact.
+    """Pressure (Pa) at x (m) from a crest of rigid waves, `fraction` of which is in contact.
 
     p = 2 p_m cos(pi x/L) sqrt(s^2 - sin^2(pi x/L))/s^2 in the contact, s = sin(pi fraction/2); p_m
     as in `westergaard_mean`. Source: Westergaard, J. Appl. Mech. 6 (1939) 49; Johnson 13.2.
@@ -87,16 +86,13 @@ def westergaard_pressure(
 
 
 def westergaard_mean(fraction: float, amplitude: float, wavelength: float, modulus: float) -> float:
-    """Mean pressure (Pa) with `fraction` of a wavy surface in contact: pi E* A/L sin^2(pi
-    fraction/2).
-    """
+    """Mean pressure (Pa) for `fraction` of a wavy surface: pi E* A/L sin^2(pi fraction/2)."""
     full = math.pi * modulus * amplitude / wavelength
     return full * math.sin(math.pi * fraction / 2) ** 2
 
 
 def carter_force(creepage: float, friction: float, half_width: float, radius: float) -> float:
-    """Tangential force over mu P on an elastic cylinder rolling on a half-space, one of them rigid
-    or both alike.
+    """Tangential force over mu P of a rolling elastic cylinder, one body rigid or both alike.
 
     Q/(mu P) = 1 - (1 - R xi/(mu a))^2, and 1 from xi = mu a/R on: `creepage` xi, `friction` mu,
     half width a (m), relative radius R (m). Source: Carter, Proc. R. Soc. A 112 (1926) 151; Johnson
@@ -109,8 +105,7 @@ def carter_force(creepage: float, friction: float, half_width: float, radius: fl
 def carter_traction(
     x: np.ndarray, creepage: float, friction: float, half_width: float, radius: float
 ) -> np.ndarray:
-    """Tangential traction over peak pressure at x (m) from the middle, the leading edge being
-    at x = a.
+    """Tangential traction over peak pressure at x (m) from the middle, leading edge at x = a.
 
     mu [sqrt(1 - x^2/a^2) - c/a sqrt(1 - (x - a + c)^2/c^2)]; the stick zone is 2c = 2a - 2 R xi/mu
     wide and adjoins the leading edge.

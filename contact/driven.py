@@ -58,9 +58,7 @@ class Driven:
         self._along = along
 
     def inertia_force(self) -> np.ndarray:
-        """What axle and contact balance together (3,), N: rate of momentum less the prescribed
-        forces.
-        """
+        """What axle and contact balance (3,), N: rate of momentum less prescribed forces."""
         rate = self._tire.inertia_force()
         return rate - self._history[self._step] @ self._directions if self._forced else rate
 

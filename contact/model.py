@@ -92,9 +92,7 @@ def tread_memory(spec: Spec, patch: Patch, speed: float, step: float) -> TreadMe
 
 
 def tread_shear(spec: Spec, patch: Patch, at_once: float = 1.0) -> Shear | None:
-    """The tread's shear compliance between the points, times `at_once`; None if it is rigid in
-    shear.
-    """
+    """The tread's shear compliance between the points, times `at_once`; None if it is rigid."""
     if not spec.sheared:
         return None
     plain = spec.law.shear(_farthest(patch))
@@ -113,8 +111,7 @@ def _spread(patch: Patch, tire: Array) -> Array:
 
 
 def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> ContactSolver:
-    """The solver for A = W tire W^T + C~, `tire` (p, p) m/N between the patch's nodes; C~ times
-    `at_once`.
+    """The solver for A = W tire W^T + C~, `tire` (p, p) m/N between nodes; C~ times `at_once`.
 
     InputError if a matrix of that many points is not affordable, or A is not positive definite.
     """
@@ -146,9 +143,7 @@ def tread_matrix(spec: Spec, patch: Patch, index: slice | NDArray[np.intp] = sli
 
 
 def touching_compliance(spec: Spec, patch: Patch, tire: Array, index: NDArray[np.intp]) -> Array:
-    """W tire W^T + C~ between the points of the `index`, (n, n) m/N; `tire` (p, p) m/N between the
-    nodes.
-    """
+    """W tire W^T + C~ between the points `index`, (n, n) m/N; `tire` (p, p) between the nodes."""
     if patch.weights is None:
         return tire[np.ix_(index, index)] + tread_matrix(spec, patch, index)
     rows = patch.weights[index]
@@ -156,8 +151,7 @@ def touching_compliance(spec: Spec, patch: Patch, tire: Array, index: NDArray[np
 
 
 def _out_of_reach(patch: Patch) -> InputError | None:
-    """The InputError for a road so high that the patch extends up the tire's flanks; None
-    otherwise.
+    """The InputError for a road so high that the patch extends up the tire's flanks, or None.
 
     Tread laws hold on a plane. Points that rise by more than STEEPEST of their distance from the
     footprint lie above each other, seen from the road.
@@ -176,9 +170,7 @@ def _out_of_reach(patch: Patch) -> InputError | None:
 
 
 def _product(spec: Spec, patch: Patch, tire: Array, at_once: float) -> Compliance:
-    """A as a product. A grid has more points than nodes, so that A would be singular without a
-    tread.
-    """
+    """A as a product. Without a tread it would be singular: a grid has more points than nodes."""
     if not spec.law.compliant:
         raise InputError(
             "contact.tread: the tread leaves a grid of points without compliance of its own: take "

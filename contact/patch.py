@@ -38,9 +38,7 @@ class Patch:
     pull: np.ndarray | None = None
 
     def resultant(self, force: np.ndarray, horizontal: np.ndarray) -> np.ndarray:
-        """Resultant (3,) N in the wheel's axes of forces normal to the road (c,) and along and
-        across it (c, 2).
-        """
+        """Resultant (3,) N in the wheel's axes of normal (c,) and tangential (c, 2) forces."""
         if self.frames is None:
             # A product: sum(axis=0) of so narrow an array takes ten times as long, 2 % of a step.
             return np.array([*(np.ones(len(force)) @ horizontal), force.sum()])
@@ -63,25 +61,20 @@ class Patch:
 
     @property
     def spacing(self) -> np.ndarray:
-        """Distance (2,) m between neighbouring points along and across the footprint at rest; 0
-        without one.
-        """
+        """Point spacing (2,) m along and across the footprint at rest; 0 without one."""
         held = self.force > 0
         return 2 * np.median(self.half_sizes[held], axis=0) if held.any() else np.zeros(2)
 
     @property
     def touching(self) -> np.ndarray:
-        """Number of points (2,) along and across the footprint at rest, by its extent; 0 without
-        one.
-        """
+        """Number of points (2,) along and across the footprint at rest; 0 without one."""
         held = self.force > 0
         if not held.any():
             return np.zeros(2)
         return np.rint(np.ptp(self.points[held, :2], axis=0) / self.spacing) + 1
 
     def check_edge(self, force: np.ndarray, time: np.ndarray, reach: float) -> None:
-        """Raise ConvergenceError if a point on the edge touches, since points beyond it might touch
-        too.
+        """Raise ConvergenceError if a point on the edge touches: others beyond might touch too.
 
         `force` (n, c) N at the times (n,) s.
         """

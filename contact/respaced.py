@@ -1,6 +1,4 @@
-"""The same contact patch with twice or half the spacing of its points, for an estimate of its
-error.
-"""
+"""The same contact patch with twice or half the spacing of its points, for an error estimate."""
 
 from __future__ import annotations
 
@@ -31,8 +29,7 @@ def ratio(patch: Patch) -> float:
 
 
 def thinned(patch: Patch) -> Patch:
-    """Points at multiples of twice the spacing, each for four of the original ones; not yet
-    settled.
+    """Points at multiples of twice the spacing, each for four original ones; not yet settled.
 
     For a patch on a grid (`places`) that is not settled either: `force` is zero, `gap` the
     surface's height.
@@ -60,8 +57,7 @@ def thinned(patch: Patch) -> Patch:
 
 
 def halved(patch: Patch, surface: Surface, road_height: float, reach: float) -> Patch:
-    """Points at multiples of half the spacing, the original ones among them, on the same nodes; not
-    settled.
+    """Points at multiples of half the spacing, on the same nodes; not settled.
 
     For a patch on a grid over a plane, as in `thinned`; `surface`, `road_height` and `reach` (m)
     are those that it was made from. Points beyond the original ones, where no road is prepared, and

@@ -93,8 +93,7 @@ class Instant(NamedTuple):
 
 @dataclass(frozen=True)
 class Drive:
-    """The road's approach: `height(x, y)` m over the static plane, pointwise for arrays of any
-    shape.
+    """The road's approach: `height(x, y)` m over the static plane, pointwise for any shape.
 
     `motion(t)` m is its vertical motion, `speed` in m/s.
     """

@@ -109,9 +109,7 @@ class ContactSetup:
 
     @property
     def shortest(self) -> float:
-        """Half the shortest wave (m) that excites the points: of the road or, if it is finer, of
-        their grid.
-        """
+        """Half the shortest wave (m) of the road met by the points; at least their spacing."""
         pitch = 2 * float(self.patch.half_sizes[~self.patch.edge, 0].min(initial=np.inf))
         return max(self.road.spacing, pitch) if np.isfinite(pitch) else self.road.spacing
 
@@ -123,9 +121,7 @@ class ContactSetup:
 
     @property
     def relief(self) -> float:
-        """Height difference (m) between the highest and lowest spots of the road under the run; a
-        bound.
-        """
+        """Bound of the height difference (m) of the road under the run."""
         x0, x1, y0, y1 = self.patch.extent
         strip = x0, x1 + self.rolled.travel, y0, y1
         return self.road.highest(*strip) - self.road.lowest(*strip)
@@ -149,8 +145,7 @@ class ContactSetup:
         return replace(self, road=road, rolled=still, pattern=None)
 
     def settled(self, response: Response, nodal_force: np.ndarray, spec: Spec) -> tuple:
-        """(setup, rise in m): the points take up the static load on the tread, which the elements
-        lack.
+        """(setup, rise in m): settle the points on the tread, which the elements lack.
 
         `nodal_force` (s,) N of the finite elements on the outer face. Nodes without a tread are
         settled already.

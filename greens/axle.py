@@ -1,5 +1,4 @@
-"""Force and moment on a held axle per force on the tread: by momentum, and by the modes of a free
-rim.
+"""Force and moment on a held axle per force on the tread: by momentum, and by free-rim modes.
 
 The tire transmits the forces on it less the rate of change of its momentum,
 
@@ -61,8 +60,7 @@ def axle_transfer(
 def by_free_rim(
     wheel: Wheel, modes: Modes, loads: Probes, frequency: np.ndarray, motion: RimMotion
 ) -> np.ndarray:
-    """Force, -, and moment, m, on the held axle per unit load (f, 6, k), at `frequency` (f,) Hz
-    above 0.
+    """Force, -, and moment, m, on the held axle per unit load (f, 6, k), `frequency` in Hz above 0.
 
     Computed from the `modes` of the `wheel` with a free rim, joined by attachment modes of the rim
     and of the `loads` (k, 3 s). `motion`: that of the rim at the same state. Collective.

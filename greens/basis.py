@@ -118,8 +118,7 @@ def regained(
     outputs: sparse.csr_matrix,
     loads: sparse.csr_matrix,
 ) -> Moments:
-    """The moments of the modes under their true damping less those under the full matrices'
-    damping.
+    """Moments of the modes under true damping less those under the full matrices' damping.
 
     Added to the moments of the full matrices, they yield those of matrices that damp the modes
     truly and all other motions uniformly. `true`, `uniform`: D~ and K~ of both.

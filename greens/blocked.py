@@ -25,8 +25,7 @@ from tireroad.modal.rotating import held_matrices
 def substituted(
     basis: Basis, turning: Turning, loads: sparse.csr_matrix, frequency: np.ndarray
 ) -> np.ndarray:
-    """Force on the hub (f, 3, k) per unit load at the probes (k, 3 s), at `frequency` (f,) Hz above
-    0.
+    """Force on the hub (f, 3, k) per unit load at the probes (k, 3 s), `frequency` in Hz above 0.
 
     In directions in which the wheel moves it is that of springs and dampers, in locked ones that on
     the held rim.

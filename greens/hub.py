@@ -1,5 +1,4 @@
-"""Hub moments among the outputs of a response: those of the loads less what the tire's motion takes
-up,
+"""Hub moments as outputs of a response: those of the loads less those of the tire's motion,
 
     m = R^T f - (A_2 u'' + A_1 u' + A_0 u),
 

@@ -1,6 +1,4 @@
-"""One time step of the states: decay, and the effect of the forces at its start and end
-(greens.recursion).
-"""
+"""One time step of the states: decay, and forces at its start and end (greens.recursion)."""
 
 from __future__ import annotations
 
@@ -13,8 +11,7 @@ from tireroad.greens.response import Response
 
 
 class Block:
-    """The recursion for the dense block of nearly defective states, on the first process with
-    states only.
+    """Recursion of the block of nearly defective states, on the first process with states.
 
     Its last three outputs are the rate of change of momentum, without its jump due to the force.
     """

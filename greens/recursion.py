@@ -1,5 +1,4 @@
-"""State-space recursion: the convolution of Green's functions and forces, exact and without a
-history.
+"""State-space recursion: the exact convolution of Green's functions and forces, without history.
 
 With a force linear over one step h (first-order hold), f(tau) = f_n + (f_{n+1} - f_n) tau / h, each
 state advances by
@@ -116,8 +115,7 @@ class Recursion:
         return total
 
     def start(self, force: np.ndarray) -> None:
-        """Begin with a force (k,) N present at t = 0, the tire at rest. Collective when looking
-        ahead."""
+        """Begin with a force (k,) N at t = 0, at rest. Collective when looking ahead."""
         self._force = force
         self._push = (self._input @ force).view(complex)
         self._rate = self._begun @ force
@@ -206,8 +204,7 @@ class Recursion:
         self._samples = []
 
     def samples(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """States and pushes (mine,) of this process, and force (k,) N, of each step since the last
-        call."""
+        """States and pushes (mine,), and force (k,) N, of each step since the last call."""
         self._take()
         kept, self._samples = self._samples, []
         assert kept is not None, "samples() before keep_samples()"
@@ -244,6 +241,5 @@ class Recursion:
             self._begin()
 
     def inertia_force(self) -> np.ndarray:
-        """Rate of change of the tire's momentum (3,), N, after `advance`: sum_k (int rho phi_k)
-        eta_k''."""
+        """Rate of the tire's momentum (3,), N, after `advance`: sum_k (int rho phi_k) eta_k''."""
         return self._rate

@@ -103,8 +103,7 @@ class Response:
         return int(grows.sum()), float(values.real[grows].max(initial=0.0))
 
     def _held_block(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The block with its output and input, without the rigid states, which are last and
-        decoupled."""
+        """The block, its output and input, without rigid states, which are last and decoupled."""
         k = len(self.block) - self.rigid
         return self.block[:k, :k], self.block_output[:, :k], self.block_input[:k]
 
@@ -203,8 +202,7 @@ class Response:
         )
 
     def joined(self, other: Response) -> Response:
-        """Both sets of states between the same outputs and forces, residuals added; no rigid
-        `other`."""
+        """Both sets of states between the same outputs and forces; no rigid `other`."""
         return Response(
             eigenvalue=np.concatenate([self.eigenvalue, other.eigenvalue]),
             output=np.hstack([self.output, other.output]),

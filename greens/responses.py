@@ -69,8 +69,7 @@ def make_response(
     residual: str,
     fields: Callable[[], ModalBasis],
 ) -> Made:
-    """The response (r, k) between the probes `outputs` (r, 3 s) and `loads` (k, 3 s) with a
-    residual.
+    """The response (r, k) between probes `outputs` (r, 3 s) and `loads` (k, 3 s) with a residual.
 
     `wheel` returns the full matrices and `fields` the modes on all unknowns; each is called only if
     the residual needs it. Collective.
@@ -133,9 +132,7 @@ def cutoff(rolling: RollingModes) -> Cutoff:
 def judged(
     name: str, whole: Response, response: Response, rolling: RollingModes, wanted: Wanted
 ) -> Figures:
-    """Estimated error of the receptance within the band, due to truncated modes and to static
-    states.
-    """
+    """Estimated error of the receptance in the band, from truncated modes and static states."""
     top, figures = band(rolling, wanted), dict[str, tuple[float, str]]()
     some = [slice(None, None, -(-n // _SAMPLE)) for n in whole.residual.shape]
     whole, response = whole.between(*some), response.between(*some)

@@ -12,9 +12,7 @@ from tireroad.fem.collective import joined
 
 @dataclass(frozen=True)
 class Spread:
-    """States dealt in turn to the processes of `comm`, except the first `idle` ones, which have
-    none.
-    """
+    """States dealt in turn to the processes of `comm`, except the first `idle` ones."""
 
     comm: MPI.Comm
     idle: int

@@ -22,8 +22,7 @@ IMPEDANCE = 413.3  # N s/m3, rho c of air at 20 deg C and 1013 hPa
 
 
 def coordinates(states: StateModes, pushed: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """a (f, m) m kg^1/2, complex, at `frequency` (f,) Hz under the modal forces `pushed` (f, m) = F
-    B^T, N kg^-1/2.
+    """a (f, m) m kg^1/2 at `frequency` (f,) Hz under modal forces `pushed` (f, m) N kg^-1/2, F B^T.
 
     0 Hz only without rigid states. Not collective.
     """
@@ -41,9 +40,7 @@ def coordinates(states: StateModes, pushed: np.ndarray, frequency: np.ndarray) -
 
 @dataclass(frozen=True)
 class Surface:
-    """The outer face in the static state: `normal` (s, 3), m2, each node's normal times its share
-    of the area.
-    """
+    """The outer face in the static state: `normal` (s, 3), m2, times the area of each node."""
 
     normal: np.ndarray
 

@@ -12,8 +12,7 @@ from tireroad.modal.states import StateModes
 
 
 def beside(drag: np.ndarray, stiffness: np.ndarray, adrift: np.ndarray) -> StateModes:
-    """`rotating` for a problem whose motions `adrift` (m, r), orthonormal, meet neither stiffness
-    nor damping.
+    """`rotating` where the orthonormal motions `adrift` (m, r) meet no stiffness or damping.
 
     They are split off exactly and drift in a block of their own.
     """

@@ -32,8 +32,6 @@ class Air:
         return self.duct.joined(drag, stiffness, speed, self.coupling)
 
     def share(self, right: np.ndarray) -> np.ndarray:
-        """The air's share (q,) of the kinetic energy of states, from their vectors (m + a or more,
-        q).
-        """
+        """The air's share (q,) of the states' kinetic energy, from their vectors (m + a ..., q)."""
         squares, own = np.abs(right) ** 2, self.coupling.shape[1]
         return squares[own : own + self.count].sum(axis=0) / squares.sum(axis=0)

@@ -1,6 +1,4 @@
-"""The rotating-frame matrices on the basis of undamped modes: small, replicated, independent of
-speed.
-"""
+"""The rotating-frame matrices on the undamped modes: small, replicated, independent of speed."""
 
 from __future__ import annotations
 
@@ -49,9 +47,7 @@ class Projection:
 
     @property
     def carried(self) -> np.ndarray:
-        """Momentum (3, m + a + c) kg^1/2 per rate of all coordinates: of all mass that the hub
-        moves.
-        """
+        """Momentum (3, m + a + c) kg^1/2 per rate of coordinates, of all mass on the hub."""
         if not self.moves:
             return self.inside
         return self.wheel.carried(self.inside, self.air_mass) @ self._change
@@ -68,17 +64,14 @@ class Projection:
     def pencil(
         self, drag: np.ndarray, stiffness: np.ndarray, speed: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """D~ (1/s) and K~ (1/s2) of all coordinates, of unit mass, from those of tire and air
-        (m + a, m + a).
-        """
+        """D~ (1/s), K~ (1/s2) of all coordinates, unit mass, from tire and air (m + a, m + a)."""
         if not self.moves:
             return drag, stiffness
         turn, joined = self._change, self.wheel.joined(drag, stiffness, speed)
         return turn.T @ joined[0] @ turn, turn.T @ joined[1] @ turn
 
     def seen(self, shapes: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
-        """What `probes` read of all coordinates (k, m + a + c), from `shapes` (k, m), their reading
-        of the modes.
+        """What `probes` read of all coordinates (k, m + a + c), from `shapes` (k, m) of the modes.
 
         The coordinates of the air are not visible to probes.
         """
@@ -137,9 +130,7 @@ class Projection:
         return self.own - self.shapes
 
     def rotating(self, inertia: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Factors (m, m) of 2 Omega, Omega^2 and Omega d_k. InputError for the modes of a standing
-        wheel.
-        """
+        """Factors (m, m) of 2 Omega, Omega^2, Omega d_k. InputError for standing modes."""
         full = inertia == "full"
         gyroscopic = self.gyroscopic if full else self.body
         convective = self.convective if full else self.body_convective

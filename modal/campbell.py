@@ -1,5 +1,4 @@
-"""The second eigenproblem over speed: branches of eigenvalues, critical speed, onset of
-instability.
+"""The second eigenproblem over speed: branches, critical speed, onset of instability.
 
 One modal basis and one static state serve all speeds; only D~ and K~ change, as polynomials in
 Omega.

@@ -134,9 +134,7 @@ class Corner:
         return linalg.qr(np.vstack([p.T @ drifts, lower.T @ drifts]), mode="economic")[0]
 
     def seen(self, tire: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
-        """What probes (k, 3 s) or wider read of (eta, xi): (k, n + c), from `tire` (k, n), the part
-        of eta.
-        """
+        """What probes (k, 3 s) or wider read of (eta, xi), (k, n + c); `tire` (k, n) of eta."""
         return np.hstack([tire, self.rigid(probes)[:, self.taking_part]])
 
     def rigid(self, probes: sparse.csr_matrix) -> np.ndarray:
@@ -160,8 +158,7 @@ class Corner:
         return seen
 
     def moments(self, n: int, speed: float) -> np.ndarray:
-        """A (3, 3, n + c), N m: the hub carries the moments of the loads less A_2 q'' + A_1
-        q' + A_0 q.
+        """A (3, 3, n + c), N m: hub moments are those of loads less A_2 q'' + A_1 q' + A_0 q.
 
         q = (eta, xi) has n coordinates of tire and air and c of the wheel.
         """
@@ -180,9 +177,7 @@ class Corner:
         return whole[:, :, [*range(n), *(n + k for k in self.taking_part)]]
 
     def carried(self, tire: np.ndarray, air_mass: float = 0.0) -> np.ndarray:
-        """Momentum (3, n + c) of tire, air and wheel per rate of (eta, xi); `tire` (3, n) is that
-        of eta.
-        """
+        """Momentum (3, n + c) of tire, air, wheel per rate of (eta, xi); `tire` (3, n) is eta's."""
         whole = self.inertia(air_mass)[:3]
         return np.hstack([tire, whole[:, self.taking_part]])
 

@@ -44,9 +44,7 @@ Damping = Proportional | tuple[float, float] | StrainEnergy
 
 
 def rates(damping: Damping, projection: Projection) -> np.ndarray:
-    """Damping rates d_k (m,) 1/s of the modes. InputError if loss factors are needed and there are
-    none.
-    """
+    """Damping rates d_k (m,) 1/s of the modes. InputError if loss factors are missing."""
     if isinstance(damping, StrainEnergy):
         if projection.loss_factor is None:
             raise InputError(

@@ -71,9 +71,7 @@ def take_off(fields: Array, basis: Array, shares: Array) -> None:
 
 
 def combined(fields: Array, change: Array, out: Array) -> Array:
-    """fields (n, p) change (p, k), in the first columns of `out`, which may be the fields
-    themselves.
-    """
+    """fields (n, p) change (p, k), in the first columns of `out`, which may be `fields`."""
     out = out[:, : change.shape[1]]
     for start in range(0, len(fields), _ROWS):
         rows = slice(start, start + _ROWS)

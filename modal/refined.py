@@ -1,5 +1,4 @@
-"""Refinement of states that the companion matrix yields inaccurately, on the quadratic problem
-itself.
+"""Refinement of inaccurate states of the companion matrix on the quadratic problem itself.
 
 The companion matrix of a wide spectrum determines its slow states only to rounding of the fast
 ones; the states of a free rim, close to rest, suffer most. Such a state gets one step of inverse
@@ -46,8 +45,7 @@ def refined(
     right: Array,
     left: Array,
 ) -> tuple[Array, Array, Array]:
-    """Values (q,), right vectors (m, q) and left ones (q, m), w^T (2 s + D) u = 1, the least
-    accurate of them refined.
+    """Values (q,), right (m, q) and left vectors (q, m), w^T (2 s + D) u = 1, the worst refined.
 
     A state too close to another for one step to separate them is left unchanged.
     """
@@ -92,8 +90,7 @@ def cleared(
     span: Array,
     inverse: Array,
 ) -> Array:
-    """Eigenvectors (n, q) of a real matrix (n, n), cleared of their components in an invariant
-    subspace.
+    """Eigenvectors (n, q) of a real matrix (n, n), cleared of an invariant subspace.
 
     The subspace, which contains none of them, is spanned by `span` (n, b), on which the matrix is
     T = `block` (b, b); `inverse` (b, n) is its left basis. One first-order step: with r = A v - s
@@ -109,8 +106,7 @@ def cleared(
 
 
 def at_rest(matrix: Array, span: Array, shift: float) -> tuple[Array, Array]:
-    """(T, V) of a real matrix (n, n) on its invariant subspace of nearly zero eigenvalues, T = V^T
-    A V.
+    """(T, V) of a real matrix (n, n) on its invariant subspace of nearly zero eigenvalues.
 
     `span` (n, b), orthonormal, is improved by inverse iteration at the `shift`, far below all other
     eigenvalues. T = shift + (V^T (A - shift)^-1 V)^-1, so entries that are small beside the matrix

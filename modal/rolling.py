@@ -52,9 +52,7 @@ class RollingModes:
 
     @property
     def highest(self) -> float:
-        """Circular frequency of the highest mode, or full state, rad/s; what is truncated lies
-        above.
-        """
+        """Circular frequency of the highest mode or full state, rad/s; truncation begins there."""
         if self.full:
             return float(np.abs(self.states.eigenvalue.imag).max())
         return 2 * np.pi * float(self.basis.frequency[-1])

@@ -45,9 +45,7 @@ _COUPLED = 1e-7  # of the largest coupling by rotation: less is rounding
 
 
 def up_to(speed: float) -> float:
-    """The speed (rad/s) for which the shapes are computed: the next power of two, shared by a
-    family of speeds.
-    """
+    """The speed (rad/s) of the shapes: the next power of two, shared by a family of speeds."""
     return float(2.0 ** np.ceil(np.log2(abs(speed)))) if speed else 0.0
 
 
@@ -58,8 +56,7 @@ def with_turning(
     rotation: Rotation | None,
     turning: Turning,
 ) -> Modes:
-    """The modes followed by the rotation shapes for `up_to` the speed; `projection` is that of the
-    modes.
+    """The modes followed by the rotation shapes for `up_to` the speed; `projection` is the modes'.
 
     Unchanged for a standing wheel, and for a free rim, which has no static shapes. InputError
     without the rotation matrices. Collective.
@@ -74,9 +71,7 @@ def with_turning(
 
 
 class _Found:
-    """K-orthonormal directions (n, k), M-orthogonal to the modes, and the components of X along
-    them. Collective.
-    """
+    """K-orthonormal directions (n, k), M-orthogonal to the modes, and X along them. Collective."""
 
     def __init__(
         self, modes: Modes, operators: Operators, rotation: Rotation, turning: Turning
@@ -92,9 +87,7 @@ class _Found:
         self._of = np.empty((0, 2 * len(modes.squares)))
 
     def foremost(self, classes: list[Array]) -> Array:
-        """Own rows (n, k) of the directions that count, sought separately for each of the `classes`
-        of modes.
-        """
+        """Own rows (n, k) of directions that count, sought in each of the `classes` of modes."""
         random = np.random.default_rng(0)
         shapes = LoadedShapes(self._operators, self._operators.stiffness)
         for among in classes:
@@ -120,9 +113,7 @@ class _Found:
         return sum(f * multiply(matrix, self._modes.vectors @ part) for (f, matrix), part in parts)
 
     def _take(self, more: Array) -> None:
-        """Add to the directions what `more` shapes (n, b) contain beyond the modes and known
-        directions.
-        """
+        """Add to the directions what `more` shapes (n, b) contain beyond modes and directions."""
         vectors, comm, ops = self._modes.vectors, self._comm, self._operators
         for _ in range(2):  # the second pass removes the rounding of the first
             take_off(more, vectors, gram(comm, vectors, ops.mass[:, None] * more))

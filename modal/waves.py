@@ -1,5 +1,4 @@
-"""Names for the modes of an axisymmetric state: circumferential wave number n and cross-section
-order.
+"""Names for modes of an axisymmetric state: circumferential wave number n, cross-section order.
 
     u(theta) = sum_n c_n e^{i n theta},   share of n = |c_n|^2 / sum |c|^2, mass-weighted
 

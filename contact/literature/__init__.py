@@ -1,3 +1,1 @@
-"""Contact models of the literature, for comparison: Hertz springs on asperities, wedges, fitted
-springs.
-"""
+"""Contact models of the literature for comparison: asperities, wedges, fitted springs."""

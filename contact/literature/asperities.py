@@ -31,9 +31,7 @@ _PHASES = 64  # over one period, for the mean load
 
 @dataclass(frozen=True)
 class Asperities:
-    """Means of a profile, m: `height` over H-H, `unevenness` between neighbours, `spacing`,
-    `radius`.
-    """
+    """Means of a profile, m: `height` over H-H, `unevenness` of neighbours, `spacing`, `radius`."""
 
     height: float
     unevenness: float

@@ -1,6 +1,4 @@
-"""Stiffness of a Winkler bed from the indentation of another tread law (Kropp fits his to measured
-ones).
-"""
+"""Winkler stiffness from the indentation of another tread law (Kropp fits his to measurements)."""
 
 from __future__ import annotations
 

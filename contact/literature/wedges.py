@@ -1,5 +1,4 @@
-"""Wedges of the tire and the volume of road in them (Mancosu and Minen 1998, second model; thesis
-3.1).
+"""Wedges of the tire and the road volume in them (Mancosu and Minen 1998, 2nd model; thesis 3.1).
 
 The tire is cut into wedges around the axle. The volume in which a wedge of the unloaded tire
 intersects the road gives its force by a look-up table, here from the finite elements pressed on a
@@ -41,9 +40,7 @@ class LookUp:
 
 
 def look_up(area: Array, force: Array) -> LookUp:
-    """The table from pairs (n,) m^2 and N/m. InputError if fewer than three of them are inside the
-    road.
-    """
+    """The table from pairs (n,) m^2 and N/m. InputError if fewer than three are inside the road."""
     inside = area > 0
     if inside.sum() < 3:
         raise InputError("wedges: fewer than three of them meet the road: press further")

@@ -27,8 +27,7 @@ def own_states(response: Response, rolling: RollingModes) -> bool:
 
 
 def springs(response: Response, force: np.ndarray) -> float:
-    """Elastic energy (J) in the residual flexibility under forces (k,) N, including that of static
-    states.
+    """Elastic energy (J) in the residual flexibility, with static states, at forces (k,) N.
 
     The first k outputs are the forces' own displacements; readings may follow them
     (contact.driven).

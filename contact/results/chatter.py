@@ -1,5 +1,4 @@
-"""Chatter: points that open and close from step to step, because a step is too long for the
-contact.
+"""Chatter: points that open and close from step to step because steps are too long for them.
 
 At the touching points a force acts on an instantaneous compliance B (tread and residual
 flexibility). To an alternating force, linear over the steps, the tire's states respond as a
@@ -72,8 +71,7 @@ class Chosen:
     limit: float = math.inf
 
     def instead(self, chatter: Chatter) -> Chosen:
-        """The choice after this one has exceeded its limit; the error itself is raised if none is
-        left.
+        """The choice after this one exceeded its limit; raises the error if none is left.
 
         On a rough road points open and close because it passes by more than their spacing in a
         step. They do so with constant forces too, which cannot chatter: if more than half as many
@@ -107,8 +105,7 @@ def choose(steps: float) -> Chosen:
 def oscillation(
     spec: Spec, patch: Patch, response: Response, step: float, bristles: Stiffness | None = None
 ) -> float:
-    """Steps (2 or more, inf) in the fastest oscillation of the points touching at rest, for linear
-    forces.
+    """Steps (2 or more, inf) in the fastest oscillation of points at rest, with linear forces.
 
     `step` in s. `response` as the loop uses it (Response.resolved); its first inputs and outputs
     are the patch's nodes, with horizontal forces in z, then x and y. `bristles` N/m of each point,
@@ -164,9 +161,7 @@ def _nearest(patch: Patch, most: int) -> np.ndarray:
 
 
 def _largest(approach: np.ndarray, compliance: np.ndarray) -> float:
-    """Largest mu for the symmetric parts (n, n); infinite if the compliance is not positive
-    definite.
-    """
+    """Largest mu for the symmetric parts (n, n); inf if the compliance is not definite."""
     last = [len(approach) - 1] * 2
     symmetric = [(matrix + matrix.T) / 2 for matrix in (approach, compliance)]
     try:

@@ -84,8 +84,7 @@ class Dissipation:
 
 
 class Circulation:
-    """Work (J) of forces on the skew part of a flexibility, int f . G_a df, by the trapezoidal
-    rule.
+    """Work (J) on the skew part of a flexibility, int f . G_a df, by the trapezoidal rule.
 
     The symmetric part of a residual flexibility stores the work done on it. The skew part, which a
     rolling tire has, does not: its work is what the truncated modes dissipate, less what the drive

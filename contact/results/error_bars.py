@@ -41,9 +41,7 @@ def orders(elements: int, scheme: str = "linear") -> dict[str, float]:
 
 
 def share(ratio: float, order: float) -> float:
-    """Error of a run over its difference to a companion whose size is `ratio` times that of the
-    run.
-    """
+    """Error of a run over its difference to a companion of `ratio` times its size."""
     return 1 / abs(ratio**order - 1)
 
 

@@ -37,8 +37,7 @@ def nominal(centre: np.ndarray) -> np.ndarray:
 def band_sums(
     frequency: np.ndarray, square: np.ndarray, up_to: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (b,) Hz of base-ten bands, 1000 * 10^(k/10) (IEC 61260-1), and sums (b, ...) over
-    each band.
+    """Centres (b,) Hz of base-ten bands, 1000 * 10^(k/10) (IEC 61260-1), and sums (b, ...).
 
     `square` (f, ...) is given at evenly spaced lines (f,) Hz; lines on a border are divided. Only
     bands that lie entirely within the lines and below `up_to` Hz: a band narrower than three lines
@@ -61,9 +60,7 @@ def band_sums(
 
 
 def _bands(up_to: float, above: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centres, lower and upper borders, Hz, of all bands from 1 Hz that lie between two
-    frequencies.
-    """
+    """Centres, lower and upper borders, Hz, of all bands from 1 Hz between two frequencies."""
     centre = 1000.0 * 10.0 ** (np.arange(-30, 17) / 10)
     low, high = centre * 10**-0.05, centre * 10**0.05
     use = (high < up_to) & (low > above)
@@ -71,9 +68,7 @@ def _bands(up_to: float, above: float) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def too_narrow(spacing: float, up_to: float, lowest: float = 20.0) -> np.ndarray:
-    """Centres, Hz, of the bands from `lowest` Hz to `up_to` with fewer than three lines `spacing`
-    Hz apart.
-    """
+    """Centres, Hz, of bands in `lowest` to `up_to` Hz with fewer than 3 lines (`spacing` Hz)."""
     centre, low, high = _bands(up_to, 0.0)
     return centre[(high - low <= FEWEST * spacing) & (centre > 0.95 * lowest)]
 
@@ -84,8 +79,7 @@ def lines(centre: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def freedom(count: np.ndarray) -> np.ndarray:
-    """Degrees of freedom of the sum of `count` adjacent lines of one record of noise under a Hann
-    window.
+    """Degrees of freedom of the sum of `count` adjacent lines of noise under a Hann window.
 
     Adjacent lines are correlated by 2/3 and the next but one by 1/6, so n lines are worth
     n^2 / (n + 2 (n - 1) 4/9 + 2 (n - 2) 1/36) independent ones (Welch's method on one segment), of

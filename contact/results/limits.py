@@ -23,8 +23,7 @@ class Limit:
 
 
 def limits(*, step: float, highest: float, pitch: float, speed: float) -> tuple[Limit, ...]:
-    """All limits: of the `step` (s), of the `highest` mode (Hz), of points `pitch` (m) apart at
-    `speed` (m/s).
+    """All limits: of `step` (s), `highest` mode (Hz), points `pitch` m apart at `speed` m/s.
 
     A wave of the road needs at least two points, hence half the frequency at which points pass,
     speed / pitch. Shorter waves are aliased, and at the passing frequency the force of any road has
@@ -50,9 +49,7 @@ def lowest(found: Iterable[Limit]) -> Limit:
 
 
 def pitch(patch: Patch) -> float:
-    """Largest distance (m) along x between neighbouring points that touch at rest, or of all if
-    none does.
-    """
+    """Largest distance (m) along x between neighbouring points at rest, or of all without any."""
     some = patch.force > 0
     sizes = patch.half_sizes[some if some.any() else slice(None), 0]
     return float(2 * sizes.max())

@@ -37,8 +37,7 @@ def third_octaves(
     rate: bool = False,
     weighted: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Band centres (b,) Hz and levels (b, d), dB re `reference` (rms), of values (n, d) in steps of
-    `step` s.
+    """Band centres (b,) Hz and levels (b, d), dB re `reference` (rms), of values (n, d).
 
     With `rate`, of their rate of change per second; A-weighted line by line if `weighted`. Bands as
     in `contact.results.levels.band_sums`, below `up_to` Hz and half the sampling rate. Hann window
@@ -86,8 +85,7 @@ class Density:
 
 
 def density(values: np.ndarray, step: float, up_to: float = np.inf, rate: bool = False) -> Density:
-    """Density of values (n, d) in steps of `step` s, or of their `rate`; unit of the values squared
-    per Hz.
+    """Density of values (n, d) in steps of `step` s, or of their `rate`; unit squared per Hz.
 
     Segments of half the record or less: eight averages, or more if segments of 0.5 s allow. Each
     has its mean removed. The integral is the variance (Parseval). Under a Hann window the powers of
@@ -118,9 +116,7 @@ def density(values: np.ndarray, step: float, up_to: float = np.inf, rate: bool =
 
 @dataclass(frozen=True)
 class Distance:
-    """Relative L2 distance in the band, and the largest difference there over the largest
-    variation.
-    """
+    """Relative L2 distance in the band, and largest difference over largest variation."""
 
     mean: float
     worst: float
@@ -140,9 +136,7 @@ def distance(
 
 
 def low_part(values: np.ndarray, duration: float, band: float) -> np.ndarray:
-    """Fourier coefficients of windowed values (n, k) at t = h, 2h, ... duration, up to
-    `band` Hz.
-    """
+    """Fourier coefficients of windowed values (n, k) at t = h ... duration, to `band` Hz."""
     n = len(values)
     # The window vanishes at both ends, so the value at t = 0 is arbitrary.
     window = np.sin(np.pi * np.arange(n) / n)[:, None] ** 2

@@ -36,9 +36,7 @@ class Axis:
         return Axis(self.positions[places])
 
     def locate(self, values: Array) -> tuple[NDArray[np.intp], Array]:
-        """Index of the cell and the fraction (0 to 1) within it; values outside are moved to the
-        border.
-        """
+        """Index of the cell and fraction (0 to 1) within it; values outside move to the border."""
         if self._even:
             place = (values - self.positions[0]) * self._per_metre
             place = np.minimum(np.maximum(place, 0.0), float(self._cells))

@@ -27,9 +27,7 @@ class RoadKind(Parameters):
 
     @property
     def reads(self) -> Path | None:
-        """The file that `make` reads, if any: one process then reads it, and the others receive the
-        result.
-        """
+        """The file that `make` reads, if any: one process reads it and shares the result."""
         return None
 
     def make(self) -> Road:

@@ -14,8 +14,7 @@ Array = NDArray[np.float64]
 
 
 class Window:
-    """Heights z at rows `first` to `first` + len(x) and the columns of a road, x (n,) and y (w,) in
-    m.
+    """Heights z at rows `first` to `first` + len(x) and columns of a road, x (n,), y (w,) in m.
 
     Only the rows last needed, and as many ahead of them as make `PIECE` numbers, are in memory;
     holes in them are filled. `missing` counts all holes, `hole` is the first (row, column) or None.

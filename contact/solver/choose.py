@@ -11,8 +11,7 @@ from tireroad.fem.errors import InputError
 
 
 def make_solver(name: str, matrix: Array | Compliance) -> ContactSolver:
-    """The solver named "active-set", "projected-cg" or "snes-vi" (`contact.solver`). InputError for
-    another.
+    """The solver "active-set", "projected-cg" or "snes-vi" (`contact.solver`); else InputError.
 
     For a compliance that is a product, the active set is found from the set that usually touches,
     with a matrix of these points only.

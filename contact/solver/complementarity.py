@@ -153,9 +153,7 @@ class ActiveSet:
         return force, gap
 
     def _missed(self, index: Index, lifted: Index, reference: Array) -> Array:
-        """The displacement (m) at touching points that the reference forces of non-touching points
-        caused.
-        """
+        """Displacement (m) at touching points due to reference forces at points lifted off."""
         key = index.tobytes(), lifted.tobytes()
         if key != self._lifted or reference is not self._reference:
             self._lifted, self._reference = key, reference

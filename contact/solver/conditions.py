@@ -16,8 +16,7 @@ TOLERANCE = 1e-9
 
 
 class ContactSolver(Protocol):
-    """The interface that the time loop needs; `active`, `gap` (m), `residual`, ... are of the last
-    solve.
+    """The interface that the time loop needs; `active`, `gap` (m), ... are of the last solve.
 
     `gap` is 0 at touching points; `penetration` (m) is that of the deepest point in the solution
     itself.

@@ -31,8 +31,7 @@ ROUGHLY, CLOSER, EXACTLY = 1e-5, 1e-3, 1e-10
 
 
 class Friction:
-    """The brush on a tire with same-step response `tire` (3p, 3p) m/N, ordered z, x, y of the
-    nodes.
+    """The brush on a tire with same-step response `tire` (3p, 3p) m/N in z, x, y of the nodes.
 
     `weights` W (c, p) interpolates from nodes to points (None: they are the same). `shear` of the
     tread, None: rigid in shear; `pressed` (c,) N: normal forces without shear of the tread, None:
@@ -60,9 +59,7 @@ class Friction:
         self._key = b""
 
     def largest_unique(self, touching: NDArray[np.bool_], normal: ContactSolver) -> float:
-        """The friction coefficient up to which the step's solution is unique with these points
-        touching.
-        """
+        """Largest friction coefficient with a unique solution, with these points touching."""
         index = np.flatnonzero(touching)
         count = len(touching)
         own = normal.block(index)
@@ -145,8 +142,7 @@ class Friction:
         guess: Array,
         within: float,
     ) -> Array:
-        """Tangential forces t (c, 2): B t + c = 0, or slip, to the tolerance `within` of
-        stick_slip.
+        """Tangential forces t (c, 2): B t + c = 0, or slip, to `within` of stick_slip.
 
         B = A_hh + 1/(K share), c = u_other + past/share.
         """
@@ -167,9 +163,7 @@ class Friction:
         return out
 
     def _between(self, index: NDArray[np.intp]) -> tuple[Array, Array | None, Between | None]:
-        """A_hh between the nodes that carry the points, the weights of the nodes, and the tread's
-        part.
-        """
+        """A_hh between the nodes that carry the points, their weights, and the tread's part."""
         key = index.tobytes()
         if key != self._key:
             own, p = self._w[index], self._w.shape[1]

@@ -18,8 +18,7 @@ from tireroad.contact.solver.grid_compliance import Compliance
 
 
 class Pivot:
-    """M (c, c) of the `taken` points (n,) bool, `base` (n,) bool being those of B; 20 c^3 bytes of
-    work.
+    """M (c, c) of the `taken` points (n,) bool, of which `base` (n,) are B; 20 c^3 bytes of work.
 
     `places` (c,): the points in the order of M, B first. InputError if A is not positive definite.
     """

@@ -41,9 +41,7 @@ class Product:
         y.array[:] = out if self._added is None else out + self._added * x.array_r
 
     def multTranspose(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y = (A D_b + D_a) x, for the slope of the merit function, where A's skew part may be
-        neglected.
-        """
+        """y = (A D_b + D_a) x, for the merit function's slope; A's skew part may be neglected."""
         scaled = x.array_r if self._scale is None else self._scale * x.array_r
         out = self._through(self._compliance.apply, scaled) / self._unit
         y.array[:] = out if self._added is None else out + self._added * x.array_r

@@ -26,9 +26,7 @@ class Solved(NamedTuple):
 
 
 class Ahead(Protocol):
-    """A tire that computes part of the next step before it has the force of this one
-    (greens.recursion).
-    """
+    """A tire that computes part of the next step ahead of this one's force (greens.recursion)."""
 
     def look_ahead(self) -> None: ...
 

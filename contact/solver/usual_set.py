@@ -1,5 +1,4 @@
-"""The active set on a rough road with hundreds of points: changes relative to the set that usually
-touches.
+"""The active set on a rough road with hundreds of points, relative to the set that usually touches.
 
 On a road whose texture makes points touch and lift off, a step of a few millimetres exchanges a
 hundred points, so a factor of the touching set serves only one step. The set of points that touch
@@ -35,8 +34,7 @@ PORTION, FEWEST = 0.05, 8
 
 
 class UsualSet:
-    """f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0, by the active set method on the pivoted
-    problem.
+    """f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0, by active set on the pivoted problem.
 
     Points far from the road are not included. Every gap is evaluated with A itself afterwards; if
     one is negative, more points are included and the step is solved again. A new base is chosen,
@@ -122,9 +120,7 @@ class UsualSet:
         return self._problem
 
     def _widened(self, taken: Mask, base: Mask, gap: Array) -> tuple[Pivot, ActiveSet]:
-        """The problem with a further portion of points, those nearest to touching by their gaps
-        (n,) m.
-        """
+        """The problem with a further portion of points, nearest by their gaps (n,) m."""
         left = np.flatnonzero(~taken)
         below = int(np.count_nonzero(gap[left] < 0.0))
         more = max(int(PORTION * np.count_nonzero(taken)), 2 * below, FEWEST)

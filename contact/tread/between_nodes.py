@@ -48,9 +48,7 @@ class Backed(TreadLaw):
 
 
 def over_rectangles(influence: Influence) -> Influence:
-    """The mean over a rectangle by 2 x 2 Gauss points, as a grid point reads the mesh
-    (contact.grid_patch).
-    """
+    """The mean over a rectangle by 2 x 2 Gauss points, as in contact.grid_patch."""
 
     def of(x: Array, y: Array, a: Array, b: Array) -> Array:
         parts = [influence(x + i * a / 3**0.5, y + j * b / 3**0.5, a, b) for i, j in _CORNERS]
@@ -74,8 +72,7 @@ def on_nodes(patch: Patch, node_area: Array, wall: Influence) -> Array:
 
 
 def unsettled(patch: Patch, known: Array, nodal_force: Array) -> Patch:
-    """The unsettled patch for nodes that are more rigid by `known` N (p, p), with the same unloaded
-    shape.
+    """The unsettled patch for nodes more rigid by `known` N (p, p), of the same unloaded shape.
 
     `nodal_force` (p,) N: the forces under which its gap was computed.
     """

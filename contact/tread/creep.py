@@ -63,9 +63,7 @@ def _product(factors: list[Array]) -> Array:
 
 
 def weights(lag: Array, step: float) -> tuple[Array, Array, Array]:
-    """(decay, old pressure's weight, new pressure's weight) (k,) over a step (s) for times `lag`
-    (s).
-    """
+    """(decay, weight of old pressure, of new pressure) (k,) over a step (s), times `lag` (s)."""
     x = step / np.asarray(lag, float)
     decay = np.exp(-x)
     first = -np.expm1(-x) / x  # phi_1(-x)

@@ -1,6 +1,4 @@
-"""The interface of a tread law: parameters, and the compliance between contact points that they
-define.
-"""
+"""The interface of a tread law: its parameters, and the compliance that they define."""
 
 from __future__ import annotations
 
@@ -33,8 +31,7 @@ class TreadLaw(Parameters):
         return None
 
     def influence(self, farthest: float) -> Influence:
-        """Approach (m/N) at offsets x, y (m) from rectangles of half sizes a, b (m) under a unit
-        force.
+        """Approach (m/N) at x, y (m) from rectangles of half sizes a, b (m) per unit force.
 
         `farthest` (m): the largest distance at which it will be evaluated.
         """

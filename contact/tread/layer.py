@@ -33,8 +33,7 @@ def transform_ratio(m: Array, poisson_ratio: float) -> Array:
 
 
 class LayerInfluence:
-    """Approach per unit force spread uniformly over a rectangle: half-space plus a smooth
-    correction.
+    """Approach per unit force, uniform over a rectangle: half-space plus a smooth correction.
 
     A point force moves the surface by u(r) = 1/(pi E*) [1/r + 1/h int_0^oo (ratio(m) - 1) J0(m r/h)
     dm]; the integral of the second part over a disc of radius R = rho h is 2h/E*

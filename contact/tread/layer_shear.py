@@ -1,5 +1,4 @@
-"""An elastic layer bonded to a rigid base under horizontal forces, and their coupling with
-pressure.
+"""An elastic layer bonded to a rigid base under horizontal forces, coupled with pressure.
 
 Forces in waves of wave number k = m/h along a direction of the surface, h the thickness and G the
 shear modulus, move it by 1/(G k) times
@@ -30,9 +29,7 @@ _FIRST = 1e-4  # thicknesses: the table begins near 0, where J1/rho and J2/rho^2
 
 
 def transforms(m: Array, poisson_ratio: float) -> tuple[Array, Array, Array]:
-    """T, S and C at m = wave number x thickness, with numerators and denominators divided by
-    e^(2m).
-    """
+    """T, S and C at m = wave number x thickness, with e^(2m) divided out."""
     nu, decay = poisson_ratio, np.exp(-2.0 * m)
     a = 3.0 - 4.0 * nu
     cosh, sinh = 0.5 * (1.0 + decay**2), 0.5 * (1.0 - decay**2)
@@ -89,9 +86,7 @@ class LayerShear:
         return whole + total * (1.0 + nu) / (np.pi * youngs_modulus * h)
 
     def _at(self, x: Array, y: Array) -> Array:
-        """Correction (5, ...) for a point force, all in thicknesses; far away it cancels the
-        half-space.
-        """
+        """Correction (5, ...) for a point force, in thicknesses; far away minus the half-space."""
         rho, nu = np.hypot(x, y), self._nu
         far = np.maximum(rho, REACH)
         none = -0.5 * (2.0 - nu) / far, -0.5 * (1.0 - 2.0 * nu) / far**2, 0.5 * nu / far**3

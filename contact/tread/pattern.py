@@ -72,9 +72,7 @@ class Pattern:
         return max(len(self.starts) - 1, 0) if any(_lateral(g) for g in self.grooves) else 0
 
     def depth(self, s: Array, y: Array) -> Array:
-        """Depth (m) below the tread surface at positions s around the tire and y across (m), of
-        equal shape.
-        """
+        """Depth (m) below the tread surface at s around the tire and y across (m), of one shape."""
         out = np.zeros(np.broadcast_shapes(np.shape(s), np.shape(y)))
         if self.heights is not None:
             return self._read(s, y, out)
@@ -116,9 +114,7 @@ class Pattern:
         return out
 
     def land(self, y: Array) -> float:
-        """Share of the tread without any depth at the positions y (m) across. InputError if there
-        is none.
-        """
+        """Share of the tread without depth at the positions y (m) across; InputError if none."""
         s = np.arange(_SAMPLES) * self.circumference / _SAMPLES
         share = float(np.mean(self.depth(*np.meshgrid(s, np.unique(y), indexing="ij")) <= 0.0))
         if share < _LEAST_LAND:
@@ -129,9 +125,7 @@ class Pattern:
 
 
 def pitch_starts(pitches: int, lengths: Sequence[float], seed: int, circumference: float) -> Array:
-    """Where the pitches begin (p + 1,) m: relative `lengths`, as evenly frequent as possible,
-    shuffled.
-    """
+    """Starts of the pitches (p + 1,) m: relative `lengths` in equal numbers, shuffled."""
     drawn = np.resize(np.asarray(lengths, float), pitches)
     np.random.default_rng(seed).shuffle(drawn)
     return np.concatenate([[0.0], np.cumsum(drawn)]) * circumference / drawn.sum()

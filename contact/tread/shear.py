@@ -1,5 +1,4 @@
-"""Horizontal displacements of an elastic half-space, coupled with pressure (Boussinesq and
-Cerruti).
+"""Horizontal displacements of an elastic half-space, coupled with pressure (Boussinesq, Cerruti).
 
 With z into the body, G the shear modulus, r the distance in the surface from a force t (in the
 surface) and f (along z),
@@ -40,8 +39,7 @@ FEW = 200
 def half_space_shear(
     x: Array, y: Array, a: Array, b: Array, youngs_modulus: float, poisson_ratio: float
 ) -> Array:
-    """(5, ...) m/N at offsets x, y (m) from a rectangle 2a x 2b (m) under a unit force spread over
-    it.
+    """(5, ...) m/N at offsets x, y (m) from a rectangle 2a x 2b (m) under a unit force on it.
 
     u_x by t_x, u_x by t_y (and u_y by t_x), u_y by t_y, u_z by t_x, u_z by t_y. The displacement
     u_x by f is that of u_z by t_x with opposite sign.
@@ -102,9 +100,7 @@ class Shear(Protocol):
         """Displacements (c,) m in the plane under forces (c,) N normal to it."""
 
     def lifted(self, index: Index) -> Array:
-        """`lift` between the points `index` as a matrix (a, 2a): all forces along x, then those
-        along y.
-        """
+        """`lift` between the points `index`, (a, 2a): of all forces along x, then along y."""
 
     def between(self, index: Index) -> Between:
         """`spread` between the points `index`."""
@@ -148,9 +144,7 @@ class MatrixShear:
         return (self._lift @ force).real
 
     def drag(self, force: Array) -> Plane:
-        """Displacements (c,) m in the plane under forces (c,) N normal to it: the transpose of
-        `lift`.
-        """
+        """Displacements (c,) m in the plane under normal forces (c,) N, the transpose of `lift`."""
         return self._lift.T.conj() @ force
 
     def lifted(self, index: Index) -> Array:
@@ -191,9 +185,7 @@ class KernelShear:
         return self._whole.lift(force, self._grid.place)
 
     def drag(self, force: Array) -> Plane:
-        """Displacements (c,) m in the plane under forces (c,) N normal to it: the transpose of
-        `lift`.
-        """
+        """Displacements (c,) m in the plane under normal forces (c,) N, the transpose of `lift`."""
         return self._whole.drag(force, self._grid.place)
 
     def lifted(self, index: Index) -> Array:

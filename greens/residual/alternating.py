@@ -1,5 +1,4 @@
-"""The response to forces that alternate in sign from step to step, which a chattering contact
-excites.
+"""The response to forces that alternate in sign from step to step, as in a chattering contact.
 
 With f_n = (-1)^n F, linear in between, every state settles at z_n = (-1)^n Z,
 
@@ -18,8 +17,7 @@ from tireroad.greens.response import Response
 
 
 def alternating(response: Response, step: float) -> np.ndarray:
-    """Displacement (r, k) m/N at the outputs under unit forces of alternating sign, without the
-    residual.
+    """Displacement (r, k) m/N under unit forces of alternating sign, without the residual.
 
     `response` as the loop uses it (Response.resolved), `step` s; forces linear over the step.
     """

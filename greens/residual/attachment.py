@@ -57,8 +57,7 @@ def foremost(missing: np.ndarray, flexibility: np.ndarray) -> np.ndarray:
 
 
 def dynamic(projection: Projection, speed: float, known: int) -> np.ndarray:
-    """Mask (m,) of the coordinates that stay: the first `known`, `FEW` pseudo-modes, and all
-    dynamic ones.
+    """Mask (m,) of coordinates that stay: the first `known`, `FEW` pseudo-modes, dynamic ones.
 
     Relative to its static response, a coordinate's response at w has the dynamic part  (w^2 + 2 w
     Omega n) / (omega_k^2 - Omega^2 n^2),  n = |S_kk|^1/2: inertia and convection. It counts as

@@ -32,8 +32,7 @@ class Parted:
 
 
 def parted(block: np.ndarray, values: np.ndarray, stays: np.ndarray) -> Parted:
-    """The block (n, n) split between the eigenvalues (n,) that stay and the others, conjugates
-    together.
+    """Split the block (n, n) by its eigenvalues (n,), those that stay first; pairs together.
 
     Its real Schur form is divided between the two, and the coupling C removed by the solution of
     Sylvester's equation A X - X B = -C. Not collective.

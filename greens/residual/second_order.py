@@ -63,9 +63,7 @@ def modal_moments(
     loads: np.ndarray,
     carried: np.ndarray,
 ) -> Moments:
-    """The moments between outputs (r, m) and loads (k, m) of a projected pencil D~, K~ of unit
-    mass.
-    """
+    """Moments between outputs (r, m) and loads (k, m) of a pencil D~, K~ of unit mass."""
     x, y = np.linalg.solve(stiffness, loads.T), np.linalg.solve(stiffness.T, outputs.T).T
     return Moments(outputs @ x, y @ drag @ x, y @ x, carried @ x)
 

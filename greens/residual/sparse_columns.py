@@ -37,8 +37,7 @@ class SharedRows:
 
 
 class LoadedColumns:
-    """A (n, k), stored by `columns` (k, n); products with forces read only the columns of nonzero
-    entries.
+    """A (n, k), stored by `columns` (k, n); products read only columns of nonzero forces.
 
     Runs of adjacent nonzero entries, such as the touching points of a line, are read in place:
     copying them side by side first takes twice as long. The order of summation depends on the
@@ -80,9 +79,7 @@ class LoadedColumns:
         return self.columns.take(columns, axis=0).take(rows, axis=1).T
 
     def around(self, index: Index) -> ColumnsAround:
-        """The columns (a,) of `index` for products with forces that are nonzero there and at few
-        others.
-        """
+        """The columns (a,) of `index`, for forces that are nonzero there and at few others."""
         return ColumnsAround(self, index)
 
 

@@ -1,5 +1,4 @@
-"""Selection of the states that stay dynamic: those that respond within the band, not just the
-slowest.
+"""Selection of dynamic states: those that respond within the band, not just the slowest.
 
 A state A = C P that is made static loses  (A e(s) + A* e(s*)) / 2,  e(s) = i w / (s (i w - s)). Its
 participation is the largest magnitude of that over the band. Fast modes lose (w/s)^2, since the two

@@ -1,3 +1,1 @@
-"""Eigensolvers: block Lanczos in inertia slices of symmetric parts, and SLEPc on the quadratic
-problem.
-"""
+"""Eigensolvers: block Lanczos in inertia slices, and SLEPc for the quadratic problem."""

@@ -9,9 +9,7 @@ _BORDER = 0.02  # relative: truncation may move a state across a limit by as muc
 
 
 def truncation(full: np.ndarray, projected: np.ndarray) -> np.ndarray:
-    """Relative error (q,) of the projected eigenvalue matched to each eigenvalue of the full
-    problem.
-    """
+    """Relative error (q,) of the projected eigenvalue matched to each full eigenvalue."""
     distance = np.abs(full[:, None] - projected)
     rows, columns = optimize.linear_sum_assignment(distance)
     error = np.full(len(full), np.inf)  # inf: no projected state left to match
@@ -20,8 +18,7 @@ def truncation(full: np.ndarray, projected: np.ndarray) -> np.ndarray:
 
 
 def missing(full: np.ndarray, projected: np.ndarray, low: float, high: float) -> int:
-    """How many states the full problem lacks between two limits (1/s), by the count of the
-    projected one.
+    """Number of states missing from the full problem between two limits (1/s).
 
     `full`, `projected` are magnitudes (Im s or |s|). Projected states within 2 % of a limit are not
     counted, since truncation may have moved them across it.

@@ -18,9 +18,7 @@ def merged(steps: list[tuple[float, np.ndarray]], most: float) -> list[tuple[flo
 
 
 def onward(low: float, step: float) -> float:
-    """The next boundary: `step` (rad/s) up in frequency, at most threefold once the first modes are
-    known.
-    """
+    """The next boundary, `step` (rad/s) up; at most threefold once the first modes are known."""
     root = np.sqrt(low)
     return (root + (min(step, 2 * root) if root else step)) ** 2
 

@@ -83,9 +83,7 @@ class Ring:
         return sparse.diags(np.exp(1j * n * self.angle)) @ self.kept
 
     def is_kept(self) -> bool:
-        """Whether H_n is real on the kept fields, to the tolerance, at a wave number that would
-        show it.
-        """
+        """Whether H_n is real on the kept fields, at a wave number that would show it."""
         n = max(1, self.segments // 3)
         basis = self._basis(n)
         H = (basis.getH() @ self._hermitian(n) @ basis).tocsr()
@@ -216,9 +214,7 @@ def _turned(angle: np.ndarray, order: np.ndarray) -> sparse.csr_matrix:
 def _kept(
     points: np.ndarray, within: np.ndarray, alpha: float, along_axle: float
 ) -> sparse.csr_matrix | None:
-    """Columns (d, d) that v -> P conj(v) keeps, for the map (x, y) -> (-x, `along_axle` y) of a
-    segment.
-    """
+    """Columns (d, d) that v -> P conj(v) keeps, for (x, y) -> (-x, `along_axle` y)."""
     near = _NEAR * np.abs(points).max(initial=0.0)
     reach = np.hypot(points[:, 0], points[:, 2])
     here, there = ((angle + _NEAR) % alpha for angle in (within, -within))

@@ -153,8 +153,7 @@ def projected(
 def loss_factors(
     modes: Modes, loss: PETSc.Mat, comm: MPI.Comm, known: np.ndarray | None
 ) -> np.ndarray:
-    """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of mass-normalised modes; 0 for rigid
-    ones.
+    """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of mass-normalised modes, rigid ones 0.
 
     `known`: the values of the first modes, which are reused. Collective.
     """

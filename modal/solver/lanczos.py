@@ -24,9 +24,7 @@ _LOST = 1e-8  # of the largest: a direction of a new block shorter than this is 
 
 
 class Basis:
-    """Orthonormal vectors (n, m), orthogonal to the `known` (n, k) ones, that grow by blocks; own
-    rows of all.
-    """
+    """Orthonormal vectors (n, m), own rows, orthogonal to `known` (n, k), grown by blocks."""
 
     def __init__(self, shifted: Shifted, known: np.ndarray, most: int, seed: int) -> None:
         self._shifted, self._known, self._team = shifted, known, shifted.team
@@ -61,9 +59,7 @@ class Basis:
         self._rest = self._append(ahead, largest)
 
     def ritz(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """theta (m,), their residuals (m,) and their vectors (m, m) in the part of the basis solved
-        for.
-        """
+        """theta (m,), residuals (m,) and vectors (m, m) in the part of the basis solved for."""
         m = self._done
         theta, vectors = np.linalg.eigh((self._projected[:m, :m] + self._projected[:m, :m].T) / 2)
         last = vectors[m - self._rest.shape[1] :]
@@ -95,8 +91,7 @@ class Basis:
 def nearest(
     shifted: Shifted, low: float, high: float, wanted: int, known: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues (k,) between `low` and `high`, and orthonormal vectors (n, k) orthogonal to the
-    `known`.
+    """Eigenvalues (k,) from `low` to `high`; orthonormal vectors (n, k) orthogonal to the `known`.
 
     The search ends when `wanted` have converged, to a residual below the tolerance relative to
     theta, or when the basis is full. Each process has its rows. Collective in the team.

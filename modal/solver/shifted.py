@@ -65,9 +65,7 @@ class Shifted:
         return out
 
     def destroy(self) -> None:
-        """Free the factor, the eigensolver's largest memory, which petsc4py does not free by
-        itself.
-        """
+        """Free the factor, the eigensolver's largest memory, which petsc4py does not."""
         self._factor.destroy()
         self._pc.destroy()
 

@@ -114,9 +114,7 @@ def _hertz(square: float) -> float:
 
 
 def _regular_shift(matrix: sparse.csr_matrix, interval: Interval, team: Team) -> Shifted:
-    """Factorised at a shift near the middle that is not itself an eigenvalue. ConvergenceError if
-    none is found.
-    """
+    """Factorised at a shift near the middle that is no eigenvalue; else ConvergenceError."""
     width = interval.high - interval.low
     for part in (0.5, 0.507, 0.489, 0.523):
         shift = interval.low + part * width

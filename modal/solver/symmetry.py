@@ -38,9 +38,7 @@ class Isometry:
     flip: tuple[float, float, float]
 
     def sign(self, component: int) -> float:
-        """Sign of the image of a displacement (0, 1, 2) or a rotation (3, 4, 5), which a mirror
-        reverses.
-        """
+        """Sign of the image of a displacement (0-2) or a rotation (3-5), which mirrors reverse."""
         if component < 3:
             return self.flip[component]
         return self.flip[component - 3] * float(np.prod(self.flip))

@@ -66,9 +66,7 @@ class Team:
         return np.sqrt(summed(self.comm, (vectors**2).sum(axis=0)))
 
     def orthonormal(self, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Q (rows, b) and R (b, b) of the vectors: a QR of each process's rows, then one of all
-        their R.
-        """
+        """Q (rows, b) and R (b, b) of the vectors: QR of each process's rows, then of all R."""
         q, r = np.linalg.qr(vectors)
         if self.alone:
             return q, r

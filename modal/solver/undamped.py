@@ -187,9 +187,7 @@ class _Problem:
         return min(max(stiff, defect) / flexible.min(), MOST) if len(flexible) else 0.0
 
     def _allowed(self, modes: Modes, defect: float) -> float:
-        """Largest residual allowed. Near incompressibility rounding alone is 1e-8 of the softest
-        mode.
-        """
+        """Largest residual: near incompressibility rounding alone is 1e-8 of the softest mode."""
         return max(RESIDUAL_TOLERANCE, self._rounding(modes.squares, defect))
 
     def accurate(self, modes: Modes, defect: float) -> bool:
@@ -212,9 +210,7 @@ class _Problem:
         return modes
 
     def _residuals(self, squares: np.ndarray, vectors: np.ndarray, least: float) -> np.ndarray:
-        """Relative residuals (m,), a rigid mode's relative to the first flexible eigenvalue
-        `least`. Collective.
-        """
+        """Relative residuals (m,); of rigid modes, to the eigenvalue `least`. Collective."""
         defects = np.empty(len(squares))
         root = np.sqrt(self.mass)[:, None]
         for start in range(0, len(squares), CHUNK):
@@ -227,9 +223,7 @@ class _Problem:
 
 
 def _families(parts: list[Part], found: list[Slice]) -> np.ndarray:
-    """(k,) a number for each eigenpair: that of its part and, within it, of the first or second
-    copy.
-    """
+    """(k,) a number for each eigenpair: of its part and, within it, of the copy."""
     most = max(part.copies for part in parts)
     numbers = [
         most * one.part + np.arange(len(one.values)) % parts[one.part].copies for one in found

@@ -32,9 +32,7 @@ class Header(NamedTuple):
 
 
 def read_header(stream: IO[bytes], info: zipfile.ZipInfo, name: str) -> Header:
-    """The header of an array. ValueError if it is not one of numbers, or does not fit the member's
-    size.
-    """
+    """The header of an array. ValueError if it has no numbers or does not fit the member's size."""
     version = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0
     if version != (1, 0):

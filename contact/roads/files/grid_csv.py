@@ -77,9 +77,7 @@ def _csv_rows(file: Path, lines: Iterator[Line]) -> tuple[Array, Array, Rows]:
 
 
 def _first_line(file: Path, line: Line, width: int) -> Array:
-    """The positions across of a matrix. InputError, which explains the layout, if they do not
-    ascend.
-    """
+    """The positions across of a matrix. InputError explains the layout if they do not ascend."""
     axis = _numbers(file, [line], width)[0, 1:]
     if len(axis) > 1 and not np.all(np.diff(axis) > 0):
         raise InputError(
@@ -117,9 +115,7 @@ def _numbers(file: Path, numbered: list[Line], width: int) -> Array:
 
 
 def _points(file: Path, table: Array) -> tuple[Array, Array, Array]:
-    """The grid of a list of points, which must contain each combination of its x and y exactly
-    once.
-    """
+    """The grid of a list of points, which must hold each combination of x and y exactly once."""
     if not np.all(np.isfinite(table[:, :2])):
         raise InputError(f"road.file {file}: x and y must be finite numbers")
     x, i = np.unique(table[:, 0], return_inverse=True)

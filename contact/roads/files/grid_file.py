@@ -23,8 +23,7 @@ def read_grid(
     length_unit: str | None = None,
     height_unit: str | None = None,
 ) -> Grid:
-    """The road of a grid file: x (nx,), y (ny,) and z (nx, ny), x in rolling direction, y to the
-    left.
+    """The road of a grid file: x (nx,) in rolling direction, y (ny,) to the left, z (nx, ny).
 
     .npz: arrays x, y, z. .h5 or .hdf5: datasets x, y, z in the root. .csv: with a first line
     `x,y,z`, one point per line, every point of the grid once, in any order; otherwise a matrix

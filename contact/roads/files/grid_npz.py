@@ -66,9 +66,7 @@ def _rows(file: Path, archive: zipfile.ZipFile) -> Rows:
 
 
 def _blocks(stream: IO[bytes], packed: Packed) -> Iterator[Array]:
-    """Blocks of rows in their order; reading beyond the last one lets the archive verify its
-    checksum.
-    """
+    """Blocks of rows in their order; reading past the last lets the archive verify its checksum."""
     (count, width), size = packed.shape, packed.kind.itemsize
     most = max(PIECE // width, 1)
     for first in range(0, count, most):

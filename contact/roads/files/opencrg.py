@@ -226,9 +226,7 @@ def _check_rows(file: Path, channels: list[Channel], rows: Array, place: tuple[i
 
 
 def _check_radius(file: Path, phi: Array, step: float, start: float) -> None:
-    """InputError if the heading (rad) turns faster than the smallest radius permits; begins at
-    `start`.
-    """
+    """InputError if the heading (rad), from `start` (m) on, turns faster than permitted."""
     if np.isnan(phi).any():
         missing = int(np.isnan(phi).sum())
         raise InputError(f"{file}: reference line phi is missing at {missing} points")

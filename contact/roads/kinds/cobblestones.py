@@ -44,9 +44,7 @@ class Cobblestones(Levelled):
     seed: int = integer(0, "seed of the random generator", least=0, most=2**31 - 1)
 
     def validate(self) -> None:
-        """Require joints narrower than blocks, edges that fit on them, blocks that stay above their
-        joints.
-        """
+        """Require joints narrower than blocks, edges that fit, blocks that stay above joints."""
         for side in ("block_length", "block_width"):
             size = getattr(self, side)
             if self.joint_width >= size:
@@ -158,9 +156,7 @@ class Pavement:
 
 
 def _mix(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """One step of splitmix64 (Steele, Lea, Flood 2014): changing one input bit changes half of the
-    output bits.
-    """
+    """One step of splitmix64 (Steele, Lea, Flood 2014): one bit in changes half of those out."""
     key = key + np.uint64(0x9E3779B97F4A7C15)
     key = (key ^ (key >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     key = (key ^ (key >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)

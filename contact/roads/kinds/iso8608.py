@@ -35,8 +35,7 @@ class Iso8608(Levelled):
 
 
 class Profile:
-    """z(x) = sum_k sqrt(2 G_d(n_k) dn_k) cos(2 pi n_k x + phase_k), one n_k in each of equal bands
-    of log n.
+    """z(x) = sum_k sqrt(2 G_d(n_k) dn_k) cos(2 pi n_k x + phase_k), n_k in equal bands of log n.
 
     G_d by road class, n up to 1/shortest wave, phases by seed. The profile is generated in chunks
     with 16 points per shortest wave and interpolated cubically (Catmull-Rom, error below 1 % of
@@ -94,15 +93,11 @@ class Profile:
         return self._chunks[number]
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Highest point of the profile from x0 to x1, m, plus a bound for what lies between two
-        points.
-        """
+        """Highest point of the profile from x0 to x1, m, plus a bound between two points."""
         return self._extreme(x0, x1, np.max)
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Lowest point of the profile from x0 to x1, m, less a bound for what lies between two
-        points.
-        """
+        """Lowest point of the profile from x0 to x1, m, less a bound between two points."""
         return -self._extreme(x0, x1, lambda z: np.max(-z))
 
     def _extreme(self, x0: float, x1: float, pick: Callable[[Array], float]) -> float:

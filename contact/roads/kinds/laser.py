@@ -134,9 +134,7 @@ class LaserFile(Levelled):
         return _Line(profile, float(pitch))
 
     def _resampled(self, profile: Array, pitch: float, source: str) -> tuple[Array, float]:
-        """The profile without waves shorter than `shortest_wave` (ISO 16610-21), sampled at a
-        quarter of that.
-        """
+        """Without waves shorter than `shortest_wave` (ISO 16610-21), sampled at a quarter of it."""
         from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
 
         from tireroad.contact.roads.levelling import DEVIATION

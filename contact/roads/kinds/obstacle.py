@@ -1,6 +1,4 @@
-"""A step or a cleat on an otherwise flat road, perpendicular to the rolling direction or at an
-angle.
-"""
+"""A step or a cleat on a flat road, perpendicular to the rolling direction or at an angle."""
 
 import math
 from dataclasses import dataclass

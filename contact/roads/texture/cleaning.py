@@ -1,5 +1,4 @@
-"""Cleaning of a measured profile: laser outliers are removed, gaps are bridged, and both are
-counted.
+"""Cleaning of a measured profile: outliers are removed, gaps bridged, and both are counted.
 
 An outlier is farther from the median of 11 neighbours than `limit` times 1.4826 times the median
 such distance of all points, and farther than 50 um. For Gaussian noise the factor yields the

@@ -125,8 +125,7 @@ def _parted(edges: Array) -> list[slice]:
 
 
 def band_power(wavelength: Sequence[float], level: Sequence[float], edges: Array) -> Array:
-    """Variances (k,) m^2 in the bands between the `edges` (1/m) from third-octave levels
-    (dB re 1 um).
+    """Variances (k,) m^2 in the bands between `edges` (1/m) from third-octave levels (re 1 um).
 
     The levels are given at wavelengths (m) and interpolated linearly over the logarithm, constant
     beyond.

@@ -39,9 +39,7 @@ def texture_of(profile: Array, pitch: float) -> Texture:
 
 
 def mean_profile_depth(profile: Array, pitch: float) -> float | None:
-    """Mean profile depth, m; None for a profile shorter than 100 mm or with fewer than 8 points in
-    it.
-    """
+    """Mean profile depth, m; None for less than 100 mm, or fewer than 8 points per 100 mm."""
     count = round(BASE / pitch)
     if count < 8 or len(profile) < count:
         return None
@@ -52,9 +50,7 @@ def mean_profile_depth(profile: Array, pitch: float) -> float | None:
 
 
 def third_octaves(profile: Array, pitch: float) -> tuple[Array, Array]:
-    """Wavelengths (k,) m, descending, and levels (k,) dB re 1 um; empty if the profile is too
-    short.
-    """
+    """Wavelengths (k,) m, descending, and levels (k,) dB re 1 um; empty for a short profile."""
     length = len(profile) * pitch
     first = int(np.ceil(10 * np.log10(2.5 * pitch)))
     last = int(np.floor(10 * np.log10(length / _CYCLES / 2)))
@@ -73,9 +69,7 @@ def third_octaves(profile: Array, pitch: float) -> tuple[Array, Array]:
 
 
 def _periodogram(profile: Array, pitch: float, count: int) -> tuple[Array, float]:
-    """One-sided density (count // 2 + 1,) m^3 of pieces of `count` points, and its line spacing
-    (1/m).
-    """
+    """One-sided density (count // 2 + 1,) m^3 of pieces of `count` points; line spacing (1/m)."""
     window = np.hanning(count + 1)[:-1]
     begin = np.arange(0, len(profile) - count + 1, max(count // 2, 1))
     total = np.zeros(count // 2 + 1)

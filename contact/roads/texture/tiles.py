@@ -78,9 +78,7 @@ class Tiles:
         return 2 * half, across
 
     def _tile(self, number: int) -> Array:
-        """The independent tile `number`: filtered white noise, scaled to exactly the expected
-        variance.
-        """
+        """The independent tile `number`: filtered white noise, scaled to the exact variance."""
         from scipy import fft
 
         if self._filter is None:

@@ -51,9 +51,7 @@ def memory(count: int, pitch: float, width: float) -> float:
 
 
 def _sizes(count: int, pitch: float, width: float) -> tuple[int, float, tuple[int, int]]:
-    """Heights on either side of the profile, longest wave (m) of the surface, its heights along and
-    across.
-    """
+    """Heights on either side of the profile, longest wave (m), and heights along and across."""
     from scipy.fft import next_fast_len  # not needed to read a scene
 
     half = int(np.ceil(0.5 * width / pitch))
@@ -90,9 +88,7 @@ def _padded(count: int, longest: float, pitch: float) -> int:
 
 
 def _amplitude(edges: Array, power: Array, shape: tuple[int, int], pitch: float) -> Array:
-    """(n // 2 + 1, m) amplitudes for the transform of white noise, so that profiles have the
-    `power`.
-    """
+    """(n // 2 + 1, m) amplitudes for white noise, such that profiles have the `power`."""
     density = surface_density(edges, power)
     along, across = np.fft.rfftfreq(shape[0], pitch), np.fft.fftfreq(shape[1], pitch)
     wave = np.hypot(along[:, None], across[None, :])

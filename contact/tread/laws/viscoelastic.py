@@ -1,6 +1,4 @@
-"""A viscoelastic tread: a half-space or a bonded layer of rubber with one to three relaxation
-times.
-"""
+"""A viscoelastic tread: a half-space or a bonded layer with up to three relaxation times."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +19,7 @@ _TERMS = 3
     "viscoelastic rubber, on a grid of points: the history of the pressure travels with the tread",
 )
 class Viscoelastic(Elastic):
-    """E(t) = E [1 - sum_k g_k (1 - exp(-t/t_k))] with a constant Poisson's ratio
-    (contact.tread.creep).
+    """E(t) = E [1 - sum_k g_k (1 - exp(-t/t_k))] at constant Poisson's ratio.
 
     E is the instantaneous modulus.
     """
