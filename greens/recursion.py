@@ -29,9 +29,9 @@ class Recursion:
     processes meet once per step.
 
     With `look_ahead` the root has no states: it solves the contact problem while the others look
-    ahead. With z_n = e^{sh} z_{n-1} + b0 P f_{n-1} + b1 P f_n = y_n + b1 P f_n, the displacement C
-    y_{n+1} at the end of the following step is C e^{sh} y_n, known before f_n, plus C
-    (e^{sh} b1 + b0) P f_n, of which the root reads the columns of nonzero forces. So the root
+    ahead. With z_n = e^{sh} z_{n-1} + b0 P f_{n-1} + b1 P f_n = y_n + b1 P f_n, the displacement
+    C y_{n+1} at the end of the following step is C e^{sh} y_n, known before f_n, plus
+    C (e^{sh} b1 + b0) P f_n, of which the root reads the columns of nonzero forces. So the root
     predicts by itself and sends its prediction with the force, when it receives what the others
     know of the next step. States take up a force only when they are next needed, so nobody waits
     for P f_n. `ahead` is then the recursion itself, else None."""

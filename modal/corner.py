@@ -9,9 +9,9 @@
     J = R^T M R + wheel,   C = hub dampers + 2 Om R^T G R + Om wheel's gyroscopic matrix,
     K_h = hub springs + R^T (K + Om^2 S) R.
 
-The material damping acts on eta alone, the motion of the tire relative to its wheel. With L
-L^T = J - P P^T, the mass that the modes do not carry, the coordinates  xi = L^-T x,  eta = q - P^T
-xi  have unit mass, and all further steps treat them as modal coordinates. Air in the cavity is
+The material damping acts on eta alone, the motion of the tire relative to its wheel. With
+L L^T = J - P P^T, the mass that the modes do not carry, the coordinates  xi = L^-T x,
+eta = q - P^T xi  have unit mass, and all further steps treat them as modal coordinates. Air in the cavity is
 carried along by its momentum.
 """
 

@@ -1,4 +1,4 @@
-"""Chatter: points that open and close from step to step because steps are too long for them.
+"""Chatter: points that open and close from step to step because the step is too long.
 
 At the touching points a force acts on an instantaneous compliance B (tread and residual
 flexibility). To an alternating force, linear over the steps, the tire's states respond as a
@@ -6,8 +6,8 @@ negative compliance X (greens.residual.alternating). With
 
     -X v = mu B v,   mu the largest,
 
-the fastest oscillation of the touching points takes  2 pi / theta  steps,  cos
-theta = (1 - 4 mu) / (1 + 2 mu). A mass m on a compliance C has mu = h^2 / (12 m C); its true
+the fastest oscillation of the touching points takes  2 pi / theta  steps,
+cos theta = (1 - 4 mu) / (1 + 2 mu). A mass m on a compliance C has mu = h^2 / (12 m C); its true
 oscillation rotates by (12 mu)^1/2 in a step. At mu = 1 it takes two steps, and beyond it grows
 without bound. Horizontal forces act on bristles and on the tread's shear in the same way; the
 larger mu of the two counts. A force that is constant over the step has X = 0: it damps such an
@@ -34,7 +34,7 @@ Stiffness = float | np.ndarray
 # modes gained energy between impacts (measured from 2.9 down: contact force a hundred times too
 # large).
 FEWEST = 2.5
-# Points for which the oscillation is computed, half as many with horizontal forces: a second of
+# Points for which the oscillation is computed, half as many for horizontal forces: a second of
 # eigenvalues.
 MOST = 1000
 # Largest accepted share of the touching points that alternate: that return to their state of two
@@ -105,7 +105,7 @@ def choose(steps: float) -> Chosen:
 def oscillation(
     spec: Spec, patch: Patch, response: Response, step: float, bristles: Stiffness | None = None
 ) -> float:
-    """Steps (2 or more, inf) in the fastest oscillation of points at rest, with linear forces.
+    """Steps (2 or more, inf) per fastest oscillation of points touching at rest, linear forces.
 
     `step` in s. `response` as the loop uses it (Response.resolved); its first inputs and outputs
     are the patch's nodes, with horizontal forces in z, then x and y. `bristles` N/m of each point,

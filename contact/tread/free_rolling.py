@@ -1,7 +1,7 @@
 """The slip at which a tire rolls freely: no drag on a smooth road.
 
-Bristles are sensitive to the local speed of the surface. For a wheel at speed Omega with r_e
-Omega = v, the road's speed, the surface at (x, y) moves at -Omega d(x, y)/dtheta in the static
+Bristles are sensitive to the local speed of the surface. For a wheel at speed Omega with
+r_e Omega = v, the road's speed, the surface at (x, y) moves at -Omega d(x, y)/dtheta in the static
 shape, and so slips by
 
     s_x = (dx/dtheta) / r_e - 1,     s_y = -(dy/dtheta) / r_e
@@ -41,8 +41,8 @@ def shape_slip(positions: Array, ring: Array, shape: tuple[int, int], radius: fl
 def free_slip(drag: Callable[[float], float], load: float) -> float:
     """The slip at which `drag(slip)` (N, forward) vanishes, within 1e-4 of the `load` (N).
 
-    Regula falsi (Illinois) in a bracket sought outwards from 0, at most to 0.2. ConvergenceError if
-    there is none.
+    Regula falsi (Illinois) in a bracket sought outwards from 0: 1e-3, then four times as far while
+    that is at most 0.2. ConvergenceError if there is none.
     """
     small = TOLERANCE * load
     low, at_low = 0.0, drag(0.0)

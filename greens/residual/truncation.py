@@ -1,8 +1,8 @@
 """Estimated error of the receptance within a band, due to the truncated modes.
 
 Every truncated mode is faster than the last one kept, w_c. With a damping rate d, its static
-response differs from its true one by at most the share  b(w) = |w^2 - i w d| / |w_c^2 - w^2 + i w
-d|.  Hence
+response differs from its true one by at most the share
+b(w) = |w^2 - i w d| / |w_c^2 - w^2 + i w d|.  Hence
 
     none          |G_t| (1 + b) / |H|     G_t: share of the upper half of the modes
     dirac, static |G_res| b / |H|         a bound for a standing wheel
