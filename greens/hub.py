@@ -4,8 +4,8 @@
 
 with A as in modal.corner.Corner.moments, and u the motion of the states and of what follows a force
 statically. States z' = s z + P f with coordinates q = C z (real part) have the rates
-q' = C s z + C P f  and  q'' = C s^2 z + C s P f.  The term C P f', which vanishes for a complete set of
-states, is omitted, as for the momentum (Response.direct_momentum_rate).
+q' = C s z + C P f  and  q'' = C s^2 z + C s P f.  The term C P f', which vanishes for a complete
+set of states, is omitted, as for the momentum (Response.direct_momentum_rate).
 """
 
 from __future__ import annotations

@@ -11,8 +11,8 @@
 
 The material damping acts on eta alone, the motion of the tire relative to its wheel. With
 L L^T = J - P P^T, the mass that the modes do not carry, the coordinates  xi = L^-T x,
-eta = q - P^T xi  have unit mass, and all further steps treat them as modal coordinates. Air in the cavity is
-carried along by its momentum.
+eta = q - P^T xi  have unit mass, and all further steps treat them as modal coordinates. Air in the
+cavity is carried along by its momentum.
 """
 
 from __future__ import annotations

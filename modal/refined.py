@@ -94,8 +94,8 @@ def cleared(
 
     The subspace, which contains none of them, is spanned by `span` (n, b), on which the matrix is
     T = `block` (b, b); `inverse` (b, n) is its left basis. One first-order step: with
-    r = A v - s v,  v+ = v + span (s - T)^-1 inverse r. The left vectors of drifting motions are so long that
-    the rounding of fast vectors is amplified a million times along them.
+    r = A v - s v,  v+ = v + span (s - T)^-1 inverse r. The left vectors of drifting motions are so
+    long that the rounding of fast vectors is amplified a million times along them.
     """
     if not len(block):
         return vectors

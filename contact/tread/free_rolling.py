@@ -1,8 +1,8 @@
 """The slip at which a tire rolls freely: no drag on a smooth road.
 
 Bristles are sensitive to the local speed of the surface. For a wheel at speed Omega with
-r_e Omega = v, the road's speed, the surface at (x, y) moves at -Omega d(x, y)/dtheta in the static
-shape, and so slips by
+r_e Omega = v, the road's speed, the surface at (x, y) moves at -Omega d(x, y)/dtheta in the
+static shape, and so slips by
 
     s_x = (dx/dtheta) / r_e - 1,     s_y = -(dy/dtheta) / r_e
 

@@ -35,9 +35,12 @@ def transform_ratio(m: Array, poisson_ratio: float) -> Array:
 class LayerInfluence:
     """Approach per unit force, uniform over a rectangle: half-space plus a smooth correction.
 
-    A point force moves the surface by u(r) = 1/(pi E*) [1/r
-    + 1/h int_0^oo (ratio(m) - 1) J0(m r/h) dm]; the integral of the second part over a disc of radius R = rho h is 2h/E*
-    (bounded(rho) - rho), with bounded(rho) = rho int_0^oo ratio(m)/m J1(m rho) dm, which tends to
+    A point force moves the surface by
+
+        u(r) = 1/(pi E*) [1/r + 1/h int_0^oo (ratio(m) - 1) J0(m r/h) dm];
+
+    the integral of the second part over a disc of radius R = rho h is 2h/E* (bounded(rho) - rho),
+    with bounded(rho) = rho int_0^oo ratio(m)/m J1(m rho) dm, which tends to
     (1 - 2nu)/(2(1 - nu)^2). The integral over a rectangle is that of four right-angled corners, in
     polar coordinates about the point of evaluation, r = X cosh t along a side. `thickness` h in m.
     InputError for a thickness that is not positive, and for rectangles so much wider than the

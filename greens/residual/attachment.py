@@ -60,9 +60,9 @@ def dynamic(projection: Projection, speed: float, known: int) -> np.ndarray:
     """Mask (m,) of coordinates that stay: the first `known`, `FEW` pseudo-modes, dynamic ones.
 
     Relative to its static response, a coordinate's response at w has the dynamic part
-    (w^2 + 2 w Omega n) / (omega_k^2 - Omega^2 n^2),  n = |S_kk|^1/2: inertia and convection. It counts as
-    static if at half the highest mode this is no more than for a standing wheel at `FASTEST` times
-    the highest mode.
+    (w^2 + 2 w Omega n) / (omega_k^2 - Omega^2 n^2),  n = |S_kk|^1/2: inertia and convection. It
+    counts as static if at half the highest mode this is no more than for a standing wheel at
+    `FASTEST` times the highest mode.
     """
     squares = projection.squares
     highest = np.sqrt(squares[projection.modes - 1])

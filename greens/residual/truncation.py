@@ -4,7 +4,7 @@ Every truncated mode is faster than the last one kept, w_c. With a damping rate 
 response differs from its true one by at most the share
 b(w) = |w^2 - i w d| / |w_c^2 - w^2 + i w d|.  Hence
 
-    none          |G_t| (1 + b) / |H|     G_t: share of the upper half of the modes
+    none          |G_t| (1 + b) / |H|     G_t: upper half of the modes, for the tail
     dirac, static |G_res| b / |H|         a bound for a standing wheel
     attachment, second-order: (|H_x(w) - H_x(0)| + |G_res|) b / |H|, H_x the states beyond w_c,
 
