@@ -131,7 +131,7 @@ def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> 
 
 def tread_matrix(spec: Spec, patch: Patch, index: slice | NDArray[np.intp] = slice(None)) -> Array:
     """Compliance of the tread between the points, or those of the `index`, (c, c) m/N."""
-    # evaluates a few thousand offsets instead of c^2
+    # Evaluates a few thousand offsets instead of c^2.
     if patch.places is not None and spec.law.compliant:
         some = np.arange(len(patch.points))[index]
         return KernelTread(patch.places, spec.law.influence(_farthest(patch))).block(some, some)

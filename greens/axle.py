@@ -74,7 +74,7 @@ def by_free_rim(
     rate = -motion.rows["body"] if wheel.speed else np.zeros_like(motion.rows["mass"])
     beside = np.hstack([motion.rows["mass"], rate])
     own = summed(wheel.operators.body.comm, beside.T @ fields[: len(beside)])
-    # only the tire has mass-proportional damping, not the air
+    # Only the tire has mass-proportional damping, not the air.
     own = np.pad(own, ((0, 0), (0, carried.shape[1] - own.shape[1])))
     response = couple(grown.states, np.vstack([seen[:6], own]), seen, carried)
     turning = wheel.speed, wheel.against_wheel

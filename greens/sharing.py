@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_info
 from tireroad.fem.collective import alike
 from tireroad.greens.response import Response
 
-# bytes of both matrices; smaller ones fit the caches, and processes would only wait
+# Bytes of both matrices; smaller ones fit the caches, and processes would only wait.
 SHARED_FROM = 20e6
 _LIBRARY = "user_api", "internal_api", "version", "architecture"
 

@@ -47,8 +47,7 @@ class CellMean:
         self._reach = reach = int(np.ceil(2 * widest / self._step + 0.5))
         offset = self._step * np.arange(-reach, reach + 1)
         parts = [_parts(offset, self._step, share * rows[:, 1:2]) for share in (1, 2)]
-        # Weights of samples within the rectangle's width, and within twice that: (2, r, 2
-        # reach + 1).
+        # Weights (2, r, 2 reach + 1) of samples within the rectangle's width, and twice that.
         self._weight = np.stack([4 / 3 * parts[0], -1 / 3 * parts[1]])
         count = 4 * int(np.clip(np.ceil(broadest / road.spacing), 2, MOST // 2))
         middles = (np.arange(count) + 0.5) / count * 4 - 2

@@ -17,7 +17,7 @@ def make_solver(name: str, matrix: Array | Compliance) -> ContactSolver:
     with a matrix of these points only.
     """
     if name == "snes-vi":
-        from tireroad.contact.solver.snes_vi import SnesVI  # PETSc only if it is asked for
+        from tireroad.contact.solver.snes_vi import SnesVI  # PETSc only if requested
 
         return SnesVI(matrix)
     if name not in ("active-set", "projected-cg"):

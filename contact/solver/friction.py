@@ -34,8 +34,9 @@ class Friction:
     """The brush on a tire with same-step response `tire` (3p, 3p) m/N in z, x, y of the nodes.
 
     `weights` W (c, p) interpolates from nodes to points (None: they are the same). `shear` of the
-    tread, None: rigid in shear; `pressed` (c,) N: normal forces without shear of the tread, None:
-    the static ones. `horizontal` (c, 2) N is the last solution, `turns` its number of iterations.
+    tread, None: rigid in shear; `pressed` (c,) N: normal forces relative to which pressure shears
+    it, None: the static ones. `horizontal` (c, 2) N is the last solution, `turns` its number of
+    iterations.
     """
 
     def __init__(

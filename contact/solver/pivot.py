@@ -63,7 +63,7 @@ class Pivot:
         return out
 
     def exchanged(self, active: Mask) -> Mask:
-        """Which z (c,) are nonzero when the points `active` (n,) touch; inverts itself on B."""
+        """Nonzero z (c,) if `active` (n,) touch: of B those that do not, of N those that do."""
         out = active[self.places]
         out[: self._size] ^= True
         return out

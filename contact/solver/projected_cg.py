@@ -24,7 +24,7 @@ class ProjectedCG:
 
     Conjugate gradients (Polak-Ribiere) on the touching points. Forces that turn negative are set to
     zero and their points leave, points with a negative gap join, and either restarts the
-    directions. Symmetry of A is assumed only in the choice of directions: a slight skew part slows
+    directions. Symmetry of A is assumed only in the length of steps: a slight skew part slows
     convergence, but the gap is always that of A itself. Warm start by linear extrapolation of the
     last forces. Sources: Polonsky and Keer, Wear 231 (1999) 206; Vollebregt, J. Comput. Phys. 257
     (2014) 333.

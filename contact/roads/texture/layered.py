@@ -96,7 +96,7 @@ def textured(
     InputError if the resulting surface has no variance.
     """
     density = surface_density(edges, power)
-    # variance of the surface in its bands
+    # Variance of the surface in its bands.
     own = np.pi * density * (edges[1:] ** 2 - edges[:-1] ** 2)
     if not own.sum() > 0:
         raise InputError("road: a texture needs a level above nothing in one band at least")
