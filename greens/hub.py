@@ -31,7 +31,7 @@ def reading(
         return response
     s, block = states.eigenvalue, states.block
     by_state, by_block = np.zeros((3, len(s)), complex), np.zeros((3, len(block)))
-    # Horner's rule: each further rate has the jump of the one before
+    # Horner's rule: each further rate has the jump of the one before.
     for part in np.split(rows, 3)[::-1]:
         direct = (by_state @ response.input).real + by_block @ response.block_input
         by_state = by_state * s - part @ states.right

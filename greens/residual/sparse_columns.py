@@ -10,7 +10,7 @@ from scipy.sparse.linalg import LinearOperator
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Numbers in a run of columns, on average, above which each run is multiplied by itself instead of
+# Numbers in a run of columns, on average, above which each run is multiplied on its own instead of
 # first copying all columns side by side: 16 columns of 430 numbers, 7 of 1,000, 3 of 2,000; at
 # least two columns.
 LONG, FEWEST = 7000, 2
