@@ -2,10 +2,10 @@
 
 A point has one force for its rectangle, and so one height. Read at the point alone, waves shorter
 than two rectangles would be aliased into long ones that the road does not have. The mean over the
-rectangle contains very little of them, sin(k a) / (k a) at a wave number k for a half width a, but
-lowers waves of four rectangles by a tenth, and every crest: cobblestones at points 8 mm apart lost
-5 % of the mean load. Four thirds of it less a third of the mean over twice the rectangle cancels
-the second-order part of that: it loses 1 % of waves of four rectangles, 15 % of those of two.
+rectangle reduces them to sin(k a) / (k a), at a wave number k for a half width a, but also lowers
+waves of four rectangles by a tenth, and every crest: cobblestones at points 8 mm apart lost 5 % of
+the mean load. Four thirds of it less a third of the mean over twice the rectangle cancels the
+second-order part of that: it loses 1 % of waves of four rectangles, 15 % of those of two.
 """
 
 from __future__ import annotations
