@@ -1,7 +1,7 @@
-"""Closed forms of contact with an elastic half-space and of rolling, for tests and users alike.
+"""Closed forms of contact with an elastic half-space and of rolling, for tests and users.
 
 E* is the contact modulus, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, in Pa; a rigid body has no term.
-Source: Johnson, Contact Mechanics (1985), unless said otherwise.
+Source: Johnson, Contact Mechanics (1985), unless another is given.
 """
 
 import math
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# pi times the capacity of the unit-half-side square plate (0.3667892 per side, Read 1997): F/(E* a
+# pi times the capacity of the square plate of half side 1 (0.3667892 per side, Read 1997): F/(E* a
 # delta).
 SQUARE_PUNCH = 2.3046
 # pi E* u / p at the centre of a uniformly loaded square of half side 1; half of it at the corner
@@ -47,7 +47,7 @@ def hertz_sphere(load: float, radius: float, modulus: float) -> SphereContact:
 
 
 def hertz_sphere_load(approach: float, radius: float, modulus: float) -> float:
-    """Load (N) on a sphere pressed in by an approach delta (m): F = 4/3 E* sqrt(R) delta^(3/2)."""
+    """Load (N) on a sphere at an approach delta (m): F = 4/3 E* sqrt(R) delta^(3/2)."""
     return 4.0 / 3.0 * modulus * math.sqrt(radius) * approach**1.5
 
 
@@ -73,11 +73,10 @@ def love_square_centre(pressure: float, half_side: float, modulus: float) -> flo
 def westergaard_pressure(
     x: np.ndarray, fraction: float, amplitude: float, wavelength: float, modulus: float
 ) -> np.ndarray:
-    """Pressure (Pa) at x (m) from a crest, rigid waves of `amplitude` (m) pressed in until `fraction`
-    of the surface touches.
+    """Pressure (Pa) at x (m) from a crest of rigid waves, `fraction` of which is in contact.
 
-    p = 2 p_m cos(pi x/L) sqrt(s^2 - sin^2(pi x/L))/s^2, s = sin(pi fraction/2), where it touches;
-    p_m as `westergaard_mean`. Source: Westergaard, J. Appl. Mech. 6 (1939) 49; Johnson 13.2.
+    p = 2 p_m cos(pi x/L) sqrt(s^2 - sin^2(pi x/L))/s^2 in the contact, s = sin(pi fraction/2); p_m
+    as in `westergaard_mean`. Source: Westergaard, J. Appl. Mech. 6 (1939) 49; Johnson 13.2.
     """
     s = math.sin(math.pi * fraction / 2)
     mean = westergaard_mean(fraction, amplitude, wavelength, modulus)
@@ -87,20 +86,17 @@ def westergaard_pressure(
 
 
 def westergaard_mean(fraction: float, amplitude: float, wavelength: float, modulus: float) -> float:
-    """Mean pressure (Pa) at which `fraction` of a wavy surface touches: pi E* A/L sin^2(pi fraction/2).
-
-    `amplitude` A (m) is half the height from trough to crest.
-    """
+    """Mean pressure (Pa) for `fraction` of a wavy surface: pi E* A/L sin^2(pi fraction/2)."""
     full = math.pi * modulus * amplitude / wavelength
     return full * math.sin(math.pi * fraction / 2) ** 2
 
 
 def carter_force(creepage: float, friction: float, half_width: float, radius: float) -> float:
-    """Tangential force over mu P of an elastic cylinder that rolls on a half-space (one of them rigid,
-    or both alike): Q/(mu P) = 1 - (1 - R xi/(mu a))^2, 1 from xi = mu a/R on.
+    """Tangential force over mu P of a rolling elastic cylinder, one body rigid or both alike.
 
-    `creepage` xi, `friction` mu, half width a (m), relative radius R (m).
-    Source: Carter, Proc. R. Soc. A 112 (1926) 151; Johnson (8.20).
+    Q/(mu P) = 1 - (1 - R xi/(mu a))^2, and 1 from xi = mu a/R on: `creepage` xi, `friction` mu,
+    half width a (m), relative radius R (m). Source: Carter, Proc. R. Soc. A 112 (1926) 151; Johnson
+    (8.20).
     """
     share = min(radius * creepage / (friction * half_width), 1.0)
     return 1.0 - (1.0 - share) ** 2
@@ -109,10 +105,10 @@ def carter_force(creepage: float, friction: float, half_width: float, radius: fl
 def carter_traction(
     x: np.ndarray, creepage: float, friction: float, half_width: float, radius: float
 ) -> np.ndarray:
-    """Tangential over peak normal traction at x (m) from the middle, the leading edge at x = a.
+    """Tangential traction over peak pressure at x (m) from the middle, leading edge at x = a.
 
-    mu [sqrt(1 - x^2/a^2) - c/a sqrt(1 - (x - a + c)^2/c^2)]; what sticks is 2c = 2a - 2 R xi/mu wide
-    and reaches to the leading edge.
+    mu [sqrt(1 - x^2/a^2) - c/a sqrt(1 - (x - a + c)^2/c^2)]; the stick zone is 2c = 2a - 2 R xi/mu
+    wide and adjoins the leading edge.
     """
     a, x = half_width, np.asarray(x)
     stick = a * math.sqrt(1.0 - carter_force(creepage, friction, half_width, radius))
@@ -128,7 +124,7 @@ def brush_force(
 ) -> float:
     """Force (N) of a sliding brush under parabolic pressure: mu F [1 - (1 - theta sigma)^3].
 
-    `slip` sigma, load F (N), half length a (m), stiffness `tread` c (N/m2) of the bristles per length,
+    `slip` sigma, load F (N), half length a (m), bristle stiffness `tread` c (N/m2) per length,
     theta = 2 c a^2/(3 mu F). Source: Pacejka, Tire and Vehicle Dynamics (2012), 3.2.
     """
     theta = 2 * tread * half_length**2 / (3 * friction * load)

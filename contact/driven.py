@@ -1,7 +1,7 @@
-"""Prescribed forces that act on the tire while it is in contact: one tire, one loop.
+"""Prescribed forces on a tire in contact: one tire, one loop.
 
-The tire's inputs are the contact's forces, then the k prescribed ones; its outputs the contact's
-displacements, then each prescribed force's own displacement along itself, then the readings.
+The tire's inputs are the contact forces, then the k prescribed ones. Its outputs are the
+displacements of the contact, then that of each prescribed force along itself, then the readings.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from tireroad.greens.residual.sparse_columns import LoadedColumns
 
 
 class Driven:
-    """The tire as the contact sees it, its motion under prescribed forces included.
+    """The tire as the contact sees it, including its motion under prescribed forces.
 
-    `history` (n + 1, k) N at the steps from t = 0 on; `directions` (k, 3) of unit length. After each
-    `advance`: `reading` (r,) m, and `work` (J) the prescribed forces did so far (trapezoid),
-    and `lead`, what more they do where each has its new value for the whole step.
+    `history` (n + 1, k) N at the steps from t = 0 on; `directions` (k, 3) of unit length. After
+    each `advance`: `reading` (r,) m; `work` (J) of the prescribed forces so far (trapezoidal rule);
+    `lead`, the additional work if each force has its new value during the whole step.
     """
 
     def __init__(self, tire: Tire, history: np.ndarray, directions: np.ndarray) -> None:
@@ -34,7 +34,7 @@ class Driven:
         tire.start(np.concatenate([np.zeros(self._count), history[0]]))
 
     def predict(self) -> np.ndarray:
-        """Displacement (c,) m at the end of the step with no new contact force. Collective."""
+        """Displacement (c,) m at the end of the step without new contact forces. Collective."""
         self._step += 1
         self._free = self._tire.predict()
         if not self._forced:
@@ -43,7 +43,7 @@ class Driven:
         return self._free[: self._count] + pushed
 
     def advance(self, force: np.ndarray) -> None:
-        """Take the contact's forces (c,) N at the end of the step."""
+        """Set the contact forces (c,) N at the end of the step."""
         if not self._forced:
             self._tire.advance(force)
             self.reading = self._free[self._count :] + self._beside @ force
@@ -58,12 +58,12 @@ class Driven:
         self._along = along
 
     def inertia_force(self) -> np.ndarray:
-        """What axle and contact together have to balance (3,), N: momentum's rate less the forces."""
+        """What axle and contact balance (3,), N: rate of momentum less prescribed forces."""
         rate = self._tire.inertia_force()
         return rate - self._history[self._step] @ self._directions if self._forced else rate
 
     def snapshot(self) -> dict[str, np.ndarray]:
-        """The tire's, and how far the prescribed forces are. Collective when the tire's is."""
+        """The tire's snapshot and that of the prescribed forces. Collective if the tire's is."""
         own = {
             "driven_step": self._step,
             "driven_along": self._along,
@@ -72,7 +72,7 @@ class Driven:
         return self._tire.snapshot() | {name: np.array(value) for name, value in own.items()}
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from a snapshot."""
+        """Continue from a snapshot."""
         self._step, (self.work, self.lead) = int(kept["driven_step"]), kept["driven_work"].tolist()
         self._along = kept["driven_along"]
         self._tire.restore(kept)

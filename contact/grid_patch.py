@@ -1,11 +1,12 @@
-"""Contact points on a regular grid of the road's own resolution, carried by the nodes around them.
+"""Contact points on a regular grid, interpolated from the nodes around them.
 
-The finite elements found the static state with the road touching nodes only, and without the tread on them. On the grid, or
-on the nodes with their tread, it settles anew under the same load, about that state: f >= 0, g >= 0, f . g = 0 with
+The finite elements find the static state with the road touching nodes only, and without the tread.
+On the grid, or on the nodes with their tread, the contact therefore settles again under the same
+load, linearised about that state: f >= 0, g >= 0, f . g = 0 with
 
     g = z_surface - z_road + delta + C~ f + W A_static (W^T f - f_nodes),  sum f = load,
 
-A_static the exact static flexibility between the nodes, delta the height by which the tire rises.
+where A_static is the exact static flexibility between the nodes and delta the rise of the tire.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 
-# Points of the largest grid that is laid out before the reach is known.
+# Points of the largest grid that is laid out before the patch is known.
 MOST_POINTS = 1_000_000
 LOAD_TOLERANCE = 1e-7
-# Displacements up to which W A W^T is a matrix: 8 MB.
+# Number of displacements up to which W A W^T is kept as a matrix: 8 MB.
 MOST_DENSE = 1000
 
 
@@ -53,10 +54,10 @@ def make_grid_patch(
 ) -> Patch:
     """Points at multiples of the spacing (m) with a static gap within reach (m), not yet settled.
 
-    One more row around them is the edge, which watches. `nodes`: the patch of the nodes for the same
-    reach, which the grid covers. `gap` is the
-    surface's height over the road plane (m), negative where it sinks in between nodes that touch,
-    and `force` still zero.
+    One more row around them is the edge, which should never touch. `nodes`: the patch of the nodes
+    for the same reach, which the grid covers. `gap` is the surface's height over the road plane
+    (m), negative where it penetrates between touching nodes; `force` is still zero. InputError for
+    a grid that is too large or has no point near the road.
     """
     x0, x1, y0, y1 = nodes.extent
     margin = nodes.half_sizes.max(axis=0)
@@ -101,12 +102,12 @@ def over_cells(
     ring: np.ndarray,
     arc: np.ndarray,
 ) -> sparse.csr_matrix:
-    """Shape functions (c, s) averaged over the cell of each of the points (c, 2) m, by 2 x 2 Gauss points.
+    """Shape functions (c, s) averaged over the cell of each point (c, 2) m, by 2 x 2 Gauss points.
 
-    A point's force is a pressure on its cell, as the tread takes it, and what it reads the mean there. As a force at
-    a point it would sink in by what the element happens to allow: 16.9 um/N where elements of order 3 meet, 9.3
-    to 9.7 inside, on a wall of 48 MPa, 12 mm thick; over cells of 5 mm 9.7 and 9.0 to 9.2. `ring` and `arc` (rad) of the
-    points stand in for places of a cell beyond the surface.
+    A point's force is a pressure on its cell, as in the tread, and its displacement the mean there.
+    The penetration of a point force would depend on the element: 16.9 um/N where elements of order
+    3 meet, 9.3 to 9.7 inside, on a wall of 48 MPa, 12 mm thick; over cells of 5 mm 9.7 and 9.0 to
+    9.2. Where a cell extends beyond the surface, `ring` and `arc` (rad) of its point are used.
     """
     parts = []
     for signs in product((-1, 1), repeat=2):
@@ -135,8 +136,8 @@ def settle(
 ) -> tuple[Patch, float]:
     """The patch in its static state, and the rise delta (m) of the tire.
 
-    `solver` is made for W A_static W^T + C~; `flexibility` A_static (p, p) m/N; `nodal_force` (p,) N
-    of the finite elements, whose sum is kept. ConvergenceError when no rise gives that load.
+    `solver` is made for W A_static W^T + C~; `flexibility` A_static (p, p) m/N; `nodal_force` (p,)
+    N of the finite elements, whose sum is preserved. ConvergenceError if no rise yields that load.
     """
     load = float(nodal_force.sum())
     flat = patch.gap - patch.at_points(flexibility @ nodal_force)
@@ -157,8 +158,10 @@ def settle(
 
 
 def spread_pull(patch: Patch, pull: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Horizontal forces (c, 2) N of the points of a settled grid from those of the nodes that carry it, `pull` (p, 2) N beside
-    their normal `force` (p,): in the ratio of the nodes around, their sum kept.
+    """Horizontal forces (c, 2) N at the points of a settled grid, from those of the nodes.
+
+    `pull` (p, 2) N acts on the nodes beside their normal `force` (p,). A point has the ratio of the
+    two at the nodes around it; the sum of `pull` is preserved.
     """
     touching = (force > 0).astype(float)
     ratio = pull / np.where(force > 0, force, 1.0)[:, None]
@@ -171,7 +174,7 @@ def spread_pull(patch: Patch, pull: np.ndarray, force: np.ndarray) -> np.ndarray
 
 
 def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, float]:
-    """Rises (m) with too much and too little load."""
+    """Rises (m) with too much and with too little load. ConvergenceError if there are none."""
     low, high = 0.0, 0.0
     for _ in range(20):
         if excess(low) <= 0.0:
@@ -188,7 +191,7 @@ def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, floa
 
 
 class OnPoints:
-    """A tire between nodes as seen at the points of a patch: W u, and W^T f into it.
+    """A tire given at nodes, as seen at the points of a patch: W u from it, W^T f into it.
 
     `components` 1: vertical only; 3: z, then x, then y of all points.
     """
@@ -203,19 +206,19 @@ class OnPoints:
         self.snapshot, self.restore = tire.snapshot, tire.restore
 
     def start(self, force: np.ndarray) -> None:
-        """Begin with a force (c,) N that is already there at t = 0."""
+        """Begin with a force (c,) N present at t = 0."""
         self._tire.start(self._transposed @ force)
 
     def predict(self) -> np.ndarray:
-        """Displacement (c,) m at the end of the step with no new force."""
+        """Displacement (c,) m at the end of the step without a new force."""
         return self._weights @ self._tire.predict()
 
     def advance(self, force: np.ndarray) -> None:
-        """Take the force (c,) N at the end of the step."""
+        """Set the force (c,) N at the end of the step."""
         self._tire.advance(self._transposed @ force)
 
     def _same_step(self) -> np.ndarray | LinearOperator:
-        """W A W^T: a matrix where that is small, since then a step reads its loaded columns alone."""
+        """W A W^T: a matrix if it is small, because a step then reads only its loaded columns."""
         weights, tire = self._weights, self._tire.same_step
         count = weights.shape[0]
         if count > MOST_DENSE:

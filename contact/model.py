@@ -1,4 +1,4 @@
-"""A scene's tread law and solver on a patch: what the time loop asks for forces."""
+"""A scene's tread law and contact solver on a patch, from which the time loop obtains forces."""
 
 from typing import Protocol
 
@@ -17,14 +17,15 @@ from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Up to here the matrix is kept (8 MB); beyond, the tread is a convolution.
+# Up to here the matrix is stored (8 MB); beyond, the tread is a convolution.
 DENSE_POINTS = 1000
-# Points touching at rest from which conjugate gradients take over. The active set costs as the cube of the points that
-# come and go: with 580 touching and 180 away from the usual set a fifth of conjugate gradients, with 770 and 550 (a road
-# as rough as the points are apart, a whole point a step) twice as much.
+# Points touching at rest above which conjugate gradients take over. The active set costs the cube
+# of the points that come and go: with 580 touching and 180 away from the usual set a fifth of
+# conjugate gradients, with 770 and 550 (a road as rough as the points are apart, a whole point per
+# step) twice as much.
 MOST_TOUCHING = 1000
 MOST_DENSE = 6000  # 0.3 GB a matrix
-# Height over half the width of a patch on a torus that has gone up its flanks.
+# Height over half the width of a patch above which it extends up the flanks of a torus.
 STEEPEST = 0.25
 
 
@@ -41,11 +42,11 @@ class Spec(Protocol):
 
     @property
     def sheared(self) -> bool:
-        """Whether the tread gives way to horizontal forces."""
+        """Whether the tread deforms under horizontal forces."""
 
 
 def solver_name(spec: Spec, patch: Patch) -> str:
-    """The solver that `solver = "auto"` means on this patch: by the points that touch at rest."""
+    """The solver's name; "auto" is resolved by the number of points that touch at rest."""
     if spec.solver != "auto":
         return spec.solver
     many = np.count_nonzero(patch.gap <= 0.0) > MOST_TOUCHING
@@ -53,8 +54,11 @@ def solver_name(spec: Spec, patch: Patch) -> str:
 
 
 def static_solver(spec: Spec, patch: Patch, tire: Array, speed: float) -> ContactSolver:
-    """The solver for the static state of a patch that rolls at `speed` m/s: as `step_solver`, and of a tread
-    that creeps with all of its past, C~ (1 + sum c_k F_k) (contact.tread.creep)."""
+    """The solver for the static state of a patch that rolls at `speed` m/s.
+
+    As `step_solver`; a viscoelastic tread has all of its past, C~ (1 + sum c_k F_k)
+    (contact.tread.creep).
+    """
     if spec.law.creep is None:
         return step_solver(spec, patch, tire)
     check_creeps(patch)
@@ -63,7 +67,7 @@ def static_solver(spec: Spec, patch: Patch, tire: Array, speed: float) -> Contac
 
 
 def check_creeps(patch: Patch) -> None:
-    """InputError where a tread that creeps has no grid, or one too large for its static state."""
+    """InputError if a viscoelastic tread has no grid, or one too large for its static state."""
     if patch.places is None:
         raise InputError(
             "contact.tread: a viscoelastic tread needs a grid of points: contact.points = { dx, dy }"
@@ -76,7 +80,7 @@ def check_creeps(patch: Patch) -> None:
 
 
 def tread_memory(spec: Spec, patch: Patch, speed: float, step: float) -> TreadMemory | None:
-    """The past of a tread that creeps, rolled over at `speed` m/s in steps of `step` s; else None."""
+    """Memory of a viscoelastic tread rolling at `speed` m/s in steps of `step` s; else None."""
     if spec.law.creep is None:
         return None
     check_creeps(patch)
@@ -88,7 +92,7 @@ def tread_memory(spec: Spec, patch: Patch, speed: float, step: float) -> TreadMe
 
 
 def tread_shear(spec: Spec, patch: Patch, at_once: float = 1.0) -> Shear | None:
-    """What the tread gives way to horizontal forces between the points, times `at_once`; None where it is rigid to them."""
+    """The tread's shear compliance between the points, times `at_once`; None if it is rigid."""
     if not spec.sheared:
         return None
     plain = spec.law.shear(_farthest(patch))
@@ -107,9 +111,9 @@ def _spread(patch: Patch, tire: Array) -> Array:
 
 
 def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> ContactSolver:
-    """The solver for A = W tire W^T + C~, `tire` (p, p) m/N between the patch's nodes; C~ times `at_once`.
+    """The solver for A = W tire W^T + C~, `tire` (p, p) m/N between nodes; C~ times `at_once`.
 
-    InputError when the matrix of that many points is not affordable, or A not positive definite.
+    InputError if a matrix of that many points is not affordable, or A is not positive definite.
     """
     name, count = solver_name(spec, patch), len(patch.points)
     if patch.places is not None and count > DENSE_POINTS:
@@ -127,7 +131,8 @@ def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> 
 
 def tread_matrix(spec: Spec, patch: Patch, index: slice | NDArray[np.intp] = slice(None)) -> Array:
     """Compliance of the tread between the points, or those of the `index`, (c, c) m/N."""
-    if patch.places is not None and spec.law.compliant:  # of a few thousand offsets in place of c^2
+    # Evaluates a few thousand offsets instead of c^2.
+    if patch.places is not None and spec.law.compliant:
         some = np.arange(len(patch.points))[index]
         return KernelTread(patch.places, spec.law.influence(_farthest(patch))).block(some, some)
     places, sizes = patch.points[index, :2], patch.half_sizes[index]
@@ -138,7 +143,7 @@ def tread_matrix(spec: Spec, patch: Patch, index: slice | NDArray[np.intp] = sli
 
 
 def touching_compliance(spec: Spec, patch: Patch, tire: Array, index: NDArray[np.intp]) -> Array:
-    """W tire W^T + C~ between the points of the `index`, (n, n) m/N, `tire` (p, p) m/N between the nodes."""
+    """W tire W^T + C~ between the points `index`, (n, n) m/N; `tire` (p, p) between the nodes."""
     if patch.weights is None:
         return tire[np.ix_(index, index)] + tread_matrix(spec, patch, index)
     rows = patch.weights[index]
@@ -146,10 +151,10 @@ def touching_compliance(spec: Spec, patch: Patch, tire: Array, index: NDArray[np
 
 
 def _out_of_reach(patch: Patch) -> InputError | None:
-    """What is wrong where the road is so high that the patch goes up the tire's flanks.
+    """The InputError for a road so high that the patch extends up the tire's flanks, or None.
 
-    The tread's laws are those of a plane: points that rise by more than STEEPEST of their distance
-    from the footprint lie above each other as seen by the road.
+    Tread laws hold on a plane. Points that rise by more than STEEPEST of their distance from the
+    footprint lie above each other, seen from the road.
     """
     highest = float(patch.gap[~patch.edge].max(initial=0.0))
     x0, x1, y0, y1 = patch.extent
@@ -165,7 +170,7 @@ def _out_of_reach(patch: Patch) -> InputError | None:
 
 
 def _product(spec: Spec, patch: Patch, tire: Array, at_once: float) -> Compliance:
-    """A as a product. A grid has more points than nodes: without a tread A would be singular."""
+    """A as a product. Without a tread it would be singular: a grid has more points than nodes."""
     if not spec.law.compliant:
         raise InputError(
             "contact.tread: the tread leaves a grid of points without compliance of its own: take "
@@ -181,9 +186,9 @@ def _product(spec: Spec, patch: Patch, tire: Array, at_once: float) -> Complianc
 
 
 def _farthest(patch: Patch) -> float:
-    """Largest distance (m) at which the influence is read.
+    """Largest distance (m) at which the influence is evaluated.
 
-    The doubled grid of the convolution asks for a step beyond twice the patch.
+    The doubled grid of the convolution extends one step beyond twice the patch.
     """
     x0, x1, y0, y1 = patch.extent
     return 2.1 * float(np.hypot(x1 - x0, y1 - y0)) + 4 * float(patch.half_sizes.max())

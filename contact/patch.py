@@ -1,4 +1,4 @@
-"""The points of the tread that may touch the road in a run, in the static state."""
+"""The points of the tread that may touch the road during a run, in the static state."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from tireroad.fem.errors import ConvergenceError
 
 @dataclass(frozen=True, kw_only=True)
 class Patch:
-    """c points on p nodes of the outer face.
+    """c contact points on p nodes of the outer face.
 
-    `index` (p,) into the outer face; `points` (c, 3) m deformed, `half_sizes` (c, 2) m of the
-    rectangle of each, `force` (c,) N and `gap` (c,) m of the static state on a flat road, `edge`
-    (c,) marks its outermost points, which should never touch. `weights` W (c, p) takes nodal values to
-    the points; None: the points are the nodes. `places`: where they lie on a regular grid, or None.
-    Points of equal `line` (c,) int follow each other in the rolling direction. `frames` (c, 3, 3): unit vectors along,
-    across and normal to the road in the wheel's axes, along which forces and displacements are counted; None: x, y, z. `pull` (c, 2) N: horizontal forces of a static state with
-    friction, which stay as they are; None without.
+    `index` (p,) into the outer face; `points` (c, 3) m deformed; `half_sizes` (c, 2) m of each
+    point's rectangle; `force` (c,) N and `gap` (c,) m of the static state on a flat road; `edge`
+    (c,): the outermost points, which should never touch; `weights` W (c, p): nodal values to
+    points, None if the points are the nodes; `places` on a regular grid, or None. Points of equal
+    `line` (c,) int follow each other in the rolling direction. `frames` (c, 3, 3): unit vectors
+    along, across and normal to the road in the wheel's axes, in which forces and displacements are
+    given; None: x, y, z. `pull` (c, 2) N: horizontal forces of a static state with friction, held
+    constant; None without.
     """
 
     index: np.ndarray
@@ -37,14 +38,14 @@ class Patch:
     pull: np.ndarray | None = None
 
     def resultant(self, force: np.ndarray, horizontal: np.ndarray) -> np.ndarray:
-        """(3,) N in the wheel's axes of forces normal to the road (c,) and along and across it (c, 2)."""
+        """Resultant (3,) N in the wheel's axes of normal (c,) and tangential (c, 2) forces."""
         if self.frames is None:
             # A product: sum(axis=0) of so narrow an array takes ten times as long, 2 % of a step.
             return np.array([*(np.ones(len(force)) @ horizontal), force.sum()])
         return np.einsum("ci,cij->j", np.column_stack([horizontal, force]), self.frames)
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Values (p, ...) of the nodes at the points."""
+        """Values at the points from values (p, ...) at the nodes."""
         return values if self.weights is None else self.weights @ values
 
     @property
@@ -60,20 +61,20 @@ class Patch:
 
     @property
     def spacing(self) -> np.ndarray:
-        """From one point to the next along and across (2,), m, where they touch at rest; 0 where none does."""
+        """Point spacing (2,) m along and across the footprint at rest; 0 without one."""
         held = self.force > 0
         return 2 * np.median(self.half_sizes[held], axis=0) if held.any() else np.zeros(2)
 
     @property
     def touching(self) -> np.ndarray:
-        """How many points the footprint at rest is long and wide (2,), by its extent and a point's own; 0 without one."""
+        """Number of points (2,) along and across the footprint at rest; 0 without one."""
         held = self.force > 0
         if not held.any():
             return np.zeros(2)
         return np.rint(np.ptp(self.points[held, :2], axis=0) / self.spacing) + 1
 
     def check_edge(self, force: np.ndarray, time: np.ndarray, reach: float) -> None:
-        """Raise ConvergenceError when a point on the edge touches: those beyond it may touch too.
+        """Raise ConvergenceError if a point on the edge touches: others beyond might touch too.
 
         `force` (n, c) N at the times (n,) s.
         """
@@ -96,11 +97,13 @@ def make_patch(
     shape: tuple[int, int],
     reach: float,
 ) -> Patch:
-    """The points of the outer face (s of them, as a ring of `shape`) with a static gap within reach (m),
-    and one row more around them: the edge, which watches that nothing beyond it is missed.
+    """The points of the outer face with a static gap within reach (m).
+
+    The outer face has s points as a ring of `shape`. One more row around the points is the edge,
+    which reveals contact beyond the patch.
     """
     near = (gap <= reach).reshape(shape)
-    # The beads are the end of the tread; around the axle it closes on itself.
+    # The tread ends at the beads and is periodic around the axle.
     wide = np.pad(near, ((0, 0), (1, 1)))
     taken = near | np.roll(near, 1, 0) | np.roll(near, -1, 0) | wide[:, 2:] | wide[:, :-2]
     index = np.flatnonzero(taken.ravel())

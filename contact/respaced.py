@@ -1,4 +1,4 @@
-"""The same contact patch with twice or half the spacing of its points: what that is worth."""
+"""The same contact patch with twice or half the spacing of its points, for an error estimate."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from tireroad.contact.grid_patch import Surface, over_cells
 from tireroad.contact.patch import Patch
 from tireroad.contact.tread.kernel import GridPlaces
 
-ACROSS = 8  # points along the footprint and across it, below which twice their spacing tells nothing of them
+ACROSS = 8  # points across the footprint below which twice their spacing gives no estimate
 
 
 def ratio(patch: Patch) -> float:
     """Spacing of a companion's points over that of a patch in its static state.
 
-    The forces of a footprint some points wide change from spacing to spacing by where they happen to lie
-    (cobblestones, 17 mm wide, points 16, 11.3, 8, 5.7 and 4 mm apart: mean 547, 515, 521, 548, 545 N): there only
-    finer points tell, and those that touch are few. On a road that is no plane they are always coarser.
+    The forces of a footprint a few points wide depend on where the points happen to lie
+    (cobblestones, 17 mm wide, points 16, 11.3, 8, 5.7 and 4 mm apart: mean 547, 515, 521, 548,
+    545 N). There only finer points give an estimate, and few of them touch. On a curved road the
+    companion is always coarser.
     """
     least = patch.touching.min()
     if patch.places is None or patch.frames is not None or not least:
@@ -28,9 +29,10 @@ def ratio(patch: Patch) -> float:
 
 
 def thinned(patch: Patch) -> Patch:
-    """Points at multiples of twice the spacing, each for four of before; not yet settled.
+    """Points at multiples of twice the spacing, each for four original ones; not yet settled.
 
-    For a patch on a grid (`places`), not settled either: `force` is zero, `gap` the surface's height.
+    For a patch on a grid (`places`) that is not settled either: `force` is zero, `gap` the
+    surface's height.
     """
     places, weights = patch.places, patch.weights
     assert places is not None and weights is not None  # of every grid
@@ -55,10 +57,11 @@ def thinned(patch: Patch) -> Patch:
 
 
 def halved(patch: Patch, surface: Surface, road_height: float, reach: float) -> Patch:
-    """Points at multiples of half the spacing, those of before among them, on the same nodes; not yet settled.
+    """Points at multiples of half the spacing, on the same nodes; not settled.
 
-    For a patch on a grid over a plane, as `thinned`; `surface`, `road_height` and `reach` (m) are those it was made from. Points
-    beyond those of before, where no road is prepared, or whose rectangles reach beyond the nodes are left out.
+    For a patch on a grid over a plane, as in `thinned`; `surface`, `road_height` and `reach` (m)
+    are those that it was made from. Points beyond the original ones, where no road is prepared, and
+    those whose rectangles extend beyond the nodes are left out.
     """
     assert patch.places is not None
     along, across = (step / 2 for step in patch.places.spacing)

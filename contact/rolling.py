@@ -4,7 +4,8 @@ Each step finds the total contact forces f >= 0 with gaps g >= 0, f . g = 0,
 
     g = g_static + u_free - r(x + v t, y, t) + (A + C~)(f - f_static),
 
-u_free the tire's motion from past forces, A its answer within the step, C~ the tread's compliance.
+where u_free is the tire's motion due to past forces, A its response within the step, and C~ the
+compliance of the tread.
 """
 
 from __future__ import annotations
@@ -24,14 +25,15 @@ from tireroad.contact.solver.together import Ahead, Solved, Together
 from tireroad.contact.tread.creep import TreadMemory
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 
-# Road heights that are found at once: as many steps as make this many points, so that what a call
-# costs is shared; and at most so many steps.
+# Road heights are computed at once for as many steps as make this many points, to share the
+# overhead of a call; and for at most so many steps.
 _POINTS_AHEAD, _STEPS_AHEAD = 200_000, 64
 
 
 class Tire(Protocol):
-    """A linear tire between the patch's forces and displacements (greens.recursion, .convolution), taken over the
-    steps by the processes of `comm` together.
+    """A linear tire between the forces and displacements of the patch.
+
+    greens.recursion or greens.convolution; the processes of `comm` advance it together.
     """
 
     comm: MPI.Comm
@@ -52,24 +54,28 @@ class Tire(Protocol):
 
 @runtime_checkable
 class AheadTire(Tire, Protocol):
-    """A tire that may look ahead: None where it does not."""
+    """A tire that may look ahead; `ahead` is None if it does not."""
 
     ahead: Ahead | None
 
 
 @runtime_checkable
 class NonlinearTire(Tire, Protocol):
-    """A tire whose answer is known in approximation (fem.nonlinear_transient): `settle` gives None when
-    its motion under a force balances, else the free displacement to solve the contact for again.
+    """A tire whose response is known approximately (fem.nonlinear_transient).
+
+    `settle` returns None if its motion under a force is in balance, else the free displacement for
+    which the contact has to be solved again.
     """
 
     def settle(self, force: np.ndarray) -> np.ndarray | None: ...
 
 
 class Instant(NamedTuple):
-    """The state at the end of a step: (c,) arrays in N and m, `horizontal` (c, 2) N, `axle_force`
-    (3,) N; `penetration` (m) of the deepest point as it was solved; `change` and `moved`, what the tire feels and does beyond the static state, all
-    components.
+    """The state at the end of a step: (c,) arrays in N and m.
+
+    `horizontal` (c, 2) N; `axle_force` (3,) N; `penetration` (m) of the deepest point in the
+    solution; `change` and `moved`: the tire's forces and displacements relative to the static
+    state, all components.
     """
 
     time: float
@@ -87,8 +93,9 @@ class Instant(NamedTuple):
 
 @dataclass(frozen=True)
 class Drive:
-    """How the road comes: `height(x, y)` m over the static plane, point by point for arrays of any
-    shape, `motion(t)` m, `speed` in m/s.
+    """The road's approach: `height(x, y)` m over the static plane, pointwise for any shape.
+
+    `motion(t)` m is its vertical motion, `speed` in m/s.
     """
 
     height: Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -98,7 +105,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Loop:
-    """The parts of a time loop that have a past: what a checkpoint has to keep."""
+    """The parts of a time loop that have a history, which a checkpoint must keep."""
 
     tire: Tire
     solver: ContactSolver
@@ -112,7 +119,7 @@ class Loop:
         return self.tire.snapshot() | self.solver.state() | friction | memory
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on as if nothing had happened: the same bits on the same number of processes."""
+        """Continue with the same bits as without interruption, on the same number of processes."""
         self.tire.restore(kept)
         self.solver.set_state(kept)
         if self.friction:
@@ -133,18 +140,19 @@ def roll(
     memory: TreadMemory | None = None,
     motion: bool = True,
 ) -> Iterator[Instant]:
-    """Yield the state after each of `steps` steps of `step` seconds. Collective when the tire is.
+    """Yield the state after each of `steps` steps of `step` seconds. Collective if the tire is.
 
-    `done` of them were taken before, and tire, solver and friction are as they were then.
-
-    The solver was made for A + C~. Of the processes of `tire.comm` the root solves the contact problem, and all have its
-    answer; solver and friction of the others stay as they were, the tire and `memory` go on in each. With `friction`, the tire's forces and
-    displacements are three times as many: z, then x, then y of all points. `memory`: of a tread that creeps,
-    whose part within the step the solver knows. Without `motion` nothing is `moved`, for callers that want forces alone.
+    `solver` is made for A + C~. With `friction`, the tire's forces and displacements are three
+    times as many: z, then x, then y of all points. `memory`: that of a viscoelastic tread, whose
+    response within the step is part of the solver. `done` steps have been taken before, and tire,
+    solver and friction are as they were then. The root of `tire.comm` solves the contact problem
+    and sends the result; solver and friction of other processes stay unchanged, while tire and
+    `memory` advance on each. Without `motion` nothing is `moved`, for callers that need only
+    forces.
     """
     count = len(patch.points)
     horizontal = np.zeros((count, 2)) if patch.pull is None else patch.pull
-    # The first step starts from the static contact set, the others from the solver's last one.
+    # The first step starts from the static contact set, later ones from the solver's last one.
     touching = None if done else patch.force > 0
     answer = LoadedColumns.of(tire.same_step, tire.comm)
     settle = tire.settle if isinstance(tire, NonlinearTire) else None
@@ -189,7 +197,7 @@ def roll(
 
 
 def looking_ahead(tire: Tire) -> Ahead | None:
-    """What knows part of a step ahead, where there is such a thing."""
+    """The tire's part that looks ahead, if it has one."""
     return tire.ahead if isinstance(tire, AheadTire) else None
 
 
@@ -202,7 +210,7 @@ def _contact(
     touching: np.ndarray | None,
     free: np.ndarray,
 ) -> Solved:
-    """The contact of a step: the tire's motion `free` and the tread's `tread` from past forces, m."""
+    """The contact in one step; `free` (tire) and `tread` are the motions due to past forces, m."""
     count = len(road)
     q = patch.gap + free[:count] + tread[0] - road
     if friction is None:
@@ -219,7 +227,8 @@ def _roads(
 ) -> Iterator[tuple[float, np.ndarray]]:
     """Time (s) and road (c,) m under the points for each step after `done`.
 
-    Blocks of steps are counted from the first step on: a loop that goes on finds the same bits.
+    Blocks of steps are counted from the first step on, so that a restarted loop finds the same
+    bits.
     """
     x, y = patch.points[:, 0], patch.points[:, 1]
     block = min(max(_POINTS_AHEAD // len(x), 1), _STEPS_AHEAD)

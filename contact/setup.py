@@ -1,4 +1,4 @@
-"""What a tire meets: the points that may touch, the strip of road they drive over, and its motion."""
+"""What a tire rolls over: contact points, the strip of road under them, and its motion."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tireroad.contact.tread.pattern import Pattern
 from tireroad.fem.static.curved.shape import RoadShape
 from tireroad.greens.response import Response
 
-# What the tire may give way beyond the road's own height, m: the smallest reach of the patch.
+# Allowance for the tire's own motion beyond the road's height, m: the smallest reach.
 _MARGIN = 5e-3
 _RUNG = 1.1
 
@@ -51,8 +51,9 @@ class OuterFace(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Rolled:
-    """How the tire rolls: `speed` m/s over the road, `duration` s of the run, and the road's vertical
-    `motion` m over time s, by at most `lift` m."""
+    """How the tire rolls: `speed` m/s over the road, `duration` s of the run, and the road's
+    vertical `motion` m over time s, of at most `lift` m.
+    """
 
     speed: float
     duration: float
@@ -67,9 +68,11 @@ class Rolled:
 
 @dataclass(frozen=True, kw_only=True)
 class ContactSetup:
-    """The `patch` of points whose static gap is within `reach` (m), the strip of `road` under it, and the `slip`
-    (s_x, s_y) of the wheel, as contact.tread.brush has it, with that of the static shape at the outer face's nodes,
-    `shape_slip` (s, 2), where bristles feel it; `pull` (s, 2) N: horizontal forces of a static state with friction."""
+    """The contact of a run: the `patch` of points whose static gap is within `reach` (m), the strip
+    of `road` under it, the `slip` (s_x, s_y) of the wheel as in contact.tread.brush, `shape_slip`
+    (s, 2) of the static shape at the outer face's nodes, for bristles, and `pull` (s, 2) N,
+    horizontal forces of a static state with friction.
+    """
 
     patch: Patch
     reach: float
@@ -82,8 +85,9 @@ class ContactSetup:
 
     @property
     def drive(self) -> Drive:
-        """The road as the time loop asks for it: smoothed over each point's rectangle where it resolves less than
-        that; a pattern's depth is road that is missing, but for what the static state knows of it."""
+        """The road as the time loop uses it, smoothed over each point's rectangle where it is
+        finer; a pattern's depth lowers it, but for what the static state contains.
+        """
         road = (
             CellMean(self.road, self.patch.points[:, 1], self.patch.half_sizes)
             if self.fine
@@ -100,12 +104,12 @@ class ContactSetup:
 
     @property
     def fine(self) -> bool:
-        """Whether the road has waves shorter than two points along or across, which the points cannot tell."""
+        """Whether the road has waves shorter than two points, which the points cannot resolve."""
         return self.road.spacing < 2 * float(self.patch.half_sizes.max())
 
     @property
     def shortest(self) -> float:
-        """Half the shortest wave (m) that the points meet as they roll: of the road, or, where it is finer, of theirs."""
+        """Half the shortest wave (m) of the road met by the points; at least their spacing."""
         pitch = 2 * float(self.patch.half_sizes[~self.patch.edge, 0].min(initial=np.inf))
         return max(self.road.spacing, pitch) if np.isfinite(pitch) else self.road.spacing
 
@@ -117,7 +121,7 @@ class ContactSetup:
 
     @property
     def relief(self) -> float:
-        """From the lowest to the highest spot of the road that the patch drives over, m; bounds."""
+        """Bound of the height difference (m) of the road under the run."""
         x0, x1, y0, y1 = self.patch.extent
         strip = x0, x1 + self.rolled.travel, y0, y1
         return self.road.highest(*strip) - self.road.lowest(*strip)
@@ -135,14 +139,17 @@ class ContactSetup:
         return replace(self, slip=(self.slip[0] + more, self.slip[1]))
 
     def smooth(self, duration: float) -> ContactSetup:
-        """The same on a road without heights, at rest, for `duration` s; a slick."""
+        """The same on a flat road at rest, for `duration` s, without a pattern."""
         still = replace(self.rolled, duration=duration, motion=lambda time: 0.0, lift=0.0)
         road = _under(RoadUnderTire(Flat()), self.patch, still)
         return replace(self, road=road, rolled=still, pattern=None)
 
     def settled(self, response: Response, nodal_force: np.ndarray, spec: Spec) -> tuple:
-        """(setup, rise in m): the points take up the static load that the finite elements gave to nodes, `nodal_force`
-        (s,) N of the outer face, on the tread that the elements do not have; nodes without one have it already."""
+        """(setup, rise in m): settle the points on the tread, which the elements lack.
+
+        `nodal_force` (s,) N of the finite elements on the outer face. Nodes without a tread are
+        settled already.
+        """
         patch, force = self.patch, nodal_force[self.patch.index]
         pull = None if self.pull is None else self.pull[patch.index]
         if patch.weights is None and not spec.law.compliant:
@@ -171,7 +178,8 @@ def contact_setup(
 ) -> ContactSetup:
     """Patch and road of a run: points at the nodes, or on a grid of the `spacing` (m).
 
-    `lattice` of the finite elements' nodes, for a grid only. `pattern` of the tread, on a grid. `reach` (m) by default from the road.
+    `lattice`: of the finite elements' nodes, and `pattern`: of the tread; both for a grid only.
+    `reach` (m) is by default that of the road.
     """
     if reach is None:
         reach = _reach(face, road, rolled)
@@ -192,13 +200,13 @@ def contact_setup(
 
 
 def nodes_within(face: OuterFace, reach: float) -> Patch:
-    """The nodes with a static gap within reach (m), and one row more around them."""
+    """The nodes with a static gap within reach (m), and one more row around them."""
     given = face.half_sizes, face.normal_force, face.gap, face.shape, reach
     return make_patch(face.seen, *given)
 
 
 def on_shape(patch: Patch, road: RoadShape) -> Patch:
-    """The patch with its points where they are, and gaps, forces and motions counted along the road's normal."""
+    """The patch on a shaped road, with gaps, forces and motions along its normal."""
     if road.flat:
         return patch
     x, y, height = patch.points.T
@@ -211,7 +219,7 @@ def on_shape(patch: Patch, road: RoadShape) -> Patch:
 
 
 def _under(road: RoadUnderTire, patch: Patch, rolled: Rolled) -> PreparedRoad:
-    """The strip of road that the patch drives over in this run."""
+    """The strip of road that the patch passes over in this run."""
     _, x1, y0, y1 = patch.extent
     return road.prepare(x1, x1 + rolled.travel, y0, y1)
 
@@ -219,8 +227,9 @@ def _under(road: RoadUnderTire, patch: Patch, rolled: Rolled) -> PreparedRoad:
 def _reach(face: OuterFace, road: RoadUnderTire, rolled: Rolled) -> float:
     """Static gap up to which a point can touch: the road's highest spot, its motion, a margin.
 
-    The highest spot depends on the strip, the strip on the patch: two rounds settle it. Rounded up to a power of
-    `_RUNG` margins: roads of one kind have the same patch then, and share its Green's functions.
+    The highest spot depends on the strip and the strip on the patch, which two rounds resolve.
+    Rounded up to a power of `_RUNG` margins, so that similar roads have the same patch and share
+    its Green's functions.
     """
     reach = rolled.lift + _MARGIN
     for _ in range(2):

@@ -1,4 +1,4 @@
-"""How many steps a run takes, and so how long it is and how far the tire rolls."""
+"""The number of time steps, and hence the duration of a run and the distance rolled."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ _ROUNDING = 1e-9  # of the number of steps: a duration that is a multiple of the
 
 @dataclass(frozen=True)
 class Steps:
-    """`count` equal steps of `size` s. The state at t = 0 is known; the last one is at `duration`."""
+    """`count` equal steps of `size` s from the known state at t = 0 to the last at `duration`."""
 
     size: float
     count: int
 
     @property
     def duration(self) -> float:
-        """Time of the last step, s: not less than the duration that was asked for."""
+        """Time of the last step, s; not less than the requested duration."""
         return self.size * self.count
 
 
 def steps_of(duration: float, size: float) -> Steps:
-    """The least number of steps of `size` (s) that cover `duration` (s); at least one."""
+    """The smallest number of steps of `size` (s) that cover `duration` (s), at least one."""
     _check(duration, size)
     return Steps(size, max(math.ceil(duration / size * (1.0 - _ROUNDING)), 1))
 
 
 def equal_steps(duration: float, largest: float) -> Steps:
-    """Equal steps no longer than `largest` (s) that end at `duration` (s) exactly."""
+    """Equal steps no longer than `largest` (s) that end exactly at `duration` (s)."""
     _check(duration, largest)
     count = steps_of(duration, largest).count
     return Steps(duration / count, count)

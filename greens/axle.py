@@ -1,20 +1,22 @@
-"""Force and moment on a held axle per force on the tread: from the momentum, and from the modes of a free rim.
+"""Force and moment on a held axle per force on the tread: by momentum, and by free-rim modes.
 
-The tire passes on what acts on it less what its momentum takes up,
+The tire transmits the forces on it less the rate of change of its momentum,
 
     f_axle = sum f_c - d/dt int rho Du/Dt = sum f_c + omega^2 int rho u,
 
-for the convective part of the momentum cancels around the ring. The other way is the thesis's (7.1)-(7.4), put right.
-With the rigid rim's six motions r and the loads c, a rim that is held stands still under the forces
+since the convective part of the momentum cancels around the ring. The other way is the thesis's
+(7.1)-(7.4), corrected. With the six motions r of the rigid rim and the loads c, the rim stays at
+rest under the forces
 
     f_r = -H_rr^-1 H_rc f_c     on the tire,
 
-the opposite of which acts on the axle. Damping by the mass acts against the wheel and not against the
-ground, so the axle carries  gamma1 (s R^T M + Omega R^T B) u  besides, u the tire's motion while the rim is held.
-R^T B = -(B R)^T; for the force it is  gamma1 (s - Omega e_y x) int rho u.
+the opposite of which acts on the axle. Mass-proportional damping acts against the wheel and not
+against the ground, so the axle also carries  gamma1 (s R^T M + Omega R^T B) u, with u the motion of
+the tire while the rim is held. R^T B = -(B R)^T; for the force it is  gamma1 (s - Omega e_y x) int
+rho u.
 
-Both ways give the moments about the axle's centre too: rotations r of the rim, R = e_k x, x the loaded tire. By
-momentum they are
+Both ways also yield the moments about the axle's centre, with the rotations R = e_k x of the
+rim, x the position in the loaded tire. By momentum they are
 
     m_axle = R^T f - [s^2 R^T M + 2 s Omega R^T G + R^T (K + Omega^2 S)] u,
 
@@ -44,9 +46,9 @@ def axle_transfer(
 ) -> np.ndarray:
     """Force, -, and moment, m, of the tire on the axle per unit load, (f, 6, k).
 
-    `receptance` (f, 18, 6 + k) per force and moment on the rim and per load: translation (m) and rotation (rad) of
-    the free rim, then R^T M u and R^T B u of the tire beside it, at `frequency` (f,) Hz above 0; `speed` rad/s,
-    `damping` gamma1 1/s.
+    `receptance` (f, 18, 6 + k) per force and moment on the rim and per load: translation (m) and
+    rotation (rad) of the free rim, followed by R^T M u and R^T B u of the tire, at `frequency` (f,)
+    Hz above 0; `speed` rad/s, `damping` gamma1 1/s.
     """
     rim, rest = receptance[:, :6], receptance[:, 6:]
     held = -np.linalg.solve(rim[:, :, :6], rim[:, :, 6:])
@@ -58,10 +60,10 @@ def axle_transfer(
 def by_free_rim(
     wheel: Wheel, modes: Modes, loads: Probes, frequency: np.ndarray, motion: RimMotion
 ) -> np.ndarray:
-    """Force, -, and moment, m, on the held axle per unit load (f, 6, k), at `frequency` (f,) Hz above 0.
+    """Force, -, and moment, m, on the held axle per unit load (f, 6, k), `frequency` in Hz above 0.
 
-    By the `modes` of the free rim of the `wheel`, which the rim's and the `loads`' (k, 3 s) attachment modes join; `motion` of
-    the rim of the same state. Collective.
+    Computed from the `modes` of the `wheel` with a free rim, joined by attachment modes of the rim
+    and of the `loads` (k, 3 s). `motion`: that of the rim at the same state. Collective.
     """
     width = loads.shape[1]
     rim = sparse.hstack([sparse.csr_matrix((6, width)), sparse.identity(6)])
@@ -72,7 +74,7 @@ def by_free_rim(
     rate = -motion.rows["body"] if wheel.speed else np.zeros_like(motion.rows["mass"])
     beside = np.hstack([motion.rows["mass"], rate])
     own = summed(wheel.operators.body.comm, beside.T @ fields[: len(beside)])
-    # What damps by the mass is the tire, not the air.
+    # Only the tire has mass-proportional damping, not the air.
     own = np.pad(own, ((0, 0), (0, carried.shape[1] - own.shape[1])))
     response = couple(grown.states, np.vstack([seen[:6], own]), seen, carried)
     turning = wheel.speed, wheel.against_wheel
@@ -80,15 +82,18 @@ def by_free_rim(
 
 
 def from_moment(total: np.ndarray, moment: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Force on the axle per unit load (f, 3, k), -, from the `total` (3, k) of each load and the tire's first
-    moment int rho u per unit load (f, 3, k) kg m/N, at `frequency` (f,) Hz.
+    """Force on the axle per unit load (f, 3, k), -, at `frequency` (f,) Hz.
+
+    `total` (3, k) is the sum of each load, `moment` (f, 3, k) kg m/N the first moment int rho u of
+    the tire per unit load.
     """
     return total + (2 * np.pi * frequency[:, None, None]) ** 2 * moment
 
 
 def by_momentum(response: Response, total: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """The same of a held rim by the states of a response; what no state has follows statically, where its moment
-    is known (Response.left_out).
+    """The same for a held rim, from the states of a response.
+
+    What no state contains follows statically, where its moment is known (Response.left_out).
     """
     nothing = np.zeros((3, response.residual.shape[1]))
     moment = replace(

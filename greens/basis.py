@@ -1,4 +1,4 @@
-"""A basis of decoupled states as probes on the outer face see it."""
+"""A basis of decoupled states, seen through probes on the outer face."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ Pencil = tuple[np.ndarray, np.ndarray]  # D~ and K~ of a projected problem
 
 @dataclass(frozen=True, kw_only=True)
 class Basis:
-    """`shape` kg^-1/2 of the outer face (3 s, m), of a free rim after it (+ 6); the projected matrices;
-    the decoupled states at `speed` rad/s.
+    """The modal basis and its states, with the operations that probes need.
 
-    Probes are (k, 3 s) weights of the outer face; or wider: 6 more of a free rim's motion; of a corner's wheel
-    and body 7 (modal.corner), and 3 more that read the moments on its hub.
+    `shape` kg^-1/2 of the outer face (3 s, m), with six more rows for a free rim; `projection`: the
+    projected matrices; `states`: the decoupled states at `speed` rad/s. Probes are weights (k, 3 s)
+    of the outer face. Wider ones have six more columns for the motion of a free rim, or, with a
+    corner, seven for wheel and body (modal.corner) and three more that read the hub moments.
     """
 
     shape: np.ndarray
@@ -37,7 +38,7 @@ class Basis:
 
     @staticmethod
     def of(rolling: RollingModes) -> Basis:
-        """The states of a rolling tire, as probes see them."""
+        """The basis of the states of a rolling tire."""
         return Basis(
             shape=rolling.basis.shape,
             projection=rolling.basis.projection,
@@ -51,8 +52,11 @@ class Basis:
         loads: sparse.csr_matrix,
         flexibility: np.ndarray | None = None,
     ) -> Response:
-        """Response (r, k) of the probes `outputs` and `loads`; with the exact static answers `flexibility` (r, k) its
-        residual is what the states lack of them."""
+        """Response (r, k) between the probes `outputs` and `loads`.
+
+        With the exact static response `flexibility` (r, k), its residual is what the states lack of
+        it.
+        """
         given = self.seen(outputs), self.seen(loads)
         response = couple(self.states, *given, self.projection.carried)
         wanted = self.of_hub(outputs)
@@ -65,19 +69,22 @@ class Basis:
         return replace(response, residual=flexibility - response.static())
 
     def of_hub(self, outputs: sparse.csr_matrix) -> sparse.csr_matrix:
-        """By what weights (r, 3) the probes read the moments on the hub."""
+        """Weights (r, 3) by which the probes read the hub moments."""
         corner = self.projection.corner
         if corner is None:
             return sparse.csr_matrix((outputs.shape[0], 3))
         return outputs[:, 3 * len(corner.places) + SEEN :]
 
     def loaded(self, loads: sparse.csr_matrix) -> np.ndarray:
-        """Moments (3, k) m of unit loads about the axle's centre."""
+        """Moments (3, k), m, of unit loads about the axle's centre."""
         return self.projection.wheel.rigid(loads)[:, MOMENTS].T
 
     def beside(self, wanted: sparse.csr_matrix) -> np.ndarray:
-        """What all coordinates carry besides, (3, m + a + c): momentum; and where moments on the hub are `wanted` (r, 3) the
-        rows A_0, A_1, A_2 of greens.hub after it, (12, m + a + c)."""
+        """Rows that all coordinates carry besides: the momentum (3, m + a + c).
+
+        Where hub moments are `wanted` (r, 3), the rows A_0, A_1, A_2 of greens.hub follow,
+        (12, m + a + c).
+        """
         carried = self.projection.carried
         if not wanted.nnz:
             return carried
@@ -85,21 +92,21 @@ class Basis:
 
     @property
     def coordinates(self) -> int:
-        """How many there are: m + a + c."""
+        """Number of coordinates, m + a + c."""
         return self.projection.carried.shape[1]
 
     def seen(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """All coordinates (k, m + a + c) as the probes read them (modal.basis.Projection.seen)."""
+        """What the probes read of all coordinates, (k, m + a + c) (modal.basis.Projection.seen)."""
         return self.projection.seen(self._of_modes(probes), probes)
 
     def _of_modes(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """What the probes see of the modes (k, m); a corner's own motions come after the outer face."""
+        """What the probes read of the modes (k, m); columns of a corner's motions are skipped."""
         width = min(probes.shape[1], len(self.shape))
         return probes[:, :width] @ self.shape[:width]
 
     @property
     def held(self) -> Basis:
-        """The coordinates with the rim held; the states are not theirs."""
+        """The coordinates with the rim held; the states are not those of a held rim."""
         corner = self.projection.corner and replace(self.projection.corner, axle=Axle.held())
         return replace(self, projection=replace(self.projection, corner=corner))
 
@@ -111,10 +118,10 @@ def regained(
     outputs: sparse.csr_matrix,
     loads: sparse.csr_matrix,
 ) -> Moments:
-    """What the modes answer under their true damping beyond what they do under that of the full matrices.
+    """Moments of the modes under true damping less those under the full matrices' damping.
 
-    The moments of full matrices with it are those of matrices that damp the modes truly, and the rest
-    uniformly. `true`, `uniform`: D~ and K~ of both.
+    Added to the moments of the full matrices, they yield those of matrices that damp the modes
+    truly and all other motions uniformly. `true`, `uniform`: D~ and K~ of both.
     """
     own = basis.projection.squares > 0
     flexible = np.pad(own, (0, len(true[0]) - len(own)), constant_values=True)  # the air's are

@@ -1,10 +1,11 @@
-"""The force on a hub that gives way, from the force on one that does not: substructuring by the blocked force.
+"""The force on a compliant hub from the force on a rigid one: substructuring by the blocked force.
 
     f = (Y_T + Y_S)^-1 Y_T f_blocked = Z_S (Z_T + Z_S)^-1 f_blocked,
 
-f_blocked the force of the tire on a rim that is held, Y = 1/Z the mobility (here: the receptance) of the tire
-at its free rim and of what holds it, wheel, springs and body. With the same loads on the tire it is the force
-of the coupled states, which never saw these matrices: a check of their whole way.
+where f_blocked is the force of the tire on a held rim, and Y = 1/Z the mobility (here: the
+receptance) of the tire at its free rim (T) and of its support (S): wheel, springs and body. The
+coupled states yield the same force under the same loads without these matrices, so the comparison
+checks them entirely.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ from tireroad.modal.rotating import held_matrices
 def substituted(
     basis: Basis, turning: Turning, loads: sparse.csr_matrix, frequency: np.ndarray
 ) -> np.ndarray:
-    """Force on the hub (f, 3, k) per unit load at the probes (k, 3 s), at `frequency` (f,) Hz above 0: of its
-    springs and dampers where the wheel moves, of the held rim where it is locked.
+    """Force on the hub (f, 3, k) per unit load at the probes (k, 3 s), `frequency` in Hz above 0.
+
+    In directions in which the wheel moves it is that of springs and dampers, in locked ones that on
+    the held rim.
     """
     corner, held = basis.projection.wheel, basis.held
     drag, stiffness = held_matrices(
@@ -79,7 +82,7 @@ def _wheel(axle: Axle) -> np.ndarray:
 
 
 def by_states(basis: Basis, loads: sparse.csr_matrix, frequency: np.ndarray) -> np.ndarray:
-    """The same (f, 3, k) from the coupled states: loads less the rate of the momentum that they carry."""
+    """The same (f, 3, k) from the coupled states: loads less the rate of their momentum."""
     response = basis.couple(loads, loads)
     count = loads.shape[0]
     moving = replace(
@@ -95,7 +98,7 @@ def by_states(basis: Basis, loads: sparse.csr_matrix, frequency: np.ndarray) -> 
 def disagreement(
     basis: Basis, turning: Turning, loads: sparse.csr_matrix, frequency: np.ndarray
 ) -> float:
-    """Largest relative difference of both over the frequencies, Frobenius norm."""
+    """Largest relative difference between the two over the frequencies, in the Frobenius norm."""
     one, other = substituted(basis, turning, loads, frequency), by_states(basis, loads, frequency)
     size = np.linalg.norm(one, axis=(1, 2))
     return float((np.linalg.norm(one - other, axis=(1, 2)) / size).max())

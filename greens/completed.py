@@ -1,4 +1,4 @@
-"""The states of a basis with the static answers of all that they lack."""
+"""The states of a basis, completed by the static response of all that they lack."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ def completed(
     flexibility: Array,
     beside: Array,
 ) -> Response:
-    """The response (r, k) that answers a slow force as the full matrices do, its rim held: `flexibility` (r, k) m/N, and
-    what that carries `beside` (Basis.beside), the momentum (3, k) or that with the moments on the hub (12, k).
+    """The response (r, k) whose static limit is that of the full matrices with the rim held.
 
-    A wheel that moves has the states' answers to that, and of what they lack those of the held rim.
+    `flexibility` (r, k) m/N is their static response and `beside` what it carries (Basis.beside):
+    the momentum (3, k), or with hub moments (12, k). For a wheel that moves, the states respond as
+    they are, and are completed by what the states of the held rim lack.
     """
     hub = basis.of_hub(outputs)
     if hub.nnz:

@@ -1,4 +1,4 @@
-"""Direct convolution with sampled Green's functions (thesis (5.3)): the reference, not the way.
+"""Direct convolution with sampled Green's functions (thesis (5.3)), kept as a reference.
 
     u_n = sum_{k<n} g((n - k) h) f_k h + G_res f_n,   g(0) = 0
 
@@ -18,7 +18,10 @@ LARGEST = 4e9  # bytes of sampled Green's functions
 
 
 class Convolution:
-    """The interface of `Recursion` by direct sums over the whole history, in steps of `step` s. Not collective."""
+    """The interface of `Recursion` by direct sums over the whole history, in steps of `step` s.
+
+    InputError if the sampled Green's functions take more than `LARGEST` bytes. Not collective.
+    """
 
     def __init__(self, *, response: Response, step: float, steps: int) -> None:
         outputs, forces = response.residual.shape
@@ -42,12 +45,12 @@ class Convolution:
         self._history[0] = force
 
     def predict(self) -> np.ndarray:
-        """Displacement (r,) m at the end of the step from all forces before it."""
+        """Displacement (r,) m at the end of the step due to all earlier forces."""
         self._n += 1
         return _convolve(self._kernel[: self._n], self._history[: self._n])
 
     def advance(self, force: np.ndarray) -> None:
-        """Take the force (k,) N at the end of the step."""
+        """Set the force (k,) N at the end of the step."""
         self._history[self._n] = force
 
     def snapshot(self) -> dict[str, np.ndarray]:
@@ -55,12 +58,12 @@ class Convolution:
         return {"history": self._history[: self._n + 1]}
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from a snapshot."""
+        """Continue from a snapshot."""
         self._n = len(kept["history"]) - 1
         self._history[: self._n + 1] = kept["history"]
 
     def inertia_force(self) -> np.ndarray:
-        """Rate of the tire's momentum (3,), N."""
+        """Rate of change of the tire's momentum (3,), N."""
         past = _convolve(self._momentum[: self._n], self._history[: self._n])
         return past + self._direct @ self._history[self._n]
 

@@ -1,4 +1,4 @@
-"""Responses between chosen probes of a turning tire, with the wanted residual flexibility."""
+"""Responses between chosen probes of a rolling tire, with the requested residual flexibility."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ from tireroad.modal.solver.modes import Modes
 
 @dataclass(frozen=True, kw_only=True)
 class Wheel:
-    """The full matrices of a tire that turns: `damping` as in modal.damping, `rotation` None when it
-    stands. `beyond` (gamma1 1/s, gamma2 s) damps what no mode has, and the full matrices: given where
-    `damping` is by strain energy, of which there are no full matrices. `corner` joins a wheel,
-    held or not, to a projection on modes; `rim`: what a held rim's motions meet, for the moments on its hub. Its
-    properties are collective at their first use."""
+    """The full matrices of a rolling tire, or a standing one if `rotation` is None. `beyond`
+    (gamma1 1/s, gamma2 s) damps motions outside the modes, and the full matrices: it is given if
+    `damping` (modal.damping) is by strain energy, which has no full matrices. `corner` adds a
+    wheel, held or not, to a projection; `rim`: motions of a held rim, for hub moments. Properties
+    are collective at first use."""
 
     operators: Operators
     rotation: Rotation | None
@@ -73,12 +73,12 @@ class Wheel:
 
     @property
     def against_wheel(self) -> float:
-        """Damping by the mass, 1/s, that acts against the wheel: by strain energy a rigid motion is not damped."""
+        """Mass-proportional damping, 1/s, against the wheel; none by strain energy."""
         return 0.0 if self.beyond is not None else self._uniform[0]
 
     @property
     def _uniform(self) -> tuple[float, float]:
-        """What the full matrices are damped by."""
+        """The damping of the full matrices."""
         if self.beyond is not None:
             return self.beyond
         assert not isinstance(self.damping, StrainEnergy), "`beyond` is given then"
@@ -90,7 +90,7 @@ class Wheel:
         return self.operators.loss_stiffness()
 
     def _pencils(self, projection: Projection) -> tuple[Pencil, Pencil]:
-        """With the rim held, the projected pencil as the modes are damped, and as the full matrices are."""
+        """Projected pencils with the rim held: damped as the modes, and as the full matrices."""
         true = held_matrices(projection, self.speed, self.damping, self.inertia)
         return true, held_matrices(projection, self.speed, self._uniform, self.inertia)
 
@@ -99,9 +99,8 @@ class Wheel:
     ) -> Response:
         """Response with the residual `option`. Collective.
 
-        For "attachment" only: `modes` on all unknowns, the very solution that `basis` projects. InputError
-        for another one: its signs and its vectors of repeated frequencies differ.
-        """
+        `modes` on all unknowns, for "attachment" only, must be the solution that `basis` projects:
+        another one has other signs and vectors of repeated frequencies. InputError otherwise."""
         if option in ("static", "dirac"):
             whole = self._with_statics(basis, outputs, loads)
             moved = outputs.shape[0] - np.count_nonzero(basis.of_hub(outputs).getnnz(axis=1))
@@ -120,7 +119,7 @@ class Wheel:
         return whole if same else whole.between(slice(r), slice(r, r + k))
 
     def _of_second_order(self, basis: Basis, probes: Probes) -> Response:
-        """The states, and those that stand for what they lack. Collective."""
+        """The states, and residual states in place of the truncated modes. Collective."""
         hub = basis.of_hub(probes)
         face = probes[:, : 3 * len(self.operators.body.surface.ids)] if hub.nnz else probes
         full = self.rotating_stiffness, self.rotating_damping
@@ -139,8 +138,7 @@ class Wheel:
         return whole if self.air is not None else replace(whole, left_out=moment)
 
     def _beside(self, hub: Probes) -> Array:
-        """Own rows (3, n) of the momentum; where moments on the `hub` (r, 3) are read the rows A_0, A_1, A_2 of greens.hub
-        after it, (12, n). Collective."""
+        """Own rows (3, n) of momentum; with A_0 to A_2 of greens.hub (12, n) if `hub` is read."""
         carried = self.operators.carried
         if not hub.nnz:
             return carried
@@ -161,7 +159,7 @@ class Wheel:
     def _completed(
         self, basis: Basis, outputs: Probes, loads: Probes, flexibility: Array, beside: Array
     ) -> Response:
-        """The states with what they lack (greens.completed)."""
+        """The states completed by what they lack (greens.completed)."""
         made = completed(basis, self.turning, outputs, loads, flexibility, beside)
         return made if self.air is None else replace(made, left_out=None)
 
@@ -177,7 +175,7 @@ class Wheel:
         answers = shapes.readings(sparse.vstack([loads.T, rows], format="csr"), loads)
         flexibility = weights @ (weights @ answers[: loads.shape[1]].T).T
         beside = (weights @ answers[loads.shape[1] :].T).T
-        # Few of the shapes join the basis: solving for these once more takes less than holding all until it is known which.
+        # Few shapes join the basis: solving for them again is cheaper than storing all.
         columns = shapes.whole(loads @ (weights.T @ self._foremost(basis, probes, flexibility)))
         shapes.destroy()
         grown_modes = joined(modes, columns, self.operators)
@@ -189,7 +187,7 @@ class Wheel:
         return self._completed(grown, probes, probes, flexibility, beside)
 
     def _foremost(self, basis: Basis, probes: Probes, flexibility: Array) -> Array:
-        """By which loads (p, k) of the probes shapes are made: of those that move something."""
+        """Load combinations (p, k) whose shapes join the basis, among probes that move anything."""
         moving = np.flatnonzero(np.diag(flexibility))
         some, own = probes[moving], flexibility[np.ix_(moving, moving)]
         missing = self._completed(basis, some, some, own, np.zeros((3, len(moving)))).residual
@@ -199,7 +197,7 @@ class Wheel:
         return out
 
     def _check_same(self, basis: Basis, modes: Modes) -> None:
-        """InputError where these modes are not those of the basis. Collective."""
+        """InputError if these modes are not those of the basis. Collective."""
         if not same_fields(self.operators.trace(modes.vectors), basis.shape):
             raise InputError(
                 "attachment modes: the modes on all unknowns are not those that the basis shows; take "
@@ -208,18 +206,18 @@ class Wheel:
 
     @property
     def _drifts(self) -> bool:
-        """Whether the turning tire has no static answer: with a free rim K_Omega has no inverse."""
+        """Whether a rolling tire has no static response: with a free rim K_Omega is singular."""
         return self.rotation is not None and self.operators.unknowns.rim is not None
 
     def standing_attachments(self, modes: Modes, probes: Probes) -> tuple[Basis, Array]:
-        """Modes with the static shapes, relieved where nothing holds the tire, of K; their fields, own rows. Collective."""
+        """Modes with static shapes of K (inertia relief if free), and own fields. Collective."""
         operators = self.operators
         columns = statics(operators, operators.stiffness, on_own_rows(operators, probes))
         return self._grown(joined(modes, columns, operators))
 
     def _grown(self, grown: Modes, known: Projection | None = None) -> tuple[Basis, Array]:
-        """The basis of modes with their attachment modes, and their fields; `known`: on the first of them, beside which
-        those stay that are more than static; of its shapes and those that join now none is as it was. Collective."""
+        """The basis of modes with attachment modes, and its fields; `known`: on the first of them,
+        whose modes are reused. Of the shapes that join, only dynamic ones stay. Collective."""
         operators, comm, loss = self.operators, self.operators.body.comm, self.beyond and self._loss
         same = known and known.first(known.modes)
         projection = project(grown, self.rotation, operators.carried, comm, same, loss)
@@ -235,18 +233,18 @@ class Wheel:
 
     @property
     def turning(self) -> Turning:
-        """How the wheel turns."""
+        """The rotation of the wheel."""
         return Turning(speed=self.speed, damping=self.damping, inertia=self.inertia)
 
     def with_air(self, projection: Projection, modes: Modes) -> Projection:
-        """The projection on the modes (all rows), joined by the air where there is any. Collective."""
+        """The projection on the modes (all rows), joined by the air, if any. Collective."""
         return with_air(projection, modes, self.air)
 
     def decouple(self, projection: Projection, comm: MPI.Comm) -> StateModes:
-        """The second eigenproblem, or the closed formula of a tire that stands. Collective."""
+        """The second eigenproblem, or the closed form of a standing tire. Collective."""
         return decouple(projection, self.turning, comm)
 
     def receptance(self, outputs: Probes, loads: Probes, frequency: np.ndarray) -> np.ndarray:
-        """H (f, r, k) m/N without any modes, at the frequencies in Hz. Collective."""
+        """H (f, r, k) m/N of the full matrices, at the frequencies in Hz. Collective."""
         full = self.rotating_stiffness, self.rotating_damping
         return receptance(self.operators, *full, outputs, loads, frequency, air=self.air)

@@ -1,10 +1,11 @@
-"""Moments on the hub among a response's outputs: the loads' own less what the motion of the tire takes up,
+"""Hub moments as outputs of a response: those of the loads less those of the tire's motion,
 
     m = R^T f - (A_2 u'' + A_1 u' + A_0 u),
 
-A as in modal.corner.Corner.moments, u all that moves: states, and what follows a force statically. Of states z' = s z + P f
-with coordinates q = C z (real part) the rates are  q' = C s z + C P f  and  q'' = C s^2 z + C s P f;  C P f', which a
-complete set of states does not have, is left out, as for the momentum (Response.direct_momentum_rate).
+with A as in modal.corner.Corner.moments, and u the motion of the states and of what follows a force
+statically. States z' = s z + P f with coordinates q = C z (real part) have the rates
+q' = C s z + C P f  and  q'' = C s^2 z + C s P f.  The term C P f', which vanishes for a complete
+set of states, is omitted, as for the momentum (Response.direct_momentum_rate).
 """
 
 from __future__ import annotations
@@ -21,14 +22,17 @@ from tireroad.modal.states import StateModes
 def reading(
     response: Response, states: StateModes, wanted: sparse.csr_matrix, rows: np.ndarray
 ) -> Response:
-    """The `response` whose outputs read, by the weights `wanted` (r, 3), less A_2 q'' + A_1 q' + A_0 q of its own
-    `states`; `rows` (9, m): A_0, A_1 and A_2 on their m coordinates.
+    """The `response` with -(A_2 q'' + A_1 q' + A_0 q) of its own `states` added to its outputs.
+
+    `wanted` (r, 3): the weights of the moments in the outputs; `rows` (9, m): A_0, A_1 and A_2 on
+    the m coordinates.
     """
     if not wanted.nnz:
         return response
     s, block = states.eigenvalue, states.block
     by_state, by_block = np.zeros((3, len(s)), complex), np.zeros((3, len(block)))
-    for part in np.split(rows, 3)[::-1]:  # Horner's rule: a rate more has the jump of what it was
+    # Horner's rule: each further rate has the jump of the one before.
+    for part in np.split(rows, 3)[::-1]:
         direct = (by_state @ response.input).real + by_block @ response.block_input
         by_state = by_state * s - part @ states.right
         by_block = by_block @ block - part @ states.block_right

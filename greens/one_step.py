@@ -1,4 +1,4 @@
-"""One step of the states: what they keep of themselves, and what forces at its beginning and its end do (greens.recursion)."""
+"""One time step of the states: decay, and forces at its start and end (greens.recursion)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from tireroad.greens.response import Response
 
 
 class Block:
-    """The recursion for the dense block of near-defective states, on the first process that has states alone.
+    """Recursion of the block of nearly defective states, on the first process with states.
 
-    Its last three outputs are the rate of momentum, the jump with the force left out.
+    Its last three outputs are the rate of change of momentum, without its jump due to the force.
     """
 
     def __init__(self, response: Response, step: float, scheme: str) -> None:
@@ -56,7 +56,7 @@ class Block:
 def block_steps(
     block: np.ndarray, push: np.ndarray, step: float, scheme: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """e^{Th} (b, b), and b0 P and b1 P (b, k) of the block T with its input P."""
+    """e^{Th} (b, b), and b0 P and b1 P (b, k), of the block T with its input P."""
     size, forces = push.shape
     # expm of [[T, P, 0], [0, 0, I/h], [0, 0, 0]] h carries e^{Th}, h phi1 P and h phi2 P at once.
     wide = np.zeros((size + 2 * forces, size + 2 * forces))

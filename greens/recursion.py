@@ -1,12 +1,12 @@
-"""The convolution of Green's functions and forces, advanced exactly step by step without a history.
+"""State-space recursion: the exact convolution of Green's functions and forces, without history.
 
-Over one step h with the force linear, f(tau) = f_n + (f_{n+1} - f_n) tau / h, each state moves by
+With a force linear over one step h (first-order hold), f(tau) = f_n + (f_{n+1} - f_n) tau / h, each
+state advances by
 
     z_{n+1} = e^{sh} z_n + b0 P f_n + b1 P f_{n+1},   b1 = h phi2(sh),  b0 = h (phi1 - phi2)(sh),
 
-phi1(x) = (e^x - 1)/x, phi2(x) = (e^x - 1 - x)/x^2; with the force constant at its new value b0 = 0
-and b1 = h phi1. Cost: one pass over output and input, 4 q (r + k) flops and 16 q (r + k) bytes.
-"""
+phi1(x) = (e^x - 1)/x, phi2(x) = (e^x - 1 - x)/x^2. With the force constant at its new value b0 = 0
+and b1 = h phi1. Cost: one pass over output and input, 4 q (r + k) flops and 16 q (r + k) bytes."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from tireroad.greens.spread import Spread
 
 
 class Recursion:
-    """Response states of a `Response`, spread over the processes of `comm` by eigenvalue; with `look_ahead`, over all but the
-    root, which solves the contact problem while they look ahead.
+    """The states of a `Response`, distributed over the processes of `comm` by eigenvalue.
 
-    `predict` gives the displacement at the end of the next step if the new force were zero (without
-    the residual); `advance` takes the new force. `same_step` (r, k) m/N is what a unit new force
-    adds to it at once, the residual included. A step reads the output matrix once and of the input
-    matrix the columns of the forces that are not zero. The rate of momentum is three more outputs,
-    so that processes meet once a step.
+    `predict` gives the displacement at the end of the next step for a zero new force (without the
+    residual); `advance` sets the new force. `same_step` (r, k) m/N is the immediate displacement
+    per unit new force, residual included. A step reads the output matrix once, and of the input
+    matrix the columns of nonzero forces. The rate of change of momentum is three more outputs, so
+    processes meet once per step.
 
-    Looking ahead: with z_n = e^{sh} z_{n-1} + b0 P f_{n-1} + b1 P f_n = y_n + b1 P f_n the displacement C y_{n+1} at the end of
-    the step after is C e^{sh} y_n, known before f_n is, and C (e^{sh} b1 + b0) P f_n, of which the root reads the columns
-    of the forces that are not zero. So it predicts by itself; the others get its prediction with the force, when they give it
-    what they know of the next step, and states take a force only when something is asked of them: nobody waits for P f_n.
-    `ahead` is the recursion itself then, else None.
-    """
+    With `look_ahead` the root has no states: it solves the contact problem while the others look
+    ahead. With z_n = e^{sh} z_{n-1} + b0 P f_{n-1} + b1 P f_n = y_n + b1 P f_n, the displacement
+    C y_{n+1} at the end of the following step is C e^{sh} y_n, known before f_n, plus
+    C (e^{sh} b1 + b0) P f_n, of which the root reads the columns of nonzero forces. So the root
+    predicts by itself and sends its prediction with the force, when it receives what the others
+    know of the next step. States take up a force only when they are next needed, so nobody waits
+    for P f_n. `ahead` is then the recursion itself, else None."""
 
     def __init__(
         self,
@@ -47,14 +47,14 @@ class Recursion:
     ) -> None:
         self.comm = comm
         self.step = step
-        self._idle = int(look_ahead and comm.size > 1)  # processes without states, from the root on
+        self._idle = int(look_ahead and comm.size > 1)  # processes without states, the root first
         self._spread = Spread(comm, self._idle)
         mine = self._spread.mine(np.arange(len(response.eigenvalue)))
         s = response.eigenvalue[mine]
         self._decay = np.exp(s * step)
         self._old, self._new = weights(s * step, step, scheme)
         momentum = response.momentum[:, mine]
-        # Real arithmetic on (re, im) beside each other, as the states lie in memory.
+        # Real arithmetic on adjacent (re, im), as the states lie in memory.
         output = np.vstack([response.output[:, mine], momentum * s**2])
         into = np.ascontiguousarray(response.input[mine])
         self._output = np.ascontiguousarray(output.conj()).view(float)
@@ -62,10 +62,10 @@ class Recursion:
         if comm.rank == self._idle and len(response.block):
             self._block = Block(response, step, scheme)
         self._state = np.zeros(len(mine), complex)
-        self._push = np.zeros(len(mine), complex)  # P f of the step before
-        self._free = self._state  # at the end of the step, if it had no force
-        self._moved = False  # whether `_free` is that of this step yet
-        self._taken = True  # whether `_state` knows the last force
+        self._push = np.zeros(len(mine), complex)  # P f of the previous step
+        self._free = self._state  # at the end of the step without a new force
+        self._moved = False  # whether `_free` belongs to this step yet
+        self._taken = True  # whether `_state` includes the last force
         self._samples: list[tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
         self._begun = response.direct_momentum_rate()
         self._add_same_step(response, into)
@@ -73,19 +73,19 @@ class Recursion:
         self._next = self._answers_next(into) if self._idle else None
         self._late = None
         if response.pulse and scheme == "linear":
-            # A pulse one step long answers the mean of a linear force over the step.
+            # A pulse one step long responds to the mean of a linear force over the step.
             self._late = response.residual / 2
             self._late[response.pulse :] = 0.0
             self.same_step -= self._late
         self._force = np.zeros(response.residual.shape[1])
         self._rate = np.zeros(3)
-        # Outputs at the end of this step, and what is known of those at the end of the next: here, on all processes.
+        # Outputs at the end of this step; this process's and all known parts of the next step's.
         self._out = np.zeros(len(self._output))
         self._part = self._known = self._out
-        self._unknown = self._force  # whose answer `_known` lacks
+        self._unknown = self._force  # the force missing from `_known`
 
     def _add_same_step(self, response: Response, into: np.ndarray) -> None:
-        """What a unit new force adds at once, to the displacements and to the rate of momentum."""
+        """Immediate effect of a unit new force on the displacements and on the rate of momentum."""
         pushed = np.ascontiguousarray((self._new[:, None] * into).T).view(float)
         direct = self._output @ pushed.T
         if self._block:
@@ -94,11 +94,12 @@ class Recursion:
         self.same_step = response.residual + direct[:-3]
         pushes = np.ascontiguousarray(into.T).view(float).T
         self._input = LoadedColumns(pushes)
-        # By itself, or processes with other numbers of states would round it otherwise.
+        # A product of its own: otherwise its rounding would depend on the number of states per
+        # process.
         self._into_rate = direct[-3:] + self._begun
 
     def _answers_next(self, into: np.ndarray) -> LoadedColumns | None:
-        """What a unit force does by the end of the step after its own, on the root process. Collective."""
+        """Effect of a unit force at the end of the step after its own, on the root. Collective."""
         pushed = (self._decay * self._new + self._old)[:, None] * into
         direct = self._output @ np.ascontiguousarray(pushed.T).view(float).T
         if self._block:
@@ -114,7 +115,7 @@ class Recursion:
         return total
 
     def start(self, force: np.ndarray) -> None:
-        """Begin with a force (k,) N that is already there at t = 0, the tire still at rest. Collective when looking ahead."""
+        """Begin with a force (k,) N at t = 0, at rest. Collective when looking ahead."""
         self._force = force
         self._push = (self._input @ force).view(complex)
         self._rate = self._begun @ force
@@ -123,14 +124,16 @@ class Recursion:
         self._begin()
 
     def _begin(self) -> None:
-        """Know all of the first step's outputs."""
+        """Compute all outputs of the first step. Collective when looking ahead."""
         if self.ahead:
             self._move()
             self._known, self._unknown = self._reduce(self._seen()), np.zeros_like(self._force)
 
     def predict(self) -> np.ndarray:
-        """Displacement (r,) m at the end of the step with no new force. Collective; looking ahead, the root is first, and the
-        others may call it after `exchange`."""
+        """Displacement (r,) m at the end of the step without a new force.
+
+        Collective. When looking ahead the root calls it first, and the others may after `exchange`.
+        """
         if not self.ahead:
             self._move()
             self._out = self._reduce(self._seen())
@@ -141,7 +144,7 @@ class Recursion:
         return out if self._late is None else out + self._late @ self._force
 
     def _move(self) -> None:
-        """States to the end of the step, with no new force."""
+        """Advance the states to the end of the step, without a new force."""
         if self._moved:
             return
         self._take()
@@ -151,7 +154,7 @@ class Recursion:
         self._moved = True
 
     def _take(self) -> None:
-        """The force that `advance` was given, into the states."""
+        """Add the force that `advance` was given to the states."""
         if self._taken:
             return
         self._push = (self._input @ self._force).view(complex)
@@ -163,27 +166,28 @@ class Recursion:
             self._samples.append((self._state, self._push, self._force))
 
     def _seen(self) -> np.ndarray:
-        """This process's part of the outputs with no new force."""
+        """This process's part of the outputs without a new force."""
         out = self._output @ self._free.view(float)
         if self._block:
             out += self._block.seen()
         return out
 
     def look_ahead(self) -> None:
-        """Find what of the next outputs does not depend on the force of this step."""
+        """Compute the part of the next outputs that does not depend on the force of this step."""
         self._move()
         self._part = self._output @ (self._decay * self._free).view(float)
         if self._block:
             self._part += self._block.seen_next()
 
     def exchange(self) -> None:
-        """What the root predicted, to the others, and what they looked ahead to, to it; before `advance`. Collective."""
+        """Broadcast the root's prediction and sum what was looked ahead; before `advance`.
+        Collective."""
         self._out = self._out if self._next is not None else np.empty_like(self._out)
         self.comm.Bcast(self._out)
         self._known = self._reduce(self._part)
 
     def advance(self, force: np.ndarray) -> None:
-        """Take the force (k,) N at the end of the step; after `predict`. Local to each process."""
+        """Set the force (k,) N at the end of the step; after `predict`. Local to each process."""
         self._move()
         self._force = self._unknown = force
         self._rate = self._rate + self._into_rate @ force
@@ -196,11 +200,11 @@ class Recursion:
         return self._state
 
     def keep_samples(self) -> None:
-        """Have `samples` of each step from now on."""
+        """Record `samples` of each step from now on."""
         self._samples = []
 
     def samples(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """States and pushes (mine,) of this process and force (k,) N at the end of each step since the last call."""
+        """States and pushes (mine,), and force (k,) N, of each step since the last call."""
         self._take()
         kept, self._samples = self._samples, []
         assert kept is not None, "samples() before keep_samples()"
@@ -211,7 +215,8 @@ class Recursion:
         return self._spread.everywhere(np.array(samples).T).T
 
     def snapshot(self) -> dict[str, np.ndarray]:
-        """All states in the order of the response, the same for any number of processes. Collective."""
+        """All states in the order of the response, alike for any number of processes.
+        Collective."""
         kept = {
             "state": self._spread.everywhere(self.state),
             "push": self._spread.everywhere(self._push),
@@ -222,7 +227,7 @@ class Recursion:
         return kept | self.comm.bcast(block, root=self._idle)
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from a snapshot, between `advance` and `predict`. Collective when looking ahead."""
+        """Continue from a snapshot, after `advance`. Collective when looking ahead."""
         self._state, self._push = (
             self._spread.mine(kept[name]).copy() for name in ("state", "push")
         )
@@ -236,5 +241,5 @@ class Recursion:
             self._begin()
 
     def inertia_force(self) -> np.ndarray:
-        """Rate of the tire's momentum (3,), N: sum_k (int rho phi_k) eta_k'', after `advance`."""
+        """Rate of the tire's momentum (3,), N, after `advance`: sum_k (int rho phi_k) eta_k''."""
         return self._rate

@@ -3,8 +3,7 @@
     u(t) = Re[C z(t)] + C_b y(t) + G_res f(t),   z' = s z + P f,   y' = T y + P_b f
     g(t) = Re[C e^{st} P] + C_b e^{Tt} P_b  (+ G_res delta(t)),   g(0) = 0 without truncation
 
-thesis (4.14) with its sum over eigenpairs kept as a product, C = Phi_out R and P = L Phi_in^T.
-"""
+thesis (4.14), whose sum over eigenpairs is kept as a product, C = Phi_out R and P = L Phi_in^T."""
 
 from __future__ import annotations
 
@@ -17,9 +16,10 @@ from scipy import linalg
 from tireroad.greens.residual.parted import parted
 from tireroad.modal.states import StateModes, growing
 
-# Radians a state may turn in a step and stay dynamic. Undamped and bouncing on a stiff tread, up to 3
-# gained no energy and 5 blew up: from pi on a turn is not seen any more. Rolling on a rough road in
-# steps of 0.2 ms, 1 errs by 1.6 % in the axle force, 1.5 to 3 by 0.7 %: what turns is better not static.
+# Radians a state may rotate in a step and stay dynamic. Undamped, bouncing on a stiff tread, up to
+# 3 gained no energy and 5 diverged: rotation beyond pi is not resolved. Rolling on a rough road in
+# steps of 0.2 ms, 1 has an error of 1.6 % in the axle force, 1.5 to 3 of 0.7 %: a rotating state is
+# better kept dynamic.
 RESOLVED = 2.0
 
 
@@ -30,11 +30,11 @@ class Response:
     `eigenvalue` (q,) 1/s, `output` (r, q) and `input` (q, k) complex, `block` (b, b) with its
     `block_output` (r, b) and `block_input` (b, k), `residual` (r, k) m/N; `momentum` (3, q) and
     `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries. The last `rigid`
-    states of the block drift under a constant force: static figures leave them out. Of the first `pulse`
-    outputs the residual answers not at once but with a pulse 1/step high and one step long in place of its
-    delta(t) (thesis (C.4)). `left_out` (3, k) kg m/N, where it is known: the static first moment int rho u of
-    all motions that no state has; the axle force lacks its second rate.
-    """
+    states of the block drift under a constant force and are omitted from static results. In the
+    first `pulse` outputs the residual responds not at once but with a pulse 1/step high and one
+    step long, in place of its delta(t) (thesis (C.4)). `left_out` (3, k) kg m/N, where known: the
+    static first moment int rho u of all motions outside the states, whose second rate the axle
+    force lacks."""
 
     eigenvalue: np.ndarray
     output: np.ndarray
@@ -54,12 +54,12 @@ class Response:
         return self._waves(times, self.output, self.block_output)
 
     def momentum_rate(self, times: np.ndarray) -> np.ndarray:
-        """Rate of momentum (t, 3, k) 1/s after a unit impulse of each force, its own jump left out."""
+        """Rate of momentum (t, 3, k) 1/s after a unit impulse of each force, without its jump."""
         s, block = self.eigenvalue, self.block
         return self._waves(times, self.momentum * s**2, self.block_momentum @ block @ block)
 
     def direct_momentum_rate(self) -> np.ndarray:
-        """Rate of momentum (3, k) per force acting at the moment itself."""
+        """Rate of momentum (3, k) due to each force at the same instant."""
         direct = ((self.momentum * self.eigenvalue) @ self.input).real
         return direct + self.block_momentum @ self.block @ self.block_input
 
@@ -71,7 +71,7 @@ class Response:
         return g
 
     def receptance(self, frequency: np.ndarray) -> np.ndarray:
-        """H (f, r, k) complex, m/N, at the given frequencies in Hz, 0 only without rigid states."""
+        """H (f, r, k) complex, m/N, at the given frequencies in Hz; 0 only without rigid states."""
         H = np.empty((len(frequency), *self.residual.shape), complex)
         for k, s in enumerate(2j * np.pi * frequency):
             poles = (self.output / (s - self.eigenvalue)) @ self.input
@@ -97,18 +97,18 @@ class Response:
 
     @property
     def growth(self) -> tuple[int, float]:
-        """How many states grow, beyond rounding, and how fast the fastest does, 1/s."""
+        """Number of states that grow beyond rounding, and the largest growth rate, 1/s."""
         values = self.every
         grows = growing(values)
         return int(grows.sum()), float(values.real[grows].max(initial=0.0))
 
     def _held_block(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The block with its output and input without rigid states, which are last and apart."""
+        """The block, its output and input, without rigid states, which are last and decoupled."""
         k = len(self.block) - self.rigid
         return self.block[:k, :k], self.block_output[:, :k], self.block_input[:k]
 
     def spectral_moment(self) -> np.ndarray:
-        """-dH/ds (r, k) at s = 0, m s/N: what damping adds to a slow force's displacement."""
+        """-dH/ds (r, k) at s = 0, m s/N: the first-order effect of damping under a slow force."""
         first = ((self.output / self.eigenvalue**2) @ self.input).real
         block, output, push = self._held_block()
         if len(block):
@@ -116,7 +116,7 @@ class Response:
         return first
 
     def keeping(self, keep: np.ndarray) -> Response:
-        """The poles where `keep` (q,) is true; the others follow the force statically."""
+        """The poles where `keep` (q,) is true stay dynamic; the others follow statically."""
         if keep.all():
             return self
         following = self.input[~keep] / self.eigenvalue[~keep, None]
@@ -139,7 +139,7 @@ class Response:
         return np.concatenate([self.eigenvalue, np.linalg.eigvals(self._held_block()[0])])
 
     def keeping_where(self, wanted: Callable[[np.ndarray], np.ndarray]) -> Response:
-        """Rigid states, and those where `wanted` of their eigenvalues is true; the others follow statically."""
+        """Keep states of `wanted` eigenvalues, and rigid ones; the others follow statically."""
         values = self.every
         stays = wanted(values)
         poles = self.keeping(stays[: len(self.eigenvalue)])
@@ -167,20 +167,19 @@ class Response:
         )
 
     def slow(self, step: float, limit: float = RESOLVED) -> np.ndarray:
-        """Which poles (q,) `resolved` keeps."""
+        """Mask (q,) of the poles that `resolved` keeps."""
         return np.abs(self.eigenvalue) * step <= limit
 
     def resolved(self, step: float, limit: float = RESOLVED) -> Response:
-        """Poles and states of the block with |s| step above the limit follow the force statically: over so
-        long a step their turning is not seen, and they can gain energy in contact."""
+        """States with |s| step above the limit follow statically: the step does not resolve their
+        rotation, and they can gain energy in contact."""
         return self.keeping_where(lambda s: np.abs(s) * step <= limit)
 
     def rate(self) -> Response:
         """The velocities at the outputs: g' for g, i omega H for H.
 
-        The poles' own jump at an impulse, Re[C P], is the new residual: zero for a complete set of
-        states. G_res f' of the residual is left out: it needs the rate of the force.
-        """
+        The poles' own jump at an impulse, Re[C P], is the new residual, zero for a complete set of
+        states. G_res f' is omitted: it needs the rate of the force."""
         return replace(
             self,
             output=self.output * self.eigenvalue,
@@ -190,7 +189,7 @@ class Response:
         )
 
     def between(self, outputs: slice, forces: slice) -> Response:
-        """The same for some of the outputs and forces (slices)."""
+        """The response for some of the outputs and forces (slices)."""
         return replace(
             self,
             output=self.output[outputs],
@@ -203,7 +202,7 @@ class Response:
         )
 
     def joined(self, other: Response) -> Response:
-        """Both sets of states between the same outputs and forces, the residuals added; no rigid `other`."""
+        """Both sets of states between the same outputs and forces; no rigid `other`."""
         return Response(
             eigenvalue=np.concatenate([self.eigenvalue, other.eigenvalue]),
             output=np.hstack([self.output, other.output]),
@@ -228,10 +227,9 @@ def couple(
 ) -> Response:
     """Response from modal shapes at the outputs (r, m) and forces (k, m), kg^-1/2.
 
-    `momentum` (3, m) as in modal.basis. `compliance` (r, k) m/N is the exact static flexibility in the
-    rotating frame; with it G_res = [K_Omega^-1]_rk - Phi_r K~^-1 Phi_k^T stands for all modes left
-    out (static, exact at 0 Hz); without it they are simply missing.
-    """
+    `momentum` (3, m) as in modal.basis. With the exact static flexibility `compliance` (r, k) m/N
+    of the rolling tire, G_res = [K_Omega^-1]_rk - Phi_r K~^-1 Phi_k^T represents the truncated
+    modes (statically, exact at 0 Hz); without it they are missing."""
     response = Response(
         eigenvalue=modes.eigenvalue,
         output=output @ modes.right,

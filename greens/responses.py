@@ -1,4 +1,4 @@
-"""Responses between probes of a tire as they are wanted: residual, dynamic states, and what they cost."""
+"""Responses between probes of a tire: residual, choice of dynamic states, error estimates."""
 
 from __future__ import annotations
 
@@ -21,19 +21,22 @@ Figures = dict[str, tuple[float, str]]
 
 RESIDUALS = ("none", "dirac", "static", "second-order", "attachment")
 CHOICES = ("participation", "frequency")
-# Points and frequencies at which the truncation is estimated: enough for its size.
+# Points and frequencies at which the truncation error is estimated: enough for its magnitude.
 _SAMPLE = 40
 _FREQUENCIES = 25
-# Residual states faster than this many times the highest mode follow statically: they would set the
-# automatic step and change the receptance up to half the highest mode by 0.001 at most (measured).
+# Residual states faster than this many times the highest mode follow statically: they would
+# determine the automatic step and change the receptance up to half the highest mode by at most
+# 0.001 (measured).
 _FASTEST = 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """What a response should hold: `residual` flexibility of what the modes leave out, how many states
-    stay `dynamic` (None: all), their `choice`, and the `band` (Hz) of interest (None: up to half the
-    highest mode).
+    """Options of a response.
+
+    `residual`: how truncated modes are represented; `dynamic`: how many states stay dynamic (None:
+    all), and `choice` by what; `band` (Hz) of interest (None: up to half the highest mode).
+    InputError for unknown values.
     """
 
     residual: str = "static"
@@ -51,7 +54,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Made:
-    """A `response`, and what is to be known of it: `figures` name: (value, unit), `warnings`."""
+    """A `response` with `figures`, name: (value, unit), and `warnings`."""
 
     response: Response
     figures: Figures = field(default_factory=dict)
@@ -66,16 +69,16 @@ def make_response(
     residual: str,
     fields: Callable[[], ModalBasis],
 ) -> Made:
-    """The response (r, k) of the probes `outputs` (r, 3 s) and `loads` (k, 3 s) with a residual.
+    """The response (r, k) between probes `outputs` (r, 3 s) and `loads` (k, 3 s) with a residual.
 
-    `wheel` gives the full matrices, `fields` the modes on all unknowns: each is called where the residual
-    needs it. Collective.
+    `wheel` returns the full matrices and `fields` the modes on all unknowns; each is called only if
+    the residual needs it. Collective.
     """
     if residual == "none":
         return _made(Basis.of(rolling).couple(outputs, loads))
     if residual == "attachment":
         found = fields()
-        if found is not rolling.basis:  # solved once more: their states, too, are their own
+        if found is not rolling.basis:  # a new solution: its states must be its own too
             rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)
         response = wheel().respond(Basis.of(rolling), found.modes, outputs, loads, residual)
     else:
@@ -91,7 +94,7 @@ def make_response(
 
 
 def _made(response: Response, figures: Figures | None = None) -> Made:
-    """The response with a warning where its states grow."""
+    """The response, with a warning if any of its states grow."""
     count, rate = response.growth
     warnings: tuple[str, ...] = ()
     if count:
@@ -105,8 +108,10 @@ def _made(response: Response, figures: Figures | None = None) -> Made:
 def selected(
     whole: Response, rolling: RollingModes, wanted: Wanted, counted: slice = slice(None)
 ) -> Response:
-    """The states that stay dynamic; without a residual the others are gone altogether. `counted`: the outputs
-    and forces by which they are chosen."""
+    """The response with only the wanted states dynamic; without a residual the others are dropped.
+
+    `counted`: the outputs and forces by which states are chosen.
+    """
     if wanted.dynamic is None:
         return whole
     kept = keep(whole, wanted.dynamic, band(rolling, wanted), wanted.choice, counted)
@@ -114,7 +119,7 @@ def selected(
 
 
 def band(rolling: RollingModes, wanted: Wanted) -> float:
-    """Frequencies of interest, Hz: as given, or up to half the highest mode."""
+    """Upper limit of the band of interest, Hz: as given, or half the highest mode."""
     return wanted.band or cutoff(rolling).circular / (4 * np.pi)
 
 
@@ -127,7 +132,7 @@ def cutoff(rolling: RollingModes) -> Cutoff:
 def judged(
     name: str, whole: Response, response: Response, rolling: RollingModes, wanted: Wanted
 ) -> Figures:
-    """How far off the receptance may be within the band: by the modes left out, by the states."""
+    """Estimated error of the receptance in the band, from truncated modes and static states."""
     top, figures = band(rolling, wanted), dict[str, tuple[float, str]]()
     some = [slice(None, None, -(-n // _SAMPLE)) for n in whole.residual.shape]
     whole, response = whole.between(*some), response.between(*some)

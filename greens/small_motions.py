@@ -1,4 +1,4 @@
-"""The turning wheel of a tire's small motions about its static state."""
+"""The full matrices of a tire's small motions about its static state, for a rolling wheel."""
 
 from __future__ import annotations
 
@@ -22,10 +22,12 @@ def wheel_of(
     projection: Projection | None = None,
     axle: Axle | None = None,
 ) -> Wheel:
-    """The full matrices of a tire at its static state as the wheel turns, with the `air` in it.
+    """The full matrices of a tire at its static state as the wheel rotates, with the `air` in it.
 
-    `projection` on the modes: for damping by strain energy only, which has no full matrices. `axle`: what the
-    wheel moves on, where it does; the full matrices are those of a rim that is held. Collective.
+    `projection` on the modes: only for damping by strain energy, which has no full matrices.
+    `axle`: the suspension of a wheel that moves; the full matrices are always those of a held rim.
+    InputError if the static state was found for another speed or inertia, or the projection is
+    missing. Collective.
     """
     shape, tail = motions.static.rolling, None
     if shape.speed and (shape.speed, shape.inertia) != (turning.speed, turning.inertia):

@@ -1,4 +1,4 @@
-"""Which process has which states of a loop that several take together."""
+"""Distribution of the states of a shared loop over the processes."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from tireroad.fem.collective import joined
 
 @dataclass(frozen=True)
 class Spread:
-    """States one after the other to the processes of `comm` in turn, but for the first `idle` of them, which have none."""
+    """States dealt in turn to the processes of `comm`, except the first `idle` ones."""
 
     comm: MPI.Comm
     idle: int
 
     def mine(self, every: np.ndarray) -> np.ndarray:
-        """Of all states (q, ...) those of this process, a view."""
+        """This process's share of all states (q, ...), a view."""
         return self._of(self.comm.rank, every)
 
     def everywhere(self, own: np.ndarray) -> np.ndarray:

@@ -1,13 +1,13 @@
-"""Vibration of the whole tire in frequency, from the forces on it: u(w) = Phi a(w).
+"""Vibration of the whole tire in the frequency domain, from the forces on it: u(w) = Phi a(w).
 
-With the states of the tire as it turns, C = R and P = L B,
+With the states of the rolling tire, C = R and P = L B,
 
     a(w) = [R (i w - s)^-1 P + R* (i w - s*)^-1 P*] F(w) / 2  +  R_b (i w - T)^-1 P_b F(w),
 
-F(w) the forces and B (m, k) what a unit of each pushes the m coordinates with. The mean square of the
+where F(w) are the forces and B (m, k) the modal forces per unit of each. The mean square of the
 velocity normal to the surface, over its area S, is  w^2 a^H N a / (2 S)  with  N = sum_n (n A)_n
-Phi^T n_n n_n^T Phi: one small matrix for all frequencies. A plate that radiated all of it would give the
-equivalent radiated power  rho c S <v^2>: an upper bound.
+Phi^T n_n n_n^T Phi:  one small matrix for all frequencies. A plate that radiated all of it would
+have the equivalent radiated power  rho c S <v^2>, an upper bound.
 """
 
 from __future__ import annotations
@@ -22,8 +22,10 @@ IMPEDANCE = 413.3  # N s/m3, rho c of air at 20 deg C and 1013 hPa
 
 
 def coordinates(states: StateModes, pushed: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """a (f, m) m kg^1/2 complex at `frequency` (f,) Hz under the modal forces `pushed` (f, m) = F B^T,
-    N kg^-1/2. 0 Hz only without rigid states. Not collective."""
+    """a (f, m) m kg^1/2 at `frequency` (f,) Hz under modal forces `pushed` (f, m) N kg^-1/2, F B^T.
+
+    0 Hz only without rigid states. Not collective.
+    """
     a = np.empty(pushed.shape, complex)
     right, left, s = states.right, states.left, states.eigenvalue
     for k, point in enumerate(2j * np.pi * frequency):
@@ -38,15 +40,15 @@ def coordinates(states: StateModes, pushed: np.ndarray, frequency: np.ndarray) -
 
 @dataclass(frozen=True)
 class Surface:
-    """The outer face in the static state: `normal` (s, 3), m2, of each node with the area that is its own."""
+    """The outer face in the static state: `normal` (s, 3), m2, times the area of each node."""
 
     normal: np.ndarray
 
     @staticmethod
     def of(points: np.ndarray, quads: np.ndarray) -> Surface:
-        """From nodes (s, 3) m and quadrilaterals (q, 4) of them, which share their area among their nodes.
+        """From nodes (s, 3) m and quadrilaterals (q, 4), whose area is divided among their nodes.
 
-        The vector area of a quadrilateral is half the product of its diagonals, exactly.
+        The vector area of a quadrilateral is exactly half the cross product of its diagonals.
         """
         a, b, c, d = (points[quads[:, k]] for k in range(4))
         vector = np.cross(c - a, d - b) / 2

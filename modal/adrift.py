@@ -1,4 +1,4 @@
-"""Motions that nothing holds, beside all others: a wheel that floats with its car."""
+"""Unrestrained motions, decoupled from all others: a wheel that drifts together with its car."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from tireroad.modal.states import StateModes
 
 
 def beside(drag: np.ndarray, stiffness: np.ndarray, adrift: np.ndarray) -> StateModes:
-    """`rotating` where the motions `adrift` (m, r), orthonormal, meet neither force nor damping: they are parted
-    from the others, and drift in a block of their own.
+    """`rotating` where the orthonormal motions `adrift` (m, r) meet no stiffness or damping.
+
+    They are split off exactly and drift in a block of their own.
     """
     m, r = adrift.shape
     others = linalg.qr(adrift)[0][:, r:]

@@ -1,7 +1,7 @@
-"""The air in the tire on a modal basis: what joins the projected problem.
+"""The air in the tire on a modal basis: the terms that it adds to the projected problem.
 
-With coordinates eta of the tire and g of the air's own modes, both of unit mass, the pencil is that of
-fem.cavity.duct.Duct.joined; the tire's shapes at the outer face are zero in g.
+With coordinates eta of the tire and g of the air's own modes, both of unit mass, the pencil is that
+of `fem.cavity.duct.Duct.joined`. The shapes on the outer face have no component along g.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from tireroad.fem.cavity.duct import Duct
 
 @dataclass(frozen=True)
 class Air:
-    """The `duct`'s air, and the `coupling` e (1 + a, m) 1/s of m coordinates with it."""
+    """The air of the `duct`, and its `coupling` e (1 + a, m) 1/s with m coordinates of the tire."""
 
     duct: Duct
     coupling: np.ndarray
 
     @property
     def count(self) -> int:
-        """Coordinates of the air."""
+        """Number of coordinates of the air, a."""
         return len(self.duct.circular)
 
     def joined(
@@ -32,6 +32,6 @@ class Air:
         return self.duct.joined(drag, stiffness, speed, self.coupling)
 
     def share(self, right: np.ndarray) -> np.ndarray:
-        """Part (q,) of the states' kinetic energy that is the air's, from their vectors (m + a or more, q)."""
+        """The air's share (q,) of the states' kinetic energy, from their vectors (m + a ..., q)."""
         squares, own = np.abs(right) ** 2, self.coupling.shape[1]
         return squares[own : own + self.count].sum(axis=0) / squares.sum(axis=0)

@@ -1,4 +1,4 @@
-"""The rotating-frame matrices on the basis of undamped modes: small, replicated, and free of speed."""
+"""The rotating-frame matrices on the undamped modes: small, replicated, independent of speed."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from tireroad.modal.solver.fields import loss_factors, projected
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.waves import Labels
 
-_SAME = 1e-9  # of the largest trace: two solutions of the same modes differ by their sign at least
+_SAME = 1e-9  # of the largest trace: two solutions of the same modes differ at least in signs
 
 
 @dataclass(frozen=True, kw_only=True)
 class Projection:
-    """Phi^T X Phi of the matrices with Omega taken out (physics of the rotating frame).
+    """Phi^T X Phi of the rotating-frame matrices, factors of Omega taken out.
 
-    `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad skew; `convective`, `body_convective`
-    (m, m) 1/rad2 symmetric, all four None for a wheel that stands; `momentum` (3, m) kg^1/2:
-    int rho phi_k, the mass each mode moves; `loss_factor` (m,) by strain energy (modal.damping), None where
-    no compound has one. The last `shapes` of the m are static shapes that joined the modes (modal.joined). What else
-    takes part: `air`, a coordinates after the m, and a `corner`, c after them, none of a wheel that is held, whose hub
-    yet carries moments.
+    `squares` (m,) omega^2; `gyroscopic`, `body` (m, m) 1/rad, skew; `convective`, `body_convective`
+    (m, m) 1/rad2, symmetric; all four are None for a standing wheel. `momentum` (3, m) kg^1/2: int
+    rho phi_k, the momentum per rate of each mode. `loss_factor` (m,) by strain energy
+    (modal.damping), None where no compound has one. The last `shapes` of the m coordinates are
+    static shapes that joined the modes (modal.joined). Further coordinates: a of the `air` after
+    the m, then c of a `corner`; a held wheel has c = 0, but its hub still carries moments.
     """
 
     squares: np.ndarray
@@ -47,14 +47,14 @@ class Projection:
 
     @property
     def carried(self) -> np.ndarray:
-        """Momentum (3, m + a + c) kg^1/2 per rate of all coordinates: of all that the hub has to move."""
+        """Momentum (3, m + a + c) kg^1/2 per rate of coordinates, of all mass on the hub."""
         if not self.moves:
             return self.inside
         return self.wheel.carried(self.inside, self.air_mass) @ self._change
 
     @property
     def inside(self) -> np.ndarray:
-        """Momentum (3, m + a) kg^1/2 per rate of tire and air against the rim."""
+        """Momentum (3, m + a) kg^1/2 per rate of tire and air relative to the rim."""
         return (
             self.momentum
             if self.air is None
@@ -64,21 +64,22 @@ class Projection:
     def pencil(
         self, drag: np.ndarray, stiffness: np.ndarray, speed: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """D~ (1/s) and K~ (1/s2) of all coordinates, unit mass, from those of tire and air, (m + a, m + a)."""
+        """D~ (1/s), K~ (1/s2) of all coordinates, unit mass, from tire and air (m + a, m + a)."""
         if not self.moves:
             return drag, stiffness
         turn, joined = self._change, self.wheel.joined(drag, stiffness, speed)
         return turn.T @ joined[0] @ turn, turn.T @ joined[1] @ turn
 
     def seen(self, shapes: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
-        """All coordinates (k, m + a + c) as `probes` read them, `shapes` (k, m) being what they see of the modes:
-        the air's are not seen.
+        """What `probes` read of all coordinates (k, m + a + c), from `shapes` (k, m) of the modes.
+
+        The coordinates of the air are not visible to probes.
         """
         seen = shapes if self.air is None else np.pad(shapes, ((0, 0), (0, self.air.count)))
         return self.wheel.seen(seen, probes) @ self._change if self.moves else seen
 
     def moments(self, speed: float) -> np.ndarray:
-        """The rows (3, 3, m + a + c) of `Corner.moments` on all coordinates."""
+        """The rows (3, 3, m + a + c) of `Corner.moments` in all coordinates."""
         rows = self.wheel.moments(self.inside.shape[1], speed)
         return rows @ self._change if self.moves else rows
 
@@ -89,20 +90,20 @@ class Projection:
 
     @property
     def wheel(self) -> Corner:
-        """The corner, of which there must be one."""
+        """The corner, which must exist."""
         assert self.corner is not None, "nothing is known of this tire's rim"
         return self.corner
 
     @property
     def adrift(self) -> np.ndarray:
-        """Orthonormal motions (m + a + c, r) of a corner that meet neither stiffness nor damping."""
+        """Orthonormal motions (m + a + c, r) of a corner without stiffness and damping."""
         if not self.moves:
             return np.zeros((self.inside.shape[1], 0))
         return self.wheel.adrift(*self._moved)
 
     @property
     def air_mass(self) -> float:
-        """Of what the rim carries along besides the tire, kg."""
+        """Mass that the rim carries along besides the tire, kg."""
         return 0.0 if self.air is None else self.air.duct.density * self.air.duct.volume
 
     @property
@@ -120,16 +121,16 @@ class Projection:
 
     @property
     def own(self) -> int:
-        """Coordinates of the tire itself, m."""
+        """Number of coordinates of the tire itself, m."""
         return len(self.squares)
 
     @property
     def modes(self) -> int:
-        """How many of the coordinates are modes: the first ones."""
+        """How many of the coordinates are modes; they come first."""
         return self.own - self.shapes
 
     def rotating(self, inertia: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Factors (m, m) of 2 Omega, Omega^2 and Omega d_k. InputError for the modes of a wheel that stands."""
+        """Factors (m, m) of 2 Omega, Omega^2, Omega d_k. InputError for standing modes."""
         full = inertia == "full"
         gyroscopic = self.gyroscopic if full else self.body
         convective = self.convective if full else self.body_convective
@@ -138,7 +139,7 @@ class Projection:
         return gyroscopic, convective, self.body
 
     def first(self, count: int) -> Projection:
-        """On the first `count` coordinates alone."""
+        """The projection on the first `count` coordinates only."""
         cut: dict[str, Any] = {
             "squares": self.squares[:count],
             "momentum": self.momentum[:, :count],
@@ -155,7 +156,7 @@ class Projection:
         return replace(self, **cut)
 
     def among(self, wanted: np.ndarray) -> Projection:
-        """On the coordinates where `wanted` (m,) is true, before anything joins them."""
+        """The projection on the coordinates where `wanted` (m,) is true, without air and corner."""
         small: dict[str, Any] = {
             name: None if value is None else value[np.ix_(*[wanted] * value.ndim)]
             for name, value in vars(self).items()
@@ -167,13 +168,14 @@ class Projection:
 
 @dataclass(frozen=True, kw_only=True)
 class ModalBasis:
-    """The standing modes as all later steps take them: fields, M-orthonormal.
+    """The standing modes in the form that all later steps use: M-orthonormal fields.
 
-    `frequency` (m,) Hz; `shape` kg^-1/2 of the outer face (3 s, m + k), of a free rim after it (+ 6), k static shapes
-    that joined the m modes among them (modal.turning_shapes); `projection` the small matrices on these very fields.
-    `modes`: the fields on all unknowns, where this process solved for them and they are not read from a file; `labels` of a round tire;
-    `column`: the air that joined them, where this process made it. Signs of eigenvectors, and vectors
-    of repeated frequencies, are of one solution only: never combine two bases' parts.
+    `frequency` (m,) Hz; `shape` kg^-1/2 of the outer face (3 s, m + k), with six more rows for a
+    free rim, where k is the number of static shapes that joined the m modes (modal.turning_shapes);
+    `projection`: the small matrices on these same fields. `modes`: the fields on all unknowns, if
+    this process solved for them instead of reading a file; `labels` of an axisymmetric tire;
+    `column`: the air that joined the modes, if this process made it. The signs of eigenvectors, and
+    the vectors of repeated frequencies, belong to one solution: never combine parts of two bases.
     """
 
     frequency: np.ndarray
@@ -184,7 +186,7 @@ class ModalBasis:
     column: Column | None = None
 
     def first(self, count: int) -> ModalBasis:
-        """The first `count` modes, no more than there are, without any shapes."""
+        """The first `count` modes, or all if there are fewer, without any shapes."""
         count = min(count, len(self.frequency))
         return ModalBasis(
             frequency=self.frequency[:count],
@@ -197,8 +199,7 @@ class ModalBasis:
 
 
 def same_fields(found: np.ndarray, known: np.ndarray) -> bool:
-    """Whether shapes on the outer face (s, m) are of one solution: another one's signs and vectors of repeated
-    frequencies differ."""
+    """Whether shapes on the outer face (s, m) are of one solution: two differ in signs."""
     return found.shape == known.shape and np.allclose(found, known, 0, _SAME * np.abs(known).max())
 
 
@@ -210,10 +211,11 @@ def project(
     known: Projection | None = None,
     loss: PETSc.Mat | None = None,
 ) -> Projection:
-    """Project the rotation matrices (fem.operators.Rotation, or None) and the momentum: `carried` (3, n)
-    kg of own rows, as in fem.operators. `known`, the projection on the first of the modes, is taken
-    over: a basis that grows costs the products with what joins it. `loss`: the loss stiffness of
-    fem.operators, or None. Collective.
+    """Project the rotation matrices (fem.matrices.operators.Rotation, or None) and the momentum.
+
+    `carried` (3, n) kg, own rows, and `loss`, the loss stiffness or None, are those of
+    fem.matrices.operators. `known`, the projection on the first of the modes, is reused: a basis
+    that grows costs only the products with what joins it. Collective.
     """
     moved = comm.allreduce(carried @ modes.vectors)
     shapes = len(modes.squares) - modes.count

@@ -1,6 +1,7 @@
-"""The second eigenproblem over speed: branches of eigenvalues, critical speed, onset of instability.
+"""The second eigenproblem over speed: branches, critical speed, onset of instability.
 
-One modal basis and one static state serve all speeds: only D~ and K~ change, as polynomials in Omega.
+One modal basis and one static state serve all speeds; only D~ and K~ change, as polynomials in
+Omega.
 """
 
 from __future__ import annotations
@@ -15,16 +16,18 @@ from tireroad.modal.damping import Damping
 from tireroad.modal.rotating import matrices, overlap, rotating
 from tireroad.modal.states import StateModes, growing
 
-# Stiffness of a rigid motion of a free wheel over Omega^2: 0 but for what the modes leave out.
+# Stiffness of a rigid motion of a free wheel over Omega^2: zero but for truncation.
 RIGID = 1e-3
 
 
 @dataclass(frozen=True)
 class Campbell:
-    """`speed` (v,) rad/s; `eigenvalue` (v, b) complex 1/s, one column a branch, NaN where a branch is in
-    a near-defective block or has left the oscillating states; `similarity` (v, b): the share of the
-    branch's state one speed before, 1 when nothing changes, low where branches veer; `undamped` (v, b) Hz:
-    the branches of the same tire without damping, where they were followed.
+    """Eigenvalues over speed, one column per branch.
+
+    `speed` (v,) rad/s; `eigenvalue` (v, b) complex 1/s, NaN where a branch is in a nearly defective
+    block or no longer oscillates; `similarity` (v, b): the share of the branch's state at the
+    previous speed, 1 when nothing changes, low where branches veer; `undamped` (v, b) Hz: the
+    branches of the same tire without damping, where they were followed.
     """
 
     speed: np.ndarray
@@ -45,10 +48,11 @@ def sweep(
     speeds: np.ndarray,
     branches: int,
 ) -> Campbell:
-    """Follow the `branches` lowest oscillating states of the first speed through all others. Not collective.
+    """Follow the `branches` lowest oscillating states of the first speed through all others.
 
-    A state at one speed goes on in the state at the next that shares most of it (modal.rotating.overlap),
-    each in one only: lines cross instead of being cut and joined by size.
+    A state continues in the state at the next speed that shares most of it
+    (modal.rotating.overlap), one to one, so that branches cross instead of being cut and rejoined
+    by size. Not collective.
     """
     eigenvalue = np.full((len(speeds), branches), np.nan + 0j)
     similarity = np.full((len(speeds), branches), np.nan)
@@ -77,7 +81,7 @@ def _lowest(modes: StateModes, count: int) -> np.ndarray:
 def _continued(
     before: StateModes, now: StateModes, held: np.ndarray, drag: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Indices at the present speed of the states held before (-1: lost), and the shares."""
+    """Indices at the present speed of the states followed so far (-1: lost), and their shares."""
     alive = np.flatnonzero(held >= 0)
     share = np.abs(overlap(before, now, drag))[held[alive]]
     rows, columns = optimize.linear_sum_assignment(-np.minimum(share, 1.0))
@@ -88,12 +92,13 @@ def _continued(
 
 
 def critical_speed(projection: Projection, inertia: str, free_at: float | None = None) -> float:
-    """The least Omega (rad/s) at which a wave stands still in the non-rotating frame; inf if none does.
+    """The lowest Omega (rad/s) at which a wave stands in the non-rotating frame; inf if none does.
 
-    Undamped, K~ = Lambda + Omega^2 S is singular there: Omega^-2 is the largest eigenvalue of
-    Lambda^-1/2 (-S) Lambda^-1/2, rigid modes left out. A road that stands still to the axle excites such
-    a wave without end. `free_at` (rad/s): the speed of a wheel that nothing holds; moved as a rigid body
-    it stands still by itself, K~ is singular at that very speed, and those motions are left out too.
+    Without damping K~ = Lambda + Omega^2 S is singular there: Omega^-2 is the largest eigenvalue of
+    Lambda^-1/2 (-S) Lambda^-1/2, rigid modes excluded. A road at rest relative to the axle excites
+    such a wave without limit. `free_at` (rad/s) is the speed of an unrestrained wheel: its rigid
+    motions are stationary by themselves and make K~ singular at that very speed, so they are
+    excluded too.
     """
     _, convective, _ = projection.rotating(inertia)
     flexible = projection.squares > 0
@@ -110,10 +115,11 @@ def critical_speed(projection: Projection, inertia: str, free_at: float | None =
 
 
 def onset(projection: Projection, damping: Damping, inertia: str, unstable: float) -> float:
-    """The speed (rad/s) at which a motion begins to grow, at or below one where it does; within 0.1 %.
+    """The speed (rad/s) at which a motion begins to grow, within 0.1 %.
 
-    By bisection from rest: of several windows of instability it finds the edge of one. Static state
-    and modes are those of the basis, whatever the speed.
+    By bisection between rest and an `unstable` speed (rad/s): where there are several intervals of
+    instability, the edge of one is found. Static state and modes are those of the basis at every
+    speed.
     """
     stable = 0.0
     while unstable - stable > 1e-3 * unstable:
@@ -126,7 +132,7 @@ def onset(projection: Projection, damping: Damping, inertia: str, unstable: floa
 
 
 def growth(projection: Projection, speed: float, damping: Damping, inertia: str) -> float:
-    """Largest Re s (1/s) at a speed; 0 when it is rounding."""
+    """Largest Re s (1/s) at a speed; 0 if it is rounding."""
     drag, stiffness = matrices(projection, speed, damping, inertia)
     m = len(drag)
     values = linalg.eigvals(np.block([[np.zeros((m, m)), np.eye(m)], [-stiffness, -drag]]))

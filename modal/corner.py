@@ -1,16 +1,18 @@
-"""A wheel that moves, joined to the modes of the tire with a fixed rim (Craig and Bampton 1968).
+"""A moving wheel, coupled to the modes of the tire with a fixed rim (Craig and Bampton 1968).
 
-    u = Phi eta + R xi:  the tire's motion against its rim, and the rim's, the tire carried along as a rigid body,
+    u = Phi eta + R xi:  motion relative to the rim, and that of the rim with the tire,
 
     [1    P^T] eta''   [D   2 Om G] eta'   [K~  k ] eta
-    [P    J  ] xi''  + [-2 Om G^T C] xi' + [k^T K_h] xi = forces,      P = R^T M Phi,   G = Phi^T G R,
-                                                                       k = Phi^T (K + Om^2 S) R,
+    [P    J  ] xi''  + [-2 Om G^T C] xi' + [k^T K_h] xi = forces,
+
+    P = R^T M Phi,   G = Phi^T G R,   k = Phi^T (K + Om^2 S) R,
     J = R^T M R + wheel,   C = hub dampers + 2 Om R^T G R + Om wheel's gyroscopic matrix,
     K_h = hub springs + R^T (K + Om^2 S) R.
 
-The material's damping acts on eta alone: the tire against its wheel. With L L^T = J - P P^T, the mass that the
-modes do not carry, the coordinates  xi = L^-T x,  eta = q - P^T xi  have unit mass; all further steps
-take them as they take modes. Air in the cavity is carried along by its momentum.
+The material damping acts on eta alone, the motion of the tire relative to its wheel. With
+L L^T = J - P P^T, the mass that the modes do not carry, the coordinates  xi = L^-T x,
+eta = q - P^T xi  have unit mass, and all further steps treat them as modal coordinates. Air in the
+cavity is carried along by its momentum.
 """
 
 from __future__ import annotations
@@ -26,18 +28,20 @@ from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
 from tireroad.fem.matrices.rim_motion import RimMotion, carried_pencil
 
-BODY = 6  # place of the body's height after the rim's six motions
-SEEN = (
-    7  # motions that probes can read or load after the outer face: the rim's six, the body's height
-)
-MOMENTS = slice(3, 6)  # of the six: after the motions probes can read the moments on the hub, N m
+BODY = 6  # index of the body's height, after the six motions of the rim
+# Motions that probes can read or load after the outer face: the rim's six and the body's height.
+SEEN = 7
+MOMENTS = slice(3, 6)  # of the six; after the motions probes can read the hub moments, N m
 
 
 @dataclass(frozen=True, kw_only=True)
 class Corner:
-    """`axle`; of m modes  `mass` P^T, `stiffness`, `gyroscopic`, `convective` (m, 6), and of the rim's motions
-    alone `own_...` (6, 6), Omega taken out; `places` (s, 3) m of the outer face in the static state.
-    Gyroscopic and convective ones are zero for a wheel that stands.
+    """The wheel and its coupling to m modes.
+
+    `axle`: the wheel and its suspension; `mass` P^T, `stiffness`, `gyroscopic`, `convective` (m, 6)
+    of the modes, and `own_...` (6, 6) of the rim's motions alone, factors of Omega taken out;
+    `places` (s, 3) m of the outer face in the static state. Gyroscopic and convective arrays are
+    zero for a standing wheel.
     """
 
     axle: Axle
@@ -53,21 +57,21 @@ class Corner:
 
     @property
     def taking_part(self) -> list[int]:
-        """Which of the seven motions of rim and body are coordinates."""
+        """Indices of those of the seven motions of rim and body that are coordinates."""
         return self.axle.taking_part
 
     @property
     def count(self) -> int:
-        """Coordinates that join."""
+        """Number of coordinates added, c."""
         return len(self.taking_part)
 
     def first(self, count: int) -> Corner:
-        """With the first `count` modes alone."""
+        """The corner with the first `count` modes only."""
         cut = {name: getattr(self, name)[:count] for name in _PER_MODE}
         return replace(self, **cut)
 
     def momentum(self, air: np.ndarray | None) -> np.ndarray:
-        """P (7, m + a) kg^1/2 of the modes and of the air, whose own momentum (3, a) is `air`."""
+        """P (7, m + a) kg^1/2 of the modes and of the air, whose own momentum is `air` (3, a)."""
         rows = self.mass.T
         if air is not None:
             rows = np.hstack([rows, np.vstack([air, np.zeros((3, air.shape[1]))])])
@@ -84,7 +88,7 @@ class Corner:
         return carried_pencil(self.axle, whole, speed)
 
     def change(self, momentum: np.ndarray, air_mass: float = 0.0) -> np.ndarray:
-        """T (n + c, n + c) with (eta, xi) = T (q, x), `momentum` as P above."""
+        """T (n + c, n + c) with (eta, xi) = T (q, x); `momentum` is P as above."""
         part, n = self.taking_part, momentum.shape[1]
         p = momentum[part]
         left = self.inertia(air_mass)[np.ix_(part, part)] - p @ p.T
@@ -96,7 +100,7 @@ class Corner:
     def joined(
         self, drag: np.ndarray, stiffness: np.ndarray, speed: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Damping and stiffness (n + c, n + c) in (eta, xi) from those of tire and air (n, n)."""
+        """Damping and stiffness (n + c, n + c) in (eta, xi), from those of tire and air (n, n)."""
         part, n, m = self.taking_part, len(drag), len(self.mass)
         across = np.zeros((2, n, SEEN))
         across[0, :m, :BODY] = 2 * speed * self.gyroscopic
@@ -109,7 +113,7 @@ class Corner:
         )
 
     def check(self, speed: float) -> None:
-        """InputError where the hub's springs are softer than what the tire's static loads turn the wheel by."""
+        """InputError if the hub springs are too soft to hold the wheel against the static loads."""
         part = [k for k in self.axle.moving if k >= MOMENTS.start]
         rows = np.ix_(part, part)
         needed = -(self.own_stiffness + speed**2 * self.own_convective)[rows]
@@ -122,7 +126,7 @@ class Corner:
             )
 
     def adrift(self, momentum: np.ndarray, air_mass: float = 0.0) -> np.ndarray:
-        """Orthonormal motions (n + c, r), in (q, x), that no spring or damper knows."""
+        """Orthonormal motions (n + c, r), in (q, x), that no spring or damper acts on."""
         part = self.taking_part
         drifts = self.axle.adrift[part]
         p = momentum[part]
@@ -130,20 +134,22 @@ class Corner:
         return linalg.qr(np.vstack([p.T @ drifts, lower.T @ drifts]), mode="economic")[0]
 
     def seen(self, tire: np.ndarray, probes: sparse.csr_matrix) -> np.ndarray:
-        """What the probes (k, 3 s) or wider see of (eta, xi): (k, n + c), `tire` (k, n) being the first."""
+        """What probes (k, 3 s) or wider read of (eta, xi), (k, n + c); `tire` (k, n) of eta."""
         return np.hstack([tire, self.rigid(probes)[:, self.taking_part]])
 
     def rigid(self, probes: sparse.csr_matrix) -> np.ndarray:
-        """What they see of the motions of rim and body, (k, 7): m per m and rad; transposed, the forces N and
-        moments N m on the axle's centre by unit loads at the probes."""
+        """What probes read of the motions of rim and body, (k, 7), m per m and per rad.
+
+        The transpose gives the forces N and the moments N m about the axle's centre of unit loads
+        at the probes.
+        """
         s = len(self.places)
         weights = probes[:, : 3 * s].tocsr()
         seen = np.zeros((probes.shape[0], SEEN))
         for k in range(3):
             seen[:, k] = np.asarray(weights[:, k::3].sum(axis=1)).ravel()
-        moment = [
-            weights[:, k::3] @ self.places for k in range(3)
-        ]  # of component k: x_j in column j
+        # Of component k: x_j in column j.
+        moment = [weights[:, k::3] @ self.places for k in range(3)]
         for k in range(3):
             j, i = (k + 1) % 3, (k + 2) % 3
             seen[:, 3 + k] = moment[i][:, j] - moment[j][:, i]
@@ -152,8 +158,9 @@ class Corner:
         return seen
 
     def moments(self, n: int, speed: float) -> np.ndarray:
-        """A (3, 3, n + c): the hub carries the moments of the loads less  A_2 q'' + A_1 q' + A_0 q,  q = (eta, xi)
-        of n coordinates and c; N m.
+        """A (3, 3, n + c), N m: hub moments are those of loads less A_2 q'' + A_1 q' + A_0 q.
+
+        q = (eta, xi) has n coordinates of tire and air and c of the wheel.
         """
         zero, m = np.zeros((n, n)), len(self.mass)
         held = replace(
@@ -170,7 +177,7 @@ class Corner:
         return whole[:, :, [*range(n), *(n + k for k in self.taking_part)]]
 
     def carried(self, tire: np.ndarray, air_mass: float = 0.0) -> np.ndarray:
-        """Momentum (3, n + c) of tire, air and wheel per rate of (eta, xi), `tire` (3, n) that of the first."""
+        """Momentum (3, n + c) of tire, air, wheel per rate of (eta, xi); `tire` (3, n) is eta's."""
         whole = self.inertia(air_mass)[:3]
         return np.hstack([tire, whole[:, self.taking_part]])
 
@@ -182,7 +189,7 @@ ARRAYS = tuple(item.name for item in fields(Corner) if item.name != "axle")
 def meeting(
     axle: Axle, rim: RimMotion, vectors: np.ndarray, places: np.ndarray, comm: MPI.Comm
 ) -> Corner:
-    """The corner on fields `vectors` (own rows (n, m)) of unit mass. Collective."""
+    """The corner on mass-normalised fields `vectors` (own rows (n, m)). Collective."""
     nothing = np.zeros((vectors.shape[1], 6))
     per_mode = {
         name: summed(comm, vectors.T @ rim.rows[name]) if name in rim.rows else nothing

@@ -1,19 +1,20 @@
-"""How the modes of a tire are damped: in proportion to its matrices, or by the strain energy of its rubber.
+"""Modal damping: proportional to the matrices, or by the strain energy of the rubber.
 
-    D_mod = diag(d_k),   d_k = gamma1 + gamma2 omega_k^2   or   d_k = 2 zeta_k omega_k = eta_k omega_k,
+    D_mod = diag(d_k),  d_k = gamma1 + gamma2 omega_k^2  or  d_k = 2 zeta_k omega_k = eta_k omega_k,
 
     eta_k = sum_r eta_r (phi_k . K_r phi_k) / (phi_k . K phi_k),
 
-K_r the material part of the tangent of region r, of loss factor eta_r; cords, pressure and the turning of stresses
-store energy and lose none (Ungar and Kerwin 1962; Johnson and Kienholz 1982, doi 10.2514/3.51195). D_mod acts on
-the body rate: the rolling pencil has Omega D_mod P besides.
+where K_r is the material part of the tangent of region r and eta_r its loss factor. Cords, pressure
+and geometric stiffness store energy and dissipate none (Ungar and Kerwin 1962; Johnson and Kienholz
+1982, doi 10.2514/3.51195). D_mod acts on the body rate, which adds Omega D_mod B to the stiffness
+of the rolling tire.
 
-Motions that no mode of the basis has are damped too: gamma1, gamma2, or, with loss factors, at the uniform
-rate of the highest modes,
+Motions outside the modal basis are damped too: by gamma1 and gamma2 or, with loss factors, at the
+uniform rate of the highest modes,
 
     D = M Phi diag(d_k - d_c) Phi^T M + d_c M,   d_c = eta_c omega_m,
 
-eta_c the mean loss factor of the upper quarter of the modes.
+where eta_c is the mean loss factor of the upper quarter of the modes.
 """
 
 from __future__ import annotations
@@ -36,14 +37,14 @@ class Proportional(NamedTuple):
 
 @dataclass(frozen=True)
 class StrainEnergy:
-    """By the loss factors of the modes, `Projection.loss_factor`."""
+    """Damping by the loss factors of the modes, `Projection.loss_factor`."""
 
 
 Damping = Proportional | tuple[float, float] | StrainEnergy
 
 
 def rates(damping: Damping, projection: Projection) -> np.ndarray:
-    """d_k (m,) 1/s of the modes."""
+    """Damping rates d_k (m,) 1/s of the modes. InputError if loss factors are missing."""
     if isinstance(damping, StrainEnergy):
         if projection.loss_factor is None:
             raise InputError(
@@ -55,7 +56,7 @@ def rates(damping: Damping, projection: Projection) -> np.ndarray:
 
 
 def beyond(damping: Damping, projection: Projection) -> Proportional:
-    """What damps the motions that no mode has."""
+    """The damping of motions that the modes do not contain."""
     if isinstance(damping, StrainEnergy):
         highest = np.sqrt(max(float(projection.squares[: projection.modes].max()), 0.0))
         return Proportional(tail_loss(projection) * highest, 0.0)
@@ -63,7 +64,7 @@ def beyond(damping: Damping, projection: Projection) -> Proportional:
 
 
 def tail_loss(projection: Projection) -> float:
-    """Loss factor eta_c of motions beyond the modes: the mean of the upper quarter."""
+    """Loss factor eta_c of motions beyond the modes: the mean over their upper quarter."""
     assert projection.loss_factor is not None, "rates() refuses modes without loss factors"
     count = projection.modes
     return float(projection.loss_factor[count - max(count // 4, 1) : count].mean())

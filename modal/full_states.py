@@ -1,7 +1,7 @@
-"""States of the rolling tire from the full finite-element matrices, in the place of the projected ones.
+"""States of the rolling tire from the full finite-element matrices, instead of the projected ones.
 
-Their fields take the place of the modes too: the basis is M-orthonormal, as that of the modes is, and
-spans [Re U, Im U, Re W, Im W], with U the right and W the left vectors (n, q).
+Their fields also replace the modes: the basis is M-orthonormal, as that of the modes is, and spans
+[Re U, Im U, Re W, Im W], where U are the right and W the left vectors (n, q).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tireroad.modal.solver.agreement import missing, truncation
 from tireroad.modal.solver.fields import gram
 from tireroad.modal.solver.quadratic import FullModes
 
-_ROUNDING = 1e-14  # of the largest squared length: directions below are the fields' rounding
+_ROUNDING = 1e-14  # of the largest squared length: smaller directions are rounding of the fields
 
 Figures = dict[str, tuple[float, str]]
 
@@ -38,9 +38,11 @@ def full_states(
     count: int,
     window: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[RollingModes, Figures, list[str]]:
-    """`count` pairs nearest to zero, or all in the `window` (Hz), how far the projected states are off them,
-    and warnings. `pencil`: D + 2 Omega G and K_Omega as in fem.matrices.compliance; `rim`: what a held rim's motions meet,
-    for the moments on its hub. Collective.
+    """`count` pairs nearest to zero, or all in the `window` (Hz), with figures and warnings.
+
+    The figures tell how far the projected states are from them. `pencil`: D + 2 Omega G and K_Omega
+    as in fem.matrices.compliance; `rim`: the reactions to motions of a held rim, for the moments on
+    its hub. Collective.
     """
     found, figures, lacking = _solve(operators, pencil, projected, count, window)
     fields, coordinates = _orthonormal(operators, found)
@@ -75,7 +77,7 @@ def _solve(
     count: int,
     window: tuple[float, float],
 ) -> tuple:
-    """As many pairs as wanted, or all in the window. Collective."""
+    """The requested pairs or all in the window, figures, and the number missing. Collective."""
     drag, full_stiffness = pencil
     whole, s = (operators.mass, drag, full_stiffness), projected.states.eigenvalue
     if not any(window):
@@ -96,7 +98,9 @@ def _solve(
 
 
 def _orthonormal(operators: Operators, found: FullModes) -> tuple[np.ndarray, np.ndarray]:
-    """An M-orthonormal basis (own rows n, p) of all fields, and their coordinates (p, 4 q). Collective."""
+    """An M-orthonormal basis (own rows n, p) of all fields, and their coordinates (p, 4 q).
+    Collective.
+    """
     comm, mass = operators.body.comm, operators.mass[:, None]
     fields = np.hstack([found.right.real, found.right.imag, found.left.real, found.left.imag])
     lengths = np.sqrt(comm.allreduce((mass * fields**2).sum(axis=0)))
@@ -127,7 +131,7 @@ def _states(found: FullModes, coordinates: np.ndarray) -> StateModes:
 
 
 def _compared(found: FullModes, projected: StateModes) -> Figures:
-    """Truncation error of the projected eigenvalues: how many modes are enough."""
+    """Truncation error of the projected eigenvalues, which tells whether there are enough modes."""
     error = truncation(found.eigenvalue, projected.eigenvalue)
     half = error[: max(len(error) // 2, 1)]
     return {

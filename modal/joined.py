@@ -1,10 +1,11 @@
-"""What joins the modes of a basis: static shapes with their inertia, the air, the wheel.
+"""Additions to the modes of a basis: static shapes with their inertia, the air, the wheel.
 
     R <- R - Phi (Phi^T M R),  Psi = R V with Psi^T M Psi = I, Psi^T K Psi diagonal
 
-The pseudo-modes Psi are M-orthonormal to the modes and to each other, so all that is done with modes is done with
-them; coupled to the modes through G, S and B. Eigenvectors are K-orthogonal to all that they are M-orthogonal to;
-shapes are not: those that joined before and those that join now are one space, and K diagonal on all of it.
+The pseudo-modes Psi are M-orthonormal to the modes and to each other, so all later steps treat them
+as modes; G, S and B couple them to the modes. Eigenvectors are K-orthogonal to all that they are
+M-orthogonal to, but static shapes are not: shapes that joined earlier and those that join now form
+one space, on all of which K is made diagonal.
 """
 
 from __future__ import annotations
@@ -27,22 +28,24 @@ from tireroad.modal.solver.modes import Modes
 
 Array = np.ndarray
 
-# Share of the largest squared length below which a direction is rounding of the orthogonalisation.
+# Fraction of the largest squared length below which a direction is rounding.
 _ROUNDING = 1e-12
 _ROWS = 4096  # of all fields at a time, when they are changed in place
 
 
 def joined(modes: Modes, columns: Array, operators: Operators) -> Modes:
-    """Modes of K and M (not K_Omega) followed by pseudo-modes, those of before among them, ascending. Collective.
+    """Modes of K and M (not K_Omega) followed by pseudo-modes, earlier ones among them, ascending.
+    Collective.
 
-    `columns` own rows (n, p) of R, which are used up: of a thousand loads on a fine mesh every copy takes a gigabyte.
+    `columns`, own rows (n, p) of R, are overwritten: with a thousand loads on a fine mesh a copy
+    takes a gigabyte.
     """
     comm, root = operators.body.comm, np.sqrt(operators.mass)[:, None]
     basis, extra = root * modes.vectors, columns
     extra *= root
     whole = summed(comm, np.einsum("ij,ij->j", extra, extra))
     extra /= np.sqrt(np.where(whole > 0, whole, 1.0))  # a load on the clamped rim moves nothing
-    for _ in range(2):  # once leaves what the first pass's rounding brought back
+    for _ in range(2):  # the second pass removes the rounding of the first
         take_off(extra, basis, gram(comm, basis, extra))
     lengths, directions = np.linalg.eigh(gram(comm, extra, extra))
     kept = lengths > _ROUNDING
@@ -68,7 +71,7 @@ def take_off(fields: Array, basis: Array, shares: Array) -> None:
 
 
 def combined(fields: Array, change: Array, out: Array) -> Array:
-    """fields (n, p) change (p, k) in the first columns of `out`, which may be the fields themselves."""
+    """fields (n, p) change (p, k), in the first columns of `out`, which may be `fields`."""
     out = out[:, : change.shape[1]]
     for start in range(0, len(fields), _ROWS):
         rows = slice(start, start + _ROWS)
@@ -84,8 +87,11 @@ def with_corner(
     places: np.ndarray,
     comm: MPI.Comm,
 ) -> Projection:
-    """The projection on the modes (all rows), joined by the wheel, one that is held where `axle` is None; `places` (s, 3) m
-    of the outer face in the static state; as it is without a `rim`. Collective."""
+    """The projection on the modes (all rows), with the wheel added; unchanged without a `rim`.
+
+    The wheel is held where `axle` is None. `places` (s, 3) m of the outer face in the static state.
+    Collective.
+    """
     if rim is None:
         return projection
     return replace(
@@ -94,5 +100,5 @@ def with_corner(
 
 
 def with_air(projection: Projection, modes: Modes, air: Column | None) -> Projection:
-    """The projection on the modes (all rows), joined by the air where there is any. Collective."""
+    """The projection on the modes (all rows), with the air added where there is any. Collective."""
     return replace(projection, air=Air(air.duct, air.coupling(modes.vectors)) if air else None)

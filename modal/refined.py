@@ -1,12 +1,13 @@
-"""States made accurate on the problem they came from, s^2 + s D + K, where the companion matrix left them rough.
+"""Refinement of inaccurate states of the companion matrix on the quadratic problem itself.
 
-The companion matrix of a wide spectrum knows its slow states to rounding of the fast ones: those of a free
-rim, next to rest, most of all. For such a state one step of inverse iteration on the quadratic itself,
+The companion matrix of a wide spectrum determines its slow states only to rounding of the fast
+ones; the states of a free rim, close to rest, suffer most. Such a state gets one step of inverse
+iteration on the quadratic problem,
 
     Q(s) u+ = u,   Q(s)^T w+ = w,   Q(s) = s^2 + s D + K,
 
-then w^T (2 s + D) u = 1 again, and the two-sided quotient  s+ = s - w^T Q(s) u  (Lancaster's, of the second
-order in the vectors' errors).
+is normalised again, w^T (2 s + D) u = 1, and its eigenvalue follows from Lancaster's two-sided
+quotient,  s+ = s - w^T Q(s) u,  whose error is of second order in those of the vectors.
 """
 
 from __future__ import annotations
@@ -16,15 +17,16 @@ from scipy import linalg
 
 Array = np.ndarray
 
-# States slower than this part of the fastest have terms of rounding alone: a faster one is their yardstick.
+# States slower than this fraction of the fastest have terms of rounding alone; a residual is
+# relative to at least this fraction of the fastest |s|^2.
 AT_REST = 1e-5
-_ROUGH = 1e-11  # residual from which a state is made better
-_MOST = 20  # such states, of which each costs a factorisation: more are no case of a few slow ones
-_SAME = 1e-4  # relative change beyond which inverse iteration has left the state for a neighbour
+_ROUGH = 1e-11  # residual above which a state is refined
+_MOST = 20  # refinements, a factorisation each; only a few slow states ever need one
+_SAME = 1e-4  # relative change beyond which inverse iteration has moved on to a neighbouring state
 
 
 def residual(drag: Array, stiffness: Array, values: Array, vectors: Array) -> Array:
-    """||(s^2 + s D + K) u|| over the sum of its terms' norms, column by column."""
+    """||(s^2 + s D + K) u|| over the sum of the norms of its terms, column by column."""
 
     # Real by complex, without a complex copy of the matrix.
     def times(matrix: Array) -> Array:
@@ -43,8 +45,9 @@ def refined(
     right: Array,
     left: Array,
 ) -> tuple[Array, Array, Array]:
-    """Values (q,), right vectors (m, q) and left ones (q, m) with w^T (2 s + D) u = 1, the roughest of them
-    made better. A state next to another one, which one step cannot tell from it, stays as it is.
+    """Values (q,), right (m, q) and left vectors (q, m), w^T (2 s + D) u = 1, the worst refined.
+
+    A state too close to another for one step to separate them is left unchanged.
     """
     rough = np.maximum(
         residual(drag, stiffness, values, right), residual(drag.T, stiffness.T, values, left.T)
@@ -61,7 +64,7 @@ def refined(
 def _better(
     drag: Array, stiffness: Array, s: complex, u: Array, w: Array
 ) -> tuple[complex, Array, Array] | None:
-    """One state after a step, real if it was; None where it became another."""
+    """One state after a refinement step, real if it was real; None if it turned into another."""
     if s.imag == 0:
         s, u, w = s.real, u.real, w.real
     unit = np.eye(len(u))
@@ -70,8 +73,8 @@ def _better(
         u, before, w, also = np.linalg.solve(matrix, u), u, np.linalg.solve(matrix.T, w), w
     except np.linalg.LinAlgError:  # the state is exact
         return None
-    u, w = (x / np.abs(x).max() for x in (u, w))  # next to singular they may be of any size
-    u = u * (np.vdot(u, before) / np.vdot(u, u))  # of the same length and phase
+    u, w = (x / np.abs(x).max() for x in (u, w))  # a nearly singular solve can return any length
+    u = u * (np.vdot(u, before) / np.vdot(u, u))  # the original length and phase
     w = w / (w @ (2 * s * u + drag @ u))
     same = np.linalg.norm(u - before) < _SAME * np.linalg.norm(before)
     if not (same and np.linalg.norm(w - also) < _SAME * np.linalg.norm(also)):
@@ -87,11 +90,12 @@ def cleared(
     span: Array,
     inverse: Array,
 ) -> Array:
-    """Eigenvectors (n, q) of a real matrix (n, n) without what they have of an invariant subspace `span` (n, b),
-    T = `block` (b, b) on it, that is none of theirs; `inverse` (b, n) its left basis.
+    """Eigenvectors (n, q) of a real matrix (n, n), cleared of an invariant subspace.
 
-    A step of first order: with r = A v - s v,  v+ = v + span (s - T)^-1 inverse r. What drifts is so long on the
-    left that rounding of fast vectors is seen along it a million times larger.
+    The subspace, which contains none of them, is spanned by `span` (n, b), on which the matrix is
+    T = `block` (b, b); `inverse` (b, n) is its left basis. One first-order step: with
+    r = A v - s v,  v+ = v + span (s - T)^-1 inverse r. The left vectors of drifting motions are so
+    long that the rounding of fast vectors is amplified a million times along them.
     """
     if not len(block):
         return vectors
@@ -102,10 +106,11 @@ def cleared(
 
 
 def at_rest(matrix: Array, span: Array, shift: float) -> tuple[Array, Array]:
-    """(T, V): a real matrix (n, n) on its invariant subspace next to rest, `span` (n, b) orthonormal, and that
-    subspace, by inverse iteration at the `shift`, far below all other eigenvalues.
+    """(T, V) of a real matrix (n, n) on its invariant subspace of nearly zero eigenvalues.
 
-    T = shift + (V^T (A - shift)^-1 V)^-1: what is small beside the matrix is not lost in A V.
+    `span` (n, b), orthonormal, is improved by inverse iteration at the `shift`, far below all other
+    eigenvalues. T = shift + (V^T (A - shift)^-1 V)^-1, so entries that are small beside the matrix
+    are not lost in A V.
     """
     factor = linalg.lu_factor(matrix - shift * np.eye(len(matrix)))
     for _ in range(2):

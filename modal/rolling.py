@@ -1,4 +1,4 @@
-"""The states of a rolling tire: what its modes become as the wheel turns, and what they were made for."""
+"""The states of a rolling tire, and the wheel's motion that they were computed for."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ from tireroad.modal.rotating import (
     standing,
 )
 
-# Conditions from which on vectors count as defective: where the states are not exact enough, more of them are kept
-# together (seen beside the rigid motions of a free rim with air, on two processes of three).
+# Conditions above which vectors count as defective. Where the checks fail, a lower limit moves more
+# states into the block (observed beside the rigid motions of a free rim with air, on two processes
+# of three).
 _CONDITIONS = DEFECTIVE, 1e4, 1e2
 
 
@@ -37,9 +38,9 @@ def pencil(projection: Projection, turning: Turning) -> tuple[np.ndarray, np.nda
 class RollingModes:
     """The decoupled `states` on the fields of `basis`, for a wheel that moves as `turning` says.
 
-    `full`: they are states of the full finite-element matrices, and the basis is of their own fields.
-    `campbell`: eigenvalues over speed, where they were asked for; `figures`: how far
-    the states are from the problem they came from (modal.rotating.checks).
+    `full`: these are states of the full finite-element matrices, and the basis consists of their
+    own fields. `campbell`: eigenvalues over speed, where requested. `figures`: how accurately the
+    states satisfy the problem that they solve (modal.rotating.checks).
     """
 
     basis: ModalBasis
@@ -51,27 +52,29 @@ class RollingModes:
 
     @property
     def highest(self) -> float:
-        """Circular frequency of the highest mode, or full state, rad/s: what is left out lies beyond."""
+        """Circular frequency of the highest mode or full state, rad/s; truncation begins there."""
         if self.full:
             return float(np.abs(self.states.eigenvalue.imag).max())
         return 2 * np.pi * float(self.basis.frequency[-1])
 
 
 def rolling_modes(basis: ModalBasis, turning: Turning, comm: MPI.Comm) -> RollingModes:
-    """The second eigenproblem on the modal basis; of a tire without air that stands, the closed
-    formula. Collective.
+    """The second eigenproblem on the modal basis; in closed form for a standing tire without air.
+    Collective.
     """
     states, figures = _decoupled(basis.projection, turning, comm)
     return RollingModes(basis=basis, states=states, turning=turning, figures=figures)
 
 
 def decouple(projection: Projection, turning: Turning, comm: MPI.Comm) -> StateModes:
-    """The states of the projected problem, on every process, their identities checked. Collective."""
+    """The states of the projected problem, on every process, with their identities checked.
+    Collective.
+    """
     return _decoupled(projection, turning, comm)[0]
 
 
 def _decoupled(projection: Projection, turning: Turning, comm: MPI.Comm) -> tuple[StateModes, dict]:
-    """The states and the figures of modal.rotating.checks. Collective."""
+    """The states, and the figures of modal.rotating.checks. Collective."""
     if turning.speed == 0 and projection.air is None and not projection.moves:
         return standing(projection, turning.damping), {}
     if turning.speed and projection.gyroscopic is None:
@@ -94,5 +97,6 @@ def _decoupled(projection: Projection, turning: Turning, comm: MPI.Comm) -> tupl
                 failed = error
         raise failed
 
-    # One process solves: LAPACK on another could order repeated eigenvalues differently.
+    # Only one process solves, because LAPACK on another could order repeated eigenvalues
+    # differently.
     return on_root(comm, solve)

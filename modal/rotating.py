@@ -1,10 +1,10 @@
-"""The second eigenproblem on the modal basis: the tire as it turns, seen in the non-rotating frame.
+"""The second eigenproblem on the modal basis: the rotating tire in the non-rotating frame.
 
     s^2 I + s (D_mod + 2 Omega G) + (Lambda + Omega^2 S + Omega D_mod B),  D_mod as in modal.damping
 
-(thesis (2.1)-(2.5), put right; the doppler form takes B for G and S_B for S). Its response to modal
-forces is kept as  eta(t) = Re[R z(t)] + R_b y(t),  z' = s z + L f,  y' = T y + L_b f:  one complex
-state per conjugate pair or real eigenvalue, and a real block for those too close to defective.
+(thesis (2.1)-(2.5), corrected; the doppler form takes B for G and S_B for S). Its response to modal
+forces is  eta = Re[R z] + R_b y,  z' = s z + L f,  y' = T y + L_b f:  a complex state per conjugate
+pair or real eigenvalue, and a real block for those that are nearly defective.
 """
 
 from __future__ import annotations
@@ -19,10 +19,9 @@ from tireroad.modal.refined import AT_REST, at_rest, cleared, refined, residual
 from tireroad.modal.states import StateModes
 
 Array = np.ndarray
-# Above this condition an eigenvector loses ten of sixteen digits; such eigenvalues go to the block.
-DEFECTIVE = 1e6
-SINGULAR = 1e13  # condition of K~ beyond which it has no inverse
-# States at rest beside the fastest drift, as rigid modes do, unless there is one and its vectors are apart.
+DEFECTIVE = 1e6  # above, an eigenvector has lost six of sixteen digits, and goes to the block
+SINGULAR = 1e13  # condition of K~ above which it counts as singular
+# States at rest go to the block, as rigid modes do, unless there is one, of at most this condition.
 _SKEWED = 1e2
 
 Pencil = tuple[Array, Array]
@@ -34,13 +33,13 @@ def matrices(projection: Projection, speed: float, damping: Damping, inertia: st
 
 
 def held_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
-    """The same of tire and air with the rim held: without a corner."""
+    """The same for tire and air with the rim held, without a corner."""
     pencil = _tire_matrices(projection, speed, damping, inertia)
     return pencil if projection.air is None else projection.air.joined(*pencil, speed)
 
 
 def _tire_matrices(projection: Projection, speed: float, damping: Damping, inertia: str) -> Pencil:
-    """The same of the tire without the air in it."""
+    """The same for the tire without its air."""
     rate = rates(damping, projection)
     stiffness, drag = np.diag(projection.squares), np.diag(rate)
     if speed == 0:
@@ -51,7 +50,7 @@ def _tire_matrices(projection: Projection, speed: float, damping: Damping, inert
 
 
 def standing(projection: Projection, damping: Damping) -> StateModes:
-    """Without rotation the modes stay uncoupled: s = -d/2 +- sqrt(d^2/4 - omega^2), a = 2 s + d."""
+    """Uncoupled states without rotation: s = -d/2 +- sqrt(d^2/4 - omega^2), a = 2 s + d."""
     squares = projection.squares
     m = len(squares)
     half = rates(damping, projection) / 2
@@ -64,7 +63,7 @@ def standing(projection: Projection, damping: Damping) -> StateModes:
     defective = np.concatenate([np.flatnonzero(~split & ~rigid), np.flatnonzero(rigid)])
     paired = np.flatnonzero((root.imag != 0) & split)
     real = np.flatnonzero((root.imag == 0) & split)
-    # Of the two real roots the slow one is omega^2 over the fast one: no cancellation.
+    # Of two real roots the slow one is computed as omega^2 over the fast one: no cancellation.
     fast = -half[real] - root[real].real
     eigenvalue = np.concatenate([-half[paired] + root[paired], fast, squares[real] / fast])
     mode = np.concatenate([paired, real, real])
@@ -90,24 +89,24 @@ def standing(projection: Projection, damping: Damping) -> StateModes:
     )
 
 
-LIMITS = 1e-8, 1e-6  # largest residual, and largest defect of an identity, of states that are taken
+LIMITS = 1e-8, 1e-6  # largest residual, and largest error of an identity, that are accepted
 
 
 def checks(
     modes: StateModes, drag: Array, stiffness: Array, limits: tuple[float, float] = LIMITS
 ) -> dict[str, float]:
-    """How far the decoupled equations are from the problem they came from, relative figures by name.
+    """How well the decoupled equations satisfy the original problem: relative figures by name.
 
     Over all 2m states  sum u w^T / a = 0,  sum s u w^T / a = 1,  sum -u w^T / (a s) = K~^-1,  and
-    w_i^T [(s_i + s_j) + D~] u_j = a_i delta_ij among states with vectors; the third only where K~ has an
-    inverse, which rigid modes deny it. Raises ConvergenceError when
-    a residual or an identity exceeds its one of the `limits`.
+    w_i^T [(s_i + s_j) + D~] u_j = a_i delta_ij among states with vectors. The third only for an
+    invertible K~ (no rigid modes). ConvergenceError if a residual or an identity exceeds its
+    `limits`.
     """
     m = len(drag)
     s, block = modes.eigenvalue, modes.block
     displacement = (modes.right @ modes.left).real + modes.block_right @ modes.block_left
     rate = (modes.right * s @ modes.left).real + modes.block_right @ block @ modes.block_left
-    # A displacement per velocity is a time: the slowest state's is the yardstick.
+    # A displacement per velocity is a time: relative to that of the slowest state.
     slowest = np.abs(s).min(initial=np.inf) if len(s) else 1.0
     figures = {
         "worst residual": float(modes.residual.max(initial=0.0)),
@@ -133,9 +132,9 @@ def checks(
 
 
 def overlap(one: StateModes, other: StateModes, drag: Array) -> Array:
-    """(q, q') share of the states of `other` in those of `one`: 1 on the diagonal for the same problem.
+    """(q, q') share of the states of `other` in those of `one`: the identity for the same problem.
 
-    w_i^T [(s_i + s'_j) + D~] u'_j / a_i: the left vectors of the companion matrix on its right ones.
+    w_i^T [(s_i + s'_j) + D~] u'_j / a_i: left times right vectors of the companion matrices.
     """
     weight = np.where(other.eigenvalue.imag > 0, 2.0, 1.0)
     right = other.right / weight
@@ -146,7 +145,7 @@ def overlap(one: StateModes, other: StateModes, drag: Array) -> Array:
 def companion_blocks(
     modes: Array, squares: Array, half: Array, m: int
 ) -> tuple[Array, Array, Array]:
-    """(T, R_b, L_b) of single modes, critically damped or rigid, each as its own companion matrix."""
+    """(T, R_b, L_b) of critically damped or rigid modes, each a companion matrix of its own."""
     k = 2 * len(modes)
     block, right, left = np.zeros((k, k)), np.zeros((m, k)), np.zeros((k, m))
     for i, mode in enumerate(modes):
@@ -156,14 +155,13 @@ def companion_blocks(
 
 
 def rotating(drag: Array, stiffness: Array, defective: float = DEFECTIVE) -> StateModes:
-    """Decouple s^2 + s D~ + K~ through the companion matrix and the inverse of its vectors; eigenvalues of
-    vectors with a condition above `defective` stay together in a block.
+    """Decouple s^2 + s D~ + K~ by the eigenvectors of its companion matrix and their inverse.
 
-    The lower half of a row of that inverse is w^T / a: left vectors and their normalisation come
-    together, biorthogonal also inside clusters of repeated eigenvalues.
+    Eigenvalues whose vectors have a condition above `defective` stay together in a block. The right
+    half of a row of the inverse is w^T / a, biorthogonal also inside clusters.
     """
     m = len(drag)
-    # Velocities in units of a mean circular frequency: displacements and they have one size.
+    # Velocities scaled by a mean circular frequency, to be as large as displacements.
     scale = np.sqrt(np.abs(np.diag(stiffness)).mean())
     companion = np.block([[np.zeros((m, m)), scale * np.eye(m)], [-stiffness / scale, -drag]])
     values, vectors = linalg.eig(companion)
@@ -199,8 +197,8 @@ def rotating(drag: Array, stiffness: Array, defective: float = DEFECTIVE) -> Sta
 
 
 def _in_order(values: Array, vectors: Array) -> tuple[Array, Array]:
-    """Ascending in Im s, then from fast to slow decay; vectors of length 1, whose largest component, or the
-    first of those within a thousandth, is real and positive.
+    """States ascending in Im s, then in Re s, with vectors of length 1 whose largest component, or
+    the first of those within a thousandth of it, is real and positive.
     """
     order = np.lexsort((values.real, values.imag))
     values, vectors = values[order], vectors[:, order]
@@ -211,9 +209,8 @@ def _in_order(values: Array, vectors: Array) -> tuple[Array, Array]:
 
 
 def _inverse(values: Array, vectors: Array, block_vectors: Array) -> tuple[Array, Array]:
-    """Rows of the inverse of [vectors, their conjugates, block vectors] for the first and the last.
-
-    Through [Re v, Im v] in real arithmetic, a quarter of the work of the complex matrix.
+    """Rows of the inverse of [vectors, their conjugates, block vectors] for the first and the last,
+    from [Re v, Im v] in real arithmetic at a quarter of the work.
     """
     pairs = values.imag > 0
     real = np.hstack([vectors.real, vectors.imag[:, pairs], block_vectors])
@@ -225,11 +222,11 @@ def _inverse(values: Array, vectors: Array, block_vectors: Array) -> tuple[Array
 
 
 def _invariant(companion: Array, values: Array, good: Array) -> tuple[Array, Array, Array]:
-    """Schur block and orthonormal real basis of the invariant subspace of the eigenvalues that are not `good`,
-    and which are good in the end: what cannot be distinguished from the others goes with them.
+    """Schur block and real orthonormal basis of the invariant subspace of eigenvalues not `good`,
+    and which are good in the end: those that cannot be told from the others join them.
 
-    Another algorithm finds them again within what a defective one is uncertain by: a small part of
-    itself, or, where it is zero, of the matrix.
+    The Schur form reproduces a defective eigenvalue only within a small fraction of itself or,
+    where it is zero, of the matrix. ConvergenceError if none of the distances separates them.
     """
     chosen, everything = values[~good], float(np.linalg.norm(companion, 2))
     for near in (1e-6 * float(np.abs(chosen).max()), 1e-7 * everything, 1e-6 * everything):

@@ -1,4 +1,4 @@
-"""The standing modes of a tire at its static state, as a basis for all that moves."""
+"""The modes of the standing tire at its static state: the basis of all dynamics."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.symmetry import Sites
 from tireroad.modal.turning_shapes import with_turning
 
-_SAME = 1e-6  # relative distance of the frequencies of one mode in two solutions
+_SAME = 1e-6  # relative difference of the frequencies of one mode in two solutions
 
 
 def standing_modes(
@@ -33,10 +33,11 @@ def standing_modes(
 ) -> ModalBasis:
     """The `count` lowest modes, or all below `up_to` (Hz), with their fields on all unknowns.
 
-    `rotation`: also project the matrices of the rotating frame; without them the wheel can only stand. `turning`: how it
-    does, so that the shapes of turning join the modes (modal.turning_shapes), which belts need.
-    `air`: what is in the cavity joins the projected problem, and so does the wheel of an `axle` that moves.
-    ConvergenceError when one is missing, inaccurate or unstable. Collective.
+    `rotation`: also project the matrices of the rotating frame, without which the wheel can only
+    stand. `turning`: how the wheel rotates, so that rotation shapes join the modes
+    (modal.turning_shapes); belts need them. `air`: the air in the cavity joins the projected
+    problem, and so does the wheel of an `axle` that moves. ConvergenceError if a mode is missing,
+    inaccurate or unstable. Collective.
     """
     modes = solved(motions.operators, count=count, up_to=up_to)
     return projected(motions, modes, rotation, air, axle, turning)
@@ -45,7 +46,9 @@ def standing_modes(
 def fewer(
     basis: ModalBasis, motions: SmallMotions, count: int, turning: Turning, axle: Axle | None
 ) -> ModalBasis:
-    """The basis of the first `count` modes, and of their shapes of turning where it has such. Collective."""
+    """The basis of the first `count` modes, with their own rotation shapes where it has any.
+    Collective.
+    """
     few = basis.first(count)
     if not basis.projection.shapes or few.modes is None:
         return few
@@ -60,7 +63,11 @@ def solved(
     teams: int | None = None,
     journal: Journal | None = None,
 ) -> Modes:
-    """The modes alone, found by `teams` of processes (modal.solver.team), the `journal` what was found before. Collective."""
+    """The modes alone, found by `teams` of processes (modal.solver.team).
+
+    Results that the `journal` holds are not computed again. InputError if neither `count` nor
+    `up_to` (Hz) is given. Collective.
+    """
     if count is None and up_to is None:
         raise InputError("modes: give count, how many of the lowest, or up_to, a frequency in Hz")
     return undamped.solve(
@@ -82,7 +89,9 @@ def projected(
     axle: Axle | None = None,
     turning: Turning | None = None,
 ) -> ModalBasis:
-    """The basis of these modes and of the shapes of `turning`, where it is given: what they project and show. Collective."""
+    """The basis of these modes, and of the rotation shapes of `turning` where it is given.
+    Collective.
+    """
     operators = motions.operators
     matrices = motions.rotation if rotation else None
     comm, loss = operators.body.comm, operators.loss_stiffness()
@@ -113,8 +122,11 @@ def with_fields(
     axle: Axle | None = None,
     turning: Turning | None = None,
 ) -> ModalBasis:
-    """The basis with its fields on all unknowns: itself, or, of one read from a file, the `count` lowest modes
-    or those below `up_to` (Hz) solved and projected once more, in place of all its parts. Collective.
+    """The basis with its fields on all unknowns.
+
+    A basis that has them is returned as it is. For one read from a file, the `count` lowest modes
+    or those below `up_to` (Hz) are solved and projected again, and replace all its parts;
+    ConvergenceError if their frequencies differ. Collective.
     """
     if basis.modes is not None:
         return basis
@@ -139,5 +151,5 @@ def with_fields(
 
 
 def sites(operators: Operators) -> Sites:
-    """Where this process's unknowns are: there mirrors and repeated segments are looked for."""
+    """The sites of this process's unknowns, where symmetries are sought."""
     return Sites(operators.unknowns.place, operators.unknowns.component)

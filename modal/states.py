@@ -1,4 +1,4 @@
-"""The decoupled equations of motion, and when a motion grows by itself."""
+"""The decoupled equations of motion, and which of their eigenvalues grow."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-GROWS = 1e-9  # of the largest |s|: a growth rate below is rounding, an undamped state's is 0 with either sign
-ROUNDING = (
-    1e3 * np.finfo(float).eps
-)  # of the largest |s|^2: what rounding of the pencil may add to an s^2
+# Of the largest |s|. A smaller growth rate is rounding: an undamped state has 0 with either sign.
+GROWS = 1e-9
+# Of the largest |s|^2: what rounding of the pencil may add to an s^2.
+ROUNDING = 1e3 * np.finfo(float).eps
 
 
 def growing(eigenvalue: np.ndarray) -> np.ndarray:
-    """Which of the eigenvalues (q,) 1/s of one problem belong to a growing motion: Re s beyond rounding.
+    """Mask (q,) of the eigenvalues (q,) 1/s of one problem that grow: Re s > 0 beyond rounding.
 
-    Rounding changes s^2 by a part of the largest one, hence s by that over 2 |s|: much where s is next to 0. A
-    rigid motion, s^2 = 0, comes out with s^2 of 1e-10 1/s^2 and either sign, and drifts but does not grow.
+    Rounding perturbs s^2 by a fraction of the largest s^2, hence s by that over 2 |s|, which is
+    large where s is near zero. A rigid motion, s^2 = 0, is computed with an s^2 of about
+    1e-10 1/s^2 of either sign; it drifts but does not grow.
     """
     size = np.abs(eigenvalue)
     largest = size.max(initial=1.0)
@@ -26,13 +27,14 @@ def growing(eigenvalue: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, kw_only=True)
 class StateModes:
-    """The decoupled equations of motion for m modal coordinates.
+    """The decoupled equations of motion of m modal coordinates.
 
-    `eigenvalue` (q,) 1/s, Im >= 0; `right` (m, q) with the weight 2 of a pair already in it; `left`
-    (q, m), transposed and not conjugated, divided by a_q; `block` (k, k), `block_right` (m, k),
-    `block_left` (k, m). `residual`, `left_residual` (q,) relative to the terms of the quadratic
-    problem; `condition` the worst eigenvector condition among those kept as vectors. The last `rigid`
-    states of the block belong to rigid modes: they drift, and have no static answer.
+    `eigenvalue` (q,) 1/s, Im >= 0; `right` (m, q), with the factor 2 of a conjugate pair included;
+    `left` (q, m), transposed, not conjugated, and divided by a_q. Nearly defective states are kept
+    as a real block: `block` (k, k), `block_right` (m, k), `block_left` (k, m). `residual`,
+    `left_residual` (q,) are relative to the terms of the quadratic problem; `condition` is the
+    worst condition of the eigenvectors that are kept. The last `rigid` states of the block belong
+    to rigid modes: they drift and have no static response.
     """
 
     eigenvalue: np.ndarray
@@ -48,12 +50,12 @@ class StateModes:
 
     @property
     def every(self) -> np.ndarray:
-        """All eigenvalues (q + k,) 1/s, the block's last; complex ones of the block with their conjugates."""
+        """All eigenvalues (q + k,) 1/s, those of the block last and with their conjugates."""
         return np.concatenate([self.eigenvalue, np.linalg.eigvals(self.block)])
 
     @property
     def unstable(self) -> int:
-        """Eigenvalues with a growing motion, beyond rounding."""
+        """Number of eigenvalues that grow beyond rounding."""
         return int(growing(self.every).sum())
 
     @property

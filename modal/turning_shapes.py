@@ -1,19 +1,22 @@
-"""Shapes of turning: what a tire's modes set off, as it turns, in motions that no mode has.
+"""Rotation shapes: the static response of the tire to the rotation forces of its modes.
 
-On a mode phi that moves at the rate eta' the turning wheel exerts the Coriolis forces  2 Omega G phi eta'  and the
-convective ones  Omega^2 S phi eta.  Belts that roll round are bent out of their own plane by them, so that they answer by
-modes of some kHz, which no basis of the lowest has; they answer statically,
+A mode phi with amplitude eta exerts, in a rotating wheel, the Coriolis forces  2 Omega G phi eta'
+and the convective forces  Omega^2 S phi eta.  They bend belts out of their own plane; the belts
+respond with modes of some kHz, which a basis of the lowest modes lacks, hence statically:
 
-    X = K^-1 [2 Omega G Phi,  Omega^2 S Phi / w] - (the modes' part),   w half the highest mode's circular frequency.
+    X = K^-1 [2 Omega G Phi,  Omega^2 S Phi / w] - (component along the modes),   w = omega_m / 2,
 
-x . K x is by how much a shape shifts squares of frequencies, relative to them, of motions at w. The foremost directions
-of X in that measure, those of `TOLERANCE` and more, join the basis (modal.joined) and turn with it. They are found from
-random combinations of its columns, some at a time until no more is found (Halko, Martinsson and Tropp, SIAM Review 53
-(2011) 217): some solutions for each direction that counts, not two for each mode.
+where omega_m is the circular frequency of the highest mode. x . K x is the relative shift that a
+shape causes in the squared frequencies near w. The leading directions of X in that measure, those
+of `TOLERANCE` and more, join the basis (modal.joined) and take part in the rotating problem. They
+are found from random combinations of the columns of X, a block at a time until no more are found
+(Halko, Martinsson and Tropp, SIAM Review 53 (2011) 217): a few solutions per direction that counts
+instead of two per mode.
 
-Of a belted tire at 80 rad/s (20,520 unknowns, 100 modes to 322 Hz, 37 points of its footprint, against its full
-matrices) the receptance up to 161 Hz is 45 % off without them where it is worst, 7.2 % with attachment modes in their
-place, 8.7 % with 70 of them, 2.2 % with both; of a torus of rubber a few count, and change little.
+For a belted tire at 80 rad/s (20,520 unknowns, 100 modes to 322 Hz, 37 points of its footprint,
+against its full matrices) the largest error of the receptance up to 161 Hz is 45 % without them,
+7.2 % with attachment modes instead, 8.7 % with 70 rotation shapes and 2.2 % with both. In a torus
+of rubber a few count, and change little.
 """
 
 from __future__ import annotations
@@ -35,14 +38,14 @@ Array = np.ndarray
 
 TOLERANCE = 2e-3
 BLOCK = 32  # solutions at a time
-_SPARE = 16  # directions found beyond those that count, by which they are known to be all
+_SPARE = 16  # directions found beyond those that count, as evidence that none is missing
 _ROUNDING = 1e-14  # of the largest of a block
-_NOTHING = 1e-6  # of the tolerance: what rounding leaves where the modes are all there are
-_COUPLED = 1e-7  # of the largest of what turning couples: less is rounding
+_NOTHING = 1e-6  # of the tolerance: what rounding leaves where the modes span everything
+_COUPLED = 1e-7  # of the largest coupling by rotation: less is rounding
 
 
 def up_to(speed: float) -> float:
-    """The speed (rad/s) for which shapes are made: the next power of two, so that members of a family share them."""
+    """The speed (rad/s) of the shapes: the next power of two, shared by a family of speeds."""
     return float(2.0 ** np.ceil(np.log2(abs(speed)))) if speed else 0.0
 
 
@@ -53,8 +56,11 @@ def with_turning(
     rotation: Rotation | None,
     turning: Turning,
 ) -> Modes:
-    """The modes, `projection` what they project, followed by the shapes of turning up to `up_to` the speed; as they are of
-    a wheel that stands, or with a free rim, which has no static shapes. Collective."""
+    """The modes followed by the rotation shapes for `up_to` the speed; `projection` is the modes'.
+
+    Unchanged for a standing wheel, and for a free rim, which has no static shapes. InputError
+    without the rotation matrices. Collective.
+    """
     if not turning.speed or operators.unknowns.rim is not None:
         return modes
     if rotation is None:
@@ -65,7 +71,7 @@ def with_turning(
 
 
 class _Found:
-    """K-orthonormal directions (n, k), M-orthogonal to the modes, and what X has of them. Collective."""
+    """K-orthonormal directions (n, k), M-orthogonal to the modes, and X along them. Collective."""
 
     def __init__(
         self, modes: Modes, operators: Operators, rotation: Rotation, turning: Turning
@@ -81,7 +87,7 @@ class _Found:
         self._of = np.empty((0, 2 * len(modes.squares)))
 
     def foremost(self, classes: list[Array]) -> Array:
-        """Own rows (n, k) of the directions that count, found for each of the `classes` of modes by itself."""
+        """Own rows (n, k) of directions that count, sought in each of the `classes` of modes."""
         random = np.random.default_rng(0)
         shapes = LoadedShapes(self._operators, self._operators.stiffness)
         for among in classes:
@@ -91,7 +97,7 @@ class _Found:
         return combined(self._fields, turn[:, :counts], self._fields)
 
     def _search(self, shapes: LoadedShapes, random: np.random.Generator, among: Array) -> None:
-        """Find all that counts of the columns `among` (2 m,) those of X."""
+        """Find all that counts among the columns `among` (2 m,) of X."""
         known, width, found = len(self._of), int(among.sum()), 0
         while found < width:
             mix = np.zeros((len(among), min(BLOCK, width - found)))
@@ -102,32 +108,34 @@ class _Found:
                 return
 
     def _load(self, mix: Array) -> Array:
-        """Own rows (n, b) of forces: [2 Omega G Phi, Omega^2 S Phi / w] mix."""
+        """Own rows (n, b) of the forces [2 Omega G Phi, Omega^2 S Phi / w] mix."""
         parts = zip(self._forces, np.split(mix, 2), strict=True)
         return sum(f * multiply(matrix, self._modes.vectors @ part) for (f, matrix), part in parts)
 
     def _take(self, more: Array) -> None:
-        """Of `more` shapes (n, b) what is in no mode and not known joins the directions."""
+        """Add to the directions what `more` shapes (n, b) contain beyond modes and directions."""
         vectors, comm, ops = self._modes.vectors, self._comm, self._operators
-        for _ in range(2):  # once leaves what the first pass's rounding brought back
+        for _ in range(2):  # the second pass removes the rounding of the first
             take_off(more, vectors, gram(comm, vectors, ops.mass[:, None] * more))
             take_off(more, self._fields, gram(comm, self._fields, multiply(ops.stiffness, more)))
         sizes, turn = np.linalg.eigh(gram(comm, more, multiply(ops.stiffness, more)))
         kept = sizes > max(_NOTHING * TOLERANCE, _ROUNDING * sizes.max())
         new = more @ (turn[:, kept] / np.sqrt(sizes[kept]))
-        # Q^T K X = Q^T L, and L of one matrix and one direction is G^T q . phi.
+        # Q^T K X = Q^T L, with L the forces; for one matrix and one direction q it is G^T q . phi.
         given = [f * self._read(matrix, new) for f, matrix in self._forces]
         self._fields = np.hstack([self._fields, new])
         self._of = np.vstack([self._of, np.hstack(given)])
 
     def _read(self, matrix: PETSc.Mat, fields: Array) -> Array:
-        """fields^T matrix Phi (k, m): G is skew and S symmetric, but for signs, which do not count."""
+        """fields^T matrix Phi (k, m): right up to a sign, which does not matter for skew G."""
         return gram(self._comm, multiply(matrix, fields), self._modes.vectors)
 
 
 def _uncoupled(projection: Projection, inertia: str) -> list[Array]:
-    """Masks (m,) of modes that turning does not couple, as of a mirror's two kinds: mixed at random their shapes would have
-    no symmetry any more."""
+    """Masks (m,) of modes that rotation does not couple, such as the two parities of a mirror.
+
+    Random mixtures across them would lose the symmetry of the shapes.
+    """
     coupled = np.zeros(2 * projection.squares.shape)
     for matrix in projection.rotating(inertia)[:2]:
         part = np.abs(matrix)
@@ -137,6 +145,6 @@ def _uncoupled(projection: Projection, inertia: str) -> list[Array]:
 
 
 def _counting(of: Array) -> tuple[Array, int]:
-    """Singular directions of what X has of those found, and how many of them count."""
+    """Left singular vectors of the components `of` X, and how many of them count."""
     turn, sizes, _ = np.linalg.svd(of, full_matrices=False)
     return turn, int((sizes**2 > TOLERANCE).sum())

@@ -1,8 +1,8 @@
-"""Modes of an axisymmetric state by name: circumferential wave number n and number in the section.
+"""Names for modes of an axisymmetric state: circumferential wave number n, cross-section order.
 
-    u(theta) = sum_n c_n e^{i n theta},   share of n = |c_n|^2 / sum |c|^2, in mass
+    u(theta) = sum_n c_n e^{i n theta},   share of n = |c_n|^2 / sum |c|^2, mass-weighted
 
-with u in the components along and across the ring, which turn with the angle.
+where u has tangential, axial and radial components.
 """
 
 from __future__ import annotations
@@ -14,13 +14,16 @@ from mpi4py import MPI
 
 from tireroad.fem.collective import summed
 
-PURE = 0.99  # least share of one wave number; a footprint or a coarse ring mixes several
+PURE = 0.99  # least share of the leading wave number; a footprint or a coarse ring mixes several
 
 
 @dataclass(frozen=True)
 class Labels:
-    """`wave` (m,) the wave number n, `section` (m,) 0, 1, ... by frequency among those of the same n, the
-    two of a pair alike; both -1 where no wave number holds 99 % of the mode. `share` (m,) of that n.
+    """Names of m modes.
+
+    `wave` (m,) is the wave number n and `section` (m,) the order 0, 1, ... by frequency among the
+    modes of that n, equal for the two of a pair; both are -1 where no wave number holds 99 % of the
+    mode. `share` (m,) is the share of n.
     """
 
     wave: np.ndarray
@@ -28,23 +31,23 @@ class Labels:
     share: np.ndarray
 
     def first(self, count: int) -> Labels:
-        """Of the first `count` modes."""
+        """The names of the first `count` modes."""
         return Labels(self.wave[:count], self.section[:count], self.share[:count])
 
 
 def label(
     comm: MPI.Comm, points: np.ndarray, ring: np.ndarray, mass: np.ndarray, vectors: np.ndarray
 ) -> Labels:
-    """Names of the modes `vectors` (own rows n, m), ascending in frequency, kg^-1/2.
+    """Names of the modes `vectors` (own rows n, m), kg^-1/2, ascending in frequency.
 
-    `points` (own n / 3, 3) m, undeformed; `ring` (own n / 3,) the index of the circle each node is on,
-    counted over all processes; `mass` (own rows) kg. Collective.
+    `points` (own n / 3, 3) m, undeformed; `ring` (own n / 3,) the index of the circle that each
+    node lies on, over all processes; `mass` (own rows) kg. Collective.
     """
     angle = np.arctan2(points[:, 0], -points[:, 2])
     circles = comm.allreduce(int(ring.max(initial=-1)), op=MPI.MAX) + 1
     number = np.arange(comm.allreduce(len(angle)) // circles // 2)
     shares = np.zeros((len(number), vectors.shape[1]))
-    # Circle by circle, all wave numbers in one product: no copy of all fields.
+    # One circle at a time, all wave numbers in one product: avoids a copy of all fields.
     for circle in range(circles):
         on = np.flatnonzero(ring == circle)
         root = np.sqrt(mass[3 * on])
@@ -67,7 +70,7 @@ def label(
 
 
 def _along_ring(angle: np.ndarray, field: np.ndarray) -> np.ndarray:
-    """Components tangential, along the axle and radial, of (nodes, 3, m)."""
+    """Tangential, axial and radial components of a field (nodes, 3, m)."""
     x, y, z = field.transpose(1, 0, 2)
     sine, cosine = np.sin(angle)[:, None], np.cos(angle)[:, None]
     return np.stack([cosine * x + sine * z, y, sine * x - cosine * z], axis=1)

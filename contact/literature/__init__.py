@@ -1,1 +1,1 @@
-"""Contact models of the literature, for comparison: asperities with Hertz springs, wedges with a look-up, fitted springs."""
+"""Contact models of the literature for comparison: asperities, wedges, fitted springs."""

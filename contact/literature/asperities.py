@@ -1,14 +1,16 @@
 """Asperities by mean road parameters and Hertz springs (Fujikawa et al. 1994, 2005; thesis 3.1).
 
-A profile is cut by the line H-H at its median height: half of the road lies above it. Parts above are asperities; of each,
-the height of its apex over the line, and the radius of the circle through the apex and both crossings. Those narrower
-than a quarter of the mean are left out, as the arcs of the others hold them. The road is then rows of alike spheres,
-higher and lower in turn; the tire a surface of constant shape over which they pass:
+A profile is cut at its median height by the line H-H, above which half of the road lies. The parts
+above are asperities; each has the height of its apex over the line, and the radius of the circle
+through the apex and both crossings. Those narrower than a quarter of the mean width are left out,
+since the arcs of the others contain them. The road then becomes rows of equal spheres, alternately
+higher and lower; the tire is a surface of constant shape over which they pass:
 
     F(t) = sum_k F_Hertz(d0 + h_k - g(k x_A - v t)),   F_Hertz = 4/3 E* sqrt(r_A) d^1.5,
 
-g its static gap along the middle, d0 from the mean load. What the tire does in answer is left out, so is every wave
-but those of the mean spacing: of F only the vibratory part is meant.
+where g is its static gap along the middle and d0 follows from the mean load. The response of the
+tire is neglected, and so are all waves but those of the mean spacing: only the vibratory part of F
+is meaningful.
 """
 
 from __future__ import annotations
@@ -24,12 +26,12 @@ from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
 _NARROW = 0.25  # of the mean width
-_PHASES = 64  # of a period, over which the mean load is taken
+_PHASES = 64  # over one period, for the mean load
 
 
 @dataclass(frozen=True)
 class Asperities:
-    """Means of a profile, m: `height` over H-H, `unevenness` between neighbours, `spacing`, `radius`."""
+    """Means of a profile, m: `height` over H-H, `unevenness` of neighbours, `spacing`, `radius`."""
 
     height: float
     unevenness: float
@@ -38,9 +40,10 @@ class Asperities:
 
 
 def asperities(profile: Array, pitch: float) -> Asperities:
-    """Of heights (n,) m every `pitch` m. InputError for fewer than three asperities.
+    """The asperities of heights (n,) m every `pitch` m. InputError for fewer than three of them.
 
-    The mean radius is that of the mean curvature: nearly flat ones would rule a mean of radii.
+    The mean radius is that of the mean curvature, because nearly flat asperities would dominate a
+    mean of radii.
     """
     z = profile - np.median(profile)
     above = np.concatenate([[0], (z > 0).astype(int), [0]])
@@ -66,20 +69,27 @@ def asperities(profile: Array, pitch: float) -> Asperities:
 
 
 def _crossing(z: Array, before: NDArray[np.intp]) -> Array:
-    """Places (in points) where z crosses 0 after the points `before`."""
+    """Positions (in points) where z crosses 0 after the points `before`."""
     return before + z[before] / (z[before] - z[before + 1])
 
 
 def _radius(left: Array, right: Array, height: Array) -> Array:
-    """Of the circle through an apex and two points `height` below it, at `left` and `right` of it, m: a b c / (4 area)."""
+    """Radius (m) of the circle through an apex and two points `height` below it: a b c / (4 area).
+
+    The points are at `left` and `right` of the apex, m.
+    """
     sides = np.hypot(left, height), np.hypot(right, height), left + right
     return sides[0] * sides[1] * sides[2] / (2 * (left + right) * height)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShiftedSprings:
-    """The model: `road`, effective `modulus` E* Pa, `width` m of the footprint (rows stand `spacing` apart), its `gap`
-    (m) at places (m) along it, `length` m from the middle beyond which nothing touches, mean `load` N."""
+    """The model of spheres under a surface of constant shape.
+
+    `road`; effective `modulus` E* Pa; `width` m of the footprint, with rows `spacing` apart; its
+    `gap` (m) at positions (m) along it; `length` m from the middle beyond which nothing touches;
+    mean `load` N.
+    """
 
     road: Asperities
     modulus: float
@@ -89,12 +99,12 @@ class ShiftedSprings:
     load: float
 
     def forces(self, travelled: Array) -> Array:
-        """Total force (n,) N after the way (n,) m."""
+        """Total force (n,) N after the distances (n,) m."""
         depth = self._depth()
         return self._at(travelled, depth)
 
     def _depth(self) -> float:
-        """d0, m, of the mean load."""
+        """d0, m, at the mean load."""
         way = 2 * self.road.spacing * np.arange(_PHASES) / _PHASES
 
         def excess(depth: float) -> float:

@@ -1,4 +1,4 @@
-"""A Winkler bed's stiffness from the indentation of another tread law (as Kropp fits his by measured ones)."""
+"""Winkler stiffness from the indentation of another tread law (Kropp fits his to measurements)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ _ACROSS = 21  # points across the square that the sphere is pressed into
 
 
 def fitted_stiffness(law: TreadLaw, radius: float, depth: float) -> float:
-    """N/m^3 of the bed that carries as much as the tread under a rigid sphere of `radius`, pressed in by `depth` (m).
+    """Stiffness (N/m^3) of the bed that carries as much as the tread under a rigid sphere.
 
-    By the complementarity problem on 21 x 21 points over the sphere's undeformed cut, sqrt(2 r d).
+    The sphere has the `radius` (m) and is pressed in by `depth` (m). The complementarity problem is
+    solved on 21 x 21 points over the sphere's undeformed cut, sqrt(2 r d).
     """
     reach = 1.1 * np.sqrt(2 * radius * depth)
     pitch = 2 * reach / _ACROSS

@@ -1,9 +1,11 @@
-"""Wedges of the tire and the volume of road in them (Mancosu and Minen 1998, second model; thesis 3.1).
+"""Wedges of the tire and the road volume in them (Mancosu and Minen 1998, 2nd model; thesis 3.1).
 
-The tire is cut into wedges around the axle. The volume in which a wedge of the unloaded tire and the road intersect gives its
-force by a look-up: of our own finite elements, pressed on a plane at several heights. Per metre around, the area A of
-a wedge's cross-section that is inside the road, and the force F it carries, are pairs of all wedges at all heights; the
-look-up is their mean in classes of A, made monotone. Wedges do not know of each other, and the tire gives no answer in time.
+The tire is cut into wedges around the axle. The volume in which a wedge of the unloaded tire
+intersects the road gives its force by a look-up table, here from the finite elements pressed on a
+plane at several heights. Per metre of circumference, the area A of a wedge's cross-section inside
+the road and the force F that it carries form pairs, over all wedges and heights; the table is their
+mean in classes of A, made monotone. Wedges are independent of each other, and the tire has no
+response in time.
 """
 
 from __future__ import annotations
@@ -21,21 +23,24 @@ _CLASSES = 24
 
 @dataclass(frozen=True)
 class LookUp:
-    """Force (k,) N/m over area (k,) m^2, both from 0; `scatter`: what it leaves of the pairs, relative to their largest."""
+    """Force (k,) N/m over area (k,) m^2, both from 0.
+
+    `scatter`: rms deviation of the pairs from it, relative to their largest force.
+    """
 
     area: Array
     force: Array
     scatter: float
 
     def __call__(self, area: Array) -> Array:
-        """N/m; beyond the largest area carried on by its last slope."""
+        """Force, N/m; extrapolated with the last slope beyond the largest area."""
         slope = (self.force[-1] - self.force[-2]) / (self.area[-1] - self.area[-2])
         beyond = np.maximum(area - self.area[-1], 0.0)
         return np.interp(area, self.area, self.force) + slope * beyond
 
 
 def look_up(area: Array, force: Array) -> LookUp:
-    """From pairs (n,) m^2 and N/m. InputError when fewer than three of them are inside the road."""
+    """The table from pairs (n,) m^2 and N/m. InputError if fewer than three are inside the road."""
     inside = area > 0
     if inside.sum() < 3:
         raise InputError("wedges: fewer than three of them meet the road: press further")
@@ -50,7 +55,7 @@ def look_up(area: Array, force: Array) -> LookUp:
 
 
 def _monotone(values: Array) -> Array:
-    """The nearest ascending sequence in least squares: neighbours that descend are pooled."""
+    """The least-squares nearest ascending sequence, by pooling neighbours that descend."""
     pools: list[list[float]] = []
     for value in values:
         pools.append([value, 1.0])
@@ -62,8 +67,11 @@ def _monotone(values: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class Wedges:
-    """The unloaded tire's face as the road sees it: `x` (a,) m of the wedges, `length` (a,) m around of each, `y` (a, b) and
-    `height` (a, b) m over the road's plane, `width` (a, b) m that each point stands for."""
+    """The face of the unloaded tire as seen from the road.
+
+    `x` (a,) m of the wedges, `length` (a,) m of each around the tire, `y` (a, b) and `height`
+    (a, b) m over the plane of the road, `width` (a, b) m that each point represents.
+    """
 
     x: Array
     length: Array

@@ -1,4 +1,4 @@
-"""The energy balance of a run, an indicator of how well its steps resolve it."""
+"""The energy balance of a run, which indicates how well its steps resolve it."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from tireroad.modal.rolling import RollingModes, pencil
 
 
 def own_states(response: Response, rolling: RollingModes) -> bool:
-    """Whether the response moves in the modes' own states: of residual dynamics, attachment modes and the
-    states of the full matrices the coordinates in the modes are not known here."""
+    """Whether the response consists of the modes' own states.
+
+    With residual states, attachment modes or states of the full matrices, the modal coordinates are
+    not known here.
+    """
     if rolling.full:
         return False
     states = rolling.states
@@ -24,9 +27,10 @@ def own_states(response: Response, rolling: RollingModes) -> bool:
 
 
 def springs(response: Response, force: np.ndarray) -> float:
-    """Elastic energy (J) in the residual flexibility under forces (k,) N, that of states made static in it.
+    """Elastic energy (J) in the residual flexibility, with static states, at forces (k,) N.
 
-    The first k outputs are the forces' own displacements; readings may follow them (contact.driven).
+    The first k outputs are the forces' own displacements; readings may follow them
+    (contact.driven).
     """
     if response.pulse:
         return 0.0
@@ -34,9 +38,9 @@ def springs(response: Response, force: np.ndarray) -> float:
 
 
 class Motion:
-    """Coordinates and rates of the modes from the states of a time loop, and what they lose.
+    """Modal coordinates and rates from the states of a time loop, and their dissipation.
 
-    Of a tire that rolls on its own states alone, without air, corner and near-defective block.
+    For a tire that rolls on its own states only, without air, corner and nearly defective block.
     """
 
     def __init__(self, rolling: RollingModes, slow: np.ndarray, step: float) -> None:
@@ -50,7 +54,7 @@ class Motion:
 
     @staticmethod
     def known(rolling: RollingModes, response: Response) -> bool:
-        """Whether the losses of these states can be told."""
+        """Whether the dissipation of these states can be computed."""
         projection = rolling.basis.projection
         plain = not rolling.full and projection.air is None and not projection.moves
         moving = rolling.turning.speed > 0 and not len(response.block)
@@ -66,12 +70,12 @@ class Motion:
 
 
 def energy_left(rolling: RollingModes, kept: dict[str, np.ndarray], slow: np.ndarray) -> float:
-    """Energy (J) of the states of a tire's snapshot; `slow` (q,) marks the modes that it holds."""
+    """Energy (J) of the states in a tire's snapshot; `slow` (q,) marks the modes it contains."""
     states, state = rolling.states, kept["state"]
     right = states.right[:, slow]
     coordinates = (right @ state).real + states.block_right @ kept["block_state"]
     rates = (right @ (states.eigenvalue[slow] * state + kept["push"])).real
     rates += states.block_right @ (states.block @ kept["block_state"])
-    # What damping adds to the rolling shape's stiffness stores nothing: it is the drive's work.
+    # Damping's contribution to the rolling stiffness stores nothing: it is work of the drive.
     _, stiffness = pencil(rolling.basis.projection, replace(rolling.turning, damping=(0.0, 0.0)))
     return stored(coordinates, rates, stiffness)

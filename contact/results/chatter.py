@@ -1,15 +1,17 @@
-"""Chatter: points that open and close from step to step, because a step is too long for the contact.
+"""Chatter: points that open and close from step to step because the step is too long.
 
-Between the points that touch, a force meets a compliance at once, B (tread and residual flexibility); a force
-linear over the steps that alternates meets the tire's states as a negative one, X (greens.residual.alternating). With
+At the touching points a force acts on an instantaneous compliance B (tread and residual
+flexibility). To an alternating force, linear over the steps, the tire's states respond as a
+negative compliance X (greens.residual.alternating). With
 
     -X v = mu B v,   mu the largest,
 
-the fastest oscillation of the points that touch takes  2 pi / theta  steps,  cos theta = (1 - 4 mu) / (1 + 2 mu).
-A mass m on a compliance C has mu = h^2 / (12 m C): its true oscillation turns by (12 mu)^1/2 in a step. At
-mu = 1 it takes two steps, and from there on it grows without bound. Horizontal forces, where there are some, meet
-bristles and the tread's shear likewise; the larger mu of the two counts. A force that is constant over the step has
-X = 0: it takes from such an oscillation what it has, and errs by the first order of the step.
+the fastest oscillation of the touching points takes  2 pi / theta  steps,
+cos theta = (1 - 4 mu) / (1 + 2 mu). A mass m on a compliance C has mu = h^2 / (12 m C); its true
+oscillation rotates by (12 mu)^1/2 in a step. At mu = 1 it takes two steps, and beyond it grows
+without bound. Horizontal forces act on bristles and on the tread's shear in the same way; the
+larger mu of the two counts. A force that is constant over the step has X = 0: it damps such an
+oscillation, with an error of first order in the step.
 """
 
 from __future__ import annotations
@@ -28,13 +30,15 @@ from tireroad.greens.response import Response
 
 Stiffness = float | np.ndarray
 
-# Steps in the fastest oscillation from which forces are taken as linear: at fewer, undamped modes between impacts
-# gained energy (measured from 2.9 down: contact force a hundred times too large).
+# Steps in the fastest oscillation from which on forces are taken as linear: with fewer, undamped
+# modes gained energy between impacts (measured from 2.9 down: contact force a hundred times too
+# large).
 FEWEST = 2.5
-# Points of which the oscillation is found, along the road of half as many: a second of eigenvalues.
+# Points for which the oscillation is computed, half as many for horizontal forces: a second of
+# eigenvalues.
 MOST = 1000
-# Share of the points that touch, of which all but these came back to where they were two steps before.
-# (Seen: 0.11 to 1 where forces were wrong, 0.035 at most where they were right.)
+# Largest accepted share of the touching points that alternate: that return to their state of two
+# steps before. (Measured: 0.11 to 1 where forces were wrong, 0.035 at most where they were right.)
 LIMIT = 0.05
 WINDOW = 200  # steps over which it is counted
 
@@ -43,8 +47,11 @@ ROAD = "points open and close from step to step with constant forces too: that i
 
 
 class Chatter(ConvergenceError):
-    """The steps are too long for the contact: `share` of the points that touch open and close from step to step; inf
-    where the motion grows without bound."""
+    """The steps are too long for the contact.
+
+    `share` of the touching points open and close from step to step; inf if the motion grows without
+    bound.
+    """
 
     def __init__(self, text: str, share: float = math.inf) -> None:
         super().__init__(text)
@@ -53,18 +60,22 @@ class Chatter(ConvergenceError):
 
 @dataclass(frozen=True)
 class Chosen:
-    """The force's course within a step, "linear" or "constant", and why; `limit`: the share of points that open and
-    close from step to step beyond which the other is tried, inf where this one is kept."""
+    """The force's course within a step, "linear" or "constant", and the reason.
+
+    `limit`: the share of points that open and close from step to step above which the other is
+    tried; inf if this one is final.
+    """
 
     scheme: str
     reason: str
     limit: float = math.inf
 
     def instead(self, chatter: Chatter) -> Chosen:
-        """What to take after this one has gone beyond its limit; the error itself where nothing is left.
+        """The choice after this one exceeded its limit; raises the error if none is left.
 
-        On a rough road points open and close because it passes under them by more than their distance in a step. Then
-        they do so with constant forces as well, which have no chatter: more than half as many, and linear it stays.
+        On a rough road points open and close because it passes by more than their spacing in a
+        step. They do so with constant forces too, which cannot chatter: if more than half as many
+        do, linear forces are kept.
         """
         if self.scheme == "linear" and self.limit < math.inf:
             limit = max(chatter.share / 2, LIMIT)
@@ -79,7 +90,7 @@ class Chosen:
 
 
 def choose(steps: float) -> Chosen:
-    """What to take where the fastest oscillation of the contact takes so many `steps`."""
+    """The choice if the fastest oscillation of the contact takes this many `steps`."""
     if steps >= FEWEST:
         why = "resolve" if math.isfinite(steps) else "have none to resolve:"
         count = f" in {steps:.3g} steps" if math.isfinite(steps) else ""
@@ -94,12 +105,12 @@ def choose(steps: float) -> Chosen:
 def oscillation(
     spec: Spec, patch: Patch, response: Response, step: float, bristles: Stiffness | None = None
 ) -> float:
-    """Steps (2 or more, inf) that the fastest oscillation of the points touching at rest takes, with
-    forces linear over steps of `step` s.
+    """Steps (2 or more, inf) per fastest oscillation of points touching at rest, linear forces.
 
-    `response` as the loop takes it (Response.resolved), its first inputs and outputs the patch's nodes, with horizontal
-    forces in z, then x and y. `bristles` N/m of each point, inf where none give way, None: no horizontal forces; the
-    points stick, so that it is their least number of steps. Of more than `MOST` points those nearest to their middle.
+    `step` in s. `response` as the loop uses it (Response.resolved); its first inputs and outputs
+    are the patch's nodes, with horizontal forces in z, then x and y. `bristles` N/m of each point,
+    inf if rigid, None: no horizontal forces. The points are taken to stick, so the result is a
+    lower bound. Of more than `MOST` points those nearest to their middle are taken.
     """
     index = _nearest(patch, MOST)
     if len(index) == 0:
@@ -116,7 +127,7 @@ def oscillation(
 
 
 def _along(spec: Spec, patch: Patch, seen: list[np.ndarray], bristles: Stiffness) -> float:
-    """mu of the points' horizontal forces, `seen` by nodes (2 p, 2 p), of x, then of y."""
+    """mu of the points' horizontal forces, `seen` by nodes (2 p, 2 p), x then y."""
     index, p = _nearest(patch, MOST // 2), len(patch.index)
     approach, compliance = (
         np.block(
@@ -140,7 +151,7 @@ def _between(patch: Patch, nodes: np.ndarray, index: np.ndarray) -> np.ndarray:
 
 
 def _nearest(patch: Patch, most: int) -> np.ndarray:
-    """The points that touch at rest, (n,) of them."""
+    """The points that touch at rest, at most `most` of them, nearest to their middle."""
     index = np.flatnonzero(patch.force > 0)
     if len(index) <= most:
         return index
@@ -150,26 +161,27 @@ def _nearest(patch: Patch, most: int) -> np.ndarray:
 
 
 def _largest(approach: np.ndarray, compliance: np.ndarray) -> float:
-    """mu of the symmetric parts (n, n); infinite where the compliance is none."""
+    """Largest mu for the symmetric parts (n, n); inf if the compliance is not definite."""
     last = [len(approach) - 1] * 2
     symmetric = [(matrix + matrix.T) / 2 for matrix in (approach, compliance)]
     try:
         return float(linalg.eigh(*symmetric, eigvals_only=True, subset_by_index=last)[0])
-    except np.linalg.LinAlgError:  # not positive definite: nothing gives way at once
+    except np.linalg.LinAlgError:  # not positive definite: no instantaneous compliance
         return math.inf
 
 
 def _steps(mu: float) -> float:
-    """Steps a period of the oscillation of that mu."""
+    """Steps per period of the oscillation of that mu."""
     if mu <= 0.0:
         return math.inf
-    # cos a = (1 - 4 mu) / (1 + 2 mu) for the angle a of a step, by its half: a cosine of 1 says nothing of a small one.
+    # cos a = (1 - 4 mu) / (1 + 2 mu) for the angle a per step, evaluated by a / 2: the cosine of a
+    # small angle is lost in rounding.
     half = 3 * mu / (1 + 2 * mu) if math.isfinite(mu) else 1.0
     return math.pi / math.asin(math.sqrt(min(half, 1.0)))
 
 
 def warning(share: float) -> str:
-    """What to say of a share of points that open and close."""
+    """The warning for a share of points that open and close."""
     return (
         f"contact: {100 * share:.2g} % of the points that touch open and close from step to step: take a smaller "
         'time.step, or time.scheme = "constant"'
@@ -177,16 +189,16 @@ def warning(share: float) -> str:
 
 
 class Alternation:
-    """How many of the points that touch change back in every step, counted as the loop goes.
+    """Counts, as the loop proceeds, the touching points that change back in every step.
 
-    An event is a point that touches or not as two steps before, and not as in the step between. `worst`
-    is the largest share of events in the points that touch, of all windows of `WINDOW` steps.
+    An event is a point that touches or not as two steps before, but not as in the step between.
+    `worst` is the largest ratio of events to touching points over all windows of `WINDOW` steps.
     """
 
     def __init__(self) -> None:
         self.worst = 0.0
         self._last = np.zeros((0, 0), dtype=bool)
-        self._window = np.zeros(3, dtype=np.int64)  # steps, events, points that touch
+        self._window = np.zeros(3, dtype=np.int64)  # steps, events, touching points
 
     def add(self, force: np.ndarray) -> None:
         """Count n steps: forces (n, c) N."""
@@ -195,7 +207,7 @@ class Alternation:
         back = (rows[2:] == rows[:-2]) & (rows[2:] != rows[1:-1])
         events = np.zeros(len(active), dtype=np.int64)
         events[len(active) - len(back) :] = back.sum(axis=1)
-        # Windows begin at the first step: they do not depend on how the steps are blocked.
+        # Windows begin at the first step, so they do not depend on how steps are blocked.
         for now in zip(events.tolist(), active.sum(axis=1).tolist(), strict=True):
             self._window += (1, *now)
             if self._window[0] == WINDOW:
@@ -203,7 +215,7 @@ class Alternation:
         self._last = rows[-2:]
 
     def finish(self) -> None:
-        """Count the window that the end of the loop cuts short, unless it is too short to say anything."""
+        """Count the last, incomplete window, unless it is too short to be meaningful."""
         if self._window[0] >= WINDOW // 4:
             self._close()
 
@@ -213,12 +225,12 @@ class Alternation:
         self._window[:] = 0
 
     def check(self, limit: float) -> None:
-        """Chatter where more than this share of the points change back."""
+        """Raise Chatter if more than this share of the points change back."""
         if self.worst > limit:
             raise Chatter(warning(self.worst), self.worst)
 
     def state(self) -> dict[str, np.ndarray]:
-        """What a checkpoint keeps."""
+        """The state that a checkpoint keeps."""
         return {
             "alternation": np.array(self.worst),
             "alternation_window": self._window,
@@ -226,6 +238,6 @@ class Alternation:
         }
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self.worst = float(kept["alternation"])
         self._window, self._last = kept["alternation_window"].copy(), kept["alternation_last"]

@@ -1,4 +1,4 @@
-"""Energy between road and tire: what came in, what is still there, and so what was lost."""
+"""Energy between road and tire: supplied, stored, and hence dissipated."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 class Work:
     """Work (J) of the changes of the contact forces on the tire, summed over the steps.
 
-    Trapezoid: sum (f + f_before).(u - u_before)/2, second order in the step. `lead`: what more a force does
-    that has its new value for the whole step, sum (f - f_before).(u - u_before)/2. A checkpoint keeps
-    both with the last force and displacement.
+    Trapezoidal rule: sum (f + f_before).(u - u_before)/2, second order in the step. `lead`: the
+    additional work of forces that have their new value during the whole step, sum
+    (f - f_before).(u - u_before)/2. A checkpoint keeps both, with the last force and displacement.
     """
 
     def __init__(self) -> None:
@@ -23,14 +23,14 @@ class Work:
         place = np.concatenate([np.broadcast_to(self._moved, (1, moved.shape[1])), moved])
         mean, way = 0.5 * (force[1:] + force[:-1]), np.diff(place, axis=0)
         ahead = 0.5 * np.diff(force, axis=0)
-        # One step after the other: the sum does not depend on how the steps are blocked.
+        # Step by step, so that the sum does not depend on how steps are blocked.
         for work, more in np.stack([mean * way, ahead * way]).sum(axis=2).T.tolist():
             self.total += work
             self.lead += more
         self._force, self._moved = change[-1], moved[-1]
 
     def state(self) -> dict[str, np.ndarray]:
-        """What a checkpoint keeps."""
+        """The state that a checkpoint keeps."""
         return {
             "work": np.array([self.total, self.lead]),
             "work_force": self._force,
@@ -38,19 +38,20 @@ class Work:
         }
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self.total, self.lead = kept["work"].tolist()
         self._force, self._moved = kept["work_force"], kept["work_moved"]
 
 
 class Dissipation:
-    """What the material of a rolling tire loses, and what the drive brings in, J, summed over the steps.
+    """Energy that the material of a rolling tire dissipates, and that the drive supplies, J.
 
     With r = q' + Omega P q the body rate of the coordinates q, D the damping of the modes:
 
         lost = int r . D r dt >= 0,   drive = int (Omega P q) . D r dt,
 
-    so that work of the forces + drive = change of the energy of `stored` + lost. By the trapezoid rule.
+    so that work of the forces + drive = change of the energy of `stored` + lost. Summed over the
+    steps by the trapezoidal rule.
     """
 
     def __init__(self, damping: np.ndarray, turning: np.ndarray, step: float) -> None:
@@ -66,28 +67,29 @@ class Dissipation:
         braked = self._damping * body
         power = np.stack([(body * braked).sum(axis=0), (turned * braked).sum(axis=0)])
         power = np.column_stack([self._last, power])
-        # One step after the other: the sums do not depend on how the steps are blocked.
+        # Step by step, so that the sums do not depend on how steps are blocked.
         for lost, drive in (self._step * (power[:, 1:] + power[:, :-1]) / 2).T.tolist():
             self.lost += lost
             self.drive += drive
         self._last = power[:, -1]
 
     def state(self) -> dict[str, np.ndarray]:
-        """What a checkpoint keeps."""
+        """The state that a checkpoint keeps."""
         return {"dissipation": np.array([self.lost, self.drive]), "dissipation_last": self._last}
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self.lost, self.drive = kept["dissipation"].tolist()
         self._last = kept["dissipation_last"]
 
 
 class Circulation:
-    """Work (J) of forces against the skew part of a flexibility, int f . G_a df, by the trapezoid rule.
+    """Work (J) on the skew part of a flexibility, int f . G_a df, by the trapezoidal rule.
 
-    The symmetric part of a residual flexibility stores what it is given; the skew part, which a rolling
-    tire's has, does not: it is what the modes left out lose, less what the drive gives them. `lead`: work
-    against the symmetric part that it does not store when forces jump, sum (f - f_before).G_s (f - f_before)/2.
+    The symmetric part of a residual flexibility stores the work done on it. The skew part, which a
+    rolling tire has, does not: its work is what the truncated modes dissipate, less what the drive
+    supplies to them. `lead`: work on the symmetric part that is not stored when forces jump, sum
+    (f - f_before).G_s (f - f_before)/2.
     """
 
     def __init__(self, flexibility: np.ndarray) -> None:
@@ -100,7 +102,7 @@ class Circulation:
     def add(self, forces: np.ndarray) -> None:
         """Count n steps: forces (n, k) N at their ends."""
         path = np.concatenate([self._force[None], forces])
-        # f_a . G_a (f_b - f_a) = f_a . G_a f_b, for f . G_a f = 0.
+        # f_a . G_a (f_b - f_a) = f_a . G_a f_b, since f . G_a f = 0.
         jump = np.diff(path, axis=0)
         turned = np.einsum("ni,ni->n", path[:-1], path[1:] @ self._skew.T)
         jumped = np.einsum("ni,ni->n", jump, jump @ self._even) / 2
@@ -110,22 +112,22 @@ class Circulation:
         self._force = path[-1]
 
     def state(self) -> dict[str, np.ndarray]:
-        """What a checkpoint keeps."""
+        """The state that a checkpoint keeps."""
         return {
             "circulation": np.array([self.work, self.lead]),
             "circulation_force": self._force,
         }
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self.work, self.lead = kept["circulation"].tolist()
         self._force = kept["circulation_force"]
 
 
 def stored(coordinates: np.ndarray, rates: np.ndarray, stiffness: np.ndarray) -> float:
-    """Energy (J) of modal coordinates (m,) and rates (m,): kinetic, and of `stiffness` (m, m) 1/s2.
+    """Energy (J) of modal coordinates (m,) and rates (m,): kinetic, and in `stiffness` (m, m) 1/s2.
 
-    In the frame that does not rotate: with the tire turning, its symmetric part keeps what the
-    inertia of the transport takes off.
+    In the non-rotating frame; in a rolling tire the symmetric part of the stiffness includes the
+    negative convective term.
     """
     return float(0.5 * rates @ rates + 0.5 * coordinates @ stiffness @ coordinates)

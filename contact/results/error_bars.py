@@ -1,15 +1,15 @@
-"""How far the figures of a run may be off, by companions whose error is larger or smaller by a known ratio.
+"""Error bars of a run, from companion runs whose error is larger or smaller by a known ratio.
 
-For a quantity Q with an error that goes as h^r, of a run at h and a companion at q h:
+For a quantity Q with an error proportional to h^r, of a run at h and a companion at q h:
 
     Q_h - Q_0 = (Q_qh - Q_h) / (q^r - 1),
 
-the share 1 / |q^r - 1| of the difference of both; of a history the difference is taken line by line of its
-spectrum, with phase. Errors of several causes add up as squares.
+the share 1 / |q^r - 1| of their difference. For a history the difference is taken line by line of
+its spectrum, with phase. Errors of several causes add as squares.
 
-What points make wrong is where the edge of the contact falls between them, which is another place on every grid. So
-the errors of both are as good as independent of each other, their mean squares add up, and the share of the root mean
-square is 1 / (1 + q^2r)^(1/2) (`random_share`).
+The error due to the points depends on where the edge of the contact falls between them, which
+differs from grid to grid. The errors of the two runs are therefore nearly independent, their mean
+squares add, and the share of the root mean square is 1 / (1 + q^2r)^(1/2) (`random_share`).
 """
 
 from __future__ import annotations
@@ -27,33 +27,37 @@ CAUSES = ("step", "points", "modes", "mesh")
 
 
 def orders(elements: int, scheme: str = "linear") -> dict[str, float]:
-    """The order, by cause, in the size of what makes the error; `elements` of which order the mesh is, `scheme` how a force goes
-    within a step.
+    """Order of the error in the size that causes it, by cause.
 
-    Step: a force that is linear over it errs by the second order, one that is constant by the first (by half a step of delay).
-    Points: a footprint's pressure ends as the root of the distance to its edge. Modes: in the highest frequency, what
-    static answers leave out falls as its cube. Mesh: displacements of order p, p + 1 in the mean (Nitsche), seen
-    between 3.7 and 4.7 of order 3 (histories of 18 x 8 elements beside 9 x 4 and 30 x 12; bench error_bars).
+    `elements`: order of the mesh; `scheme`: the force's course within a step. Step: second order
+    with linear forces, first with constant ones (half a step of delay). Points: a footprint's
+    pressure ends as the square root of the distance to its edge. Modes: the error of static
+    responses falls as the cube of the highest frequency. Mesh: displacements of order p have order
+    p + 1 in the mean (Nitsche), observed between 3.7 and 4.7 for order 3 (histories of 18 x 8
+    elements beside 9 x 4 and 30 x 12; bench error_bars).
     """
     step = 1.0 if scheme == "constant" else 2.0
     return {"step": step, "points": 1.5, "modes": 3.0, "mesh": elements + 1.0}
 
 
 def share(ratio: float, order: float) -> float:
-    """Error of a run over its difference to a companion whose size is `ratio` times that of the run."""
+    """Error of a run over its difference to a companion of `ratio` times its size."""
     return 1 / abs(ratio**order - 1)
 
 
 def random_share(ratio: float, order: float) -> float:
-    """The same where the errors of both have nothing to do with each other but their sizes."""
+    """The same for errors that are independent of each other but for their magnitudes."""
     return 1 / float(np.hypot(1.0, ratio**order))
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What is measured of a force: `mean`, `deviation` (3,) N of what the model answers for, `level` (b, 3) dB of the
-    bands at `centre` (b,) Hz, and `low` (f, 3) N, the Fourier coefficients of what varies up to a frequency
-    (contact.results.spectra.low_part)."""
+    """Quantities of a force for comparison.
+
+    `mean`, `deviation` (3,) N within the valid band of the model; `level` (b, 3) dB of the bands at
+    `centre` (b,) Hz; `low` (f, 3) N: Fourier coefficients of the variable part up to a frequency
+    (contact.results.spectra.low_part).
+    """
 
     mean: np.ndarray
     deviation: np.ndarray
@@ -64,8 +68,11 @@ class Measured:
 
 @dataclass(frozen=True)
 class Bars:
-    """Estimated errors: of the `mean` and `deviation` (3,) N and of each `level` (b, 3) dB, NaN where unknown;
-    of the `history` (3,), relative L2 norm of what varies up to a frequency, NaN where nothing does."""
+    """Estimated errors, NaN where unknown.
+
+    Of the `mean` and `deviation` (3,) N, of each `level` (b, 3) dB, and of the `history` (3,):
+    relative L2 norm of the variable part up to a frequency, NaN if nothing varies.
+    """
 
     mean: np.ndarray
     deviation: np.ndarray
@@ -74,8 +81,10 @@ class Bars:
 
 
 def measured(force: np.ndarray, step: float, limit: float, up_to: float = np.inf) -> Measured:
-    """Of a force (n, 3) N in steps of `step` s, the deviation and the bands below `limit` Hz; its history up to
-    `up_to` Hz, if that is lower."""
+    """The quantities of a force (n, 3) N in steps of `step` s.
+
+    Deviation and bands below `limit` Hz; the history up to `up_to` Hz, if that is lower.
+    """
     centre, level = third_octaves(force, step, limit)
     mean = force.mean(axis=0)
     low = low_part(force - mean, len(force) * step, min(limit, up_to))
@@ -106,6 +115,6 @@ def _apart(run: np.ndarray, companion: np.ndarray) -> np.ndarray:
 
 
 def total(causes: Mapping[Any, Bars]) -> Bars:
-    """Of all causes at once: the root of the sum of squares, NaN where a cause is unknown."""
+    """The error from all causes: the root of the sum of squares, NaN if a cause is unknown."""
     parts = [np.sqrt(sum(getattr(bar, name) ** 2 for bar in causes.values())) for name in _NAMES]
     return Bars(*parts)

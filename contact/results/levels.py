@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 _PREFERRED = np.array((1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0))
-FEWEST = 3  # lines across a band, below which it has no level
-FEW = 10  # lines, at which that of the process lies from 3.0 dB below to 4.6 dB above it in 95 % of all cases
+FEWEST = 3  # lines across a band; with fewer it has no level
+# Lines with which the process's level lies from 3.0 dB below to 4.6 dB above in 95 % of cases.
+FEW = 10
 
 
 def a_weighting(frequency: np.ndarray) -> np.ndarray:
-    """dB to add at frequencies (f,) Hz: the analytic form of IEC 61672-1, 0 at 1 kHz."""
+    """A-weighting in dB at frequencies (f,) Hz: the analytic form of IEC 61672-1, 0 at 1 kHz."""
     f2 = np.asarray(frequency, float) ** 2
     f1, low, high, f4 = 20.598997, 107.65265, 737.86223, 12194.217
 
@@ -24,7 +25,10 @@ def a_weighting(frequency: np.ndarray) -> np.ndarray:
 
 
 def nominal(centre: np.ndarray) -> np.ndarray:
-    """The names, Hz, of IEC 61260-1 for exact band centres 1000 * 10^(k/10) Hz: 315 of 316.23; others unchanged."""
+    """Nominal frequencies, Hz, of IEC 61260-1 for exact band centres 1000 * 10^(k/10) Hz.
+
+    For instance 315 for 316.23; other values are unchanged.
+    """
     band = np.rint(10.0 * np.log10(np.maximum(centre, 1e-9)))
     name = _PREFERRED[(band % 10).astype(int)] * 10.0 ** (band // 10)
     return np.where(np.abs(name / np.maximum(centre, 1e-9) - 1.0) < 0.03, name, centre)
@@ -33,11 +37,11 @@ def nominal(centre: np.ndarray) -> np.ndarray:
 def band_sums(
     frequency: np.ndarray, square: np.ndarray, up_to: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (b,) Hz of base-ten bands, 1000 * 10^(k/10) (IEC 61260-1), and the sums (b, ...) of what the lines
-    (f,) Hz, evenly spaced, hold of `square` (f, ...), those on a border shared.
+    """Centres (b,) Hz of base-ten bands, 1000 * 10^(k/10) (IEC 61260-1), and sums (b, ...).
 
-    Bands that lie whole within the lines and below `up_to` Hz; a band narrower than three lines has no
-    meaningful level, and a record of one line no band.
+    `square` (f, ...) is given at evenly spaced lines (f,) Hz; lines on a border are divided. Only
+    bands that lie entirely within the lines and below `up_to` Hz: a band narrower than three lines
+    has no meaningful level, and a record of one line has no band.
     """
     if len(frequency) < 2:
         return np.zeros(0), np.zeros((0, *square.shape[1:]))
@@ -56,7 +60,7 @@ def band_sums(
 
 
 def _bands(up_to: float, above: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centres, lower and upper borders, Hz, of all bands from 1 Hz that lie between two frequencies."""
+    """Centres, lower and upper borders, Hz, of all bands from 1 Hz between two frequencies."""
     centre = 1000.0 * 10.0 ** (np.arange(-30, 17) / 10)
     low, high = centre * 10**-0.05, centre * 10**0.05
     use = (high < up_to) & (low > above)
@@ -64,21 +68,22 @@ def _bands(up_to: float, above: float) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def too_narrow(spacing: float, up_to: float, lowest: float = 20.0) -> np.ndarray:
-    """Centres, Hz, of the bands from `lowest` Hz to `up_to` that hold fewer than three lines, `spacing` Hz apart."""
+    """Centres, Hz, of bands in `lowest` to `up_to` Hz with fewer than 3 lines (`spacing` Hz)."""
     centre, low, high = _bands(up_to, 0.0)
     return centre[(high - low <= FEWEST * spacing) & (centre > 0.95 * lowest)]
 
 
 def lines(centre: np.ndarray, spacing: float) -> np.ndarray:
-    """Lines, `spacing` Hz apart, across each band (b,)."""
+    """Number of lines, `spacing` Hz apart, across each band (b,)."""
     return centre * (10**0.05 - 10**-0.05) / spacing
 
 
 def freedom(count: np.ndarray) -> np.ndarray:
-    """Degrees of freedom of the sum of `count` neighbouring lines of one record of noise under Hann's window.
+    """Degrees of freedom of the sum of `count` adjacent lines of noise under a Hann window.
 
-    Its lines are correlated with the next by 2/3 and the next but one by 1/6, so of n independent pairs
-    n^2 / (n + 2 (n - 1) 4/9 + 2 (n - 2) 1/36) are left (Welch's method on one segment), two freedoms each.
+    Adjacent lines are correlated by 2/3 and the next but one by 1/6, so n lines are worth
+    n^2 / (n + 2 (n - 1) 4/9 + 2 (n - 2) 1/36) independent ones (Welch's method on one segment), of
+    two degrees of freedom each.
     """
     n = np.maximum(np.asarray(count, float), 1.0)
     shared = 2 * (n - 1) * 4 / 9 + 2 * np.maximum(n - 2, 0) / 36
@@ -86,9 +91,12 @@ def freedom(count: np.ndarray) -> np.ndarray:
 
 
 def confidence(degrees: np.ndarray, share: float = 0.95) -> np.ndarray:
-    """dB (..., 2), negative and positive, to add to a level of so many degrees of freedom: between them lies that
-    of the process, in `share` of all cases, if it is stationary and Gaussian: nu / chi-square(nu)."""
-    from scipy import stats  # imported where it is needed: it takes long
+    """dB (..., 2), negative and positive, to add to a level with that number of degrees of freedom.
+
+    The level of the process lies between them in `share` of all cases, if it is stationary and
+    Gaussian: nu / chi-square(nu).
+    """
+    from scipy import stats  # imported here because it is slow
 
     nu, tail = np.asarray(degrees, float), (1 - share) / 2
     ends = [nu / stats.chi2.ppf(1 - tail, nu), nu / stats.chi2.ppf(tail, nu)]

@@ -1,4 +1,4 @@
-"""Up to which frequency a run in time is an answer, and what sets that."""
+"""The frequency up to which a time-domain run is valid, and what limits it."""
 
 from __future__ import annotations
 
@@ -9,24 +9,25 @@ import numpy as np
 
 from tireroad.contact.patch import Patch
 
-# Of the highest mode: beyond it what the modes left out answer dynamically, not by their static residual alone.
+# Of the highest mode: beyond, the truncated modes respond dynamically, not by their static residual
+# alone.
 USABLE = 0.5
 
 
 @dataclass(frozen=True)
 class Limit:
-    """A `frequency` in Hz, and what `cause`s it, in words."""
+    """A limiting `frequency` in Hz, and its `cause` in words."""
 
     frequency: float
     cause: str
 
 
 def limits(*, step: float, highest: float, pitch: float, speed: float) -> tuple[Limit, ...]:
-    """All there are: of the `step` (s), of the `highest` mode (Hz), of points `pitch` (m) apart at `speed` (m/s).
+    """All limits: of `step` (s), `highest` mode (Hz), points `pitch` m apart at `speed` m/s.
 
-    A road's wave is met by two points at least, so half the frequency at which points pass, speed /
-    pitch: what is shorter folds back, and at the passing frequency the force of any road has a false
-    peak, since points come into contact one by one.
+    A wave of the road needs at least two points, hence half the frequency at which points pass,
+    speed / pitch. Shorter waves are aliased, and at the passing frequency the force of any road has
+    a spurious peak, since points come into contact one by one.
     """
     found = [
         Limit(0.5 / step, f"half the sampling rate of the time step of {step:.4g} s"),
@@ -43,12 +44,12 @@ def limits(*, step: float, highest: float, pitch: float, speed: float) -> tuple[
 
 
 def lowest(found: Iterable[Limit]) -> Limit:
-    """The one that counts."""
+    """The lowest limit, which counts."""
     return min(found, key=lambda limit: limit.frequency)
 
 
 def pitch(patch: Patch) -> float:
-    """Largest distance (m) along x between the neighbouring points that touch at rest; of all without any."""
+    """Largest distance (m) along x between neighbouring points at rest, or of all without any."""
     some = patch.force > 0
     sizes = patch.half_sizes[some if some.any() else slice(None), 0]
     return float(2 * sizes.max())

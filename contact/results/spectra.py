@@ -1,4 +1,4 @@
-"""Spectra of what was computed in time: amplitudes, densities, third-octave levels, and how far two are apart."""
+"""Spectra of time histories: amplitudes, densities, third-octave levels, distances."""
 
 from __future__ import annotations
 
@@ -8,22 +8,20 @@ import numpy as np
 
 from tireroad.contact.results.levels import a_weighting, band_sums, confidence
 
-FORCE, MOMENT, VELOCITY = (
-    1.0,
-    1.0,
-    1e-9,
-)  # N, N m, m/s: references of the levels; ISO 1683 of velocity
-BAND = 300.0  # Hz, up to which two histories are compared where nothing else is said
-_SEGMENTS = 4.5  # of half overlap make eight averages
+# References of the levels: N, N m, and m/s by ISO 1683.
+FORCE, MOMENT, VELOCITY = 1.0, 1.0, 1e-9
+BAND = 300.0  # Hz, up to which two histories are compared by default
+_SEGMENTS = 4.5  # with half overlap, eight averages
 _LONGEST = 0.5  # s of a segment: lines of 2 Hz; longer records give more averages instead
 
 
 def amplitudes(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (f,) Hz and complex amplitudes (f, d), in the unit of values (n, d).
 
-    Hann window, mean removed, scaled so that a sine of amplitude a on a line of the spectrum shows |a|.
+    Hann window, mean removed, scaled so that a sine of amplitude a on a line of the spectrum yields
+    |a|. `step` in s.
     """
-    from scipy import signal  # a quarter of a second, of which a run with all reused has no need
+    from scipy import signal  # a quarter of a second, which a run with all stages reused saves
 
     window = signal.get_window("hann", len(values))[:, None]
     spectrum = np.fft.rfft(window * (values - values.mean(axis=0)), axis=0)
@@ -39,9 +37,11 @@ def third_octaves(
     rate: bool = False,
     weighted: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Band centres (b,) Hz and levels (b, d), dB re `reference` (rms), of values (n, d), or, as `rate`, of their rate
-    of change per second; A-weighted line by line if wanted; bands as of `contact.results.levels.band_sums`, below `up_to` Hz and
-    half the sampling rate. Hann window over the whole record, mean removed. A record of one value has no band.
+    """Band centres (b,) Hz and levels (b, d), dB re `reference` (rms), of values (n, d).
+
+    With `rate`, of their rate of change per second; A-weighted line by line if `weighted`. Bands as
+    in `contact.results.levels.band_sums`, below `up_to` Hz and half the sampling rate. Hann window
+    over the whole record, mean removed. A record of one value has no band.
     """
     from scipy import signal
 
@@ -57,20 +57,25 @@ def third_octaves(
 
 
 def deviation(values: np.ndarray, step: float, up_to: float = np.inf) -> np.ndarray:
-    """Standard deviation (d,) of what of values (n, d) in steps of `step` s lies up to `up_to` Hz, by Parseval; of all,
-    where the record is shorter than a period of that."""
+    """Standard deviation (d,) of the part of values (n, d), in steps of `step` s, up to `up_to` Hz.
+
+    By Parseval; of the whole if the record is shorter than one period of `up_to`.
+    """
     if up_to * len(values) * step < 1:
         up_to = np.inf
     square = 2 * np.abs(np.fft.rfft(values - values.mean(axis=0), axis=0)) ** 2
     if len(values) % 2 == 0:
-        square[-1] /= 2  # half the sampling rate has one line only
+        square[-1] /= 2  # half the sampling rate has a single line
     return np.sqrt(square[np.fft.rfftfreq(len(values), step) <= up_to].sum(axis=0)) / len(values)
 
 
 @dataclass(frozen=True)
 class Density:
-    """Power spectral `density` (f, d), one-sided, at `frequency` (f,) Hz, by Welch's method: Hann windows of
-    `segment` s, half overlapping, `averages` of them; `confidence` (2,) dB, 95 %, as of contact.results.levels."""
+    """One-sided power spectral `density` (f, d) at `frequency` (f,) Hz, by Welch's method.
+
+    Hann windows of `segment` s, half overlapping, `averages` of them; `confidence` (2,) dB, 95 %,
+    as in contact.results.levels.
+    """
 
     frequency: np.ndarray
     density: np.ndarray
@@ -80,11 +85,12 @@ class Density:
 
 
 def density(values: np.ndarray, step: float, up_to: float = np.inf, rate: bool = False) -> Density:
-    """Of values (n, d) in steps of `step` s, or of their `rate`; unit of the values squared per Hz.
+    """Density of values (n, d) in steps of `step` s, or of their `rate`; unit squared per Hz.
 
-    Segments of half the record and less: eight averages, more where segments of 0.5 s make more. Each has its mean
-    removed. The integral is the variance (Parseval). The power of segments that overlap by half under Hann's
-    window is correlated by 1/36 with the next: of k averages k / (1 + (k - 1) / 18 k) count.
+    Segments of half the record or less: eight averages, or more if segments of 0.5 s allow. Each
+    has its mean removed. The integral is the variance (Parseval). Under a Hann window the powers of
+    segments with half overlap are correlated by 1/36 with the next, so k averages are worth
+    k / (1 + (k - 1) / (18 k)).
     """
     from scipy import signal
 
@@ -110,7 +116,7 @@ def density(values: np.ndarray, step: float, up_to: float = np.inf, rate: bool =
 
 @dataclass(frozen=True)
 class Distance:
-    """Relative L2 distance in the band, and the largest difference there over the largest variation."""
+    """Relative L2 distance in the band, and largest difference over largest variation."""
 
     mean: float
     worst: float
@@ -119,25 +125,20 @@ class Distance:
 def distance(
     reference: np.ndarray, found: np.ndarray, duration: float, band: float = BAND
 ) -> Distance:
-    """How far `found` (n', k) is from what varies of `reference` (n, k), both over `duration` s, from
-    0 to `band` Hz.
-
-    Each is looked at with its own step: thinned out to a common one, force above half its sampling
-    frequency would fold down into the band (seen: 0.6 % where there was 0.03 %). Hann window.
-    """
+    """Fourier coefficients of windowed values (n, k) at t = h ... duration, up to `band` Hz."""
     rest = reference.mean(axis=0)
     exact = low_part(reference - rest, duration, band)
     off = low_part(found - rest, duration, band) - exact
-    # Seen in time again, the same number of instants for both.
+    # Back in time, at the same number of instants for both.
     seen = [np.fft.irfft(part, 8 * len(exact), axis=0) for part in (off, exact)]
     worst, most = (np.abs(part).max() for part in seen)
     return Distance(float(np.linalg.norm(off) / np.linalg.norm(exact)), float(worst / most))
 
 
 def low_part(values: np.ndarray, duration: float, band: float) -> np.ndarray:
-    """Fourier coefficients of windowed values (n, k) at t = h, 2h, ... = duration, up to `band` Hz."""
+    """Fourier coefficients of windowed values (n, k) at t = h ... duration, to `band` Hz."""
     n = len(values)
-    # The window vanishes at both ends, so the value at t = 0 may be any.
+    # The window vanishes at both ends, so the value at t = 0 is arbitrary.
     window = np.sin(np.pi * np.arange(n) / n)[:, None] ** 2
     shifted = np.concatenate([values[:1], values[:-1]])
     keep = np.arange(n // 2 + 1) <= band * duration * (1 + 1e-9)

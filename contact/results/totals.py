@@ -1,4 +1,4 @@
-"""Running figures of the contact loop, block of steps by block of steps."""
+"""Running results of the contact loop, updated by blocks of steps."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from tireroad.contact.results.chatter import Alternation, Chatter
 from tireroad.contact.results.energy import Work
 from tireroad.contact.patch import Patch
 
-RUNAWAY = 100.0  # times the patch's reach: half a metre at least
+RUNAWAY = 100.0  # times the patch's reach, hence at least half a metre
 
 
 @dataclass
 class Figures:
-    """What a checkpoint keeps as single numbers: N, the complementarity residual, m; `excursion`, how far a point of
-    contact moved beyond the static state, as the wheel sees it."""
+    """The scalars that a checkpoint keeps: N, the complementarity residual, m.
+
+    `excursion`: the largest displacement of a contact point from the static state relative to the
+    wheel.
+    """
 
     steps: int = 0
     sum: float = 0.0
@@ -30,8 +33,11 @@ class Figures:
 
 @dataclass
 class Totals:
-    """Figures and work of the steps so far, whose points at the edge are watched (`reach` in m), and, where
-    more than the share `limit` of them that alternate is to end the loop, how they do."""
+    """Results and work of the steps so far, with checks of the contact.
+
+    Points at the edge of the `patch` must not touch (`reach` in m), and at most the share `limit`
+    of the points may alternate.
+    """
 
     patch: Patch
     reach: float
@@ -41,8 +47,10 @@ class Totals:
     alternation: Alternation = field(default_factory=Alternation)
 
     def add(self, steps: dict[str, np.ndarray]) -> None:
-        """Count a block as `ContactFile.flush` hands it over. ConvergenceError at a touching edge, Chatter where
-        the motion grows without bound, or more points than `limit` open and close from step to step.
+        """Count a block as `ContactFile.flush` passes it.
+
+        ConvergenceError if an edge point touches; Chatter if the motion grows without bound, or if
+        more points than `limit` open and close from step to step.
         """
         self.alternation.add(steps["normal_force"])
         self.alternation.check(self.limit)
@@ -52,7 +60,7 @@ class Totals:
         old, load = self.figures, steps["total_force"][:, 2]
         self.figures = Figures(
             steps=old.steps + len(load),
-            # One step after the other: the same bits however the steps are blocked.
+            # Step by step: the same bits however steps are blocked.
             sum=float(np.cumsum([old.sum, *load])[-1]),
             residual=max(old.residual, float(steps["residual"].max())),
             penetration=max(old.penetration, float(steps["penetration"].max())),
@@ -63,17 +71,17 @@ class Totals:
         )
 
     def finish(self) -> None:
-        """After the last step: Chatter as in `add`."""
+        """After the last step; raises Chatter as in `add`."""
         self.alternation.finish()
         self.alternation.check(self.limit)
 
     def _beside_wheel(self, steps: dict[str, np.ndarray]) -> np.ndarray:
-        """Displacements (n, c) m of the points less the wheel's height, of those that touch at rest."""
+        """Displacements (n, c) m, less the wheel's height, of the points that touch at rest."""
         touching = self.patch.force > 0
         return steps["displacement"][:, touching] - steps.get("wheel_height", np.zeros(1))[:, None]
 
     def _check_bounded(self, steps: dict[str, np.ndarray]) -> None:
-        """Chatter where a point moved by much more than the road could move it."""
+        """Raise Chatter if a point moved by much more than the road could move it."""
         far = np.abs(steps["displacement"]).max(axis=1)
         when = np.flatnonzero(~(far <= RUNAWAY * self.reach))
         if len(when):
@@ -84,13 +92,13 @@ class Totals:
             )
 
     def state(self) -> dict[str, np.ndarray]:
-        """What a checkpoint keeps."""
+        """The state that a checkpoint keeps."""
         return {n: np.array(v) for n, v in vars(self.figures).items()} | (
             self.work.state() | self.alternation.state()
         )
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self.figures = Figures(**{name: kept[name].item() for name in vars(self.figures)})
         self.work.set_state(kept)
         self.alternation.set_state(kept)

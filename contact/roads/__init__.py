@@ -1,1 +1,1 @@
-"""Roads, a kind a file, and how one passes under the tire."""
+"""Roads: one file per kind, and the road as it passes under the tire."""

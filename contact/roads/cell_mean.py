@@ -1,10 +1,11 @@
-"""The road as a contact point meets it: smoothed over the rectangle that the point stands for.
+"""The road at a contact point: smoothed over the rectangle that the point represents.
 
-A point has one force for its rectangle, and so one height. Read at the point alone, waves shorter than two
-rectangles would fold back into long ones that the road does not have. The mean over the rectangle holds next to nothing
-of them, sin(k a) / (k a) of a wave number k for a half width a, but lowers waves of four rectangles by a tenth, and
-every crest: cobblestones at points 8 mm apart lost 5 % of the mean load. Four thirds of it less a third of the mean over
-twice the rectangle leaves out that part of second order: 1 % of waves of four rectangles, 15 % of two.
+A point has one force for its rectangle, and so one height. Read at the point alone, waves shorter
+than two rectangles would be aliased into long ones that the road does not have. The mean over the
+rectangle reduces them to sin(k a) / (k a), at a wave number k for a half width a, but also lowers
+waves of four rectangles by a tenth, and every crest: cobblestones at points 8 mm apart lost 5 % of
+the mean load. Four thirds of it less a third of the mean over twice the rectangle cancels the
+second-order part of that: it loses 1 % of waves of four rectangles, 15 % of those of two.
 """
 
 from __future__ import annotations
@@ -22,18 +23,19 @@ class Strip(Protocol):
     """A road cut out for a run, as contact.roads.under_tire.PreparedRoad."""
 
     spacing: float  # m, the shortest length it resolves
-    end: float  # m, the farthest x it may be asked for
+    end: float  # m, the largest x at which it may be evaluated
 
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m)."""
 
 
 class CellMean:
-    """Of c points, at their y (c,) m, with rectangles of half sizes (c, 2) m; x as asked for.
+    """Smoothed heights at c points with y (c,) m and rectangles of half sizes (c, 2) m, for any x.
 
-    Along, the road is sampled every `spacing`, at the same places whatever is asked for, so that the answer does
-    not depend on how a run is cut into pieces; each sample counts by the part of its length within the rectangle, and
-    between the places of samples the result is linear. Across, samples are means of equal strips.
+    Along, the road is sampled every `spacing` at fixed positions, so that the result does not
+    depend on how a run is divided; each sample counts by the part of its length within the
+    rectangle, and the result is linear between the positions of samples. Across, samples are means
+    of equal strips.
     """
 
     def __init__(self, road: Strip, y: Array, half: Array) -> None:
@@ -45,7 +47,7 @@ class CellMean:
         self._reach = reach = int(np.ceil(2 * widest / self._step + 0.5))
         offset = self._step * np.arange(-reach, reach + 1)
         parts = [_parts(offset, self._step, share * rows[:, 1:2]) for share in (1, 2)]
-        # Of samples within the rectangle's width, and within twice that: (2, r, 2 reach + 1).
+        # Weights (2, r, 2 reach + 1) of samples within the rectangle's width, and twice that.
         self._weight = np.stack([4 / 3 * parts[0], -1 / 3 * parts[1]])
         count = 4 * int(np.clip(np.ceil(broadest / road.spacing), 2, MOST // 2))
         middles = (np.arange(count) + 0.5) / count * 4 - 2
@@ -65,8 +67,11 @@ class CellMean:
         return near + share * (far - near)
 
     def _known(self, begin: int, end: int) -> Array:
-        """(r, …) m at the places from `_begin` * step to `end` * step at least. What a footprint was over stays known
-        while it rolls on: of ten places nine were asked for before."""
+        """Means (r, ...) m at the positions from `_begin` * step to `end` * step at least.
+
+        Means under the footprint are kept as it rolls on: nine of ten positions were evaluated
+        before.
+        """
         known = self._begin + self._mean.shape[1]
         if not self._begin <= begin <= known:
             self._mean, known = np.empty((len(self._y), 0)), begin
@@ -78,7 +83,7 @@ class CellMean:
         return self._mean
 
     def _means(self, begin: int, end: int) -> Array:
-        """(r, end - begin) m at the places begin * step, …"""
+        """Means (r, end - begin) m at the positions begin * step, ..."""
         places = self._step * np.arange(begin - self._reach, end + self._reach)
         x = np.minimum(places, self._road.end)
         sample = np.zeros((2, len(self._y), len(x)))
@@ -95,6 +100,6 @@ class CellMean:
 
 
 def _parts(offset: Array, step: float, half: Array) -> Array:
-    """Share (r, n) of each sample's length within rectangles of half lengths (r, 1) m."""
+    """Fraction (r, n) of each sample's length within rectangles of half lengths (r, 1) m."""
     low, high = np.maximum(offset - step / 2, -half), np.minimum(offset + step / 2, half)
     return np.maximum(high - low, 0.0) / (2 * half)

@@ -1,4 +1,4 @@
-"""A road measured on a regular grid, between whose points heights are bilinear."""
+"""A road measured on a regular grid, with bilinear heights in between."""
 
 import copy
 
@@ -11,15 +11,16 @@ from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Axes off an even spacing by less than this share of a step count as even: files round positions.
+# Axes that deviate from even spacing by less than this fraction of a step count as even, because
+# files round positions.
 EVEN = 1e-4
 
-# Positions of a measured road, m: what lies beyond is damage.
+# Limits of steps and positions of a measured road, m; anything beyond is damage.
 FINEST, FARTHEST = 1e-6, 1e8
 
 
 class Axis:
-    """Ascending positions (m) and the cell a value falls into."""
+    """Ascending positions (m), with a search for the cell of a value."""
 
     def __init__(self, positions: Array) -> None:
         self.positions = positions
@@ -31,11 +32,11 @@ class Axis:
         self.step = mean if self._even else float(np.diff(positions).min())
 
     def part(self, places: slice) -> "Axis":
-        """Some of the positions that follow each other."""
+        """A contiguous part of the positions."""
         return Axis(self.positions[places])
 
     def locate(self, values: Array) -> tuple[NDArray[np.intp], Array]:
-        """Index of the cell and the share (0 to 1) within it; values outside go to the border."""
+        """Index of the cell and fraction (0 to 1) within it; values outside move to the border."""
         if self._even:
             place = (values - self.positions[0]) * self._per_metre
             place = np.minimum(np.maximum(place, 0.0), float(self._cells))
@@ -51,13 +52,12 @@ class Axis:
 class Grid:
     """Heights z (nx, ny) at ascending x (nx,) and y (ny,), all in m; x counts from its first value.
 
-    z may be rows in a file (contact.rows): they are read as the road rolls by, 32 MB at a time.
-
-    `holes`: what becomes of missing heights (NaN) inside the strip that `prepare` is asked for:
-    "refuse" them, or "fill" them by linear interpolation across the road, then along it, and by the
-    nearest valid height at the borders; `filled` counts them. `end`: what becomes of a strip longer
-    than the road: "refuse", or "mirror" (reflected at both ends, so that z stays continuous).
-    `source` names the road in messages. InputError when the arrays do not fit together.
+    z may be rows in a file (contact.roads.rows), read as the road rolls by, 32 MB at a time.
+    `holes`: treatment of missing heights (NaN) in the strip given to `prepare`: "refuse", or "fill"
+    by linear interpolation across the road, then along it, and by the nearest valid height at the
+    borders; `filled` counts them. `end`: treatment of a strip longer than the road: "refuse", or
+    "mirror" (reflected at both ends, so that z stays continuous). `source` names the road in
+    messages. InputError if the arrays do not fit together.
     """
 
     def __init__(
@@ -81,8 +81,8 @@ class Grid:
         self._length = float(x[-1] - x[0])
         self._sides = float(y[0]), float(y[-1])
         self.filled = 0
-        self.notes: tuple[str, ...] = ()  # what was done to the measurement, for the user
-        self.making = 0.0  # bytes that were taken to make it
+        self.notes: tuple[str, ...] = ()  # how the measurement was processed, for the user
+        self.making = 0.0  # bytes of memory that making it took
 
     def _over(self, rows: slice, columns: slice) -> Window:
         place = rows.start, columns
@@ -91,13 +91,13 @@ class Grid:
 
     @property
     def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """((x0, x1), (y0, y1)) in m; a mirrored road has no end."""
+        """((x0, x1), (y0, y1)) in m; a mirrored road is endless along x."""
         reach = (-np.inf, np.inf) if self._end == "mirror" else (0.0, self._length)
         return reach, self._sides
 
     @property
     def extent_of_file(self) -> tuple[float, float]:
-        """Length and width of what was measured, m."""
+        """Length and width of the measurement, m."""
         return self._length, self._sides[1] - self._sides[0]
 
     @property
@@ -111,7 +111,7 @@ class Grid:
         return min(self._x.step, self._y.step)
 
     def height(self, x: Array, y: Array) -> Array:
-        """Bilinear heights (m) at x, y (m) of equal shape; beyond the strip those of its border."""
+        """Bilinear heights (m) at x, y (m) of equal shape; beyond the strip those of its edge."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         if self._end == "mirror":
             x = self._reflect(x)
@@ -120,7 +120,7 @@ class Grid:
         return self._window.bilinear(i, s, j, t)
 
     def _reflect(self, x: Array) -> Array:
-        """x folded into [0, length]: 0 and the length are mirrors."""
+        """x folded into [0, length], with mirrors at 0 and at the length."""
         return self._length - np.abs(self._length - np.mod(x, 2.0 * self._length))
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
@@ -132,7 +132,7 @@ class Grid:
         return self._window.bounds(*self._cells(x0, x1, y0, y1))[0]
 
     def _cells(self, x0: float, x1: float, y0: float, y1: float) -> tuple[slice, slice]:
-        """Grid points of all cells the strip touches; all rows when it leaves a mirrored road."""
+        """Grid points of all cells in the strip; all rows if it leaves a mirrored road."""
         (i0, i1), _ = self._x.locate(np.array([x0, x1]))
         (j0, j1), _ = self._y.locate(np.array([y0, y1]))
         if self._end == "mirror" and (x0 < 0.0 or x1 > self._length):
@@ -142,7 +142,7 @@ class Grid:
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Grid":
         """The road of the strip alone (m), without holes, for fast evaluation in it.
 
-        InputError when the strip leaves the road or crosses holes that are to be refused.
+        InputError if the strip leaves the road or contains holes that are to be refused.
         """
         self._check_strip(x0, x1, y0, y1)
         rows, columns = self._cells(x0, x1, y0, y1)

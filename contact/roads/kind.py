@@ -1,4 +1,4 @@
-"""What a kind of road is: parameters, and the heights that follow from them."""
+"""The interface of a kind of road: parameters, and the heights that they define."""
 
 from __future__ import annotations
 
@@ -17,35 +17,36 @@ Extent = tuple[tuple[float, float], tuple[float, float]]
 
 
 class RoadKind(Parameters):
-    """Base of all kinds: the parameters of a road, and `make`, which gives its heights.
+    """Base of all kinds: the parameters of a road, and `make`, which returns the road.
 
-    Where these need tables or files, `make` returns another object; else the kind is its own road.
+    If tables or files are needed, `make` returns another object; otherwise the kind is its own
+    road.
     """
 
     owner = "road"
 
     @property
     def reads(self) -> Path | None:
-        """The file that `make` reads, where it does: one process does it then, and the others have what it found."""
+        """The file that `make` reads, if any: one process reads it and shares the result."""
         return None
 
     def make(self) -> Road:
-        """The road of these parameters. InputError where files do not serve."""
+        """The road of these parameters. InputError if files cannot be used."""
         raise NotImplementedError
 
 
 class EndlessRoad(RoadKind):
-    """Base of roads without ends, whose heights follow from a formula.
+    """Base of endless roads whose heights follow from a formula.
 
-    A derived class gives `height(x, y)` (m), its bounds `highest` and `lowest` (m) in a strip x0,
-    x1, y0, y1 (m), and `spacing` (m), the shortest length it resolves: half the shortest wave.
+    A derived class defines `height(x, y)` (m), its bounds `highest` and `lowest` (m) in a strip x0,
+    x1, y0, y1 (m), and `spacing` (m), the shortest length that it resolves: half the shortest wave.
     """
 
     extent: Extent = ((-np.inf, np.inf), (-np.inf, np.inf))
 
     @property
     def spacing(self) -> float:
-        """Half the shortest wave, m: 16 steps of an automatic time step resolve it."""
+        """Half the shortest wave, m; an automatic time step resolves the wave by 16 steps."""
         return np.inf
 
     def height(self, x: Array, y: Array) -> Array:
@@ -71,9 +72,9 @@ class EndlessRoad(RoadKind):
 
 @dataclass(frozen=True, kw_only=True)
 class Levelled(RoadKind):
-    """Base of roads whose heights have a mean, or waves longer than matter, that are taken out.
+    """Base of roads whose mean height, or waves longer than of interest, can be removed.
 
-    A derived class is decorated like any other; these two parameters come with it.
+    A derived class is decorated like any other and inherits these two parameters.
     """
 
     datum: str = choice(

@@ -1,4 +1,4 @@
-"""What of a road the axle is taken to follow: its mean height, or its long waves."""
+"""The part of a road that the axle is assumed to follow: its mean height, or its long waves."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# The strip's profile is taken over at most this many points.
+# The profile of the strip is sampled at no more than this many points.
 MOST_POINTS = 1_000_000
-PIECE = 20_000  # points that are asked for at once
+PIECE = 20_000  # points evaluated at once
 # The Gaussian profile filter of ISO 16610-21 passes half of a wave of the cut-off length; its
 # weight exp(-pi (x / (alpha lambda))^2) has the standard deviation alpha lambda / sqrt(2 pi).
 DEVIATION = np.sqrt(np.log(2) / np.pi) / np.sqrt(2 * np.pi)
@@ -38,7 +38,7 @@ class Level:
 
 
 def mean_level(road: Road, x0: float, x1: float, y0: float, y1: float) -> Level:
-    """The mean height of a strip of road (contact.road.Road), everywhere the same."""
+    """The mean height of a strip of road (contact.roads.under_tire.Road), as a constant level."""
     _, profile = _profile(road, x0, x1, y0, y1)
     return Level(np.array([x0]), np.array([profile.mean()]))
 
@@ -48,8 +48,9 @@ def wave_level(
 ) -> Level:
     """The waves of the strip longer than `longest_wave` (m): ISO 16610-21 on its mean profile.
 
-    Past its ends the profile is continued by reflection: a sum of cosines, each passed as the filter passes it,
-    exp(-pi (alpha lambda_c / lambda)^2), at a cost that the cut-off has no part in.
+    Beyond its ends the profile is continued by reflection. It is then a sum of cosines, each
+    transmitted by the filter as exp(-pi (alpha lambda_c / lambda)^2), at a cost that does not
+    depend on the cut-off.
     """
     from scipy.fft import dct, idct  # not needed to read a scene
 
@@ -60,7 +61,7 @@ def wave_level(
 
 
 def _profile(road: Road, x0: float, x1: float, y0: float, y1: float) -> tuple[Array, Array]:
-    """x (n,) m and the mean height over the width (n,) m, at half the road's spacing if affordable."""
+    """x (n,) m and mean height over the width (n,) m, at half the road's spacing if affordable."""
     step = 0.5 * road.spacing
     if not np.isfinite(step):
         return np.array([x0]), np.zeros(1)
@@ -69,7 +70,7 @@ def _profile(road: Road, x0: float, x1: float, y0: float, y1: float) -> tuple[Ar
     nx, ny = (max(int(c / excess), 1) for c in counts)
     x = x0 + (np.arange(nx) + 0.5) * (x1 - x0) / nx
     y = y0 + (np.arange(ny) + 0.5) * (y1 - y0) / ny
-    # All the width of a short piece at a time: a file is read once, and a texture that is drawn as it is reached is drawn
+    # The full width of a short piece at a time, so that a file is read once and a texture generated
     # once, not once for every y.
     pieces = np.array_split(x, max(nx * ny // PIECE, 1))
     means = [road.height(*np.meshgrid(piece, y)).sum(axis=0) / ny for piece in pieces]

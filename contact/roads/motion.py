@@ -1,4 +1,4 @@
-"""Vertical motion of the whole road: what a shaker or a drum under the tire does."""
+"""Vertical motion of the whole road, such as that of a shaker or a drum."""
 
 import math
 from collections.abc import Callable
@@ -42,8 +42,8 @@ def make_motion(
     """Height r(t) in m of the road over time t in s, r(0) = 0.
 
     kind "none": 0; "ramp": from 0 to `amplitude` (m, may be negative) over `duration` (s) by a
-    smoothstep, constant after; "sine": amplitude sin(2 pi frequency t), frequency in Hz.
-    InputError for another kind or a value out of the range that `Motion` gives.
+    smoothstep, then constant; "sine": amplitude sin(2 pi frequency t), frequency in Hz. InputError
+    for another kind or a value outside the range given in `Motion`.
     """
     Motion(kind=kind, amplitude=amplitude, frequency=frequency, duration=duration)
     if kind == "ramp":

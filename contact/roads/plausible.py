@@ -1,4 +1,4 @@
-"""Whether the sizes of a measured road can be metres: a file in millimetres looks just the same."""
+"""Whether the sizes of a measured road can be metres; a file in millimetres looks the same."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,13 +9,13 @@ from tireroad.fem.errors import InputError
 Array = NDArray[np.float64]
 
 WIDEST = 50.0  # m: a measured road across; a texture of 300 mm is 300 m wide when read as metres
-# Median of |dz|/dy between neighbours. Measured: 0.03 on Belgian block every 10 mm; of a texture of
-# 0.5 mm rms every 0.5 mm about 0.2. In millimetres read as metres a thousand times that.
+# Median of |dz|/dy between neighbours. Measured: 0.03 on Belgian block every 10 mm, about 0.2 on a
+# texture of 0.5 mm rms every 0.5 mm. Millimetres read as metres give a thousand times that.
 STEEPEST = 5.0
 # Median over the rows of their relief over the width: a kerb of 0.15 m on 0.3 m has 0.5.
 ROUGHEST = 2.0
-HIGHEST = 1e4  # m above sea level: more is damage
-SAMPLES = 64  # rows looked at
+HIGHEST = 1e4  # m above sea level; larger values are damage
+SAMPLES = 64  # rows inspected
 
 
 def check_plausible(
@@ -27,11 +27,11 @@ def check_plausible(
     lengths: bool = True,
     heights: bool = True,
 ) -> None:
-    """InputError when a road cannot be in the unit it was read in.
+    """InputError if a road cannot be in the unit in which it was read.
 
-    `extent` (m) along and across, `steps` (m) between points, `rows` of heights (m), of which 64 are
-    read. `lengths`, `heights`: whether the unit was assumed and not given; then the keys that give it
-    are named. Heights beyond 10 km are refused in any case.
+    `extent` (m) along and across, `steps` (m) between points, `rows` of heights (m), of which 64
+    are read. `lengths`, `heights`: whether the unit was assumed rather than given; the message then
+    names the keys that give it. Heights beyond 10 km are refused in any case.
     """
     if lengths and extent[1] > WIDEST:
         raise InputError(
@@ -58,6 +58,6 @@ def check_plausible(
 
 
 def _median(values: Array) -> float:
-    """The median of what is finite; 0 of nothing."""
+    """The median of the finite values; 0 if there are none."""
     known = values[np.isfinite(values)]
     return float(np.median(known)) if known.size else 0.0

@@ -1,4 +1,4 @@
-"""The road as the tire meets it: any kind of road, shifted under the axle, levelled and eased in."""
+"""The road as the tire meets it: any kind, shifted under the axle, levelled, and with a run-in."""
 
 from dataclasses import fields
 from typing import Any
@@ -10,11 +10,13 @@ from tireroad.fem.parameters import ParameterError
 
 
 def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
-    """The road of a scene, make_road(scene.road), or of keys, make_road(kind="sine", wavelength=0.2).
+    """The road of a scene, make_road(scene.road), or of keys, make_road(kind="sine",
+    wavelength=0.2).
 
-    Keys are those of `Placement` and of the kind (contact.roads.kinds); what is absent or None takes
-    its default. A spec with the attributes of Placement and `surface`, a RoadKind, is taken as it is.
-    To have the road of a file once made use `placed`. InputError for an unknown kind or key, a value out of its range or a file that cannot be used.
+    Keys are those of `Placement` and of the kind (contact.roads.kinds), in their units; absent or
+    None means the default. A spec with the attributes of Placement and `surface`, a RoadKind, is
+    taken as it is. Use `placed` to reuse a road already made from a file. InputError for an unknown
+    kind or key, a value out of its range or a file that cannot be used.
     """
     if spec is None or not hasattr(spec, "surface"):
         given = keys if spec is None else vars(spec)
@@ -26,7 +28,7 @@ def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
 
 
 def placed(road: Road, surface: RoadKind, placement: Placement) -> RoadUnderTire:
-    """The road that a `surface` has made, where the placement lays it."""
+    """The `road` made from a `surface`, positioned by the placement."""
     return RoadUnderTire(
         road,
         **{item.name: getattr(placement, item.name) for item in fields(Placement)},
@@ -36,7 +38,7 @@ def placed(road: Road, surface: RoadKind, placement: Placement) -> RoadUnderTire
 
 
 def _read(given: dict[str, Any]) -> tuple[Placement, RoadKind]:
-    """Placement and surface of keys; none may be left over."""
+    """Placement and surface from keys; InputError for keys of neither."""
     if "kind" not in given:
         raise InputError("road: kind is missing")
     kind = ROADS[given["kind"]]

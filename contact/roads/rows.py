@@ -1,4 +1,4 @@
-"""Heights of a road in rows across it, in memory or left in their file until they are asked for."""
+"""Heights of a road in rows across it, in memory or left in their file until needed."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Numbers read at a time, 32 MB of them: what a road of any length takes.
+# Numbers read at a time, 32 MB: the memory that a road of any length takes.
 PIECE = 4_000_000
-# Lists of points are sorted in memory, and positions along x are held there.
+# Points in a list are sorted in memory, and positions along x are kept there.
 MAX_POINTS = 10_000_000
-# Heights that may be unpacked into a temporary file: 16 GB.
+# Largest number of heights unpacked into a temporary file: 16 GB.
 MAX_UNPACKED = 2_000_000_000
 
 
 def check_count(file: Path, count: int) -> None:
-    """InputError for more positions than are held in memory."""
+    """InputError for more positions than can be kept in memory."""
     if count > MAX_POINTS:
         raise InputError(
             f"road.file {file}: {count:,} positions to be held in memory, more than the "
@@ -35,9 +35,9 @@ def check_count(file: Path, count: int) -> None:
 
 
 class Rows(Protocol):
-    """`shape` (rows, numbers a row); `read` gives rows i0 to i1, (i1 - i0, width).
+    """`shape` (rows, numbers per row); `read` returns rows i0 to i1, (i1 - i0, width).
 
-    Rows go to other processes of the machine by pickling: arrays as buffers, what lies in a file by being opened there.
+    Rows are pickled for other processes of the machine: arrays as buffers, files by reopening them.
     """
 
     shape: tuple[int, int]
@@ -57,7 +57,7 @@ class ArrayRows:
 
 
 class Columns:
-    """Some columns of rows, in another order."""
+    """Selected columns of rows, reordered."""
 
     def __init__(self, rows: Rows, columns: list[int]) -> None:
         self._rows, self._columns = rows, columns
@@ -69,7 +69,7 @@ class Columns:
 
 
 class Scaled:
-    """Rows in another unit: times a factor."""
+    """Rows in another unit: multiplied by a factor."""
 
     def __init__(self, rows: Rows, factor: float) -> None:
         self._rows, self._factor = rows, factor
@@ -81,7 +81,7 @@ class Scaled:
 
 
 class Packed(NamedTuple):
-    """Where rows of numbers without gaps begin in a file (byte), of what kind and shape."""
+    """Position (byte), number type and shape of contiguous rows of numbers in a file."""
 
     start: int
     kind: np.dtype
@@ -89,9 +89,9 @@ class Packed(NamedTuple):
 
 
 class FileRows:
-    """Rows packed in a file, read where they are wanted; the file stays open as long as they live.
+    """Rows packed in a file, read when needed; the file stays open as long as they live.
 
-    `file`: its name, or the number of an open file, which is closed in the end.
+    `file`: its name, or the descriptor of an open file, which is closed at the end.
     """
 
     def __init__(self, file: Path | int, packed: Packed) -> None:
@@ -100,18 +100,18 @@ class FileRows:
         weakref.finalize(self, os.close, self._open)
 
     def __reduce__(self) -> tuple[type[FileRows], tuple[Path, Packed]]:
-        """Opened by its name, or, of a file without one, as the open file of this process, where the system shows it."""
+        """Reopen by name or, for a file without one, through this process's descriptor."""
         name = self._name
         if isinstance(name, int):
             name = Path(f"/proc/{os.getpid()}/fd/{name}")
         return FileRows, (name, self._packed)
 
     def read(self, i0: int, i1: int) -> Array:
-        """InputError when the file has become shorter."""
+        """Rows i0 to i1. InputError if the file has become shorter."""
         start, kind, (_, width) = self._packed
         size = width * kind.itemsize
         first, left, parts = start + i0 * size, (i1 - i0) * size, []
-        while left:  # one call reads 2 GB at most
+        while left:  # one call reads at most 2 GB
             parts.append(os.pread(self._open, left, first))
             if not parts[-1]:
                 raise InputError(f"road.file {self._name}: ends while it is read")
@@ -122,12 +122,12 @@ class FileRows:
 
 
 class Spool:
-    """Rows that come one block after the other, from text or a compressed file.
+    """Rows that arrive block by block, from text or a compressed file.
 
-    More than `PIECE` numbers go to a temporary file without a name, as doubles, and are read from
-    there: it takes room on the disk (TMPDIR) until the program ends, not memory. InputError, which
-    names `source`, when that would be more than half of the free room, or more than MAX_UNPACKED
-    numbers; at once where their number is `announced`.
+    More than `PIECE` numbers go to an unnamed temporary file, as doubles, and are read from there:
+    this takes disk space (TMPDIR) until the program ends, not memory. InputError, which names
+    `source`, if that exceeds half of the free space or MAX_UNPACKED numbers; immediately if their
+    number is `announced`.
     """
 
     def __init__(self, source: str = "road", announced: int = 0) -> None:
@@ -138,7 +138,7 @@ class Spool:
         self._open: int | None = None
 
     def add(self, block: Array) -> None:
-        """Take rows (n, width)."""
+        """Append rows (n, width)."""
         self._blocks.append(block)
         self._held += block.size
         self._rows += len(block)
@@ -147,7 +147,7 @@ class Spool:
             self._flush()
 
     def rows(self) -> Rows:
-        """All of them."""
+        """All rows."""
         if self._open is None:
             return ArrayRows(np.concatenate(self._blocks) if self._blocks else np.empty((0, 0)))
         self._flush()
@@ -166,7 +166,7 @@ class Spool:
         self._blocks, self._held = [], 0
 
     def _check_room(self, numbers: int) -> None:
-        """InputError unless so many numbers more may go to the disk."""
+        """InputError unless this many more numbers may be written to disk."""
         if numbers <= PIECE and self._written == 0:
             return
         folder = tempfile.gettempdir()
@@ -182,8 +182,10 @@ class Spool:
 
 
 def pieces(rows: Rows, overlap: int = 0) -> Iterator[tuple[int, Array]]:
-    """All rows as (first row, rows), each piece of at most `PIECE` numbers, the next beginning
-    `overlap` rows before its end."""
+    """All rows as (first row, rows), in pieces of at most `PIECE` numbers.
+
+    The next piece begins `overlap` rows before the end of the previous one.
+    """
     count, width = rows.shape
     step = max(PIECE // width, overlap + 1)
     first = 0

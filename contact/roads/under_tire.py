@@ -1,4 +1,4 @@
-"""A road placed under the tire: the strip of a run, eased in and levelled."""
+"""A road placed under the tire: the strip of a run, with run-in and levelling."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,10 +16,11 @@ from tireroad.fem.parameters import Parameters, choice, number
 
 Array = NDArray[np.float64]
 
-# Pieces a strip is cut into for its bounds, at least: the level changes slowly over one.
+# Smallest number of pieces that a strip is divided into for its bounds: the level varies slowly
+# over one.
 PIECES = 64
-LONGEST = 0.25  # m
-# The texture that is reported: of that many metres at most and at least, points at most, points this far apart at most.
+LONGEST = 0.25  # m, longest piece
+# The reported texture: longest and shortest profile (m), most points, largest spacing (m).
 _SEEN, _LEAST_SEEN, _MOST_SEEN, _COARSEST = 20.0, 0.1, 100_000, 1e-3
 
 
@@ -79,10 +80,11 @@ class Placement(Parameters):
 
 
 class RoadUnderTire:
-    """A road placed under the axle; `prepare` cuts out the strip a run drives over.
+    """A road placed under the axle; `prepare` cuts out the strip that a run passes over.
 
-    start, lateral, run_in, offset, drum_radius (m), drum: see Placement; datum: "mean" subtracts the strip's mean
-    height, "zero" nothing; longest_wave (m): longer waves are filtered out too.
+    start, lateral, run_in, offset, drum_radius (m), drum: see Placement; datum: "mean" subtracts
+    the strip's mean height, "zero" nothing; longest_wave (m): longer waves are removed too.
+    InputError for an unknown datum or a negative run_in.
     """
 
     def __init__(
@@ -112,8 +114,9 @@ class RoadUnderTire:
         """The strip of a run, in distances (m) from the axle's start and from the tire's middle.
 
         x0 is the foremost point of the patch at t = 0, ahead of the axle, x1 the farthest it gets,
-        y0 and y1 its sides. Up to x0 the road is flat, whatever the file holds there: the tire
-        stands on it at t = 0. InputError when the road is too short, too narrow or has holes there.
+        y0 and y1 its sides. Up to x0 the road is flat, whatever the file contains there, because
+        the tire stands on it at t = 0. InputError if the road is too short, too narrow or has holes
+        there.
         """
         if not (x0 <= x1 and y0 <= y1):
             raise InputError(f"road: empty strip, x {x0:g} to {x1:g} m, y {y0:g} to {y1:g} m")
@@ -143,8 +146,8 @@ class PreparedRoad:
     """z(x, y) = s((x - lead)/run_in) [h(x + start, y + lateral) + offset - level] in m.
 
     s is the smoothstep, x the distance from the axle's starting point, y from the tire's middle.
-    Also a `Road`, apart from `prepare`. `filled` counts the holes that were filled, `notes` says what else was
-    done to a measured road.
+    Also a `Road`, except for `prepare`. `filled` counts the holes that were filled; `notes`
+    describes how else a measured road was processed.
     """
 
     def __init__(
@@ -158,7 +161,7 @@ class PreparedRoad:
     ) -> None:
         self._road, self._shift, self._level, self._offset = road, shift, level, offset
         self._lead, self._run_in = reach[0], run_in
-        self.end = reach[1]  # the farthest x (m) that `height` may be asked for
+        self.end = reach[1]  # the largest x (m) at which `height` may be evaluated
         self._span = (reach[1] - reach[0]) * (1.0 + 1e-9)
         self.spacing = road.spacing
         self.filled: int = getattr(road, "filled", 0)
@@ -174,7 +177,7 @@ class PreparedRoad:
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m) over the static road plane at x, y (m) of equal shape.
 
-        ValueError for x beyond the strip that was prepared: the border would pass for the road.
+        ValueError for x beyond the prepared strip, where the border would be mistaken for the road.
         """
         ahead = np.asarray(x) - self._lead
         farthest = ahead.max(initial=0.0)
@@ -199,8 +202,10 @@ class PreparedRoad:
 
     @cached_property
     def texture(self) -> Texture | None:
-        """What the middle line says, where it is no longer eased in, over 20 m at most; None of a road without
-        resolution (flat), or too short to tell."""
+        """Texture of the middle line after the run-in, over at most 20 m.
+
+        None for a road without resolution (flat), or too short for an evaluation.
+        """
         first = self._lead + self._run_in
         length = min(self.end - first, _SEEN)
         if not (np.isfinite(self.spacing) and length >= _LEAST_SEEN):
@@ -210,19 +215,19 @@ class PreparedRoad:
         return texture_of(self.height(np.asarray(x), np.zeros(len(x))), pitch)
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Upper bound (m) of the heights in a strip, the flat start included."""
+        """Upper bound (m) of the heights in a strip, including the flat start."""
         pieces = self._pieces(x0, x1, y0, y1)
         return max(0.0, *(self._road.highest(*piece) - low for piece, low, _ in pieces))
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Lower bound (m) of the heights in a strip, the flat start included."""
+        """Lower bound (m) of the heights in a strip, including the flat start."""
         pieces = self._pieces(x0, x1, y0, y1)
         return min(0.0, *(self._road.lowest(*piece) - high for piece, _, high in pieces))
 
     def _pieces(
         self, x0: float, x1: float, y0: float, y1: float
     ) -> Iterator[tuple[tuple[float, float, float, float], float, float]]:
-        """The strip in the road's own coordinates, piece by piece with bounds of what is taken off."""
+        """The strip in the road's own coordinates, in pieces with bounds of what is subtracted."""
         dx, dy = self._shift
         count = max(PIECES, int(np.ceil((x1 - x0) / LONGEST))) if self._level else 1
         edges = np.linspace(x0 + dx, x1 + dx, count + 1)

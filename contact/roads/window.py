@@ -1,4 +1,4 @@
-"""The piece of a road's rows that is being driven over, without holes."""
+"""The part of a road's rows that the tire is passing over, without holes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 
 
 class Window:
-    """Heights z at rows `first` to `first` + len(x) and the columns of a road, x (n,) and y (w,) in m.
+    """Heights z at rows `first` to `first` + len(x) and columns of a road, x (n,), y (w,) in m.
 
-    Only the rows asked for last, and as many ahead of them as make `PIECE` numbers, are in memory;
+    Only the rows last needed, and as many ahead of them as make `PIECE` numbers, are in memory;
     holes in them are filled. `missing` counts all holes, `hole` is the first (row, column) or None.
     """
 
@@ -25,7 +25,7 @@ class Window:
     ) -> None:
         self._rows, (self._first, self._columns), self._source = rows, place, source
         self._x, self._y = x, y
-        # As many rows as are read at a time: whole rows come from the file, a part of each is kept.
+        # As many rows as are read at a time: files yield whole rows, of which a part is kept.
         self._most = max(PIECE // rows.shape[1], 2)
         self._begin, self._z = 0, np.empty((0, len(y)))
         self._corners: tuple[Array, ...] = ()
@@ -34,12 +34,12 @@ class Window:
         self.hole: tuple[int, int] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the rows in memory, which are read again where they are wanted."""
+        """The state without the rows in memory, which are read again when needed."""
         nothing = {"_begin": 0, "_z": np.empty((0, len(self._y))), "_corners": ()}
         return self.__dict__ | nothing
 
     def scan(self) -> None:
-        """Look for holes, all through once. InputError when there is no height at all."""
+        """Search all rows for holes, once. InputError if there is no height at all."""
         known = np.ones(len(self._x), dtype=bool)
         for first in range(0, len(self._x), self._most):
             missing = np.isnan(self._read(first, min(first + self._most, len(self._x))))
@@ -53,7 +53,7 @@ class Window:
         self._known = known
 
     def bilinear(self, i: NDArray[np.intp], s: Array, j: NDArray[np.intp], t: Array) -> Array:
-        """Heights in the cells (i, j) at the shares s along and t across."""
+        """Heights in the cells (i, j) at the fractions s along and t across."""
         if i.size == 0:
             return np.zeros(i.shape)
         low, high = int(i.min()), int(i.max())
@@ -67,7 +67,7 @@ class Window:
         return near + s * (far - near)
 
     def bounds(self, rows: slice, columns: slice) -> tuple[float, float]:
-        """Least and greatest height of the rows and columns, holes left out."""
+        """Lowest and highest height of the rows and columns, without holes."""
         low, high = np.inf, -np.inf
         for first in range(rows.start, rows.stop, self._most):
             last = min(first + self._most, rows.stop)
@@ -84,23 +84,23 @@ class Window:
         return out
 
     def _hold(self, low: int, high: int) -> None:
-        """Have the rows from `low` to `high` in memory, and as many beyond as there is room for."""
+        """Load the rows from `low` to `high`, and as many beyond as there is room for."""
         if low >= self._begin and high <= self._begin + len(self._z):
             return
-        # A little behind too: not all points of a patch are asked for in one go.
+        # A few behind too, since not all points of a patch are evaluated in one call.
         margin = (self._most - (high - low)) // 8
         begin = max(low - margin, 0)
         end = min(max(begin + self._most, high), len(self._x))
         z = self._read(begin, end)
         if len(self._known) and self.missing:
             z = self._without_holes(z, begin, end)
-        # Four views in which one index finds the corners of a cell.
+        # Four views in which a single index finds the corners of a cell.
         self._begin, self._z = begin, np.ascontiguousarray(z)
         flat, width = self._z.ravel(), len(self._y)
         self._corners = flat, flat[1:], flat[width:], flat[width + 1 :]
 
     def _without_holes(self, z: Array, begin: int, end: int) -> Array:
-        """With the nearest known row on either side, by which rows without any height are filled."""
+        """Fill holes, using the nearest known row on either side for rows without any height."""
         known = np.flatnonzero(self._known)
         k0, k1 = np.searchsorted(known, [begin, end - 1])
         before, after = known[max(k0 - 1, 0)], known[min(k1, len(known) - 1)]
@@ -122,10 +122,10 @@ class Window:
 
 
 def fill_holes(z: Array, x: Array, y: Array, source: str = "road") -> Array:
-    """z (nx, ny) m with its NaN replaced.
+    """z (nx, ny) m with NaN replaced.
 
-    Linear across y between valid neighbours, the nearest one beyond the last, then the same along x
-    for rows without any. InputError when all is missing.
+    Linear across y between valid neighbours, the nearest one beyond the last; then the same
+    along x for rows without any. InputError if all heights are missing.
     """
     if not np.isnan(z).any():
         return z

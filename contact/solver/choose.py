@@ -1,4 +1,4 @@
-"""The contact solver that a scene names."""
+"""The choice of the contact solver."""
 
 import numpy as np
 
@@ -11,12 +11,13 @@ from tireroad.fem.errors import InputError
 
 
 def make_solver(name: str, matrix: Array | Compliance) -> ContactSolver:
-    """The solver named "active-set", "projected-cg" or "snes-vi" (`contact.solver`). InputError for another.
+    """The solver "active-set", "projected-cg" or "snes-vi" (`contact.solver`); else InputError.
 
-    The active set of a product is found from the set that usually touches: a matrix is kept of points that do.
+    For a compliance that is a product, the active set is found from the set that usually touches,
+    with a matrix of these points only.
     """
     if name == "snes-vi":
-        from tireroad.contact.solver.snes_vi import SnesVI  # PETSc only where it is asked for
+        from tireroad.contact.solver.snes_vi import SnesVI  # PETSc only if requested
 
         return SnesVI(matrix)
     if name not in ("active-set", "projected-cg"):

@@ -1,8 +1,8 @@
 """The contact problem of one time step: f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0.
 
-A (n, n) m/N is the same-step compliance, possibly slightly unsymmetric (rolling); f (n,) N the
-total contact forces, g (n,) m the gaps, q (n,) m the gaps at f = f_ref. A positive definite
-symmetric part makes A a P-matrix, and the solution unique (Cottle, Pang and Stone, The Linear
+A (n, n) m/N is the same-step compliance, possibly slightly unsymmetric (rolling); f (n,) N are the
+total contact forces, g (n,) m the gaps, q (n,) m the gaps at f = f_ref. With a positive definite
+symmetric part A is a P-matrix and the solution unique (Cottle, Pang and Stone, The Linear
 Complementarity Problem, 3.1.6 and 3.3.7). Serial: every process that calls solves the same small
 problem for itself.
 """
@@ -22,24 +22,25 @@ from tireroad.contact.solver.factor import ActiveFactor
 from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
 from tireroad.fem.errors import ConvergenceError
 
-# A sign error below this share of the scale is rounding: without it a point whose force and gap are
-# both 0 flips in and out for ever.
+# A sign error below this share of the scale is rounding: otherwise a point whose force and gap are
+# both 0 would enter and leave for ever.
 ROUNDING = 1e-12
-# Full exchanges that may fail to reduce the wrong signs before single exchanges take over.
+# Full exchanges that may fail to reduce the number of wrong signs before single exchanges take
+# over.
 PATIENCE = 10
 
 
 class ActiveSet:
-    """Semismooth Newton (primal-dual active set), made safe as block principal pivoting.
+    """Semismooth Newton (primal-dual active set), safeguarded as block principal pivoting.
 
     A step exchanges every point of wrong sign (f < 0 where active, g < 0 where not). When
     `PATIENCE` steps in a row do not reduce their number, only the last wrong point is exchanged
-    (Murty's rule) until it falls: finite for every P-matrix. Of random matrices, n = 200, one whose
-    skew part is three times the symmetric one takes 15 steps, ten times that runs out of them.
-    Source: Judice and Pires, Computers Ops Res. 21 (1994) 587.
+    (Murty's rule) until it falls, which is finite for every P-matrix. Random matrices, n = 200:
+    with a skew part three times the symmetric one 15 steps are needed; with ten times the step
+    limit is exceeded. Source: Judice and Pires, Computers Ops Res. 21 (1994) 587.
 
-    The factor is kept and bordered while points come and go (contact.factor): a step that ends in
-    the set it began with factorises nothing.
+    The factor is kept and bordered as points come and go (contact.solver.factor): a step that ends
+    in the set it began with needs no factorisation.
     """
 
     def __init__(self, matrix: Array | Compliance) -> None:
@@ -64,10 +65,11 @@ class ActiveSet:
     ) -> Array:
         """Forces f (n,) N with f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0.
 
-        q (n,) m; guess_active (n,) bool, by default the last active set, carried on linearly; reference f_ref (n,) N, by
-        default 0. With a reference, q = 0 where f_ref > 0 and q >= 0 elsewhere returns f_ref bit
-        for bit: the state at rest cannot drift. ConvergenceError when q is not finite or the
-        residual max |min(diag(A) f, g)| exceeds 1e-9 of max |q| + max diag(A) max f.
+        q (n,) m; guess_active (n,) bool, by default extrapolated from the last two solutions;
+        reference f_ref (n,) N, by default 0. With a reference, q = 0 where f_ref > 0 and q >= 0
+        elsewhere returns f_ref bit for bit, so that the state at rest cannot drift.
+        ConvergenceError if q is not finite or the residual max |min(diag(A) f, g)| exceeds 1e-9 of
+        max |q| + max diag(A) max f.
         """
         n = len(self._diagonal)
         active = self._guess() if guess_active is None else np.asarray(guess_active, dtype=bool)
@@ -98,12 +100,12 @@ class ActiveSet:
         )
 
     def state(self) -> dict[str, Array | Mask]:
-        """What the next solve starts from."""
+        """The state from which the next solve starts."""
         signs = {"signs": self._signs, "signs_before": self._before}
         return {"active": self.active, "factorised": self.factorised} | signs
 
     def set_state(self, kept: dict[str, Array | Mask]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self.active = np.asarray(kept["active"], dtype=bool)
         self._signs = np.asarray(kept["signs"], dtype=float)
         self._before = np.asarray(kept["signs_before"], dtype=float)
@@ -115,12 +117,12 @@ class ActiveSet:
         return self._factor.base
 
     def refactor(self, touching: Mask) -> None:
-        """Factorise this set (n,): what is solved next starts from its factor."""
+        """Factorise this set (n,), from whose factor the next solve starts."""
         self._factor.rebase(touching)
 
     @property
     def factorisations(self) -> int:
-        """Factors made so far; the changes in between only bordered them."""
+        """Number of factorisations; changes in between only border the factor."""
         return self._factor.factorisations
 
     def block(self, index: Index) -> Array:
@@ -128,9 +130,9 @@ class ActiveSet:
         return self._compliance.block(index, index)
 
     def _guess(self) -> Mask:
-        """The last active set, without the points about to lift and with those about to touch.
+        """The last active set, without points about to lift off and with those about to touch.
 
-        On a rolling patch that is the right set in four steps of five, the last one in one of five.
+        On a rolling patch this is the right set in four steps of five, the last set in one of five.
         """
         ahead = 2.0 * self._signs - self._before
         return (ahead > 0.0) | ((ahead == 0.0) & self.active)
@@ -151,7 +153,7 @@ class ActiveSet:
         return force, gap
 
     def _missed(self, index: Index, lifted: Index, reference: Array) -> Array:
-        """What the reference forces of points that do not touch gave way to at those that do, m."""
+        """Displacement (m) at touching points due to reference forces at points lifted off."""
         key = index.tobytes(), lifted.tobytes()
         if key != self._lifted or reference is not self._reference:
             self._lifted, self._reference = key, reference
@@ -159,7 +161,7 @@ class ActiveSet:
         return self._gone
 
     def _finish(self, active: Mask, force: Array, gap: Array, scale: float) -> Array:
-        """Drop signs at rounding level, measure the residual, keep the state for the next step."""
+        """Clear signs at rounding level, measure the residual, keep the state for the next step."""
         np.maximum(force, 0.0, out=force)
         self.residual = complementarity_residual(force, gap, self._diagonal, scale)
         check_residual("active-set", self.residual)

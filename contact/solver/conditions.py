@@ -1,4 +1,4 @@
-"""What every solver of the contact problem has in common: its interface, and the checks of A and of f."""
+"""The interface of the contact solvers, and their checks of compliance and solution."""
 
 from typing import Any, Protocol
 
@@ -11,15 +11,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
-# Share of the scale the complementarity residual may reach in the end.
+# Largest complementarity residual of a solution, as a share of the scale.
 TOLERANCE = 1e-9
 
 
 class ContactSolver(Protocol):
-    """What the time loop needs; `active`, `gap` (m), `residual`, ... are of the last solve.
+    """The interface that the time loop needs; `active`, `gap` (m), ... are of the last solve.
 
-    `gap` is 0 at the points that touch; `penetration` (m) is how far the answer as it was solved has
-    any point inside the road.
+    `gap` is 0 at touching points; `penetration` (m) is that of the deepest point in the solution
+    itself.
     """
 
     active: Mask
@@ -43,7 +43,7 @@ class ContactSolver(Protocol):
 
 
 def penetration(gap: Array) -> float:
-    """How far (m) the deepest of the gaps (n,) m is below 0."""
+    """Depth (m) of the deepest of the gaps (n,) m below 0."""
     return max(-float(gap.min(initial=0.0)), 0.0)
 
 
@@ -69,13 +69,13 @@ def checked_compliance(matrix: Array) -> Array:
 
 
 def complementarity_residual(force: Array, gap: Array, diagonal: Array, scale: float) -> float:
-    """max |min(diag(A) f, g)| over `scale` (m); 0 at the solution, also when the scale is 0."""
+    """max |min(diag(A) f, g)| over `scale` (m); 0 at the solution, also if the scale is 0."""
     worst = float(np.abs(np.minimum(force * diagonal, gap)).max())
     return worst / scale if scale > 0.0 else worst
 
 
 def check_residual(name: str, residual: float) -> None:
-    """ConvergenceError when the relative residual is above the tolerance or not a number."""
+    """ConvergenceError if the relative residual is above the tolerance or not a number."""
     if np.isnan(residual):
         raise ConvergenceError(
             f"contact ({name}): the gaps are not finite: the motion has grown without bound; take "

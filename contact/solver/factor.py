@@ -7,8 +7,8 @@ border the system,
     [A_SB A_SS  0 ] [x_S] = [r_S],
     [E_R^T 0    0 ] [ l ]   [ 0 ]
 
-whose Schur complement is of size k: k more right-hand sides instead of a new factor.
-Source: Gill, Murray, Saunders and Wright, SIAM J. Matrix Anal. Appl. 5 (1984) 562.
+whose Schur complement is of size k: k more right-hand sides instead of a new factor. Source: Gill,
+Murray, Saunders and Wright, SIAM J. Matrix Anal. Appl. 5 (1984) 562.
 """
 
 import numpy as np
@@ -21,15 +21,16 @@ from tireroad.fem.errors import ConvergenceError
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Changes from which a new factor costs less: k right-hand sides each time against 2/3 a^3.
+# Number of changes above which a new factor costs less: k right-hand sides each time against 2/3
+# a^3.
 FEWEST, SHARE = 4, 16
 
 
 class ActiveFactor:
-    """Solves A_NN x = r for a touching set N that changes by a few points a step.
+    """Solves A_NN x = r for a touching set N that changes by a few points per step.
 
-    What comes out depends on N and on the factorised set alone, not on the way between them:
-    `base` (n,) bool is all a checkpoint needs. `factorisations` counts.
+    The result depends only on N and on the factorised set, not on the changes in between: `base`
+    (n,) bool is all that a checkpoint needs. `factorisations` counts them.
     """
 
     def __init__(self, compliance: Compliance) -> None:
@@ -41,7 +42,7 @@ class ActiveFactor:
         self._key = b""
 
     def take(self, active: Mask) -> None:
-        """Make ready for the touching set. ConvergenceError when its compliance is singular."""
+        """Prepare for the touching set. ConvergenceError if its compliance is singular."""
         key = active.tobytes()
         if key == self._key:
             return
@@ -54,7 +55,7 @@ class ActiveFactor:
         self._key = key
 
     def rebase(self, base: Mask) -> None:
-        """Factorise this set; it is then the touching one too."""
+        """Factorise this set, which then is the touching set too."""
         self.base, self.index = base.copy(), np.flatnonzero(base)
         self._members, self._changed = self.index, self.index[:0]
         self._key = base.tobytes()
@@ -81,11 +82,11 @@ class ActiveFactor:
         return whole[self.index]
 
     def spread(self, force: Array) -> Array:
-        """A f (n,) m for forces f (n,) N that are loaded at the factorised set and few others."""
+        """A f (n,) m for forces f (n,) N that are nonzero at the factorised set and few others."""
         return self._around.spread(force)
 
     def _border(self, active: Mask, changed: NDArray[np.intp]) -> None:
-        """The Schur complement of the changes since the factor was made."""
+        """The Schur complement of the changes since the factorisation."""
         self._changed = changed
         if len(changed) == 0:
             return

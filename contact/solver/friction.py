@@ -1,10 +1,11 @@
-"""One step with horizontal forces: the normal problem and stick/slip in turn, until both hold.
+"""One step with horizontal forces: the normal and the tangential problem in turn, until both hold.
 
-Normal: f >= 0, g = A_zz (f - f_static) + A_zh t + q >= 0, f . g = 0. Horizontal, at the touching
-points: t = -K_b (share u + past) cut to |t| <= mu f, u = u_free + A_hz (f - f_static) + A_hh t. With a tread that shears
-(contact.tread.shear), A has its part as well; its rubber is then in series with the bristles, or alone, K_b infinite.
-Without slip this is block Gauss-Seidel on a positive definite problem and converges always; with
-slip it is sure for mu ||A_zz^-1 A_zh|| < 1, where the answer is unique too.
+Normal: f >= 0, g = A_zz (f - f_static) + A_zh t + q >= 0, f . g = 0. Tangential, at the touching
+points: t = -K_b (share u + past) limited to |t| <= mu f, u = u_free + A_hz (f - f_static) + A_hh t.
+With a tread that shears (contact.tread.shear), A includes its part; its rubber is then in series
+with the bristles or, with K_b infinite, alone. Without slip this is block Gauss-Seidel on a
+positive definite problem and always converges; with slip convergence is certain for mu ||A_zz^-1
+A_zh|| < 1, where the solution is unique too.
 """
 
 from __future__ import annotations
@@ -23,17 +24,19 @@ from tireroad.greens.residual.sparse_columns import LoadedColumns
 Array = NDArray[np.float64]
 
 TURNS = 100
-TOLERANCE = 1e-8  # change of a turn, of the largest normal force
-# How exactly stick and slip are found in the first turn, and in later ones, of the last turn's change; at least.
+TOLERANCE = 1e-8  # change in an iteration, relative to the largest normal force
+# Accuracy of stick and slip in the first iteration, in later ones relative to the last change, and
+# the finest.
 ROUGHLY, CLOSER, EXACTLY = 1e-5, 1e-3, 1e-10
 
 
 class Friction:
-    """The brush on a tire with same-step response `tire` (3p, 3p) m/N, ordered z, x, y of the nodes.
+    """The brush on a tire with same-step response `tire` (3p, 3p) m/N in z, x, y of the nodes.
 
-    `weights` W (c, p) takes nodes to points (None: they are the same). `shear` of the tread, None: the tread is rigid to
-    horizontal forces; `pressed` (c,) N, the forces from which it is sheared by pressure, None: the static ones.
-    `horizontal` (c, 2) N is the last answer, `turns` its number of rounds.
+    `weights` W (c, p) interpolates from nodes to points (None: they are the same). `shear` of the
+    tread, None: rigid in shear; `pressed` (c,) N: normal forces relative to which pressure shears
+    it, None: the static ones. `horizontal` (c, 2) N is the last solution, `turns` its number of
+    iterations.
     """
 
     def __init__(
@@ -57,7 +60,7 @@ class Friction:
         self._key = b""
 
     def largest_unique(self, touching: NDArray[np.bool_], normal: ContactSolver) -> float:
-        """The friction up to which the step's answer is unique with these points touching."""
+        """Largest friction coefficient with a unique solution, with these points touching."""
         index = np.flatnonzero(touching)
         count = len(touching)
         own = normal.block(index)
@@ -69,12 +72,12 @@ class Friction:
         return 1.0 / max(float(np.linalg.norm(coupling, 2)), 1e-300)
 
     def state(self) -> dict[str, Array]:
-        """What a checkpoint keeps."""
+        """The state that a checkpoint keeps."""
         kept = {"horizontal": self.horizontal, "horizontal_before": self._before}
         return self._brush.state() | kept
 
     def set_state(self, kept: dict[str, Array]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self.horizontal, self._before = kept["horizontal"], kept["horizontal_before"]
         self._brush.set_state(kept)
 
@@ -83,10 +86,10 @@ class Friction:
     ) -> tuple[Array, Array]:
         """Normal (c,) and horizontal (c, 2) forces, N; `free` (2c,) m, x then y.
 
-        ConvergenceError when 100 turns do not settle.
+        ConvergenceError after 100 iterations without convergence.
         """
         share, past = self._brush.offer()
-        horizontal = 2.0 * self.horizontal - self._before  # carried on linearly: a turn less
+        horizontal = 2.0 * self.horizontal - self._before  # linear extrapolation saves an iteration
         within = ROUGHLY
         for self.turns in range(1, TURNS + 1):
             force = normal.solve(q + self._lift(horizontal), guess, reference=static)
@@ -95,7 +98,8 @@ class Friction:
             new = self._stick_slip(force, moved, (share, past), horizontal, within)
             change, largest = np.abs(new - horizontal).max(), force.max(initial=0.0)
             horizontal = new
-            # A guess that passes for an answer changes nothing: only what was found closely tells that all holds.
+            # A guess within a coarse tolerance changes nothing; only an accurate solution proves
+            # convergence.
             close = within <= 0.1 * TOLERANCE
             within = max(min(within, CLOSER * change / max(largest, 1e-300)), EXACTLY)
             if close and change <= TOLERANCE * largest:
@@ -139,7 +143,10 @@ class Friction:
         guess: Array,
         within: float,
     ) -> Array:
-        """t (c, 2): B t + c = 0 with B = A_hh + 1/(K share), c = u_other + past/share, or slip; `within` as of stick_slip."""
+        """Tangential forces t (c, 2): B t + c = 0, or slip, to `within` of stick_slip.
+
+        B = A_hh + 1/(K share), c = u_other + past/share.
+        """
         share, past = bristles
         law = self._brush.law
         out = np.zeros((len(force), 2))
@@ -157,7 +164,7 @@ class Friction:
         return out
 
     def _between(self, index: NDArray[np.intp]) -> tuple[Array, Array | None, Between | None]:
-        """A_hh between the points, through the nodes that carry them, and the tread's part."""
+        """A_hh between the nodes that carry the points, their weights, and the tread's part."""
         key = index.tobytes()
         if key != self._key:
             own, p = self._w[index], self._w.shape[1]

@@ -18,8 +18,10 @@ Index = NDArray[np.intp]
 
 
 class Around(Protocol):
-    """A seen from some points: `block` (a, a) between them, column-major as LAPACK takes it; `spread`, A f (c,) for forces
-    (c,) at those points and few others.
+    """A restricted to some points.
+
+    `block` (a, a) is A between them, column-major for LAPACK; `spread` is A f (c,) for forces (c,)
+    at those points and few others.
     """
 
     def block(self) -> Array: ...
@@ -28,10 +30,10 @@ class Around(Protocol):
 
 
 class Compliance(Protocol):
-    """What the solvers need of A (c, c) m/N.
+    """The operations on A (c, c) m/N that the solvers need.
 
-    `block` is its part between given points, column-major; `around` prepares many products with forces
-    at about the same points; `precondition` is roughly its inverse.
+    `block` is its part between given points, column-major; `around` prepares many products with
+    forces at about the same points; `precondition` is an approximate inverse.
     """
 
     diagonal: Array
@@ -47,7 +49,7 @@ class Compliance(Protocol):
 
 @dataclass(frozen=True)
 class _ProductAround:
-    """Of a compliance that is a product: it costs the same for few forces as for many."""
+    """For a compliance that is a product, which costs the same for few forces as for many."""
 
     block: Callable[[], Array]
     spread: Callable[[Array], Array]
@@ -56,7 +58,7 @@ class _ProductAround:
 class SpreadCompliance:
     """`tire` (p, p) m/N between nodes, `weights` W (c, p), the tread a convolution; nothing dense.
 
-    Preconditioned by the tread alone: the tire adds few large eigenvalues, one iteration each.
+    The tread alone is the preconditioner: the tire adds few large eigenvalues, one iteration each.
     """
 
     def __init__(self, tire: Array, weights: sparse.csr_matrix, tread: KernelTread) -> None:
@@ -72,11 +74,11 @@ class SpreadCompliance:
         return np.asfortranarray(self._weights[rows] @ ahead.T + self._tread.block(rows, columns))
 
     def around(self, index: Index) -> Around:
-        """As seen from the points of `index` (a,)."""
+        """A restricted to the points of `index` (a,)."""
         return _ProductAround(lambda: self.block(index, index), self.apply)
 
     def apply(self, force: Array) -> Array:
-        """Approach (c,) m under forces (c,) N."""
+        """Displacement (c,) m under forces (c,) N."""
         moved = self._tire @ (self._transposed @ force)
         return self._weights @ moved + self._tread.apply(force)
 
@@ -95,13 +97,13 @@ class MatrixCompliance:
         return self._columns.between(rows, columns)
 
     def around(self, index: Index) -> Around:
-        """As seen from the points of `index` (a,)."""
+        """A restricted to the points of `index` (a,)."""
         return self._columns.around(index)
 
     def apply(self, force: Array) -> Array:
-        """Approach (c,) m under forces (c,) N."""
+        """Displacement (c,) m under forces (c,) N."""
         return self._matrix @ force
 
     def precondition(self, approach: Array) -> Array:
-        """Forces (c,) N of an approach (c,) m, point by point."""
+        """Forces (c,) N for a displacement (c,) m, point by point."""
         return approach / self.diagonal

@@ -1,4 +1,4 @@
-"""Generalised minimal residuals for a few hundred unknowns, without a restart."""
+"""GMRES (generalised minimal residual method) for a few hundred unknowns, without restarts."""
 
 import inspect
 from collections.abc import Callable
@@ -8,18 +8,19 @@ from numpy.typing import NDArray
 from scipy.sparse import linalg
 
 Array = NDArray[np.float64]
-FEW, SHORT = 200, 40  # unknowns from which on a short cycle is tried first, and its steps
+FEW, SHORT = 200, 40  # unknowns above which a short cycle is tried first, and its steps
 
-# Debian 12's SciPy calls it `tol`, Debian 13's knows only `rtol`.
+# Called `tol` in the SciPy of Debian 12; that of Debian 13 has only `rtol`.
 _RELATIVE = "rtol" if "rtol" in inspect.signature(linalg.gmres).parameters else "tol"
 
 
 def gmres(apply: Callable[[Array], Array], right: Array, tolerance: float) -> Array:
     """x (n,) with |A x - b| <= tolerance |b|, `apply` v -> A v, by SciPy.
 
-    One cycle of at most n steps: in exact arithmetic that is the solution whatever A, and what is
-    left then is rounding, so that x is returned. Of many unknowns a short one is tried first: SciPy clears the memory of the longest
-    it might take, which for 800 unknowns took as long as the steps themselves.
+    One cycle of at most n steps yields the solution in exact arithmetic for any A, and the rest is
+    rounding, so x is returned. With many unknowns a short cycle is tried first: SciPy initialises
+    the memory of the longest possible one, which for 800 unknowns took as long as the steps
+    themselves.
     """
     n = len(right)
     matrix = linalg.LinearOperator((n, n), matvec=apply, dtype=float)

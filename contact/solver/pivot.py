@@ -1,12 +1,13 @@
-"""The contact problem seen from a set of points that usually touch: a principal pivot transform.
+"""The contact problem relative to a set of points that usually touch: a principal pivot transform.
 
-Of the points taken, B usually touch and N do not. With forces in metres, a = diag(A) f, the unknowns
-z = (g_B, a_N) and their partners w = (a_B, g_N) solve the same kind of problem,
+Of the points considered, B usually touch and N do not. With forces in metres, a = diag(A) f, the
+unknowns z = (g_B, a_N) and their partners w = (a_B, g_N) solve a problem of the same kind,
 
-    w = M z + h >= 0, z >= 0, w . z = 0,   M = [ P, -P A_BN; A_NB P, A_NN - A_NB P A_BN ],  P = A_BB^-1,
+    w = M z + h >= 0, z >= 0, w . z = 0,
+    M = [ P, -P A_BN; A_NB P, A_NN - A_NB P A_BN ],  P = A_BB^-1,
 
-of which few z are not zero where the contact is near B. M is a P-matrix when A is one.
-Source: Cottle, Pang and Stone, The Linear Complementarity Problem, 2.3 and 4.1.
+in which few z are nonzero if the contact is near B. M is a P-matrix if A is one. Source: Cottle,
+Pang and Stone, The Linear Complementarity Problem, 2.3 and 4.1.
 """
 
 import numpy as np
@@ -17,9 +18,9 @@ from tireroad.contact.solver.grid_compliance import Compliance
 
 
 class Pivot:
-    """M (c, c) of the `taken` points (n,) bool, `base` (n,) bool those of B; 20 c^3 bytes of work.
+    """M (c, c) of the `taken` points (n,) bool, of which `base` (n,) are B; 20 c^3 bytes of work.
 
-    `places` (c,): the points in the order of M, B first. InputError when A is not positive definite.
+    `places` (c,): the points in the order of M, B first. InputError if A is not positive definite.
     """
 
     def __init__(self, compliance: Compliance, taken: Mask, base: Mask) -> None:
@@ -27,7 +28,7 @@ class Pivot:
         self.places = np.concatenate([np.flatnonzero(base), np.flatnonzero(taken & ~base)])
         self._size = int(np.count_nonzero(base))
         whole = checked_compliance(compliance.block(self.places, self.places))
-        # A power of two: forces come back from metres to the last bit.
+        # A power of two, so that forces return from metres to the last bit.
         self._unit = 2.0 ** np.round(np.log2(whole.diagonal()))
         self.matrix = self._pivoted(whole / self._unit)
         self._turned = np.ascontiguousarray(self.matrix[:, : self._size].T)
@@ -55,14 +56,14 @@ class Pivot:
         return self._begun + (own - pushed)
 
     def _at(self, reference: Array) -> Array:
-        """The part of h that the reference makes, (c,) m."""
+        """The part of h due to the reference, (c,) m."""
         force = reference[self.places] * self._unit
         out = -(self.matrix[:, self._size :] @ force[self._size :])
         out[: self._size] += force[: self._size]
         return out
 
     def exchanged(self, active: Mask) -> Mask:
-        """Which z (c,) are not zero when the points `active` (n,) touch; and the way back."""
+        """Nonzero z (c,) if `active` (n,) touch: of B those that do not, of N those that do."""
         out = active[self.places]
         out[: self._size] ^= True
         return out

@@ -1,4 +1,4 @@
-"""Projected conjugate gradients for the contact problem of a step: thousands of points, no matrix."""
+"""Projected conjugate gradients for the contact problem of a step with thousands of points."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from tireroad.fem.errors import ConvergenceError
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Stop at a tenth of what is tolerated: the residual is taken again for the record.
+# A tenth of the tolerance, since the residual is evaluated again for the record.
 TARGET = 1e-10
 MAX_ITERATIONS = 1000
 
@@ -22,11 +22,12 @@ MAX_ITERATIONS = 1000
 class ProjectedCG:
     """f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0 for A a product with a preconditioner.
 
-    Conjugate gradients (Polak-Ribiere) on the touching points; forces that turn negative are set to
-    zero and leave, points with a negative gap join, and either starts the directions anew. A need
-    be symmetric in its directions' lengths only: a slight skew part slows it, and the gap is always
-    that of A itself. Starts from the forces of the step before, carried on linearly.
-    Sources: Polonsky and Keer, Wear 231 (1999) 206; Vollebregt, J. Comput. Phys. 257 (2014) 333.
+    Conjugate gradients (Polak-Ribiere) on the touching points. Forces that turn negative are set to
+    zero and their points leave, points with a negative gap join, and either restarts the
+    directions. Symmetry of A is assumed only in the length of steps: a slight skew part slows
+    convergence, but the gap is always that of A itself. Warm start by linear extrapolation of the
+    last forces. Sources: Polonsky and Keer, Wear 231 (1999) 206; Vollebregt, J. Comput. Phys. 257
+    (2014) 333.
     """
 
     def __init__(self, compliance: Compliance) -> None:
@@ -86,12 +87,12 @@ class ProjectedCG:
         )
 
     def state(self) -> dict[str, Array]:
-        """What the next solve starts from."""
+        """The state from which the next solve starts."""
         kept = {"last": self._last, "before": self._before}
         return {name: value for name, value in kept.items() if value is not None}
 
     def set_state(self, kept: dict[str, Array]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self._last, self._before = kept.get("last"), kept.get("before")
 
     def block(self, index: NDArray[np.intp]) -> Array:

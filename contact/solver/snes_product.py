@@ -1,4 +1,4 @@
-"""A compliance that is only a product, as PETSc's SNES VI takes it."""
+"""A compliance given as a product, in the form that PETSc's SNES VI needs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class Product:
-    """A over `unit` between some points, then as D_b A + D_a where the semismooth solver scales it."""
+    """A over `unit` between some points, or D_b A + D_a after scaling by the semismooth solver."""
 
     def __init__(self, compliance: Compliance, unit: float, index: NDArray[np.intp]) -> None:
         self._compliance, self._unit, self._index = compliance, unit, index
@@ -30,7 +30,7 @@ class Product:
         return made
 
     def reset(self) -> None:
-        """Back to A."""
+        """Remove the scaling, back to A."""
         self._scale = self._added = None
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -41,27 +41,27 @@ class Product:
         y.array[:] = out if self._added is None else out + self._added * x.array_r
 
     def multTranspose(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y = (A D_b + D_a) x: for the slope of the merit function, which may leave out A's skew part."""
+        """y = (A D_b + D_a) x, for the merit function's slope; A's skew part may be neglected."""
         scaled = x.array_r if self._scale is None else self._scale * x.array_r
         out = self._through(self._compliance.apply, scaled) / self._unit
         y.array[:] = out if self._added is None else out + self._added * x.array_r
 
     def diagonalScale(self, _matrix: PETSc.Mat, left: PETSc.Vec, _right: PETSc.Vec) -> None:
-        """D_b."""
+        """Set D_b."""
         self._scale = left.array_r.copy()
 
     def setDiagonal(self, _matrix: PETSc.Mat, diagonal: PETSc.Vec, _mode: object) -> None:
-        """D_a, added."""
+        """Set D_a, which is added."""
         self._added = diagonal.array_r.copy()
 
     def createSubMatrix(
         self, _matrix: PETSc.Mat, rows: PETSc.IS, _columns: PETSc.IS, _out: PETSc.Mat | None = None
     ) -> PETSc.Mat:
-        """Between some of the points; the solver asks for as many columns as rows."""
+        """A between some of the points; the solver requests as many columns as rows."""
         return Product(self._compliance, self._unit, self._index[rows.indices]).matrix()
 
     def roughly_inverse(self, right: Array) -> Array:
-        """A preconditioner: the compliance's own, or the diagonal once it is scaled."""
+        """A preconditioner: the compliance's own, or the diagonal once A is scaled."""
         if self._scale is None:
             return self._through(self._compliance.precondition, right) * self._unit
         own = np.broadcast_to(self._compliance.diagonal, self._whole.shape)[self._index]
@@ -75,8 +75,8 @@ class Product:
 
 
 class Preconditioner:
-    """What PETSc calls for the operator it has."""
+    """The preconditioner that PETSc calls for its current operator."""
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y, roughly the operator's inverse of x."""
+        """y: approximately the inverse of the operator times x."""
         y.array[:] = pc.getOperators()[0].getPythonContext().roughly_inverse(x.array_r)

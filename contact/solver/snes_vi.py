@@ -1,4 +1,4 @@
-"""The same contact problem through PETSc's SNES VI: an independent check, slower."""
+"""The same contact problem by PETSc's SNES VI: an independent check, slower."""
 
 import weakref
 
@@ -27,15 +27,14 @@ MAX_ITERATIONS = 200
 class SnesVI:
     """Reduced-space Newton (vinewtonrsls) for f >= 0, A (f - f_ref) + q >= 0, on this process.
 
-    PETSc sees it without units, A / max diag(A) and q / max |q|, because SNES VI's own tolerance of
-    what lies on a bound is absolute. PETSc options with the prefix `contact_` are read last and
-    win: `-contact_snes_type vinewtonssls` is the semismooth method, which takes several times the
-    steps and gives the same forces. A matrix is factorised anew in every Newton step; a product
-    (thousands of points) is solved with by GMRES, preconditioned by the tread's inverse, and never
-    made. The line search can give up when the skew part of A outweighs the symmetric one; the
-    tire's does not.
-    Sources: Benson and Munson, Optim. Methods Softw. 21 (2006) 575; Munson, Facchinei, Ferris,
-    Fischer and Kanzow, INFORMS J. Comput. 13 (2001) 294.
+    PETSc gets the problem without units, A / max diag(A) and q / max |q|, because SNES VI's own
+    tolerance for active bounds is absolute. PETSc options with the prefix `contact_` are read last
+    and take precedence: `-contact_snes_type vinewtonssls` is the semismooth method, which takes
+    several times the steps and yields the same forces. A matrix is factorised in every Newton step;
+    a product (thousands of points) is solved by GMRES, preconditioned by the tread's inverse, and
+    never assembled. The line search can fail if the skew part of A outweighs the symmetric one; the
+    tire's does not. Sources: Benson and Munson, Optim. Methods Softw. 21 (2006) 575; Munson,
+    Facchinei, Ferris, Fischer and Kanzow, INFORMS J. Comput. 13 (2001) 294.
     """
 
     def __init__(self, matrix: Array | Compliance) -> None:
@@ -60,7 +59,7 @@ class SnesVI:
         every = np.arange(n)
         self._product = None
         if isinstance(self._compliance, MatrixCompliance):
-            # By rows: petsc4py takes a matrix by columns for its transpose.
+            # Row-major: petsc4py interprets a column-major matrix as its transpose.
             self._dense = np.ascontiguousarray(self._compliance.block(every, every)) / self._unit
             self._jacobian = PETSc.Mat().createDense((n, n), comm=PETSc.COMM_SELF)
             self._jacobian.setUp()
@@ -78,7 +77,8 @@ class SnesVI:
     def _make_snes(self) -> None:
         snes = PETSc.SNES().create(comm=PETSc.COMM_SELF)
         snes.setType(PETSc.SNES.Type.VINEWTONRSLS)
-        # Not bound methods: the circle they close would outlive PETSc and crash the interpreter's exit.
+        # Not bound methods: their reference cycle would outlive PETSc and crash the interpreter's
+        # exit.
         own = weakref.proxy(self)
         snes.setFunction(lambda *given: own._evaluate(*given), self._function)
         snes.setJacobian(lambda *given: own._fill(*given), self._jacobian)
@@ -94,7 +94,7 @@ class SnesVI:
             snes.ksp.pc.setType(PETSc.PC.Type.PYTHON)
             snes.ksp.pc.setPythonContext(Preconditioner())
         snes.setOptionsPrefix(PREFIX)
-        # 1e-8 by default: forces below it would count as none, above our tolerance.
+        # The default of 1e-8 exceeds our tolerance: smaller forces would count as zero.
         options = PETSc.Options(PREFIX)
         if not options.hasName("snes_vi_zero_tolerance"):
             options["snes_vi_zero_tolerance"] = 1e-12
@@ -104,7 +104,7 @@ class SnesVI:
     def _fill(
         self, _snes: PETSc.SNES, _force: PETSc.Vec, jacobian: PETSc.Mat, _p: PETSc.Mat
     ) -> None:
-        """A anew: the semismooth solver scales it in place."""
+        """Restore A, which the semismooth solver scales in place."""
         if self._product is not None:
             self._product.reset()
             return
@@ -124,7 +124,7 @@ class SnesVI:
     ) -> Array:
         """Forces f (n,) N with f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0; see ActiveSet.solve.
 
-        `guess_active` limits the first guess to those points. ConvergenceError when SNES gives up.
+        `guess_active` restricts the initial guess to those points. ConvergenceError if SNES fails.
         """
         q = np.asarray(q, dtype=float)
         if not np.all(np.isfinite(q)):
@@ -140,11 +140,11 @@ class SnesVI:
         return self._finish(length)
 
     def state(self) -> dict[str, Array]:
-        """What the next solve starts from."""
+        """The state from which the next solve starts."""
         return {"scaled": self._force.array_r.copy()}
 
     def set_state(self, kept: dict[str, Array]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self._force.array[:] = kept["scaled"]
 
     def block(self, index: NDArray[np.intp]) -> Array:
@@ -152,7 +152,7 @@ class SnesVI:
         return self._compliance.block(index, index)
 
     def _finish(self, length: float) -> Array:
-        """Back to newtons and metres, and the residual by the same measure as ActiveSet's."""
+        """Forces in newtons and gaps in metres, with the residual measured as in ActiveSet."""
         force = np.maximum(self._force.array_r, 0.0)
         gap = self._moved(force)
         scale = float(np.abs(self._offset).max() + force.max())

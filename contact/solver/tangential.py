@@ -1,8 +1,8 @@
 """Stick and slip under given normal forces: minimise t.B t/2 + c.t with |t_i| <= b_i at each point.
 
-t_i in the plane of the road. Where |t_i| < b_i: (B t + c)_i = 0, the point sticks; where
-|t_i| = b_i: (B t + c)_i = -lambda_i t_i, lambda_i >= 0, it slips against its force. One solution
-when the symmetric part of B is positive definite.
+t_i lies in the plane of the road. Where |t_i| < b_i, (B t + c)_i = 0 and the point sticks; where
+|t_i| = b_i, (B t + c)_i = -lambda_i t_i, lambda_i >= 0, and it slips against its force. The
+solution is unique if the symmetric part of B is positive definite.
 """
 
 import numpy as np
@@ -18,13 +18,15 @@ Plane = NDArray[np.complex128]
 NEWTON_STEPS = 30
 GRADIENT_STEPS = 5000
 TOLERANCE = 1e-10  # of the largest bound, or of the largest force where nothing is bounded
-INNER = 1e-3  # reduction of a Newton step's own residual: the points that slip are not known better
+INNER = 1e-3  # residual reduction in a Newton step; the slipping points are not known any better
 
 
 class Stiffness:
-    """B = W A W^T + diag(spring), and + S of the `tread` between the points: `matrix` A (2n, 2n) m/N, x and y of each node beside each other,
-    `weights` W (a, n) from nodes to points, None where they are the same, and `spring` (a,) m/N.
-    Forces and displacements in the plane are complex, x + iy.
+    """B = W A W^T + diag(spring), plus S of the `tread`, between the points.
+
+    `matrix` A (2n, 2n) m/N, x and y of each node adjacent; `weights` W (a, n) from nodes to points,
+    None where they are the same; `spring` (a,) m/N. Forces and displacements in the plane are
+    complex, x + iy.
     """
 
     def __init__(
@@ -35,7 +37,7 @@ class Stiffness:
         tread: Between | None = None,
     ) -> None:
         self._matrix, self._weights, self._tread = matrix, weights, tread
-        # What a force gives way to at its own point, the mean of both directions (a,).
+        # Own compliance of each point (a,), the mean of both directions.
         if weights is None:
             own = matrix.diagonal().reshape(-1, 2).mean(axis=1)
         else:
@@ -58,7 +60,7 @@ class Stiffness:
         return moved.view(complex)[:, 0]
 
     def norm(self) -> float:
-        """A bound of the largest singular value, m/N."""
+        """An upper bound of the largest singular value, m/N."""
         largest = float(np.linalg.norm(self._matrix, 2))
         if self._weights is not None:
             largest *= float(np.linalg.norm(self._weights, 2)) ** 2
@@ -75,12 +77,12 @@ def stick_slip(
     """Tangential forces t (a, 2) N.
 
     `stiffness` B, `constant` c (a, 2) m, `bound` (a,) N, infinite where nothing slips, `guess`
-    (a, 2). Semismooth Newton on t = P_b(t - r (B t + c)), P_b the projection on the discs
-    (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353), r the inverse of B's
-    diagonal; its linear problems are close to the identity where the bristles are softer than the
-    tire, and GMRES solves them in a few products with B. Projected gradients, slow but sure for
-    symmetric B, where Newton circles. Returns with a residual below `within` of the forces or raises
-    ConvergenceError.
+    (a, 2). Semismooth Newton on t = P_b(t - r (B t + c)), P_b the projection on the discs (Alart
+    and Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353), r the inverse of B's diagonal. Its
+    linear problems are close to the identity if the bristles are softer than the tire, and GMRES
+    solves them in a few products with B. If Newton cycles, projected gradients follow: slow but
+    safe for symmetric B. The residual is below `within` of the forces, or ConvergenceError is
+    raised.
     """
     begin, moved = (np.ascontiguousarray(a).view(complex)[:, 0] for a in (guess, constant))
     force = _onto_discs(begin, bound)
@@ -97,7 +99,7 @@ def _newton(stiffness: Stiffness, trial: Plane, bound: Array, residual: Plane) -
     """The step d of semismooth Newton: d + P' (r B d - d) = -residual."""
     length = np.abs(trial)
     slips = length > bound
-    # Derivative P' of the projection: identity where it sticks, else b/|t| (I - n n^T).
+    # Derivative P' of the projection: the identity where a point sticks, else b/|t| (I - n n^T).
     long = np.where(slips, length, 1.0)
     normal, share = np.where(slips, trial, 0.0) / long, np.where(slips, bound, 1.0) / long
 

@@ -1,4 +1,4 @@
-"""A step's contact problem, solved by one process of those that take a loop together."""
+"""A step's contact problem, solved by one of the processes that share a time loop."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from tireroad.fem.errors import ConvergenceError, InputError
 
 
 class Solved(NamedTuple):
-    """Of the contact points: `force` (c,) N, `gap` (c,) m, `horizontal` (c, 2) N, (0, 2) without friction; the residual
-    and the `penetration` (m) as solved."""
+    """The solution at the contact points, and the residual and `penetration` (m) of it.
+
+    `force` (c,) N, `gap` (c,) m, `horizontal` (c, 2) N, or (0, 2) without friction.
+    """
 
     force: Array
     gap: Array
@@ -24,7 +26,7 @@ class Solved(NamedTuple):
 
 
 class Ahead(Protocol):
-    """What knows part of the next step before it knows the force of this one (greens.recursion)."""
+    """A tire that computes part of the next step ahead of this one's force (greens.recursion)."""
 
     def look_ahead(self) -> None: ...
 
@@ -32,8 +34,10 @@ class Ahead(Protocol):
 
 
 class Together:
-    """The root process of `comm` solves for `count` points and tells the others, which look `ahead` meanwhile where the tire
-    can. On one process nothing is sent, and nobody looks ahead.
+    """The root process of `comm` solves for `count` points and sends the result to the others.
+
+    Meanwhile the others look `ahead` if the tire can. A single process sends nothing and does not
+    look ahead.
     """
 
     def __init__(self, comm: MPI.Comm, count: int, ahead: Ahead | None) -> None:
@@ -42,8 +46,11 @@ class Together:
     def __call__(
         self, predict: Callable[[], Array], solve: Callable[[Array], Solved], horizontal: bool
     ) -> tuple[Array, Solved]:
-        """What the tire predicts, and what `solve` finds for that on the root process, with `horizontal` forces or without;
-        where it raises ConvergenceError or InputError all do. Collective."""
+        """The tire's prediction, and the solution that `solve` finds for it on the root process.
+
+        `horizontal`: whether there are horizontal forces. A ConvergenceError or InputError on the
+        root is raised on all processes. Collective.
+        """
         if self._comm.size == 1:
             return (free := predict()), solve(free)
         if self._ahead is None:

@@ -1,9 +1,10 @@
-"""The active set of a rough road under hundreds of points: what differs from the set that usually touches.
+"""The active set on a rough road with hundreds of points, relative to the set that usually touches.
 
-On a road whose texture lets points touch and lift, a step of a few millimetres exchanges a hundred points:
-a factor of the touching set serves one step only. The set that touches more often than not stays the same. Seen
-from it (contact.solver.pivot) the problem has as many unknowns that are not zero as points differ: a third of
-those that touch, on a passenger tire, so a factor costs a thirtieth.
+On a road whose texture makes points touch and lift off, a step of a few millimetres exchanges a
+hundred points, so a factor of the touching set serves only one step. The set of points that touch
+more often than not remains the same. Relative to it (contact.solver.pivot) the problem has as many
+nonzero unknowns as points differ: a third of those that touch, on a passenger tire, so a factor
+costs a thirtieth.
 """
 
 from __future__ import annotations
@@ -22,24 +23,24 @@ from tireroad.contact.solver.conditions import (
 from tireroad.contact.solver.grid_compliance import Compliance, MatrixCompliance
 from tireroad.contact.solver.pivot import Pivot
 
-# Steps over which it is counted how often a point touches.
+# Number of steps over which the frequency of touching is averaged.
 MEMORY = 200
-# Share of the time below which a point is dropped: of one that always touched, after 1400 steps.
+# Share of the time below which a point is dropped; one that always touched goes after 1400 steps.
 SELDOM = 1e-3
 # Operations of a new pivot, over c^3 of the c points taken: product, inverse, check, copies.
 PRICE = 6.0
-# Points are taken in portions of this share of those taken before, and of so many: each needs a new pivot.
+# Points are added in portions, a share of those taken but at least so many: each needs a new pivot.
 PORTION, FEWEST = 0.05, 8
 
 
 class UsualSet:
-    """f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0, by the active set method on the pivoted problem.
+    """f >= 0, g = A (f - f_ref) + q >= 0, f . g = 0, by active set on the pivoted problem.
 
-    Points far from the road are not taken; every gap is measured by A itself afterwards, and where one is
-    negative there more points are taken and the step is solved again. The base is chosen anew, and points
-    that no longer touch are dropped, as soon as what that would have saved has paid for it. A step begins
-    with the set of the step before, whose factor is there: on a rough road that takes 15 % less than signs
-    carried on (three steps of Newton's method at 2.4 mm of road).
+    Points far from the road are not included. Every gap is evaluated with A itself afterwards; if
+    one is negative, more points are included and the step is solved again. A new base is chosen,
+    and points that no longer touch are dropped, as soon as the savings would have paid for it. A
+    step begins with the set of the previous step, whose factor exists: on a rough road that takes
+    15 % less than an extrapolation of the signs (three Newton steps at 2.4 mm of road).
     """
 
     def __init__(self, compliance: Compliance) -> None:
@@ -78,7 +79,7 @@ class UsualSet:
             pivot, inner = self._widened(pivot.taken, pivot.base, gap)
 
     def state(self) -> dict[str, Array | Mask]:
-        """What the next solve starts from."""
+        """The state from which the next solve starts."""
         if self._problem is None:
             return {}
         pivot, inner = self._problem
@@ -87,7 +88,7 @@ class UsualSet:
         return kept | {"exchanged": inner.factorised}
 
     def set_state(self, kept: dict[str, Array | Mask]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         if "taken" not in kept:
             return
         masks = ("active", "pressed", "taken", "base", "exchanged")
@@ -100,7 +101,7 @@ class UsualSet:
 
     @property
     def factorisations(self) -> int:
-        """Factors made so far, the pivots' among them."""
+        """Number of factorisations, including those of the pivots."""
         return self._made + (self._problem[1].factorisations if self._problem else 0)
 
     def block(self, index: Index) -> Array:
@@ -108,7 +109,7 @@ class UsualSet:
         return self._compliance.block(index, index)
 
     def _prepared(self, q: Array, touching: Mask, pressed: Mask) -> tuple[Pivot, ActiveSet]:
-        """The problem, made anew if there is none yet or the reference presses on points not taken."""
+        """The problem, rebuilt if there is none or the reference presses on points left out."""
         if self._problem is None:
             self._share, self._pressed = touching.astype(float), pressed
             return self._widened(touching | pressed, touching, q)
@@ -119,7 +120,7 @@ class UsualSet:
         return self._problem
 
     def _widened(self, taken: Mask, base: Mask, gap: Array) -> tuple[Pivot, ActiveSet]:
-        """With a portion more of the points, those next to touch by their gaps (n,) m."""
+        """The problem with a further portion of points, nearest by their gaps (n,) m."""
         left = np.flatnonzero(~taken)
         below = int(np.count_nonzero(gap[left] < 0.0))
         more = max(int(PORTION * np.count_nonzero(taken)), 2 * below, FEWEST)
@@ -144,7 +145,7 @@ class UsualSet:
         return force
 
     def _reconsider(self) -> None:
-        """Take the set that usually touches as the base, once that would have been cheaper."""
+        """Make the set that usually touches the base, once that would have been cheaper."""
         assert self._problem is not None, "after a solution"
         pivot = self._problem[0]
         self._share += (self.active - self._share) / MEMORY
@@ -158,5 +159,5 @@ class UsualSet:
 
 
 def _work(differ: float, count: int) -> float:
-    """Operations of a step with so many unknowns that are not zero, of `count`: factor, products."""
+    """Operations of a step with `differ` nonzero unknowns of `count`: factor and products."""
     return 2.0 / 3.0 * differ**3 + 4.0 * differ * count + 2.0 * count**2

@@ -1,14 +1,16 @@
-"""What the wall under a grid of points gives way to between the nodes of its mesh.
+"""Compliance of the wall under a grid of points that the finite elements do not resolve.
 
-A point presses evenly on its rectangle. The elements take of that what their shape functions can say: forces W^T f of
-the nodes, whose pressures W^T f / A_i have T f = a W A^-1 W^T f on the rectangles (a: their areas, A those of the nodes).
-Near by, the wall is a half-space of its outer rubber, or a layer of it; with C what that gives way, the elements lack
+A point is a uniform pressure on its rectangle. The elements see only what their shape functions can
+represent: nodal forces W^T f, whose pressures W^T f / A_i have T f = a W A^-1 W^T f on the
+rectangles (a: their areas, A: those of the nodes). Locally the wall is a half-space of its outer
+rubber, or a layer of it; with the compliance C of that, the elements lack
 
     C - T^T C T,
 
-all of it within a few nodes. It falls only as the size of the elements, and its share in the compliance of a point is
-what makes rough roads depend on the mesh: soft torus, 18 x 8 and 24 x 12 elements of order 3 (nodes 13 and 10 mm apart),
-points 8 mm apart: 1.07 and 0.90 um/N by this, 1.17 and 0.87 by those and 30 x 12 and 40 x 16 elements, extrapolated.
+all of it within a few nodes. It decreases only as the element size, and its share in the compliance
+of a point is what makes results on rough roads depend on the mesh: soft torus, 18 x 8 and 24 x 12
+elements of order 3 (nodes 13 and 10 mm apart), points 8 mm apart: 1.07 and 0.90 um/N from this
+formula; 1.17 and 0.87 from those and 30 x 12 and 40 x 16 elements, extrapolated.
 """
 
 from __future__ import annotations
@@ -30,13 +32,13 @@ _CORNERS = (-1, -1), (-1, 1), (1, -1), (1, 1)
 
 @dataclass(frozen=True, kw_only=True)
 class Backed(TreadLaw):
-    """A tread of a `law` with a `wall` under it that gives way too, for forces normal to the road."""
+    """A tread `law` on a compliant `wall`, for forces normal to the road."""
 
     law: TreadLaw
     wall: Influence
 
     def influence(self, farthest: float) -> Influence:
-        """The sum of both."""
+        """The sum of both influences."""
         own = self.law.influence(farthest)
 
         def of(x: Array, y: Array, a: Array, b: Array) -> Array:
@@ -46,7 +48,7 @@ class Backed(TreadLaw):
 
 
 def over_rectangles(influence: Influence) -> Influence:
-    """The mean over a rectangle, by 2 x 2 Gauss points, as a point of a grid reads the mesh (contact.grid_patch)."""
+    """The mean over a rectangle by 2 x 2 Gauss points, as in contact.grid_patch."""
 
     def of(x: Array, y: Array, a: Array, b: Array) -> Array:
         parts = [influence(x + i * a / 3**0.5, y + j * b / 3**0.5, a, b) for i, j in _CORNERS]
@@ -56,7 +58,10 @@ def over_rectangles(influence: Influence) -> Influence:
 
 
 def on_nodes(patch: Patch, node_area: Array, wall: Influence) -> Array:
-    """N (p, p) m/N between the patch's nodes, of `node_area` (s,) m2 of the outer face: T^T C T = W N W^T."""
+    """N (p, p) m/N between the patch's nodes, such that T^T C T = W N W^T.
+
+    `node_area` (s,) m2 of the outer face; `wall`: the influence that makes C.
+    """
     assert patch.weights is not None and patch.places is not None  # of every grid
     compliance = KernelTread(patch.places, wall)
     pressed = (patch.weights.multiply(patch.area[:, None])).T.tocsr()
@@ -67,7 +72,9 @@ def on_nodes(patch: Patch, node_area: Array, wall: Influence) -> Array:
 
 
 def unsettled(patch: Patch, known: Array, nodal_force: Array) -> Patch:
-    """The patch, not settled, whose nodes give way by `known` N (p, p) less than those its gap was made with under
-    `nodal_force` (p,) N: with the same unloaded shape."""
+    """The unsettled patch for nodes more rigid by `known` N (p, p), of the same unloaded shape.
+
+    `nodal_force` (p,) N: the forces under which its gap was computed.
+    """
     assert patch.weights is not None
     return replace(patch, gap=patch.gap - patch.weights @ (known @ nodal_force))

@@ -1,24 +1,27 @@
-"""The bristles between tread and road: they carry the horizontal forces.
+"""The brush between tread and road, whose bristles carry the horizontal forces.
 
-A bristle is entered undeflected and goes through the patch with the material, at the road's speed v
-towards -x; its deflection e (base against tip) grows by the slip of its base,
+A bristle enters undeflected and moves through the patch with the material, at the road's speed v
+towards -x. Its deflection e (base relative to tip) grows by the slip of its base,
 
     De/Dt = Du/Dt + v (-s_x, s_y),   t = -K_b e on the tire,   |t| <= mu f,
 
-s_x > 0 driving, s_y > 0 the wheel drifting towards +y. Over one step, seen at the fixed points,
+s_x > 0 driving, s_y > 0 the wheel drifting towards +y. Over one step, at the fixed points,
 
     e+ = share u+ + past,   share_i = sum_j T_ij m_j,
     past_i = sum_j T_ij m_j (e_j - u_j) + share_i v h (-s_x, s_y),
 
-T the interpolation at the place a step upstream, m_j = 1 where point j touched. Slip cuts e back.
+where T interpolates at the position one step upstream, and m_j = 1 where point j touched. Sliding
+limits e.
 
-The foremost point that touches stands for a cell whose front edge, half a pitch ahead, is where bristles enter: there
-e = 0, and u is the mean of the point's and that of the one ahead. With w pitches a step, w <= 1, it so has
+The foremost touching point represents a cell whose leading edge, half a pitch ahead, is where
+bristles enter: there e = 0, and u is the mean of the point's and that of the next point ahead. With
+a travel of w pitches per step, w <= 1, therefore
 
-    e+ = u+ + (1 - 2w) (e - u) - 2w u_edge + v h (-s_x, s_y)   for w <= 1/2,   u+ - u_edge + v h (-s_x, s_y) / 2w   beyond.
+    e+ = u+ + (1 - 2w) (e - u) - 2w u_edge + v h (-s_x, s_y)   for w <= 1/2,
+    e+ = u+ - u_edge + v h (-s_x, s_y) / 2w                    beyond.
 
-A body that rolls and sticks has errors in its force of 2.7, 1.6 and 0.6 % with 6, 12 and 24 points along its contact (Kalker's
-C11); entering at a point, it had 18, 8 and 4 %.
+The force of a rolling, sticking body then has errors of 2.7, 1.6 and 0.6 % with 6, 12 and 24 points
+along its contact (Kalker's C11); with bristles entering at a point it had 18, 8 and 4 %.
 """
 
 from __future__ import annotations
@@ -35,8 +38,11 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class BrushLaw:
-    """`stiffness` N/m a point, or (c,) of each, inf: none give way; `friction` mu, None: never slips; `slip` (s_x, s_y), or (c, 2); `kind`:
-    "rolling", or "spring", the thesis's spring to the point's own displacement, e = u.
+    """Parameters of the brush.
+
+    `stiffness`: N/m per point, or (c,) of each, inf: rigid bristles; `friction`: mu, None: never
+    slides; `slip`: (s_x, s_y), or (c, 2); `kind`: "rolling", or "spring", the thesis's spring on
+    the point's own displacement, e = u.
     """
 
     stiffness: float | Array
@@ -46,7 +52,7 @@ class BrushLaw:
 
 
 class Brush:
-    """The bristles at c points: deflections e (c, 2) m, and where the points were a step ago.
+    """The bristles at c points: deflections e (c, 2) m, and the state of the points one step ago.
 
     `x` (c,) m and `line` (c,) int: points of one line follow each other in the rolling direction.
     """
@@ -63,7 +69,10 @@ class Brush:
         self._touched: Mask = np.zeros(len(x), dtype=bool)
 
     def begin(self, touching: Mask, moved: Array | None = None) -> None:
-        """The points that touch in the static state, their bristles at rest; `moved` (c, 2) m there, None: not at all."""
+        """Begin with the points that touch in the static state and undeflected bristles.
+
+        `moved` (c, 2) m: displacements in that state, by default none.
+        """
         self._touched = touching.copy()
         if moved is not None:
             self._moved = moved
@@ -79,7 +88,7 @@ class Brush:
         return share, past
 
     def _enter(self, share: Array, past: Array) -> None:
-        """Those of the points that were foremost."""
+        """Set share and past of the points that were foremost."""
         foremost = self._touched & ~self._touched[self._ahead] & (self._pitches <= 1.0 + 1e-9)
         some = np.flatnonzero(foremost & (self._way > 0))
         inside = np.minimum(2.0 * self._pitches[some, None], 1.0)  # how far towards the edge it was
@@ -91,22 +100,22 @@ class Brush:
         past[some] = (1.0 - inside) * own - inside * edge + travelled * slip
 
     def take(self, force: Array, moved: Array, touching: Mask) -> None:
-        """The step's horizontal forces (c, 2) N, displacements (c, 2) m and touching points."""
+        """Set the step's horizontal forces (c, 2) N, displacements (c, 2) m and touching points."""
         self.deflection = -force / np.reshape(self.law.stiffness, (-1, 1))
         self._moved, self._touched = moved, touching
 
     def state(self) -> dict[str, np.ndarray]:
-        """What a checkpoint keeps of the brush."""
+        """The state that a checkpoint keeps."""
         return {"deflection": self.deflection, "moved": self._moved, "touched": self._touched}
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self.deflection, self._moved = kept["deflection"], kept["moved"]
         self._touched = np.asarray(kept["touched"], dtype=bool)
 
 
 def next_ahead(x: Array, line: Array) -> tuple[NDArray[np.intp], Array]:
-    """The next point ahead of each on its line (c,), and how far (m); a line's first has itself, 0."""
+    """Next point ahead of each on its line (c,) and its distance (m); the first has itself, 0."""
     ahead, pitch = np.arange(len(x)), np.zeros(len(x))
     for one in np.unique(line):
         members = np.flatnonzero(line == one)
@@ -116,7 +125,7 @@ def next_ahead(x: Array, line: Array) -> tuple[NDArray[np.intp], Array]:
 
 
 def upstream(x: Array, line: Array, way: float) -> sparse.csr_matrix:
-    """Linear interpolation (c, c) at x + way (m) on each point's own line; no entry beyond its end."""
+    """Linear interpolation (c, c) at x + way (m) on each point's line; none beyond its end."""
     rows, columns, values = [], [], []
     for one in np.unique(line):
         members = np.flatnonzero(line == one)

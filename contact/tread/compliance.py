@@ -1,7 +1,7 @@
-"""Tread rubber between carcass and road: a compliance added to the tire's, point by point.
+"""Compliance of the tread rubber between carcass and road, added to that of the tire.
 
 Each function returns a dense (n, n) array in m/N: entry (i, j) is the approach of point i to the
-carcass when a unit force presses on point j. None of them is collective.
+carcass under a unit force on point j. None of them is collective.
 """
 
 from collections.abc import Callable
@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 Influence = Callable[[Array, Array, Array, Array], Array]
 Kernel = Callable[[Array, Array], Array]
 
-# Love's primitive cancels as eps * (r / half size)^2, a 6-point Gauss rule errs as (half size /
-# r)^12: they cross near r = 10 half sizes, where both are below 1e-12.
+# Love's primitive cancels as eps * (r / half size)^2, a 6-point Gauss rule has an error of (half
+# size / r)^12: they cross near r = 10 half sizes, where both are below 1e-12.
 FAR = 10.0
 GAUSS_POINTS = 6
 
@@ -56,7 +56,7 @@ def half_space_influence(
 def dense_compliance(points: Array, half_sizes: Array, influence: Influence) -> Array:
     """Symmetric (n, n) m/N of an influence function between points (n, 2) m.
 
-    InputError when it is not positive definite.
+    InputError if it is not positive definite.
     """
     points, half_sizes = np.asarray(points, dtype=float), np.asarray(half_sizes, dtype=float)
     x = points[:, None, 0] - points[None, :, 0]
@@ -68,10 +68,10 @@ def dense_compliance(points: Array, half_sizes: Array, influence: Influence) -> 
 
 
 def winkler_compliance(areas: Array, stiffness: float) -> Array:
-    """Independent springs, one a point: diagonal 1/(k A_i).
+    """Independent springs, one per point: diagonal 1/(k A_i).
 
-    areas (n,) m^2, stiffness k N/m^3 (force per area and approach). Returns (n, n) m/N.
-    InputError when an area or the stiffness is not positive.
+    areas (n,) m^2, stiffness k N/m^3 (force per area and approach). Returns (n, n) m/N. InputError
+    if an area or the stiffness is not positive.
     """
     areas = np.asarray(areas, dtype=float)
     if not (np.all(np.isfinite(areas)) and np.all(areas > 0.0)):
@@ -82,7 +82,7 @@ def winkler_compliance(areas: Array, stiffness: float) -> Array:
 
 
 def no_tread(n: int) -> Array:
-    """The tread is part of the finite elements: no compliance is added. (n, n) zeros, m/N."""
+    """No compliance, (n, n) zeros, m/N: the tread is part of the finite elements."""
     return np.zeros((n, n))
 
 
@@ -103,7 +103,8 @@ def over_rectangle(
 ) -> Array:
     """Integral of kernel(x - s, y - t) over |s| < a, |t| < b; d2 primitive/dxdy = kernel.
 
-    Near the rectangle four values of the primitive; far off a product Gauss rule, where nothing cancels.
+    From four values of the primitive near the rectangle, and by a product Gauss rule far away,
+    where the primitive would cancel.
     """
     x, y, a, b = np.broadcast_arrays(x, y, a, b)
     far = np.hypot(x, y) > FAR * np.maximum(a, b)
@@ -115,7 +116,7 @@ def over_rectangle(
 
 
 def primitive_product(p: Array, q: Array) -> Array:
-    """p asinh(q/|p|), 0 where p is: asinh keeps the digits that ln(q + r) loses for q < 0."""
+    """p asinh(q/|p|), 0 where p is 0; asinh keeps the digits that ln(q + r) loses for q < 0."""
     size = np.abs(p)
     safe = np.where(size > 0.0, size, 1.0)
     return np.where(size > 0.0, p * np.arcsinh(q / safe), 0.0)

@@ -1,15 +1,17 @@
-"""A tread that creeps: what its past pressure does, carried through the patch with the material.
+"""Viscoelastic creep of the tread: the effect of past pressure, convected through the patch.
 
-Of constant Poisson's ratio, its displacement is that of an elastic tread under a pressure filtered in time,
+With a constant Poisson's ratio, the displacement is that of an elastic tread under a pressure
+filtered in time,
 
     u = C~ (p + sum_k c_k q_k),   D q_k/Dt = (p - q_k) / l_k,   D/Dt = d/dt - v d/dx,
 
-C~ the tread's compliance at the modulus of a sudden step, c_k and l_k its creep: J(t) = J_0 [1 + sum_k c_k
-(1 - e^(-t/l_k))]. Over a step h, pressure linear in it, the material's q moves exactly:
+C~ being the compliance at the instantaneous modulus, c_k and l_k the creep: J(t) = J_0 [1 + sum_k
+c_k (1 - e^(-t/l_k))]. Over a step h with linear pressure, q of the material advances exactly:
 
     q+ = e^x q + (h/l) [(phi_1 - phi_2)(x) p + phi_2(x) p+],   x = -h/l.
 
-Material points keep their own values and are read between them: nothing is smeared as they travel.
+Material points keep their own values, and values between them are interpolated when read: no
+numerical diffusion as they travel.
 """
 
 from __future__ import annotations
@@ -29,8 +31,9 @@ Array = NDArray[np.float64]
 def creep_of(share: Array, time: Array) -> tuple[Array, Array]:
     """Creep (c, l) (k,), - and s, of the relaxation E(t) = E_0 [1 - sum_k g_k (1 - e^(-t/t_k))].
 
-    With E(s) = E_0 [1 - sum g_k/(1 + s t_k)] the retardation rates are its zeros, one below each relaxation
-    rate, and c_k = residue of 1/E(s). InputError for shares that leave nothing of the modulus.
+    With E(s) = E_0 [1 - sum g_k/(1 + s t_k)] the retardation rates are its zeros, one below each
+    relaxation rate, and c_k are the residues of 1/E(s). InputError for invalid shares or times, and
+    for shares that leave nothing of the modulus.
     """
     share, time = np.asarray(share, float), np.asarray(time, float)
     if len(share) != len(time) or (share <= 0).any() or (time <= 0).any() or share.sum() >= 1:
@@ -39,7 +42,7 @@ def creep_of(share: Array, time: Array) -> tuple[Array, Array]:
         )
     if len(np.unique(time)) != len(time):
         raise InputError("tread: relaxation times must differ")
-    # 1 - sum g = product form: numerator over product of (1 + s t_k).
+    # Numerator of 1 - sum g_k/(1 + s t_k) over the product of all (1 + s t_k).
     factors = [np.array([t, 1.0]) for t in time]
     whole = _product(factors)
     numerator = whole.copy()
@@ -60,7 +63,7 @@ def _product(factors: list[Array]) -> Array:
 
 
 def weights(lag: Array, step: float) -> tuple[Array, Array, Array]:
-    """(decay, of the old pressure, of the new one) (k,) over a step (s) of retardation times `lag` (s)."""
+    """(decay, weight of old pressure, of new pressure) (k,) over a step (s), times `lag` (s)."""
     x = step / np.asarray(lag, float)
     decay = np.exp(-x)
     first = -np.expm1(-x) / x  # phi_1(-x)
@@ -69,7 +72,7 @@ def weights(lag: Array, step: float) -> tuple[Array, Array, Array]:
 
 
 def steady(creep: tuple[Array, Array], patch: Patch, speed: float) -> Array:
-    """1 + sum_k c_k F_k (c, c): the filter of a pressure that stands still while the tread rolls through it."""
+    """1 + sum_k c_k F_k (c, c): the filter of a stationary pressure while the tread rolls."""
     size, lag = creep
     if speed == 0:
         return (1.0 + size.sum()) * np.eye(len(patch.points))
@@ -87,12 +90,13 @@ def steady(creep: tuple[Array, Array], patch: Patch, speed: float) -> Array:
 
 
 class TreadMemory:
-    """The past of a creeping tread under c points of a regular grid that rolls over the road.
+    """The memory of a viscoelastic tread under c points of a regular grid that rolls over the road.
 
-    `creep` (c_k, l_k); `influence` of the tread at once, and where it shears (contact.tread.shear) `shear`; `speed` m/s, `step`
-    s. `predict` gives the displacements (1, c) m at the end of a step by pressure of the past alone, or (3, c) with `shear`, z
-    before x and y; `advance` takes the change of the forces (c,) or (3 c,) N from the static ones; `at_once` is what new forces
-    see of C~, as a factor.
+    `creep` (c_k, l_k); `influence` of the tread at its instantaneous modulus, and `shear` if it
+    deforms in shear (contact.tread.shear); `speed` m/s, `step` s. `predict` returns the
+    displacements (1, c) m at the end of a step due to past pressure, or (3, c) with `shear`, z
+    before x and y. `advance` takes the change of the forces (c,) or (3 c,) N relative to the static
+    ones. `at_once` is the factor of C~ for new forces.
     """
 
     def __init__(
@@ -123,7 +127,7 @@ class TreadMemory:
         self._force = np.zeros((parts, *self._shape))
 
     def predict(self) -> Array:
-        """Displacements (1 or 3, c) m at the end of the next step with no new force."""
+        """Displacements (1 or 3, c) m at the end of the next step without a new force."""
         offset = self._offset + self._way
         jump = int(offset)
         kept = _each(self._decay) * self._kept + _each(self._old) * self._force
@@ -133,7 +137,7 @@ class TreadMemory:
         return self._moved(here.reshape(len(here), -1))[:, self._place]
 
     def _moved(self, pressed: Array) -> Array:
-        """(1 or 3, n) m of filtered forces (1 or 3, n) N on the whole grid."""
+        """Displacements (1 or 3, n) m of filtered forces (1 or 3, n) N on the whole grid."""
         down = self._tread.apply(pressed[0])
         if self._shear is None:
             return down[None]
@@ -142,8 +146,10 @@ class TreadMemory:
         return np.stack([down + self._shear.lift(sideways), moved.real, moved.imag])
 
     def advance(self, change: Array) -> None:
-        """Take the change (c,) or (3 c,) N of the forces at the end of the step, what is beyond its own parts left out; after
-        `predict`."""
+        """Set the change (c,) or (3 c,) N of the forces at the end of the step; after `predict`.
+
+        Components beyond those of the memory are ignored.
+        """
         parts = len(self._force)
         force = np.zeros((parts, int(np.prod(self._shape))))
         force[:, self._place] = change.reshape(-1, len(self._place))[:parts]
@@ -155,7 +161,7 @@ class TreadMemory:
         self._kept = self._ahead + _each(self._new) * self._force
 
     def state(self) -> dict[str, Array]:
-        """What a checkpoint keeps."""
+        """The state that a checkpoint keeps."""
         return {
             "creep": self._kept,
             "creep_force": self._force,
@@ -163,18 +169,18 @@ class TreadMemory:
         }
 
     def set_state(self, kept: dict[str, Array]) -> None:
-        """Go on from `state`."""
+        """Continue from `state`."""
         self._kept, self._force = kept["creep"], kept["creep_force"]
         self._offset = float(kept["creep_offset"])
 
 
 def _each(factor: Array) -> Array:
-    """(k,) for fields (k, parts, nx, ny)."""
+    """Factors (k,) for fields (k, parts, nx, ny)."""
     return factor[:, None, None, None]
 
 
 def _shifted(field: Array, jump: int) -> Array:
-    """The field (..., nx, ny) with the material moved on by `jump` points towards -x; what enters is at rest."""
+    """The field (..., nx, ny) with the material moved by `jump` points towards -x; zero enters."""
     if jump == 0:
         return field
     out = np.zeros_like(field)

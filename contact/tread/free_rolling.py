@@ -1,12 +1,13 @@
 """The slip at which a tire rolls freely: no drag on a smooth road.
 
-Bristles feel how fast the surface passes where they are. Of a wheel at speed Omega, r_e Omega = v the road's speed,
-the surface at (x, y) moves at -Omega d(x, y)/dtheta in the static shape, so it slips by
+Bristles are sensitive to the local speed of the surface. For a wheel at speed Omega with
+r_e Omega = v, the road's speed, the surface at (x, y) moves at -Omega d(x, y)/dtheta in the
+static shape, and so slips by
 
     s_x = (dx/dtheta) / r_e - 1,     s_y = -(dy/dtheta) / r_e
 
-beside the slip of the whole wheel (signs of contact.tread.brush). Their forces need not vanish in the sum: the wheel turns a
-little faster or slower, until they do.
+in addition to the slip of the whole wheel (signs of contact.tread.brush). The resultant of these
+forces need not vanish: the wheel rotates slightly faster or slower until it does.
 """
 
 from __future__ import annotations
@@ -26,8 +27,10 @@ TOLERANCE = 1e-4  # of the load
 
 
 def shape_slip(positions: Array, ring: Array, shape: tuple[int, int], radius: float) -> Array:
-    """(s, 2) of the outer face's nodes at `positions` (s, 3) m, a ring of `shape` at angles `ring` (rad), on a wheel of
-    effective rolling radius `radius` (m)."""
+    """Slip (s, 2) of the outer face's nodes on a wheel of effective rolling radius `radius` (m).
+
+    `positions` (s, 3) m form a ring of `shape` at the angles `ring` (rad).
+    """
     grid = positions.reshape(*shape, 3)[:, :, :2]
     closed = np.concatenate([grid[-1:], grid, grid[:1]])
     angle = np.concatenate([ring[-1:] - 2 * np.pi, ring, ring[:1] + 2 * np.pi])
@@ -36,8 +39,11 @@ def shape_slip(positions: Array, ring: Array, shape: tuple[int, int], radius: fl
 
 
 def free_slip(drag: Callable[[float], float], load: float) -> float:
-    """The slip at which `drag(slip)` (N, forward) is none, within 1e-4 of the `load` (N): regula falsi (Illinois) in a
-    bracket sought outwards from 0, up to 0.2. ConvergenceError where there is none."""
+    """The slip at which `drag(slip)` (N, forward) vanishes, within 1e-4 of the `load` (N).
+
+    Regula falsi (Illinois) in a bracket sought outwards from 0: 1e-3, then four times as far while
+    that is at most 0.2. ConvergenceError if there is none.
+    """
     small = TOLERANCE * load
     low, at_low = 0.0, drag(0.0)
     if abs(at_low) <= small:
@@ -60,7 +66,7 @@ def free_slip(drag: Callable[[float], float], load: float) -> float:
 
 
 def _bracket(drag: Callable[[float], float], at_rest: float) -> tuple[float, float]:
-    """A slip with drag of the other sign: force goes with slip, so forward force asks for less."""
+    """A slip with drag of the other sign, and that drag: force increases with slip."""
     slip = -np.sign(at_rest) * _FIRST
     while abs(slip) <= _LARGEST:
         found = drag(slip)

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GridPlaces:
-    """Where c points lie on a regular grid of `shape`: flat indices `place` (c,), `spacing` m."""
+    """Places of c points on a regular grid of `shape`: flat indices `place` (c,), `spacing` m."""
 
     shape: tuple[int, int]
     spacing: tuple[float, float]
@@ -23,8 +23,8 @@ class GridPlaces:
 class KernelTread:
     """C~ f by FFT over twice the grid: c log c work and c memory for c points.
 
-    `precondition` is the inverse of the same kernel taken as periodic over the doubled grid.
-    Measured on one core, 100 x 100 points: 1.1 ms a product; the matrix would take 0.8 GB.
+    `precondition` is the inverse of the same kernel, periodic over the doubled grid. Measured on
+    one core, 100 x 100 points: 1.1 ms per product; the matrix would take 0.8 GB.
     """
 
     def __init__(self, grid: GridPlaces, influence: Influence) -> None:
@@ -32,7 +32,8 @@ class KernelTread:
         self._size, x, y = doubled(grid)
         a, b = (np.full(x.shape, d / 2) for d in grid.spacing)
         kernel = influence(x, y, a, b)
-        # Between the two ends nothing is read; a smooth bridge keeps the periodic kernel positive.
+        # Nothing is read between the two ends; a smooth transition keeps the periodic kernel
+        # positive.
         self.diagonal = float(kernel[0, 0])
         for axis, n in enumerate(grid.shape):
             kernel = _bridged(kernel, axis, n)
@@ -52,7 +53,7 @@ class KernelTread:
         return self._convolve(force, self._transform)
 
     def precondition(self, approach: Array) -> Array:
-        """Roughly the forces (c,) N of an approach (c,) m."""
+        """Approximate forces (c,) N for an approach (c,) m."""
         return self._convolve(approach, self._inverse)
 
     def _convolve(self, values: Array, transform: Array) -> Array:
@@ -65,8 +66,10 @@ class KernelTread:
 
 
 def doubled(grid: GridPlaces) -> tuple[tuple[int, ...], Array, Array]:
-    """Size of the grid on which convolutions do not wrap around, and the offsets x, y (m) there; between both ends, which
-    nothing reads, 0."""
+    """Size of the grid on which convolutions do not wrap around, and the offsets x, y (m) on it.
+
+    Between the two ends, where nothing is read, the offsets are 0.
+    """
     size = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in grid.shape)
     offsets = [
         d * np.concatenate([np.arange(n), np.zeros(whole - 2 * n + 1), np.arange(1 - n, 0)])
@@ -77,7 +80,7 @@ def doubled(grid: GridPlaces) -> tuple[tuple[int, ...], Array, Array]:
 
 
 def _bridged(kernel: Array, axis: int, n: int) -> Array:
-    """The unused middle of a doubled axis between its two ends, linearly."""
+    """Interpolate linearly over the unused middle of a doubled axis."""
     kernel = np.moveaxis(kernel, axis, 0)
     count = len(kernel) - 2 * n + 1
     if count:

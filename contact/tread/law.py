@@ -1,4 +1,4 @@
-"""What a tread law is: parameters, and the compliance between contact points that follows from them."""
+"""The interface of a tread law: its parameters, and the compliance that they define."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Array = NDArray[np.float64]
 class TreadLaw(Parameters):
     """Base of linear tread laws: the approach of a point to the carcass under a force on another.
 
-    A derived class gives `influence`; `matrix` where the law is not one of distances alone. A law
-    without compliance of its own (`compliant` False) serves on the nodes of the mesh only: a grid of
-    points, of which there are more than nodes, would leave the contact problem singular. One that
-    gives way to forces in the plane of the road (`shears`) gives `shear`.
+    A derived class defines `influence`, and `matrix` if the law is not one of distances alone. A
+    law without compliance of its own (`compliant` False) works only on the nodes of the mesh: a
+    grid has more points than nodes, and the contact problem would be singular. A law that also
+    deforms under forces in the plane of the road (`shears`) defines `shear`.
     """
 
     owner = "contact"
@@ -27,24 +27,27 @@ class TreadLaw(Parameters):
 
     @property
     def creep(self) -> tuple[Array, Array] | None:
-        """Shares and times (k,), - and s, of its creep (contact.tread.creep); None: it answers at once."""
+        """Shares and times (k,), - and s, of its creep (contact.tread.creep), or None."""
         return None
 
     def influence(self, farthest: float) -> Influence:
-        """Approach (m/N) at offsets x, y (m) from rectangles of half sizes a, b (m) under a unit force.
+        """Approach (m/N) at x, y (m) from rectangles of half sizes a, b (m) per unit force.
 
-        `farthest` (m): the largest distance that will be asked for.
+        `farthest` (m): the largest distance at which it will be evaluated.
         """
         raise NotImplementedError
 
     def shear(self, farthest: float) -> Influence:
-        """Displacements (5, ...) m/N under unit forces in the plane of the road (contact.tread.shear), where it `shears`."""
+        """Displacements (5, ...) m/N under unit forces in the plane of the road, if it `shears`.
+
+        See contact.tread.shear.
+        """
         raise NotImplementedError
 
     def matrix(self, points: Array, half_sizes: Array, farthest: float) -> Array:
         """Compliance (c, c) m/N between points (c, 2) m with rectangles of half sizes (c, 2) m.
 
-        InputError where it is not positive definite.
+        InputError if it is not positive definite.
         """
         check_points(points, half_sizes)
         return dense_compliance(points, half_sizes, self.influence(farthest))

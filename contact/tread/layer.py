@@ -1,4 +1,4 @@
-"""An elastic layer bonded to a stiff base: what a tread on its belt is."""
+"""An elastic layer bonded to a rigid base, like a tread on its belt."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,21 +10,21 @@ from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
 
-# (C/C_half-space) - 1 falls as e^(-2m) in m = k h: nothing is left beyond.
+# (C/C_half-space) - 1 decays as e^(-2m) in m = k h: negligible beyond.
 LAST = 20.0
-REACH = 24.0  # thicknesses beyond which a point force moves nothing: 4e-8 of the bound at 0.5, none at 0.49
-PER_THICKNESS = 40  # places in the table for each thickness of distance
-GAUSS_POINTS = (
-    16  # along a side: 1e-5 of a point's own compliance at sides of 1 to 30, 1e-8 at 1 to 1
-)
-STIFFEST = 1e-4  # of the half-space's: below, a point's own compliance is left of two equal numbers
+# Thicknesses beyond which a point force moves nothing: 4e-8 of the bound at 0.5, none at 0.49.
+REACH = 24.0
+PER_THICKNESS = 40  # entries of the table per thickness of distance
+# Along a side: 1e-5 of a point's own compliance at aspect ratios of 1 to 30, 1e-8 at 1 to 1.
+GAUSS_POINTS = 16
+STIFFEST = 1e-4  # of the half-space's; below, a point's own compliance is lost in cancellation
 
 
 def transform_ratio(m: Array, poisson_ratio: float) -> Array:
-    """Compliance of the bonded layer over that of the half-space, at m = wavenumber x thickness.
+    """Compliance of the bonded layer over that of the half-space, at m = wave number x thickness.
 
-    [(3 - 4 nu) sinh 2m - 2m] / [(3 - 4 nu) cosh 2m + 2 m^2 + 5 - 4 nu (3 - 2 nu)], with e^(2m)
-    divided out. Source: Carbone and Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
+    [(3 - 4 nu) sinh 2m - 2m] / [(3 - 4 nu) cosh 2m + 2 m^2 + 5 - 4 nu (3 - 2 nu)], divided by
+    e^(2m) throughout. Source: Carbone and Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
     """
     a, decay = 3.0 - 4.0 * poisson_ratio, np.exp(-2.0 * m)
     above = 0.5 * a * (1.0 - decay**2) - 2.0 * m * decay
@@ -33,14 +33,18 @@ def transform_ratio(m: Array, poisson_ratio: float) -> Array:
 
 
 class LayerInfluence:
-    """Approach per unit force spread evenly over a rectangle: half-space plus a smooth correction.
+    """Approach per unit force, uniform over a rectangle: half-space plus a smooth correction.
 
-    A point force moves the surface by u(r) = 1/(pi E*) [1/r + 1/h int_0^oo (ratio(m) - 1) J0(m r/h) dm];
-    the integral of its second part over a disc of radius R = rho h is 2h/E* (bounded(rho) - rho), with
-    bounded(rho) = rho int_0^oo ratio(m)/m J1(m rho) dm, which tends to (1 - 2nu)/(2(1 - nu)^2). Over a
-    rectangle it is that of four right-angled corners, in polar coordinates about the point that is asked
-    for, r = X cosh t along a side. `thickness` h in m. InputError for a thickness that is not positive, and
-    where rectangles many times wider than an incompressible layer is thick leave it no compliance.
+    A point force moves the surface by
+
+        u(r) = 1/(pi E*) [1/r + 1/h int_0^oo (ratio(m) - 1) J0(m r/h) dm];
+
+    the integral of the second part over a disc of radius R = rho h is 2h/E* (bounded(rho) - rho),
+    with bounded(rho) = rho int_0^oo ratio(m)/m J1(m rho) dm, which tends to
+    (1 - 2nu)/(2(1 - nu)^2). The integral over a rectangle is that of four right-angled corners, in
+    polar coordinates about the point of evaluation, r = X cosh t along a side. `thickness` h in m.
+    InputError for a thickness that is not positive, and for rectangles so much wider than the
+    thickness of an incompressible layer that it has no compliance left.
     """
 
     def __init__(self, youngs_modulus: float, poisson_ratio: float, thickness: float) -> None:
@@ -71,12 +75,15 @@ class LayerInfluence:
         return total
 
     def _corner(self, x: Array, y: Array) -> Array:
-        """Of the correction, over the rectangle between (0, 0) and (x, y), all in thicknesses; signed."""
+        """Correction over the rectangle between (0, 0) and (x, y), all in thicknesses; signed."""
         sign, x, y = np.sign(x) * np.sign(y), np.abs(x), np.abs(y)
         return sign * (self._triangle(x, y) + self._triangle(y, x))
 
     def _triangle(self, x: Array, y: Array) -> Array:
-        """Over the triangle (0, 0), (x, 0), (x, y): int_0^asinh(y/x) (bounded(r) - r)/cosh t dt, r = x cosh t."""
+        """Correction over the triangle (0, 0), (x, 0), (x, y).
+
+        int_0^asinh(y/x) (bounded(r) - r)/cosh t dt, r = x cosh t.
+        """
         top = 0.5 * np.arcsinh(y / np.where(x > 0.0, x, 1.0))
         total = np.zeros_like(top)
         for node, weight in zip(*np.polynomial.legendre.leggauss(GAUSS_POINTS), strict=True):

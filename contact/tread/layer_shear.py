@@ -1,14 +1,17 @@
-"""An elastic layer bonded to a stiff base under horizontal forces, and how they couple with pressure.
+"""An elastic layer bonded to a rigid base under horizontal forces, coupled with pressure.
 
-Waves of wave number k = m/h along a direction of the surface, h the thickness, G the shear modulus, move it by 1/(G k) times
+Forces in waves of wave number k = m/h along a direction of the surface, h the thickness and G the
+shear modulus, move it by 1/(G k) times
 
     T = (1 - nu) [(3 - 4 nu) sinh 2m + 2m] / D      along, under forces along,
     S = tanh m                                      across, under forces across,
-    C = [(3 - 4 nu)(1 - 2 nu)/2 (cosh 2m - 1) - m^2] / D      upwards under forces along, a quarter wave off,
+    C = [(3 - 4 nu)(1 - 2 nu)/2 (cosh 2m - 1) - m^2] / D
+                                                    upwards, under forces along, in quadrature,
     D = (3 - 4 nu) cosh 2m + 2 m^2 + 5 - 4 nu (3 - 2 nu)
 
-(tests/contact/tread/test_shear.py solves the layer's equations for them). m to infinity is the half-space: T = 1 - nu, S = 1,
-C = (1 - 2 nu)/2. Unlike a half-space, a thin incompressible layer is squeezed out sideways by pressure.
+(tests/contact/tread/test_shear.py solves the layer's equations for them). The limit m to infinity
+is the half-space: T = 1 - nu, S = 1, C = (1 - 2 nu)/2. Unlike a half-space, a thin incompressible
+layer is squeezed out sideways by pressure.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ from tireroad.contact.tread.layer import LAST, PER_THICKNESS, REACH
 from tireroad.contact.tread.shear import half_space_shear
 
 Array = NDArray[np.float64]
-_FIRST = 1e-4  # thicknesses: the table begins beside 0, where J1/rho and J2/rho^2 are limits
+_FIRST = 1e-4  # thicknesses: the table begins near 0, where J1/rho and J2/rho^2 are limits
 
 
 def transforms(m: Array, poisson_ratio: float) -> tuple[Array, Array, Array]:
@@ -37,12 +40,16 @@ def transforms(m: Array, poisson_ratio: float) -> tuple[Array, Array, Array]:
 
 
 class LayerShear:
-    """As `half_space_shear`, of a layer of `thickness` m: the half-space's and a smooth correction, the mean over the rectangle of
+    """As `half_space_shear`, for a layer of `thickness` m.
 
-        2 pi G u_x = [p0 - cos 2t q2] t_x - sin 2t q2 t_y,   2 pi G u_z = c1 (cos t t_x + sin t t_y),
+    The half-space's displacements plus a smooth correction, the mean over the rectangle by Gauss
+    points of
 
-    t the direction of the offset r, p0 = 1/h int (T + S - 2 + nu)/2 J0(m r/h) dm, q2 with (T - S + nu)/2 J2, c1 with
-    (C - (1 - 2 nu)/2) J1, by Gauss points.
+        2 pi G u_x = [p0 - cos 2t q2] t_x - sin 2t q2 t_y,
+        2 pi G u_z = c1 (cos t t_x + sin t t_y),
+
+    t being the direction of the offset r, p0 = 1/h int (T + S - 2 + nu)/2 J0(m r/h) dm, q2 with
+    (T - S + nu)/2 J2, c1 with (C - (1 - 2 nu)/2) J1.
     """
 
     def __init__(self, youngs_modulus: float, poisson_ratio: float, thickness: float) -> None:
@@ -58,7 +65,7 @@ class LayerShear:
             0.5 * (along - across) + 0.5 * nu,
         )
         rho = np.linspace(_FIRST, REACH, int(PER_THICKNESS * REACH) + 1)
-        # Of J_n, over rho^n: even and smooth at 0.
+        # Tables of J_n integrals over rho^n: even and smooth at 0.
         self._tables = [
             CubicSpline(rho, [jv(n, m * r) @ (weights * part) / r**n for r in rho])
             for n, part in enumerate(parts)
@@ -79,7 +86,7 @@ class LayerShear:
         return whole + total * (1.0 + nu) / (np.pi * youngs_modulus * h)
 
     def _at(self, x: Array, y: Array) -> Array:
-        """(5, ...) of a force at a point, all in thicknesses; far off what takes the half-space away."""
+        """Correction (5, ...) for a point force, in thicknesses; far away minus the half-space."""
         rho, nu = np.hypot(x, y), self._nu
         far = np.maximum(rho, REACH)
         none = -0.5 * (2.0 - nu) / far, -0.5 * (1.0 - 2.0 * nu) / far**2, 0.5 * nu / far**3

@@ -1,9 +1,9 @@
-"""The tread's pattern: grooves that turn with the tire, as depths under its outer face.
+"""The tread pattern: grooves that rotate with the tire, as depths under its outer face.
 
-Material under the point (x, y) at time t was at s = x + v t around the tire: it moves as the road does, and comes
-again after the rolling circumference C = 2 pi r_e. The gap becomes  static + tire - road + depth(s, y).
-Lateral grooves repeat by pitches; pitches of several lengths in random order spread the tone that equal ones
-make at v (number of pitches) / C and its multiples.
+The material under the point (x, y) at time t was at s = x + v t around the tire: it moves as the
+road does, and returns after the rolling circumference C = 2 pi r_e. The gap becomes
+static + tire - road + depth(s, y).  Lateral grooves repeat by pitches; several pitch lengths in
+random order spread the tone that equal pitches make at v (number of pitches) / C and its multiples.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
-_SAMPLES = 4096  # around the tire, to see whether anything touches
+_SAMPLES = 4096  # around the tire, to check for land
 _LEAST_LAND = 1e-3
 
 
@@ -44,8 +44,11 @@ class GrooveLike(Protocol):
 
 @dataclass(frozen=True)
 class Heights:
-    """A measured or drawn pattern: `depth` (n, m) m at n equal steps around the tire and at the ascending `y` (m,) m;
-    beyond them as at the ends."""
+    """A measured or drawn pattern.
+
+    `depth` (n, m) m at n equal steps around the tire and at the ascending `y` (m,) m; constant
+    beyond the ends.
+    """
 
     depth: Array
     y: Array
@@ -53,8 +56,10 @@ class Heights:
 
 @dataclass(frozen=True)
 class Pattern:
-    """`grooves`, or `heights`, on a tire of rolling `circumference` m; `starts` (p + 1,) m where pitches begin,
-    the last one C."""
+    """`grooves`, or `heights`, on a tire of rolling `circumference` m.
+
+    `starts` (p + 1,) m where the pitches begin, the last one being C.
+    """
 
     circumference: float
     grooves: Sequence[GrooveLike] = ()
@@ -63,11 +68,11 @@ class Pattern:
 
     @property
     def pitches(self) -> int:
-        """How many go once around the tire; 0 without lateral grooves."""
+        """Number of pitches around the tire; 0 without lateral grooves."""
         return max(len(self.starts) - 1, 0) if any(_lateral(g) for g in self.grooves) else 0
 
     def depth(self, s: Array, y: Array) -> Array:
-        """Depth (m) under the tread's surface at places s around the tire and y across (m), arrays of one shape."""
+        """Depth (m) below the tread surface at s around the tire and y across (m), of one shape."""
         out = np.zeros(np.broadcast_shapes(np.shape(s), np.shape(y)))
         if self.heights is not None:
             return self._read(s, y, out)
@@ -83,7 +88,7 @@ class Pattern:
         return out
 
     def _from_pitches(self, s: Array, groove: GrooveLike) -> Array:
-        """Distance (m) along s from the nearest of the groove's places, one in each pitch."""
+        """Distance (m) along s from the nearest groove, of which there is one in each pitch."""
         lengths = np.diff(self.starts)
         centres = self.starts[:-1] + groove.position * lengths
         around = np.mod(s, self.circumference)
@@ -94,7 +99,7 @@ class Pattern:
         return np.minimum(around - whole[right - 1], whole[right] - around)
 
     def _read(self, s: Array, y: Array, out: Array) -> Array:
-        """Bilinear between the heights, around the tire without end."""
+        """Bilinear interpolation of the heights, periodic around the tire."""
         assert self.heights is not None, "a pattern of grooves has no heights"
         depth, across = self.heights.depth, self.heights.y
         place = np.mod(s, self.circumference) / self.circumference * len(depth)
@@ -109,7 +114,7 @@ class Pattern:
         return out
 
     def land(self, y: Array) -> float:
-        """Share of the tread without any depth at the places y (m) across. InputError where it is none."""
+        """Share of the tread without depth at the positions y (m) across; InputError if none."""
         s = np.arange(_SAMPLES) * self.circumference / _SAMPLES
         share = float(np.mean(self.depth(*np.meshgrid(s, np.unique(y), indexing="ij")) <= 0.0))
         if share < _LEAST_LAND:
@@ -120,7 +125,7 @@ class Pattern:
 
 
 def pitch_starts(pitches: int, lengths: Sequence[float], seed: int, circumference: float) -> Array:
-    """Where pitches begin (p + 1,) m: relative `lengths` as often each as can be, in random order."""
+    """Starts of the pitches (p + 1,) m: relative `lengths` in equal numbers, shuffled."""
     drawn = np.resize(np.asarray(lengths, float), pitches)
     np.random.default_rng(seed).shuffle(drawn)
     return np.concatenate([[0.0], np.cumsum(drawn)]) * circumference / drawn.sum()
@@ -131,6 +136,6 @@ def _lateral(groove: GrooveLike) -> bool:
 
 
 def _profile(away: Array, groove: GrooveLike) -> Array:
-    """A trapezoid: full depth within, flanks about the edge."""
+    """A trapezoid: full depth inside, with flanks about the edges."""
     inside = (groove.width / 2 + groove.flank / 2 - np.abs(away)) / groove.flank
     return groove.depth * np.clip(inside, 0.0, 1.0)

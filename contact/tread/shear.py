@@ -1,12 +1,14 @@
-"""Horizontal displacements of an elastic half-space, and their coupling with pressure (Boussinesq and Cerruti).
+"""Horizontal displacements of an elastic half-space, coupled with pressure (Boussinesq, Cerruti).
 
-With z into the body, G the shear modulus, r the distance in the surface from a force t (in the surface) and f (along z),
+With z into the body, G the shear modulus, r the distance in the surface from a force t (in the
+surface) and f (along z),
 
     2 pi G u_x = (1 - nu) t_x/r + nu (x^2 t_x + x y t_y)/r^3 - (1 - 2 nu)/2 x f/r^2,
     2 pi G u_z = (1 - nu) f/r + (1 - 2 nu)/2 (x t_x + y t_y)/r^2,
 
-u_y as u_x with x and y exchanged. Forces are spread evenly over rectangles. Of an incompressible body, nu = 1/2, pressure moves
-nothing sideways. Source: Johnson, Contact Mechanics, (3.75) and (3.76).
+and u_y as u_x with x and y exchanged. Forces are spread uniformly over rectangles. In an
+incompressible body, nu = 1/2, pressure causes no horizontal displacement. Source: Johnson, Contact
+Mechanics, (3.75) and (3.76).
 """
 
 from __future__ import annotations
@@ -29,15 +31,18 @@ from tireroad.contact.tread.shear_convolution import Convolution, Plane
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Points up to which a matrix moves them faster than transforms do: of 181 points 31 us against 137, of 357 both 170.
+# Number of points up to which a matrix product is faster than transforms: for 181 points 31 us
+# against 137, for 357 both take 170.
 FEW = 200
 
 
 def half_space_shear(
     x: Array, y: Array, a: Array, b: Array, youngs_modulus: float, poisson_ratio: float
 ) -> Array:
-    """(5, ...) m/N at offsets x, y (m) from a rectangle 2a x 2b (m) under a unit force spread over it: u_x by t_x, u_x by t_y
-    (and u_y by t_x), u_y by t_y, u_z by t_x, u_z by t_y. The displacement u_x by f is that of u_z by t_x with its sign changed.
+    """(5, ...) m/N at offsets x, y (m) from a rectangle 2a x 2b (m) under a unit force on it.
+
+    u_x by t_x, u_x by t_y (and u_y by t_x), u_y by t_y, u_z by t_x, u_z by t_y. The displacement
+    u_x by f is that of u_z by t_x with opposite sign.
     """
     nu = poisson_ratio
     shear = youngs_modulus / (2.0 * (1.0 + nu))
@@ -77,45 +82,51 @@ def _lift(x: Array, y: Array) -> Array:
 
 
 class Shear(Protocol):
-    """What a tread adds in the plane of the road, between all points: displacements of the tread's surface. Forces and
-    displacements in the plane are complex, x + iy. `coupled`: whether pressure moves it sideways."""
+    """The tread's displacements between all points in the plane of the road.
+
+    Forces and displacements in the plane are complex, x + iy. `coupled`: whether pressure causes
+    horizontal displacement.
+    """
 
     coupled: bool
 
     def spread(self, force: Plane) -> Plane:
-        """In the plane (c,) m under forces in the plane (c,) N."""
+        """Displacements (c,) m in the plane under forces (c,) N in the plane."""
 
     def lift(self, force: Plane) -> Array:
-        """Away from the road (c,) m under forces in the plane (c,) N."""
+        """Displacements (c,) m away from the road under forces (c,) N in the plane."""
 
     def drag(self, force: Array) -> Plane:
-        """In the plane (c,) m under forces normal to it (c,) N."""
+        """Displacements (c,) m in the plane under forces (c,) N normal to it."""
 
     def lifted(self, index: Index) -> Array:
-        """`lift` between the points `index` as a matrix (a, 2a): of all forces along x, then of those along y."""
+        """`lift` between the points `index`, (a, 2a): of all forces along x, then along y."""
 
     def between(self, index: Index) -> Between:
         """`spread` between the points `index`."""
 
     def matrix(self, index: Index) -> Array:
-        """The same as a matrix (2a, 2a): of all forces along x, then of those along y."""
+        """The same as a matrix (2a, 2a): all forces along x, then those along y."""
 
 
 class Between:
-    """(a,) m of (a,) N, complex: `apply`; `own` m/N, the mean of what a point's two forces move itself; `bound` m/N of the
-    largest singular value."""
+    """The operator `apply` from (a,) N to (a,) m, complex.
+
+    `own` m/N: mean self-compliance of a point's two components; `bound` m/N of the largest singular
+    value.
+    """
 
     def __init__(self, apply: Callable[[Plane], Plane], own: float | Array, bound: float) -> None:
         self.apply, self.own, self.bound = apply, own, bound
 
 
 class MatrixShear:
-    """Between points (c, 2) m with rectangles of half sizes (c, 2) m, wherever they lie."""
+    """Between points (c, 2) m with rectangles of half sizes (c, 2) m, at any positions."""
 
     def __init__(self, points: Array, half_sizes: Array, influence: Influence) -> None:
         x, y = (points[:, None, k] - points[None, :, k] for k in (0, 1))
         xx, xy, yy, zx, zy = influence(x, y, half_sizes[None, :, 0], half_sizes[None, :, 1])
-        # As a matrix of real and imaginary parts beside each other.
+        # As a matrix of adjacent real and imaginary parts.
         count = len(points)
         both = np.block([[xx, xy], [xy, yy]])
         both = 0.5 * (both + both.T)
@@ -125,15 +136,15 @@ class MatrixShear:
         self.coupled = bool(self._lift.any())
 
     def spread(self, force: Plane) -> Plane:
-        """In the plane (c,) m under forces in the plane (c,) N."""
+        """Displacements (c,) m in the plane under forces (c,) N in the plane."""
         return (self._matrix @ force.view(float)).view(complex)
 
     def lift(self, force: Plane) -> Array:
-        """Away from the road (c,) m under forces in the plane (c,) N."""
+        """Displacements (c,) m away from the road under forces (c,) N in the plane."""
         return (self._lift @ force).real
 
     def drag(self, force: Array) -> Plane:
-        """In the plane (c,) m under forces normal to it (c,) N: the transposed of `lift`."""
+        """Displacements (c,) m in the plane under normal forces (c,) N, the transpose of `lift`."""
         return self._lift.T.conj() @ force
 
     def lifted(self, index: Index) -> Array:
@@ -142,7 +153,7 @@ class MatrixShear:
         return np.hstack([some.real, -some.imag])
 
     def matrix(self, index: Index) -> Array:
-        """As a matrix, of x, then of y."""
+        """`spread` as a matrix, x of all points, then y."""
         some = np.concatenate([2 * index, 2 * index + 1])
         return self._matrix[np.ix_(some, some)]
 
@@ -153,7 +164,10 @@ class MatrixShear:
 
 
 class KernelShear:
-    """The same on a regular grid, by FFT; between few points by a matrix, and between more by FFT over the rectangle they lie in."""
+    """The same on a regular grid, by FFT.
+
+    Between few points by a matrix, between more by FFT over the rectangle that contains them.
+    """
 
     def __init__(self, grid: GridPlaces, influence: Influence) -> None:
         self._grid = grid
@@ -163,15 +177,15 @@ class KernelShear:
         self._whole = Convolution(self._kernels, grid.shape)
 
     def spread(self, force: Plane) -> Plane:
-        """In the plane (c,) m under forces in the plane (c,) N."""
+        """Displacements (c,) m in the plane under forces (c,) N in the plane."""
         return self._whole.spread(force, self._grid.place)
 
     def lift(self, force: Plane) -> Array:
-        """Away from the road (c,) m under forces in the plane (c,) N."""
+        """Displacements (c,) m away from the road under forces (c,) N in the plane."""
         return self._whole.lift(force, self._grid.place)
 
     def drag(self, force: Array) -> Plane:
-        """In the plane (c,) m under forces normal to it (c,) N: the transposed of `lift`."""
+        """Displacements (c,) m in the plane under normal forces (c,) N, the transpose of `lift`."""
         return self._whole.drag(force, self._grid.place)
 
     def lifted(self, index: Index) -> Array:
@@ -179,7 +193,7 @@ class KernelShear:
         return np.hstack([*self._between(index)[3:]])
 
     def matrix(self, index: Index) -> Array:
-        """As a matrix, of x, then of y."""
+        """`spread` as a matrix, x of all points, then y."""
         xx, xy, yy = self._between(index)[:3]
         return np.block([[xx, xy], [xy, yy]])
 
@@ -200,14 +214,14 @@ class KernelShear:
 
 
 def _dense(kernels: Array) -> Between:
-    """Of kernels (3 or more, a, a) of `spread`."""
+    """The operator of the kernels (3 or more, a, a) of `spread`."""
     xx, xy, yy = kernels[:3]
     matrix = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=1)
     return _product(matrix.reshape(2 * len(xx), -1))
 
 
 def _product(matrix: Array) -> Between:
-    """Of (2a, 2a), x and y of each point beside each other."""
+    """The operator of a matrix (2a, 2a), x and y of each point adjacent."""
 
     def apply(force: Plane) -> Plane:
         return (matrix @ force.view(float)).view(complex)

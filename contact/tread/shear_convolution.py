@@ -1,4 +1,4 @@
-"""Displacements in the plane of the road and away from it between points of a grid, by FFT."""
+"""Displacements in the plane of the road and normal to it between points of a grid, by FFT."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ Index = NDArray[np.intp]
 
 
 class Convolution:
-    """By FFT over twice a grid of `shape`, of kernels (3 or 5, ...) of a larger one; `place` (a,): flat indices of points there."""
+    """Convolution by FFT over twice a grid of `shape`, with kernels (3 or 5, ...) of a larger one.
+
+    `place` (a,): flat indices of points on the grid.
+    """
 
     def __init__(self, kernels: Array, shape: tuple[int, int]) -> None:
         self._shape = shape
@@ -23,24 +26,24 @@ class Convolution:
         )
         some = kernels[:, rows[:, None], columns]
         self.own = float(some[0, 0, 0] + some[2, 0, 0]) / 2
-        # No row of both components of `spread` sums to more.
+        # Upper bound of the row sums of both components of `spread`.
         self.bound = float(np.abs(some[:3]).sum())
         self._xx, self._xy, self._yy, *self._lift = fft.rfft2(some)
 
     def spread(self, force: Plane, place: Index) -> Plane:
-        """(a,) m in the plane under (a,) N in the plane."""
+        """Displacements (a,) m in the plane under forces (a,) N in the plane."""
         x, y = self._forward(np.stack([force.real, force.imag]), place)
         moved = np.stack([self._xx * x + self._xy * y, self._xy * x + self._yy * y])
         u, v = self._back(moved, place)
         return u + 1j * v
 
     def lift(self, force: Plane, place: Index) -> Array:
-        """(a,) m away from the road under (a,) N in the plane."""
+        """Displacements (a,) m away from the road under forces (a,) N in the plane."""
         x, y = self._forward(np.stack([force.real, force.imag]), place)
         return self._back(self._lift[0] * x + self._lift[1] * y, place)
 
     def drag(self, force: Array, place: Index) -> Plane:
-        """(a,) m in the plane under (a,) N away from the road."""
+        """Displacements (a,) m in the plane under forces (a,) N normal to it."""
         x, y = self._back(-np.stack(self._lift) * self._forward(force, place), place)
         return x + 1j * y
 

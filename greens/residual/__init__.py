@@ -1,1 +1,1 @@
-"""What the modes left out are worth: static and dynamic residual flexibility, and how much is still missing."""
+"""Truncated modes: static and dynamic residual flexibility, and estimates of their error."""

@@ -1,11 +1,11 @@
-"""The answer to forces that change their sign in every step: what a chattering contact feels.
+"""The response to forces that alternate in sign from step to step, as in a chattering contact.
 
 With f_n = (-1)^n F, linear in between, every state settles at z_n = (-1)^n Z,
 
     -Z = e^{sh} Z + b0 P F - b1 P F   =>   Z = (b1 - b0) P F / (1 + e^{sh})
 
-(greens.recursion). A mode's mass alone gives -h^2 / (12 m): the tire comes towards a force that pushes it,
-as if it were a negative spring. Forces constant over the step give zero there.
+(greens.recursion). The mass of a mode alone gives -h^2 / (12 m): the tire moves towards a force
+that pushes it, as if it were a negative spring. Forces constant over the step give zero.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from tireroad.greens.response import Response
 
 
 def alternating(response: Response, step: float) -> np.ndarray:
-    """Displacement (r, k) m/N at the outputs under unit forces of alternating sign; no residual in it.
+    """Displacement (r, k) m/N under unit forces of alternating sign, without the residual.
 
-    `response` as the loop takes it (Response.resolved), `step` s; forces linear over the step.
+    `response` as the loop uses it (Response.resolved), `step` s; forces linear over the step.
     """
     x = response.eigenvalue * step
     old, new = weights(x, step, "linear")
@@ -31,5 +31,5 @@ def alternating(response: Response, step: float) -> np.ndarray:
 
 
 def at_once(response: Response) -> np.ndarray:
-    """What the residual adds to it (r, k) m/N: a pulse, half of the step before, cancels."""
+    """The residual's contribution (r, k) m/N; that of a pulse, half of it a step late, cancels."""
     return np.zeros_like(response.residual) if response.pulse else response.residual

@@ -1,14 +1,14 @@
 """Attachment modes: the static shapes under the probes' loads join the basis, with their inertia.
 
-    R = K_Omega^-1 B,  which join the modes as modal.joined says.
+    R = K_Omega^-1 B,  joined to the modes as in modal.joined
 
-(MacNeal 1971; Rubin, AIAA J. 13 (1975) 995.) Exact at 0 Hz: the exact static answer lies in the basis, or joins it as
-a residual.
+(MacNeal 1971; Rubin, AIAA J. 13 (1975) 995). Exact at 0 Hz: the exact static response lies in the
+basis or is added as a residual.
 
-Many points close together ask for many shapes, most of which never answer otherwise than statically. Left
-out are those whose static share matters at no point (`foremost`) and pseudo-modes far above the highest
-mode (`dynamic`). The exact flexibility minus that of the states is a residual then, so what is left out
-keeps its static answer and loses its inertia.
+Many neighbouring points yield many shapes, most of which respond only statically. Those whose
+static share is negligible at every point (`foremost`) and pseudo-modes far above the highest mode
+(`dynamic`) are left out. The residual is then the exact flexibility less that of the states, so
+what is left out keeps its static response and loses its inertia.
 """
 
 from __future__ import annotations
@@ -18,18 +18,21 @@ from scipy import sparse
 
 from tireroad.modal.basis import Projection
 
-# Of each point's own static flexibility: what the shapes left out may add up to. At 90 rad/s the receptance up
-# to half the highest mode then changes by 1.2e-3, with 1e-3 by 5e-3.
+# Of each point's own static flexibility: the most that the shapes left out may add up to. At
+# 90 rad/s the receptance up to half the highest mode changes by 1.2e-3, with 1e-3 by 5e-3.
 TOLERANCE = 1e-4
-# Pseudo-modes this many times faster than the highest mode are static (`dynamic`). At 50 rad/s the receptance
-# between 187 points changes by 4e-4 up to half the highest mode then; at 3 by 1e-3, at 2 by 4e-3.
+# Pseudo-modes this many times faster than the highest mode are static (`dynamic`). At 50 rad/s the
+# receptance between 187 points up to half the highest mode changes by 4e-4, at 3 by 1e-3, at 2 by
+# 4e-3.
 FASTEST = 4.0
-FEW = 100  # pseudo-modes that are kept in any case: they cost less than is worth a thought
+FEW = 100  # pseudo-modes that are kept in any case, since they cost next to nothing
 
 
 def fewest(probes: sparse.csr_matrix) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-    """(weights (p, t), loads (t, s)) with probes = weights loads: unit loads on what the probes (p, s) touch where
-    that is fewer than they are, as for points closer than nodes; else the probes themselves.
+    """(weights (p, t), loads (t, s)) with probes = weights loads and as few loads as possible.
+
+    Unit loads on the unknowns that the probes (p, s) touch if these are fewer, as for points closer
+    than nodes; otherwise the probes themselves.
     """
     touched = np.unique(probes.tocoo().col)
     if len(touched) >= probes.shape[0]:
@@ -41,9 +44,10 @@ def fewest(probes: sparse.csr_matrix) -> tuple[sparse.csr_matrix, sparse.csr_mat
 def foremost(missing: np.ndarray, flexibility: np.ndarray) -> np.ndarray:
     """Combinations of the loads, columns (p, k), whose static shapes join the basis.
 
-    `missing` (p, p) m/N what the modes lack of the `flexibility` (p,) m/N of each point. Of the eigenvectors of
-    its symmetric part the least are left out, while at no point they add up to `TOLERANCE` of its own;
-    nor do they between any two, then (Cauchy-Schwarz).
+    `missing` (p, p) m/N is what the modes lack of the `flexibility` (p,) m/N of each point. The
+    smallest eigenvectors of its symmetric part are left out as long as at no point they add up to
+    more than `TOLERANCE` of its own flexibility; by Cauchy-Schwarz the same then holds between any
+    two.
     """
     sizes, vectors = np.linalg.eigh((missing + missing.T) / 2)
     order = np.argsort(np.abs(sizes), kind="stable")
@@ -53,11 +57,12 @@ def foremost(missing: np.ndarray, flexibility: np.ndarray) -> np.ndarray:
 
 
 def dynamic(projection: Projection, speed: float, known: int) -> np.ndarray:
-    """Which coordinates (m,) stay: the first `known`, `FEW` pseudo-modes, and all that are more than static.
+    """Mask (m,) of coordinates that stay: the first `known`, `FEW` pseudo-modes, dynamic ones.
 
-    Beside its static answer a coordinate's at w has the part  (w^2 + 2 w Omega n) / (omega_k^2 - Omega^2 n^2),
-    n = |S_kk|^1/2: inertia, and what the turning carries along. It is static when that is at half the
-    highest mode no more than for a standing wheel's at `FASTEST` times the highest mode.
+    Relative to its static response, a coordinate's response at w has the dynamic part
+    (w^2 + 2 w Omega n) / (omega_k^2 - Omega^2 n^2),  n = |S_kk|^1/2: inertia and convection. It
+    counts as static if at half the highest mode this is no more than for a standing wheel at
+    `FASTEST` times the highest mode.
     """
     squares = projection.squares
     highest = np.sqrt(squares[projection.modes - 1])

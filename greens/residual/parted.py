@@ -1,4 +1,4 @@
-"""A real block of states parted into those that stay and those that follow their force statically."""
+"""A real block of states split into those that stay dynamic and those that follow statically."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from scipy import linalg
 
 @dataclass(frozen=True)
 class Parted:
-    """y' = A y + b f in two blocks without coupling: y = right z + lagging r with z' = block z + left b f and
-    r' = faster r + lagging_left b f. Shapes: `block` (p, p), `right` (n, p), `left` (p, n); `faster`
-    (n - p, n - p), `lagging` (n, n - p), `lagging_left` (n - p, n).
+    """y' = A y + b f as two decoupled blocks: y = right z + lagging r.
+
+    z' = block z + left b f and r' = faster r + lagging_left b f. Shapes: `block` (p, p), `right`
+    (n, p), `left` (p, n); `faster` (n - p, n - p), `lagging` (n, n - p), `lagging_left` (n - p, n).
     """
 
     block: np.ndarray
@@ -23,16 +24,18 @@ class Parted:
     lagging_left: np.ndarray
 
     def following(self, push: np.ndarray) -> np.ndarray:
-        """What the states that do not stay take off y (n, k) per constant force, for the inputs (n, k):
-        lagging faster^-1 lagging_left b, so that their static answer is its negative."""
+        """lagging faster^-1 lagging_left b (n, k) for the inputs b = `push` (n, k).
+
+        Its negative is the static response y, per constant force, of the states that do not stay.
+        """
         return self.lagging @ np.linalg.solve(self.faster, self.lagging_left @ push)
 
 
 def parted(block: np.ndarray, values: np.ndarray, stays: np.ndarray) -> Parted:
-    """The block (n, n) split between the eigenvalues (n,) that stay and the others, conjugates together.
+    """Split the block (n, n) by its eigenvalues (n,), those that stay first; pairs together.
 
-    Its real Schur form is cut between the two kinds; Sylvester's equation A X - X B = -C takes the coupling
-    C away. Not collective.
+    Its real Schur form is divided between the two, and the coupling C removed by the solution of
+    Sylvester's equation A X - X B = -C. Not collective.
     """
 
     def first(re: float, im: float) -> bool:

@@ -1,14 +1,15 @@
-"""Residual flexibility with inertia and damping: states that stand for the modes left out.
+"""Residual flexibility with inertia and damping: states that represent the truncated modes.
 
-The columns x = K_Omega^-1 b and the rows y = K_Omega^-T b of the probes, less what the kept modes have
-of them, are the residual attachment modes. Between them the full matrices leave
+The columns x = K_Omega^-1 b and the rows y = K_Omega^-T b of the probes, less their component in
+the kept modes, are the residual attachment modes. On them the full matrices become
 
     q'' M_r + q' E_r + q G_0 = G_0 f,   u_r = G_0 q,
     G_0 = y^T K_Omega x - modal,  E_r = y^T (D + 2 Omega G) x - modal,  M_r = y^T M x - modal,
 
-whose receptance has the exact value and slope of what is missing at 0 Hz, and its leading inertia.
-Standing, M_r and G_0 are positive and the states cannot grow; rolling, a state that grows is made
-static. (MacNeal, Comput. Struct. 1 (1971) 581; Rubin, AIAA J. 13 (1975) 995; decoupled here.)
+whose receptance has the exact value and slope of the truncated part at 0 Hz, and its leading
+inertia. Standing, M_r and G_0 are positive and the states cannot grow; rolling, a state that grows
+is made static. (MacNeal, Comput. Struct. 1 (1971) 581; Rubin, AIAA J. 13 (1975) 995; decoupled
+here.)
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from tireroad.greens.response import Response, couple
 from tireroad.modal.rotating import checks, rotating
 from tireroad.modal.states import StateModes, growing
 
-# Share of the largest static flexibility below which a direction is the solver's rounding.
+# Share of the largest static flexibility below which a direction is rounding of the solver.
 _ROUNDING = 1e-9
 # Directions a thousand times faster than the slowest stay massless: no step resolves them.
 _MASSLESS = 1e-6
@@ -31,8 +32,11 @@ _MASSLESS = 1e-6
 
 @dataclass(frozen=True)
 class Moments:
-    """y^T (K_Omega, D + 2 Omega G, M) x of p probes with themselves, (p, p): m/N, m s/N, m s2/N;
-    `momentum` (3, p) kg m/N: int rho x; or (12, p), with A_0 x, A_1 x and A_2 x of greens.hub after it."""
+    """y^T (K_Omega, D + 2 Omega G, M) x between p probes, (p, p): m/N, m s/N, m s2/N.
+
+    `momentum` (3, p) kg m/N: int rho x; or (12, p), followed by A_0 x, A_1 x and A_2 x of
+    greens.hub.
+    """
 
     compliance: np.ndarray
     damping: np.ndarray
@@ -59,7 +63,7 @@ def modal_moments(
     loads: np.ndarray,
     carried: np.ndarray,
 ) -> Moments:
-    """The moments between outputs (r, m) and loads (k, m) of a projected pencil D~, K~ of unit mass."""
+    """Moments between outputs (r, m) and loads (k, m) of a pencil D~, K~ of unit mass."""
     x, y = np.linalg.solve(stiffness, loads.T), np.linalg.solve(stiffness.T, outputs.T).T
     return Moments(outputs @ x, y @ drag @ x, y @ x, carried @ x)
 
@@ -75,11 +79,11 @@ def second_order(
 ) -> Response:
     """The response of p probes (outputs = forces) with residual states and an exact static limit.
 
-    `shape` (p, m) are the modal shapes at the probes and `carried` (3, m) the modes' momentum. `loss`: the
-    uniform rate (1/s) by which the moments' damping has them damped, and the loss factor that damps
-    them in its place, each at eta times its own circular frequency. By the weights `hub` (p, 3) probes read moments on
-    the hub, of which `response` knows nothing; `carried` and the moments' momentum have their rows then. Their loads' own
-    part, at once, is not in it.
+    `shape` (p, m): the modal shapes at the probes; `carried` (3, m): the momentum of the modes.
+    `loss`: the uniform damping rate (1/s) in the moments, and the loss factor eta that replaces it,
+    each state being damped at eta times its own circular frequency. `hub` (p, 3): the weights by
+    which probes read hub moments, which `response` lacks; `carried` and the momentum of the moments
+    then have the rows of greens.hub. The immediate moments of the loads are not included.
     """
     missing = _missing(response, modes, shape, carried, moments)
     flexibility = missing.compliance
@@ -112,7 +116,7 @@ def second_order(
 
 
 def _by_loss_factor(stiffness: np.ndarray, rate: float, factor: float) -> np.ndarray:
-    """eta sqrt(K) - rate: damping at a loss factor in the place of a uniform rate, for unit mass."""
+    """eta sqrt(K) - rate: damping by a loss factor in place of a uniform rate, for unit mass."""
     squares, turn = np.linalg.eigh((stiffness + stiffness.T) / 2)
     own = factor * np.sqrt(np.maximum(squares, 0.0))
     return (turn * own) @ turn.T - rate * np.eye(len(squares))
@@ -121,7 +125,7 @@ def _by_loss_factor(stiffness: np.ndarray, rate: float, factor: float) -> np.nda
 def _missing(
     response: Response, modes: StateModes, shape: np.ndarray, carried: np.ndarray, moments: Moments
 ) -> Moments:
-    """The moments less the modes' share of them."""
+    """The moments less the modes' part of them."""
     x = _statics(modes, modes.left @ shape.T, modes.block_left @ shape.T)
     y = _adjoints(modes, shape @ modes.right, shape @ modes.block_right)
     return Moments(

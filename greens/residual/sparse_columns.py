@@ -1,4 +1,4 @@
-"""Products of a matrix with forces of which few are not zero: only their columns are read."""
+"""Products of a matrix with mostly zero forces, which read only the columns of nonzero ones."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from scipy.sparse.linalg import LinearOperator
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Numbers of the columns in a run, on average, from which each run is a product of its own, in place of copying all
-# columns side by side first: 16 columns of 430 numbers, 7 of 1,000, 3 of 2,000. No fewer columns than two.
+# Numbers in a run of columns, on average, above which each run is multiplied on its own instead of
+# first copying all columns side by side: 16 columns of 430 numbers, 7 of 1,000, 3 of 2,000; at
+# least two columns.
 LONG, FEWEST = 7000, 2
 
 
 class SharedRows:
-    """The rows `mine` of `count` rows that this process of `comm` computes; `gathered` joins them on all."""
+    """This process's share `mine` of `count` rows, and their collection by `gathered`."""
 
     def __init__(self, count: int, comm: MPI.Comm) -> None:
         ends = count * np.arange(comm.size + 1) // comm.size
@@ -25,7 +26,9 @@ class SharedRows:
         self._count, self._shares = count, (np.diff(ends), ends[:-1])
 
     def gathered(self, own: Array) -> Array:
-        """The numbers (count,) of all processes, the same bits on each, from this one's. Collective."""
+        """The numbers (count,) of all processes, bitwise equal on each, from this one's.
+        Collective.
+        """
         if self.comm.size == 1:
             return own
         every = np.empty(self._count)
@@ -34,11 +37,12 @@ class SharedRows:
 
 
 class LoadedColumns:
-    """A (n, k), kept by `columns` (k, n), whose products with forces read the columns of the loaded entries.
+    """A (n, k), stored by `columns` (k, n); products read only columns of nonzero forces.
 
-    Loaded entries that follow each other, as the touching points of a line do, are read as they lie: copying them side
-    by side first takes twice as long. The sum's order depends on the loaded entries alone, so that a run that goes on
-    from a checkpoint finds the same bits. With a `comm` of several processes, each computes its share of the n rows.
+    Runs of adjacent nonzero entries, such as the touching points of a line, are read in place:
+    copying them side by side first takes twice as long. The order of summation depends on the
+    nonzero entries alone, so that a run restarted from a checkpoint yields the same bits. With a
+    `comm` of several processes, each computes its share of the n rows.
     """
 
     def __init__(self, matrix: Array, comm: MPI.Comm = MPI.COMM_SELF) -> None:
@@ -48,7 +52,7 @@ class LoadedColumns:
 
     @staticmethod
     def of(matrix: Array | LinearOperator, comm: MPI.Comm) -> LoadedColumns | LinearOperator:
-        """The matrix for such products; a product stays what it is."""
+        """A matrix wrapped for such products; a linear operator is returned as it is."""
         return LoadedColumns(matrix, comm) if isinstance(matrix, np.ndarray) else matrix
 
     def __matmul__(self, force: Array) -> Array:
@@ -71,17 +75,19 @@ class LoadedColumns:
 
     def between(self, rows: Index, columns: Index) -> Array:
         """A (a, b) between `rows` (a,) and `columns` (b,), column-major."""
-        # By whole columns first: a third of the time of picking entry by entry.
+        # Whole columns first: a third of the time of picking entry by entry.
         return self.columns.take(columns, axis=0).take(rows, axis=1).T
 
     def around(self, index: Index) -> ColumnsAround:
-        """The columns (a,) of `index`, side by side, for products with forces that are loaded there and at few others."""
+        """The columns (a,) of `index`, for forces that are nonzero there and at few others."""
         return ColumnsAround(self, index)
 
 
 class ColumnsAround:
-    """Columns of A (n, n), of which no rows are shared, at `index` (a,), copied once for many products: half of a product is
-    to find and copy them."""
+    """Columns of A (n, n), rows not shared, at `index` (a,), copied once for many products.
+
+    Finding and copying them is half the cost of a product.
+    """
 
     def __init__(self, whole: LoadedColumns, index: Index) -> None:
         self._whole, self._index = whole, index
@@ -92,7 +98,7 @@ class ColumnsAround:
         return self._columns.take(self._index, axis=1).T
 
     def spread(self, force: Array) -> Array:
-        """A f (n,) for f (n,), best of forces at `index` and few others."""
+        """A f (n,) for f (n,), fastest if f is nonzero at `index` and few others."""
         moved = force[self._index] @ self._columns
         rest = force.copy()
         rest[self._index] = 0.0

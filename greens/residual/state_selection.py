@@ -1,10 +1,10 @@
-"""Which states stay dynamic: those that answer the forces within the band, not simply the slowest.
+"""Selection of dynamic states: those that respond within the band, not just the slowest.
 
-Made static, a state with A = C P leaves  (A e(s) + A* e(s*)) / 2,  e(s) = i w / (s (i w - s)),  behind.
-Its participation is the largest size of that over the band; fast modes lose by (w/s)^2, since the
-two halves of a pair all but cancel. The axle force, the contact forces less the rate of momentum,
-loses the same with s^2 times the state's momentum in place of C: the few modes that carry a net
-momentum matter there long after the displacements have stopped to need them.
+A state A = C P that is made static loses  (A e(s) + A* e(s*)) / 2,  e(s) = i w / (s (i w - s)). Its
+participation is the largest magnitude of that over the band. Fast modes lose (w/s)^2, since the two
+halves of a pair almost cancel. For the axle force, the contact forces less the rate of momentum, C
+is replaced by s^2 times the state's momentum: the few modes with a net momentum matter there long
+after the displacements no longer need them.
 """
 
 from __future__ import annotations
@@ -15,20 +15,23 @@ from tireroad.greens.response import Response
 
 
 def participation(response: Response, band: float) -> np.ndarray:
-    """What is lost when a state is made static, (q,), from 0 to `band` Hz: the larger of its shares in
-    the static displacements and in the axle force. Frobenius norms over all outputs and forces.
+    """Loss (q,) if a state is made static, from 0 to `band` Hz.
+
+    The larger of its shares in the static displacements and in the axle force, in Frobenius norms
+    over all outputs and forces.
     """
     still = np.linalg.norm(response.static() + response.residual)
     displacement = _lost(response, response.output, band) / still
-    # Of every unit force one unit reaches the axle.
+    # Of each unit force one unit reaches the axle.
     axle = _lost(response, response.momentum * response.eigenvalue**2, band)
     return np.maximum(displacement, axle / np.sqrt(response.input.shape[1]))
 
 
 def _lost(response: Response, output: np.ndarray, band: float) -> np.ndarray:
-    """Largest size (q,) over the band of what each state leaves behind at the outputs (r, q)."""
+    """Largest magnitude (q,) over the band of what each state loses at the outputs (r, q)."""
     s, push = response.eigenvalue, response.input.T
-    # Largest at its resonance when that lies within the band, else at the band's end.
+    # The maximum is at the state's resonance if that is within the band, else at the end of the
+    # band.
     omega = 1j * np.clip(np.abs(s), 0, 2 * np.pi * band)
     half = omega / (s * (omega - s))
     mirror = omega / (s.conj() * (omega - s.conj()))
@@ -42,7 +45,7 @@ def _lost(response: Response, output: np.ndarray, band: float) -> np.ndarray:
 def keep(
     response: Response, count: int, band: float, by: str, counted: slice = slice(None)
 ) -> Response:
-    """Response whose `count` foremost states stay dynamic, the others follow statically.
+    """The response with its `count` foremost states dynamic; the others follow statically.
 
     `by` "participation" within the band, or "frequency": the slowest. A state is a pair of complex
     eigenvalues or one real eigenvalue; `counted` are the outputs and forces that decide.

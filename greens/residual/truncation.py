@@ -1,14 +1,16 @@
-"""How far the receptance may be off within a band, for what the modes leave out.
+"""Estimated error of the receptance within a band, due to the truncated modes.
 
-Every mode left out is faster than the last one kept, w_c; with a rate of damping d, its static answer
-differs from its true one by at most the share  b(w) = |w^2 - i w d| / |w_c^2 - w^2 + i w d|.  So
+Every truncated mode is faster than the last one kept, w_c. With a damping rate d, its static
+response differs from its true one by at most the share
+b(w) = |w^2 - i w d| / |w_c^2 - w^2 + i w d|.  Hence
 
-    none          |G_t| (1 + b) / |H|     G_t: what the upper half of the modes adds, the tail's size
-    dirac, static |G_res| b / |H|         a bound for a wheel that stands
-    attachment, second-order: |H_x(w) - H_x(0)| b / |H|  with H_x the states beyond w_c,
+    none          |G_t| (1 + b) / |H|     G_t: upper half of the modes, for the tail
+    dirac, static |G_res| b / |H|         a bound for a standing wheel
+    attachment, second-order: (|H_x(w) - H_x(0)| + |G_res|) b / |H|, H_x the states beyond w_c,
 
-Frobenius norms over all outputs and forces. The axle force, sum of the loads less the second rate of the
-first moment, lacks  w^2 |m_r| (1 + b)  per unit load, m_r the static moment of what no state has.
+in Frobenius norms over all outputs and forces. The axle force, the sum of the loads less the second
+rate of the first moment, lacks  w^2 |m_r| (1 + b)  per unit load, m_r being the static moment
+outside the states.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from tireroad.greens.response import Response
 
 @dataclass(frozen=True)
 class Cutoff:
-    """The highest kept mode, `circular` rad/s, and the damping rate of those beyond, `rate` 1/s."""
+    """The highest kept mode, `circular` rad/s, and the damping `rate` 1/s of those beyond it."""
 
     circular: float
     rate: float
@@ -52,8 +54,11 @@ def estimate(response: Response, option: str, cutoff: Cutoff, frequency: np.ndar
 
 
 def estimate_axle(response: Response, cutoff: Cutoff, frequency: np.ndarray) -> np.ndarray | None:
-    """Estimated error (f,) of the axle force per unit load, root mean square over the loads; None where the
-    moment left out is not known. At 0 Hz a load reaches the axle whole."""
+    """Estimated error (f,) of the axle force per unit load, root mean square over the loads.
+
+    None where the static moment outside the states is unknown. At 0 Hz a load reaches the axle
+    entirely.
+    """
     if response.left_out is None:
         return None
     lacking = np.linalg.norm(response.left_out) / np.sqrt(response.left_out.shape[1])

@@ -1,1 +1,1 @@
-"""Eigensolvers: SLEPc on each symmetric part and inertia slice, and the quadratic problem of the turning tire."""
+"""Eigensolvers: block Lanczos in inertia slices, and SLEPc for the quadratic problem."""

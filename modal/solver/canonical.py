@@ -1,13 +1,14 @@
-"""Modes in one order, with one sign and one basis of each repeated frequency, by rule.
+"""One order, one sign and one basis of each repeated frequency for the modes, by rule.
 
-An eigensolver leaves a sign open, and of a repeated eigenvalue the whole basis V (n, k). Here
+An eigensolver leaves the sign undetermined, and for a repeated eigenvalue the whole basis V (n, k).
+Here
 
     r = the unknown whose row of V is longest,   v_1 = V V_r^T / |V_r|
 
-and so on in what is left of V: it depends on the space alone, v_1 has its largest component at r and
-that is positive. Lengths within a thousandth are one, of which the first by position counts, so a
-symmetric mode has one sign too. The same modes on any number of processes to rounding, sign and order
-included.
+and so on in the remainder of V. This depends on the space alone; v_1 has its largest component at
+r, and it is positive. Lengths within a thousandth count as equal, and the first by position is
+taken, so that a symmetric mode has a unique sign too. The modes are the same on any number of
+processes to rounding, sign and order included.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ _SAME_LENGTH = 1e-3  # relative
 
 
 def ordered(values: np.ndarray, family: np.ndarray, same: float) -> tuple[np.ndarray, np.ndarray]:
-    """Order of the values (k,): ascending, equal ones (to the relative distance `same` from one to the
-    next, both over `same` times the largest) by family (k,); and the group (k,) each is in then: those
-    of one family with one value.
+    """The order of the values (k,), and the group (k,) of each in that order.
+
+    Values ascend; equal ones (to the relative distance `same` from one to the next) are ordered by
+    family (k,). A group is the equal values of one family.
     """
     order = np.argsort(values, kind="stable")
     step = np.diff(values[order]) > same * np.abs(values[order][1:])
@@ -34,9 +36,10 @@ def ordered(values: np.ndarray, family: np.ndarray, same: float) -> tuple[np.nda
 
 
 def turn_to_rule(comm: MPI.Comm, vectors: np.ndarray, rank: np.ndarray, group: np.ndarray) -> None:
-    """Signs, and bases of groups (m,) of more than one column, of own rows (n, m) in place. Collective.
+    """Fix signs, and bases of groups (m,) of more than one column, of own rows (n, m) in place.
+    Collective.
 
-    `rank` (n,) the place of each own row in an order of all that does not depend on the processes.
+    `rank` (n,) of own rows in an order of all rows that does not depend on the processes.
     """
     first, size = np.unique(group, return_index=True, return_counts=True)[1:]
     alone = first[size == 1]
@@ -48,7 +51,9 @@ def turn_to_rule(comm: MPI.Comm, vectors: np.ndarray, rank: np.ndarray, group: n
 
 
 def _signs(comm: MPI.Comm, vectors: np.ndarray, rank: np.ndarray) -> np.ndarray:
-    """(m,) of the foremost of the largest components of each column. Collective."""
+    """Signs (m,) of the largest component of each column, the first by rank among equals.
+    Collective.
+    """
     size = np.abs(vectors)
     largest = _over_all(comm, size.max(axis=0, initial=0.0), MPI.MAX)
     place = np.where(size >= (1 - _SAME_LENGTH) * largest, rank[:, None], np.iinfo(int).max)
@@ -62,7 +67,7 @@ def _signs(comm: MPI.Comm, vectors: np.ndarray, rank: np.ndarray) -> np.ndarray:
 
 
 def _based(comm: MPI.Comm, vectors: np.ndarray, rank: np.ndarray) -> np.ndarray:
-    """V (n, k) turned to the basis by rule of the space it spans. Collective."""
+    """V (n, k) rotated to the basis that the rule gives its space. Collective."""
     k = vectors.shape[1]
     turn, left = np.zeros((k, 0)), vectors
     for _ in range(k):
@@ -74,7 +79,7 @@ def _based(comm: MPI.Comm, vectors: np.ndarray, rank: np.ndarray) -> np.ndarray:
 
 
 def _longest_row(comm: MPI.Comm, vectors: np.ndarray, rank: np.ndarray) -> np.ndarray:
-    """(k,) the foremost of the longest rows over all processes. Collective."""
+    """The longest row (k,) over all processes, the first by rank among equals. Collective."""
     length = np.linalg.norm(vectors, axis=1)
     largest = comm.allreduce(float(length.max(initial=0.0)), op=MPI.MAX)
     place = np.where(length >= (1 - _SAME_LENGTH) * largest, rank, np.iinfo(int).max)

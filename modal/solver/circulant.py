@@ -1,15 +1,17 @@
 """A ring of equal segments: found from its nodes, verified on its matrix, split by wave number.
 
-With components along and across the ring at each node, the matrix of an axisymmetric state repeats from
-segment to segment: blocks A_j between a segment and the j-th after it. The fields
+With tangential, axial and radial components at each node, the matrix of an axisymmetric state
+repeats from segment to segment: blocks A_j couple a segment with the j-th after it. The fields
 
-    u_s = Re[e^{i n s alpha} v],  alpha = 2 pi / N,   H_n v = lambda v,   H_n = sum_j e^{i n j alpha} A_j
+    u_s = Re[e^{i n s alpha} v],  alpha = 2 pi / N,
+    H_n v = lambda v,   H_n = sum_j e^{i n j alpha} A_j
 
-are left to themselves for each n = 0 ... N / 2, all but the first and an even N's last of them in
-pairs. (Thomas, Int. J. Numer. Meth. Eng. 14 (1979) 81.) A symmetry that runs round the ring the other
-way, a mirror or with belts at an angle the half turn, maps v to P conj(v), P a signed permutation once
-each node's phase e^{i n delta} is taken out; between the fields that it keeps H_n is real and symmetric.
-Without one, H_n = A + i B is solved as [[A, -B], [B, A]], which has each of its eigenvalues twice.
+are decoupled for n = 0 ... N / 2; all but the first and, for even N, the last come in pairs
+(Thomas, Int. J. Numer. Meth. Eng. 14 (1979) 81). A symmetry that reverses the sense around the
+ring, a mirror or, with belts at an angle, the half turn, maps v to P conj(v), with P a signed
+permutation once each node's phase e^{i n delta} is taken out. On the fields that it keeps, H_n is
+real and symmetric. Without one, H_n = A + i B is solved as [[A, -B], [B, A]], which has each
+eigenvalue twice.
 """
 
 from __future__ import annotations
@@ -25,16 +27,18 @@ from tireroad.modal.solver.distributed import congruent, largest_entry, less, ro
 from tireroad.modal.solver.symmetry import TOLERANCE, Sites
 from tireroad.modal.solver.team import ALONE, Team
 
-_NEAR = 1e-6  # of the body's size: nodes are each other's images
-_LONGEST = 4  # nodes a segment along the ring, at most
+_NEAR = 1e-6  # of the body's size: distance within which nodes are images of each other
+_LONGEST = 4  # most nodes of a segment along the ring
 
 
 @dataclass(frozen=True)
 class Ring:
-    """`turn` (n, n) from the components of all segments, one after the other, to the unknowns; `blocks`
-    j -> A_j (d, d) sparse; `angle` (d,) within the segment, rad; `kept` (d, d) complex unitary: columns that
-    a symmetry keeps, None where there is none; `defect` the norm of what the matrix changes by in a turn by
-    one segment, in the units of its eigenvalues.
+    """A matrix that repeats from segment to segment.
+
+    `turn` (n, n) maps the components of all segments, in sequence, to the unknowns; `blocks`
+    j -> A_j (d, d) sparse; `angle` (d,) within the segment, rad; `kept` (d, d) complex unitary: the
+    columns that a symmetry keeps, None without one; `defect`: the norm of the change of the matrix
+    in a rotation by one segment, in the units of its eigenvalues.
     """
 
     segments: int
@@ -50,7 +54,7 @@ class Ring:
         return range(self.segments // 2 + 1)
 
     def single(self, n: int) -> bool:
-        """Whether the modes of a wave number do not come in pairs."""
+        """Whether the modes of a wave number are single, not in pairs."""
         return n == 0 or 2 * n == self.segments
 
     def wave(self, n: int, team: Team = ALONE) -> Wave:
@@ -59,7 +63,7 @@ class Ring:
         return Wave(self, n, matrix[team.own(matrix.shape[0])], basis, copies)
 
     def _problem(self, n: int) -> tuple[sparse.csr_matrix, sparse.csr_matrix, int]:
-        """The whole of it, its basis, and the copies of each of its eigenvalues."""
+        """Its whole matrix, its basis, and the number of copies of each of its eigenvalues."""
         size = len(self.angle)
         H = self._hermitian(n)
         if self.single(n):
@@ -79,7 +83,7 @@ class Ring:
         return sparse.diags(np.exp(1j * n * self.angle)) @ self.kept
 
     def is_kept(self) -> bool:
-        """Whether H_n is real in the fields kept, to the tolerance, at a wave number that shows it."""
+        """Whether H_n is real on the kept fields, at a wave number that would show it."""
         n = max(1, self.segments // 3)
         basis = self._basis(n)
         H = (basis.getH() @ self._hermitian(n) @ basis).tocsr()
@@ -88,7 +92,10 @@ class Ring:
 
 @dataclass(frozen=True)
 class Wave:
-    """The fields of one wave number: own rows of a `matrix` (d, d) real symmetric, `basis` (., d) from its vectors to v."""
+    """The fields of one wave number.
+
+    Own rows of a `matrix` (d, d), real symmetric; `basis` (., d) maps its vectors to v.
+    """
 
     ring: Ring
     number: int
@@ -97,8 +104,9 @@ class Wave:
     copies: int
 
     def fields(self, vectors: np.ndarray) -> np.ndarray:
-        """(n, k copies) of the ring: of a pair the one that the symmetry keeps first, cos about the lowest
-        point, then sin.
+        """Fields (n, k copies) on the ring; of a pair, first the one that the symmetry keeps.
+
+        The pair is a cosine about the lowest point, then a sine.
         """
         N, v = self.ring.segments, self.basis @ vectors
         if self.copies == 2:
@@ -110,8 +118,10 @@ class Wave:
 
 
 def repeated(matrix: PETSc.Mat, sites: Sites) -> Ring | None:
-    """The matrix (n, n) as that of equal segments, as many as there are; None where it is none. With the `sites` of
-    all unknowns on every process. Collective."""
+    """The matrix (n, n) as a ring of as many equal segments as possible; None if it is not one.
+
+    `sites` of all unknowns on every process. Collective.
+    """
     if len(sites.component) % 3 or (sites.component.reshape(-1, 3) != np.arange(3)).any():
         return None
     points = sites.place[::3]
@@ -134,7 +144,7 @@ def repeated(matrix: PETSc.Mat, sites: Sites) -> Ring | None:
 
 
 def _segments(points: np.ndarray, angle: np.ndarray, count: int, near: float) -> np.ndarray | None:
-    """Nodes (segments, nodes of each) in one order, or None where a segment is not the first one turned."""
+    """Nodes (segments, nodes of each) in one order; None if the segments are not equal."""
     alpha = 2 * np.pi / count
     segment = np.floor((angle + _NEAR) / alpha).astype(int) % count
     reach, rest = np.hypot(points[:, 0], points[:, 2]), angle - segment * alpha
@@ -152,7 +162,7 @@ def _segments(points: np.ndarray, angle: np.ndarray, count: int, near: float) ->
 def _verified(
     matrix: PETSc.Mat, points: np.ndarray, angle: np.ndarray, nodes: np.ndarray
 ) -> Ring | None:
-    """The ring, if turning by one segment leaves the matrix as it is."""
+    """The ring; None if rotation by one segment changes the matrix. Collective."""
     count, each = nodes.shape[0], 3 * nodes.shape[1]
     turn = _turned(angle, nodes.ravel())
     size = turn.shape[0]
@@ -161,9 +171,8 @@ def _verified(
     two = np.unique(turn[:, : 2 * each].tocoo().row)
     first = (turn[two][:, : 2 * each].T @ rows_of(matrix, two) @ turn).tocsr()
     if abs(first[each:] - first[:each][:, along]).max() > allowed:
-        return (
-            None  # a load on the second segment already: the product with all of them is not needed
-        )
+        # A load shows on the second segment already: saves the product with all of them.
+        return None
     local = congruent(matrix, turn)
     by_one = congruent(local, sparse.identity(size, format="csr")[:, along])
     difference = less(by_one, local)
@@ -190,7 +199,7 @@ def _verified(
 
 
 def _turned(angle: np.ndarray, order: np.ndarray) -> sparse.csr_matrix:
-    """From components along the ring, along the axle and outwards of the nodes in an order to x, y, z."""
+    """Tangential, axial and radial components of the nodes, in their order, to x, y, z."""
     size = 3 * len(order)
     sine, cosine = np.sin(angle[order]), np.cos(angle[order])
     one, none = np.ones(len(order)), np.zeros(len(order))
@@ -205,7 +214,7 @@ def _turned(angle: np.ndarray, order: np.ndarray) -> sparse.csr_matrix:
 def _kept(
     points: np.ndarray, within: np.ndarray, alpha: float, along_axle: float
 ) -> sparse.csr_matrix | None:
-    """Columns (d, d) that v -> P conj(v) keeps, for (x, y) -> (-x, `along_axle` y) of a segment's nodes."""
+    """Columns (d, d) that v -> P conj(v) keeps, for (x, y) -> (-x, `along_axle` y)."""
     near = _NEAR * np.abs(points).max(initial=0.0)
     reach = np.hypot(points[:, 0], points[:, 2])
     here, there = ((angle + _NEAR) % alpha for angle in (within, -within))
@@ -220,7 +229,8 @@ def _kept(
     fixed, first = own[own == to], own[own < to]
     root = np.sqrt(0.5)
     one, turned = np.full(len(first), root), sign[first] * root
-    # e_a (or i e_a) of a node that is its own image; (e_a + s e_b) and i (e_a - s e_b) of two.
+    # Columns: e_a (or i e_a) of a node that is its own image; (e_a + s e_b) and i (e_a - s e_b) of
+    # a pair.
     values = [np.where(sign[fixed] > 0, 1.0, 1j), one, turned, 1j * one, -1j * turned]
     rows = [fixed, first, to[first], first, to[first]]
     pair = len(fixed) + np.arange(len(first))

@@ -1,4 +1,4 @@
-"""Products of a sparse matrix that is spread over processes with very sparse ones that each process has whole."""
+"""Products of a distributed sparse matrix with very sparse ones that every process holds whole."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from scipy import sparse
 
 
 def congruent(matrix: PETSc.Mat, basis: sparse.csr_matrix) -> PETSc.Mat:
-    """B^T A B of a real basis (n, d) that every process has, spread by rows. Collective."""
+    """B^T A B, distributed by rows, for a real B (n, d) whole on every process. Collective."""
     size, columns = basis.shape
     start, end = matrix.getOwnershipRange()
     own = basis[start:end]
-    across = end - start if columns == size else PETSc.DECIDE  # as A is spread, where it can be
+    across = end - start if columns == size else PETSc.DECIDE  # distributed as A, where possible
     spread = PETSc.Mat().createAIJ(
         ((end - start, size), (across, columns)),
         csr=(_index(own.indptr), _index(own.indices), own.data),
@@ -25,7 +25,9 @@ def congruent(matrix: PETSc.Mat, basis: sparse.csr_matrix) -> PETSc.Mat:
 
 
 def rows_of(matrix: PETSc.Mat, wanted: np.ndarray) -> sparse.csr_matrix:
-    """Rows (k, n) of the matrix by their numbers, ascending, other ones on each process. Collective."""
+    """Rows (k, n) of the matrix at the ascending indices `wanted`, which differ by process.
+    Collective.
+    """
     rows = PETSc.IS().createGeneral(_index(np.asarray(wanted)), comm=PETSc.COMM_SELF)
     every = PETSc.IS().createStride(matrix.getSize()[1], first=0, step=1, comm=PETSc.COMM_SELF)
     (found,) = matrix.createSubMatrices(rows, every)
@@ -37,13 +39,15 @@ def rows_of(matrix: PETSc.Mat, wanted: np.ndarray) -> sparse.csr_matrix:
 
 
 def largest_entry(matrix: PETSc.Mat) -> float:
-    """In size. Collective."""
+    """Largest magnitude of an entry. Collective."""
     values = matrix.getValuesCSR()[2]
     return matrix.comm.tompi4py().allreduce(float(np.abs(values).max(initial=0.0)), MPI.MAX)
 
 
 def row_sum(matrix: PETSc.Mat) -> float:
-    """Largest sum of the sizes of a row's entries: no eigenvalue of a symmetric matrix is larger. Collective."""
+    """Largest row sum of magnitudes, an upper bound on the eigenvalues of a symmetric matrix.
+    Collective.
+    """
     return float(matrix.norm(PETSc.NormType.NORM_INFINITY))
 
 

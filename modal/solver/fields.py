@@ -1,4 +1,4 @@
-"""Fields over all unknowns, spread by rows over the processes, many at once."""
+"""Operations on many fields over all unknowns, distributed by rows over the processes."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from tireroad.modal.solver.spectrum import Part, Slice
 from tireroad.modal.solver.team import Team
 
 _AT_ONCE = 16  # vectors that one process holds whole
-CHUNK = 64  # columns a matrix product: no second copy of all vectors
-_BETWEEN = 4 * CHUNK  # of a product with all vectors: with 64 BLAS packs them half of the time
-# Vectors of neighbouring slices are orthogonal to about 1e-11: then worth a product.
+CHUNK = 64  # columns per matrix product, to avoid a second copy of all vectors
+_BETWEEN = 4 * CHUNK  # per product with all vectors: with 64, BLAS packs them half of the time
+# Defect above which a correction pays: neighbouring slices are orthogonal to about 1e-11.
 _REPAIR = 1e-12
 
 
 def scaled_by(stiffness: PETSc.Mat, mass: np.ndarray) -> PETSc.Mat:
-    """M^-1/2 K M^-1/2 of a diagonal mass (own rows). Collective."""
+    """M^-1/2 K M^-1/2 for a diagonal mass (own rows). Collective."""
     scaled = stiffness.copy()
     roots = scaled.createVecLeft()
     roots.array[:] = 1 / np.sqrt(mass)
@@ -46,8 +46,11 @@ def everywhere(matrix: PETSc.Mat) -> sparse.csr_matrix:
 def collect(
     matrix: PETSc.Mat, parts: Sequence[Part], found: list[Slice], order: np.ndarray, team: Team
 ) -> np.ndarray:
-    """This process's rows of the vectors in the given order, sent by the first process of the team that has them,
-    a few at a time: that process holds no more than those whole. Collective."""
+    """This process's rows of the vectors in the given order. Collective.
+
+    The first process of the team that has the vectors sends them a few at a time, and holds no more
+    than those whole.
+    """
     comm = matrix.comm.tompi4py()
     ranges = np.asarray(matrix.getOwnershipRanges())
     own = int(ranges[comm.rank + 1] - ranges[comm.rank])
@@ -78,7 +81,7 @@ def collect(
 
 
 def multiply(matrix: PETSc.Mat, vectors: np.ndarray) -> np.ndarray:
-    """This process's rows of matrix @ vectors, vectors given by rows (n, m). Collective."""
+    """This process's rows of matrix @ vectors, for vectors given by rows (n, m). Collective."""
     rows, columns = vectors.shape
     out = np.empty((rows, columns), order="F")
     for start in range(0, columns, CHUNK):
@@ -98,7 +101,9 @@ def gram(comm: MPI.Comm, left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def between(comm: MPI.Comm, left: np.ndarray, matrix: PETSc.Mat, right: np.ndarray) -> np.ndarray:
-    """left^T matrix right (m, k) over all processes, some columns at a time: no copy of all of them. Collective."""
+    """left^T matrix right (m, k) over all processes, in blocks of columns to save memory.
+    Collective.
+    """
     out = np.empty((left.shape[1], right.shape[1]))
     for start in range(0, right.shape[1], _BETWEEN):
         some = slice(start, start + _BETWEEN)
@@ -107,10 +112,11 @@ def between(comm: MPI.Comm, left: np.ndarray, matrix: PETSc.Mat, right: np.ndarr
 
 
 def orthonormalise(comm: MPI.Comm, vectors: np.ndarray, part: np.ndarray) -> float:
-    """Worst entry of V^T V - 1 after a correction where slices meet, in place. Collective.
+    """Correct V in place where slices meet; the largest entry of V^T V - 1 afterwards. Collective.
 
-    One Newton-Schulz step V (3 - V^T V) / 2 squares the defect and turns no vector further than it.
-    `part` (m,) says which part each is of: those of different ones are orthogonal by their making.
+    One Newton-Schulz step V (3 - V^T V) / 2 squares the defect and changes no vector by more than
+    the defect. `part` (m,) is the part of each vector; those of different parts are orthogonal by
+    construction.
     """
     worst = 0.0
     for one in np.unique(part):
@@ -118,7 +124,7 @@ def orthonormalise(comm: MPI.Comm, vectors: np.ndarray, part: np.ndarray) -> flo
         mine = vectors[:, columns]
         defect = gram(comm, mine, mine) - np.eye(len(columns))
         if np.abs(defect).max() > _REPAIR:
-            # What is rounding already stays: mixed in, it would carry stiff modes into soft ones.
+            # Leave what is rounding already: mixing it in would carry stiff modes into soft ones.
             mine -= mine @ (np.where(np.abs(defect) > _REPAIR / 10, defect, 0.0) / 2)
             vectors[:, columns] = mine
             defect = gram(comm, mine, mine) - np.eye(len(columns))
@@ -129,7 +135,10 @@ def orthonormalise(comm: MPI.Comm, vectors: np.ndarray, part: np.ndarray) -> flo
 def projected(
     comm: MPI.Comm, vectors: np.ndarray, matrix: PETSc.Mat, sign: int, known: np.ndarray | None
 ) -> np.ndarray:
-    """V^T X V (m, m), symmetric (sign 1) or skew (-1); `known` (k, k) is its upper left part."""
+    """V^T X V (m, m), symmetric (sign 1) or skew (-1); `known` (k, k) is its upper left part.
+
+    Collective.
+    """
     m, k = vectors.shape[1], 0 if known is None else len(known)
     out = np.empty((m, m))
     out[:, k:] = between(comm, vectors, matrix, vectors[:, k:])
@@ -144,8 +153,10 @@ def projected(
 def loss_factors(
     modes: Modes, loss: PETSc.Mat, comm: MPI.Comm, known: np.ndarray | None
 ) -> np.ndarray:
-    """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of modes of unit mass; 0 of rigid ones. `known`: of the first
-    of them. Collective."""
+    """eta_k = phi . sum_r eta_r K_r phi / omega_k^2 (m,) of mass-normalised modes, rigid ones 0.
+
+    `known`: the values of the first modes, which are reused. Collective.
+    """
     done = np.zeros(0) if known is None else known
     lost = np.empty(modes.vectors.shape[1] - len(done))
     for start in range(0, len(lost), CHUNK):

@@ -1,12 +1,13 @@
-"""Eigenpairs next to a shift by block Lanczos: many solves at once read the factor once.
+"""Eigenpairs nearest to a shift by block Lanczos, which reads the factor once for many solves.
 
     W = (A - sigma I)^-1 V_j = V_1..j H_j + V_j+1 R_j,   H s = theta s,   lambda = sigma + 1 / theta
 
-with every new block orthogonalised twice against all before it. The residual of a Ritz pair is |R_j s_j|, s_j the
-last block of s. A triangular solve with one right-hand side is bound by memory: eight at once cost less than two
-one by one, and need a third more of them (radial tire, 14,919 unknowns, 76 eigenvalues: 248 solves, 1.1 s; SLEPc's
-Krylov-Schur with one vector: 2.8 s). Blocks of 4 and of 16 take 1.3 and 1.4 s.
-Sources: Golub and Underwood (1977); Grimes, Lewis and Simon, SIAM J. Matrix Anal. Appl. 15 (1994) 228.
+Every new block is orthogonalised twice against all earlier ones. The residual of a Ritz pair is
+|R_j s_j|, with s_j the last block of s. A triangular solve with one right-hand side is
+memory-bound: eight at once cost less than two one by one, and a third more of them are needed
+(radial tire, 14,919 unknowns, 76 eigenvalues: 248 solves, 1.1 s; SLEPc's Krylov-Schur with one
+vector: 2.8 s). Blocks of 4 and of 16 take 1.3 and 1.4 s. Sources: Golub and Underwood (1977);
+Grimes, Lewis and Simon, SIAM J. Matrix Anal. Appl. 15 (1994) 228.
 """
 
 from __future__ import annotations
@@ -16,16 +17,14 @@ import numpy as np
 from tireroad.modal.solver.shifted import Shifted
 
 BLOCK = 8
-_LENGTH, _MORE = (
-    6,
-    30,
-)  # longest basis: so many vectors for each wanted one, and so many blocks more
-_EVERY = 3  # blocks between two looks at what has converged
-_LOST = 1e-8  # of the largest: a direction of a new block so short is rounding
+# Longest basis: this many vectors for each wanted one, and this many blocks more.
+_LENGTH, _MORE = 6, 30
+_EVERY = 3  # blocks between two checks of convergence
+_LOST = 1e-8  # of the largest: a direction of a new block shorter than this is rounding
 
 
 class Basis:
-    """Orthonormal vectors (n, m) that grow by blocks, orthogonal to the `known` (n, k) ones; own rows of them all."""
+    """Orthonormal vectors (n, m), own rows, orthogonal to `known` (n, k), grown by blocks."""
 
     def __init__(self, shifted: Shifted, known: np.ndarray, most: int, seed: int) -> None:
         self._shifted, self._known, self._team = shifted, known, shifted.team
@@ -40,11 +39,11 @@ class Basis:
 
     @property
     def full(self) -> bool:
-        """Whether it can grow no more."""
+        """Whether the basis cannot grow any more."""
         return self._done == self.size
 
     def grow(self) -> None:
-        """One block of solves, and the next block of the basis."""
+        """Solve for one block, which yields the next block of the basis."""
         start, m = self._done, self.size
         ahead = self._shifted.solve(self._vectors[:, start:m])
         largest = self._team.lengths(ahead).max()
@@ -60,22 +59,22 @@ class Basis:
         self._rest = self._append(ahead, largest)
 
     def ritz(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """theta (m,), their residuals (m,) and vectors (m, m) in the basis as far as it was solved for."""
+        """theta (m,), residuals (m,) and vectors (m, m) in the part of the basis solved for."""
         m = self._done
         theta, vectors = np.linalg.eigh((self._projected[:m, :m] + self._projected[:m, :m].T) / 2)
         last = vectors[m - self._rest.shape[1] :]
         return theta, np.linalg.norm(self._rest @ last, axis=0), vectors
 
     def fields(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors (n, k) of those in the basis (m, k)."""
+        """Vectors (n, k) from those in the basis (m, k)."""
         return self._vectors[:, : len(vectors)] @ vectors
 
     def _append(self, ahead: np.ndarray, largest: float = 1.0) -> np.ndarray:
-        """Take the directions (n, b) in, as far as there is room; R (b', b) of what is left of them."""
+        """Add the directions (n, b) as far as there is room; returns R (b', b) of their QR."""
         m = self.size
         block, rest = self._team.orthonormal(ahead)
         short = np.abs(rest.diagonal()) < _LOST * largest
-        # In place of directions that are rounding, any others: the space was invariant there.
+        # Directions that are rounding mean an invariant subspace: replace them by random ones.
         block[:, short] = self._random.standard_normal((len(block), int(short.sum())))
         rest[short] = 0.0
         if short.any() or not m:
@@ -92,10 +91,10 @@ class Basis:
 def nearest(
     shifted: Shifted, low: float, high: float, wanted: int, known: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues (k,) between `low` and `high` and their orthonormal vectors (n, k), orthogonal to the `known`.
+    """Eigenvalues (k,) from `low` to `high`; orthonormal vectors (n, k) orthogonal to the `known`.
 
-    As many as converge, `wanted` where they do: residual below the tolerance relative to theta. Collective in the
-    team, each process with its rows.
+    The search ends when `wanted` have converged, to a residual below the tolerance relative to
+    theta, or when the basis is full. Each process has its rows. Collective in the team.
     """
     basis = Basis(shifted, known, _LENGTH * wanted + _MORE * BLOCK, 7 + known.shape[1])
     blocks = 0

@@ -1,10 +1,10 @@
-"""The second eigenproblem on the full finite-element matrices, without a modal basis in between.
+"""The second eigenproblem on the full finite-element matrices, without a modal basis.
 
     (s^2 M + s D + K_Omega) u = 0,   w^T (s^2 M + s D + K_Omega) = 0,   a = w^T (2 s M + D) u
 
-D = gamma1 M + gamma2 K + 2 Omega G, K_Omega as in fem.compliance. SLEPc's PEP (two-level orthogonal
-Arnoldi, shift-and-invert at zero) finds the states nearest to zero; it has no two-sided solver, so
-left vectors are the right ones of the transposed problem, matched and made biorthogonal.
+D = gamma1 M + gamma2 K + 2 Omega G, K_Omega as in fem.matrices.compliance. SLEPc's PEP (two-level
+orthogonal Arnoldi, shift-and-invert at zero) finds the states nearest to zero; it has no two-sided
+solver, so left vectors are the matched, biorthogonalised right ones of the transposed problem.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from tireroad.modal.solver.fields import gram, multiply
 
 Array = np.ndarray
 RESIDUAL_TOLERANCE = 1e-8
-_EXTRA = 10  # states beyond the wanted ones, to end in a gap and never inside a cluster
+_EXTRA = 10  # states beyond the wanted ones, to end in a gap and not inside a cluster
 _SAME = 1e-6  # relative distance of the right and left eigenvalue of one state
-# Two equal states come out at 7e5 to 1.3e6 by rounding, which differs with the processes.
+# Two equal states have 7e5 to 1.3e6 by rounding, depending on the number of processes.
 DEFECTIVE = 1e5
 
 
 @dataclass(frozen=True)
 class FullModes:
-    """States by |s|, Im s >= 0. `eigenvalue` (q,) 1/s; `right`, `left` this process's rows (n, q) of u, kg^-1/2,
-    and of w / a; residuals relative to the terms' norms; `condition` of the biorthogonalisation, of vectors of
-    unit momentum.
+    """States by |s|, Im s >= 0: `eigenvalue` (q,) 1/s; `right`, `left`: own rows (n, q) of u,
+    kg^-1/2, and of w / a; residuals relative to the norms of the terms; `condition` of the
+    biorthogonalisation of vectors of unit momentum.
     """
 
     eigenvalue: Array
@@ -62,11 +62,11 @@ def window(
     rate: float,
     expected: int,
 ) -> FullModes:
-    """All states with Im s between the two of `span`, 1/s, oscillating ones and, from 0 on, real ones.
+    """All states with Im s in `span`, 1/s: oscillating ones and, if it begins at 0, real ones.
 
-    In real arithmetic the shift stays at zero, so all below are found too, from about `expected` pairs on
-    until one lies beyond |s|^2 = Im^2 + (rate / 2)^2, `rate` 1/s the fastest damping in the window.
-    Raises ConvergenceError. Collective.
+    In real arithmetic the shift stays at zero, so all below are found too: `expected` pairs, then
+    more until one lies beyond |s|^2 = Im^2 + (rate / 2)^2, `rate` 1/s the fastest damping in the
+    window. Raises ConvergenceError. Collective.
     """
     low, high = span
     limit = 1.01 * np.hypot(high, rate / 2)
@@ -87,8 +87,8 @@ def window(
 
 
 def solve(mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -> FullModes:
-    """The `count` pairs (or about as many real states more) nearest to zero of a diagonal mass (own rows) kg,
-    D (n, n) kg/s and K (n, n) N/m. Raises ConvergenceError. Collective.
+    """The `count` pairs nearest to zero, or about as many real states more, for a diagonal mass
+    (own rows) kg, D (n, n) kg/s and K (n, n) N/m. Raises ConvergenceError. Collective.
     """
     comm = stiffness.comm.tompi4py()
     s, u, residual = _states(mass, drag, stiffness, 2 * count)
@@ -119,8 +119,8 @@ def solve(mass: Array, drag: PETSc.Mat, stiffness: PETSc.Mat, count: int) -> Ful
 
 
 def _condition(comm: MPI.Comm, mass: Array, s: Array, u: Array, w: Array, turn: Array) -> float:
-    """Of the pairing between vectors of unit momentum: about the worst of an eigenvalue. Raises ConvergenceError
-    where states are next to defective, for which no vectors of their own serve.
+    """Condition of the pairing of vectors of unit momentum, about that of the worst eigenvalue.
+    ConvergenceError for nearly defective states, whose own vectors are unusable. Collective.
     """
     columns, rows = (
         np.sqrt(np.abs(s)) * comm.allreduce((mass[:, None] * np.abs(v) ** 2).sum(axis=0)) ** 0.5
@@ -139,7 +139,7 @@ def _condition(comm: MPI.Comm, mass: Array, s: Array, u: Array, w: Array, turn: 
 
 
 def _pairing(comm: MPI.Comm, mass: Array, drag: PETSc.Mat, s: Array, u: Array, w: Array) -> Array:
-    """w_i^T [(s_i + s_j) M + D] u_j: diagonal but for clusters, where its inverse makes w biorthogonal."""
+    """w_i^T [(s_i + s_j) M + D] u_j, diagonal but for clusters, to biorthogonalise w."""
     moved = _times(drag, u)
     near = gram(comm, w, mass[:, None] * u)
     return s[:, None] * near + near * s + gram(comm, w, moved)
@@ -204,8 +204,8 @@ def _read(pep: SLEPc.PEP, matrix: PETSc.Mat, found: int) -> tuple[Array, Array]:
 
 
 def _polished(factor: PETSc.Mat, mass: Array, drag: PETSc.Mat, s: Array, vectors: Array) -> Array:
-    """u = -K^-1 (s^2 M + s D) u once more, with the factorised K: it takes out what the Krylov basis
-    carries in the stiffest directions, which is little in u and much in K u. Collective.
+    """u = -K^-1 (s^2 M + s D) u with the factorised K: removes errors of the Krylov basis in the
+    stiffest directions, which are small in u but large in K u. Collective.
     """
     right = mass[:, None] * vectors * s**2 + _times(drag, vectors) * s
     rows, columns = right.shape
@@ -227,7 +227,7 @@ def _times(matrix: PETSc.Mat, vectors: Array) -> Array:
 
 
 def _up_to_a_gap(s: Array, wanted: int) -> Array:
-    """Indices by |s|, ending at the widest gap after the wanted ones: conjugates stay together."""
+    """Indices by |s| up to the widest gap after the wanted ones: conjugates stay together."""
     order = np.argsort(np.abs(s), kind="stable")
     size = np.abs(s[order])
     end = len(size)

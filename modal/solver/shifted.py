@@ -1,4 +1,4 @@
-"""A symmetric matrix minus a shift, factorised by a team of processes: its inertia and its inverse."""
+"""A shifted symmetric matrix, factorised by a team of processes: its inertia and inverse."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from tireroad.modal.solver.team import ALONE, Team
 
 
 class Shifted:
-    """A - sigma I = L D L^T by MUMPS, for a symmetric sparse A (n, n), of which each process of the `team` has its
-    own rows. Collective in the team.
+    """A - sigma I = L D L^T by MUMPS, for a symmetric sparse A (n, n).
 
-    `negative` is the number of eigenvalues of A below sigma (Sylvester's law of inertia); `singular`
-    tells that sigma is an eigenvalue to rounding, so that the inverse must not be used.
+    Each process of the `team` has its own rows of A. `negative` is the number of eigenvalues of A
+    below sigma (Sylvester's law of inertia). `singular` says that sigma is an eigenvalue to
+    rounding, so that the inverse must not be used. Raises ConvergenceError if the factorisation
+    fails. Collective in the team.
     """
 
     def __init__(self, matrix: sparse.csr_matrix, shift: float, team: Team = ALONE) -> None:
@@ -32,9 +33,9 @@ class Shifted:
         self._pc.setFactorSolverType("mumps")
         self._pc.setFactorSetUpSolverType()
         self._factor = self._pc.getFactorMatrix()
-        # Null pivots are found, or MUMPS counts a zero pivot by the sign of its rounding.
+        # Without null pivot detection MUMPS counts a zero pivot by the sign of its rounding.
         self._factor.setMumpsIcntl(24, 1)
-        if not team.alone:  # the last block on one process: MUMPS counts its inertia there only
+        if not team.alone:  # last block on one process: MUMPS counts its inertia only there
             self._factor.setMumpsIcntl(13, 1)
         self._pc.setUp()
         self.negative, null, positive = self._factor.getInertia()
@@ -48,7 +49,10 @@ class Shifted:
         shifted.destroy()
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """(A - sigma I)^-1 right for own rows (rows, p) of a block: many columns at once cost a fifth of one by one."""
+        """(A - sigma I)^-1 right, own rows (rows, p).
+
+        A block of many columns costs a fifth of solving one by one.
+        """
         sizes, comm = ((self.rows, self.size), (PETSc.DECIDE, right.shape[1])), self.team.comm
         block = PETSc.Mat().createDense(sizes, array=np.asfortranarray(right), comm=comm)
         empty = np.empty(right.shape, order="F")
@@ -61,7 +65,7 @@ class Shifted:
         return out
 
     def destroy(self) -> None:
-        """Free the factor, the largest memory of the eigensolver: petsc4py does not when it goes."""
+        """Free the factor, the eigensolver's largest memory, which petsc4py does not."""
         self._factor.destroy()
         self._pc.destroy()
 

@@ -2,10 +2,10 @@
 
     (A - sigma I)^-1 v = theta v,   lambda = sigma + 1 / theta
 
-The largest |theta| belong to the eigenvalues nearest to the shift (modal.solver.lanczos). How many
-eigenvalues the interval holds is known from inertia before. A block sees as many directions of a repeated
-eigenvalue as it has vectors, so the search goes on with what was found deflated until the count is met,
-and never ends earlier.
+The largest |theta| belong to the eigenvalues nearest to the shift (modal.solver.lanczos). The
+number of eigenvalues in the interval is known beforehand from inertia. A block finds as many
+directions of a repeated eigenvalue as it has vectors, so the search continues with the found ones
+deflated until the count is met, and never ends earlier.
 """
 
 from __future__ import annotations
@@ -21,15 +21,14 @@ from tireroad.modal.solver.lanczos import nearest
 from tireroad.modal.solver.shifted import Shifted
 from tireroad.modal.solver.team import ALONE, Team
 
-# Residual of a Ritz pair relative to theta: as small as vectors of neighbouring slices must be
+# Residual of a Ritz pair relative to theta: as small as the vectors of neighbouring slices must be
 # orthogonal to each other, a few digits above rounding.
 _TOLERANCE = 1e-12
-_SEARCHES = (
-    40  # with what was found deflated: a block of each repeated eigenvalue at least every time
-)
+# With deflation: each search finds at least a block of each repeated eigenvalue.
+_SEARCHES = 40
 _SOFT = 1e-3  # of the matrix norm: noise of a hundred roundings is 1e-11 of an eigenvalue there
 _DENSE = 200  # unknowns below which LAPACK takes no longer than one factorisation and its overhead
-_MANY = 0.25  # share of all eigenvalues from which LAPACK takes no longer
+_MANY = 0.25  # share of all eigenvalues from which on LAPACK takes no longer
 _LARGEST_DENSE = 3000
 
 
@@ -45,11 +44,11 @@ class Interval:
 def eigenpairs(
     matrix: sparse.csr_matrix, interval: Interval, team: Team = ALONE
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The `count` eigenvalues inside, ascending, and their orthonormal vectors (n, count), of the matrix and of them
-    the rows of this process in the `team`. Collective there.
+    """The `count` eigenvalues in the interval, ascending, and orthonormal vectors (n, count).
 
-    Small matrices and those of which most is wanted are solved densely. Raises ConvergenceError when
-    fewer are found than inertia counts.
+    Of the matrix and of the vectors, each process of the `team` has its rows. Small matrices, and
+    those of which most eigenvalues are wanted, are solved densely. Raises ConvergenceError if the
+    number found differs from the inertia count. Collective in the team.
     """
     rows, size = matrix.shape
     if interval.count == 0:
@@ -81,7 +80,7 @@ def _check_count(found: int, interval: Interval) -> None:
 
 
 def _search(shifted: Shifted, interval: Interval) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenpairs inside the interval, in no order, as many as there are or as are found."""
+    """Eigenpairs inside the interval, unordered: all of them, or those found in `_SEARCHES`."""
     values, vectors = np.zeros(0), np.zeros((shifted.rows, 0))
     for _ in range(_SEARCHES):
         missing = interval.count - len(values)
@@ -97,8 +96,9 @@ def _polish(
 ) -> None:
     """One step of inverse iteration, in place, where rounding would show in the residual.
 
-    A Krylov basis carries noise in the stiffest directions, which the matrix multiplies by up to 1e7
-    times the lowest eigenvalue: low modes are good in the inverse norm and not in the residual's.
+    A Krylov basis carries noise in the stiffest directions, which the matrix multiplies by up to
+    1e7 times the lowest eigenvalue: low modes are accurate in the inverse norm but not in the
+    residual.
     """
     norm = shifted.team.comm.allreduce(float(abs(matrix).sum(axis=1).max()), MPI.MAX)
     soft = np.flatnonzero(values < _SOFT * norm)
@@ -114,7 +114,7 @@ def _hertz(square: float) -> float:
 
 
 def _regular_shift(matrix: sparse.csr_matrix, interval: Interval, team: Team) -> Shifted:
-    """Factorised at a shift at the middle, moved a little while it is an eigenvalue itself."""
+    """Factorised at a shift near the middle that is no eigenvalue; else ConvergenceError."""
     width = interval.high - interval.low
     for part in (0.5, 0.507, 0.489, 0.523):
         shift = interval.low + part * width

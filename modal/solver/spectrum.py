@@ -1,9 +1,9 @@
-"""The lowest eigenvalues of independent symmetric matrices, sliced by inertia over teams of processes.
+"""The lowest eigenvalues of independent symmetric matrices: spectrum slicing by teams of processes.
 
-Every team holds all the matrices and solves slices by itself: no communication between teams inside a solve,
-results that do not depend on their number, and cost proportional to the slices' number. Memory of a team, spread
-over its processes by rows: the matrices (together as many entries as the whole one), one factor and the
-Krylov basis of one slice at a time, and the vectors of the slices it solved.
+Every team has all the matrices and solves slices by itself: no communication between teams inside a
+solve, results independent of their number, cost proportional to the number of slices. Memory of a
+team, distributed over its processes by rows: the matrices (together as many entries as the whole
+one), one factor and one Krylov basis at a time, and the vectors of the slices that it has solved.
 """
 
 from __future__ import annotations
@@ -24,18 +24,16 @@ from tireroad.modal.solver.slices import Interval, eigenpairs
 from tireroad.modal.solver.team import Team
 
 ZERO = 1e-12  # of the matrix norm: eigenvalues nearer to zero are rigid modes, rounding is 1e-16
-_SLICE = (
-    64,
-    160,
-)  # eigenvalues a slice and matrix, at least where teams wait for work, and at most: the basis stays small
+# Eigenvalues per slice and matrix: fewest, where teams wait for work, and most, to limit the basis.
+_SLICE = 64, 160
 _PROBES = 8
 _FINEST = 1e-9  # relative width below which a crowded interval counts as one cluster
-_CROWDED = 1.6  # times the wanted number in a step: then a boundary below costs less
+_CROWDED = 1.6  # times the wanted number in a step: above, a boundary in between costs less
 
 
 class Part(Protocol):
-    """An independent part of a symmetric problem: own rows in the team of its sparse `matrix` (d, d), each of whose
-    eigenvalues stands for `copies` equal ones of the whole.
+    """A part of a symmetric problem: own rows in the team of a sparse `matrix` (d, d), each
+    eigenvalue of which stands for `copies` equal ones of the whole.
     """
 
     @property
@@ -44,14 +42,14 @@ class Part(Protocol):
     def copies(self) -> int: ...
 
     def fields(self, vectors: np.ndarray) -> np.ndarray:
-        """Orthonormal fields (n, k copies) of the whole, from vectors (d, k) of the part."""
+        """Orthonormal fields (n, k copies) of the whole from vectors (d, k) of the part."""
         ...
 
 
 @dataclass(frozen=True)
 class Slice:
-    """One interval of one part, and its answer: `values` (k,), each as often as the part has copies,
-    and own rows of the part's `vectors` (d, k / copies), in the team whose first process is `owner`.
+    """Eigenpairs of one part in one interval: `values` (k,), repeated for the part's copies, and
+    own rows of its `vectors` (d, k / copies), None but in the team whose first process is `owner`.
     """
 
     part: int
@@ -63,7 +61,9 @@ class Slice:
 
 @dataclass(frozen=True)
 class Bottom:
-    """Below -`zero` lie `negative` eigenvalues of all parts; `near` (k,) estimates next to zero, ascending."""
+    """`negative` eigenvalues of all parts lie below -`zero`; `near` (k,) estimates those next to
+    zero, ascending.
+    """
 
     zero: float
     negative: int
@@ -82,8 +82,9 @@ class Bottom:
 
 
 class Spectrum:
-    """Independent parts of a symmetric problem, the same in all teams of the processes of `comm`; no eigenvalue is
-    larger than `norm`. The `journal` has what was found of them before."""
+    """Independent parts of a symmetric problem, the same in all teams of the processes of `comm`;
+    no eigenvalue is larger than `norm`. The `journal` holds earlier results.
+    """
 
     def __init__(
         self,
@@ -98,7 +99,7 @@ class Spectrum:
         self.bound = 1.001 * norm
 
     def _shared(self, work: Callable[[Part], np.ndarray | int]) -> list[np.ndarray]:
-        """What is computed of each part, on every process, each by one team. Collective."""
+        """Results for each part, computed by one team and shared with every process. Collective."""
         roots = self.team.roots
         own = range(self.team.number, len(self.parts), len(roots))
         entry = self._journal.step(
@@ -108,7 +109,7 @@ class Spectrum:
         return [everyone[roots[k % len(roots)]][k] for k in range(len(self.parts))]
 
     def bottom(self) -> Bottom:
-        """Negative eigenvalues by inertia, and rough values of the lowest. Collective."""
+        """Negative eigenvalues by inertia, and estimates of the lowest. Collective."""
         zero = ZERO * self.bound
 
         def work(part: Part) -> np.ndarray:
@@ -123,7 +124,7 @@ class Spectrum:
         return Bottom(zero, negative, np.sort(np.concatenate([one[:-1] for one in found])))
 
     def below(self, shift: float) -> np.ndarray:
-        """Eigenvalues below the shift, (parts,), copies counted, by inertia. Collective."""
+        """Inertia counts (parts,) below the shift, copies included. Collective."""
 
         def work(part: Part) -> int:
             shifted = Shifted(part.matrix, shift, self.team)
@@ -138,28 +139,29 @@ class Spectrum:
     ) -> list[tuple[float, np.ndarray]]:
         """(value, eigenvalues below it in each part), ascending, in steps of about one slice.
 
-        From zero up to the first value with `count` eigenvalues below, or to `limit`, if that is less.
-        Collective.
+        From zero to the first value with `count` eigenvalues below, or to `limit`, if that is
+        lower. Collective.
         """
         limit = min(limit, self.bound)
         done = [(-bottom.zero, np.zeros(len(self.parts), int))]
-        # Two factorisations a slice: as few slices as leave none of the teams without.
+        # A slice costs two factorisations: make no more than keep all teams busy.
         rounds = -(-len(self.team.roots) // len(self.parts))
         each = count / (len(self.parts) * rounds) if rounds > 1 else np.inf
         largest = float(np.clip(each, *_SLICE)) * len(self.parts)
-        # The density of modes in frequency changes slowly: the last slice tells the next one's width.
+        # The modal density in frequency changes slowly: the last slice predicts the next one's
+        # width.
         density = len(bottom.near) / np.sqrt(np.abs(bottom.near).max())
-        ceiling = None  # a value with too many below: the next boundary lies under it
+        ceiling = None  # a value with too many eigenvalues below; the next boundary lies under it
         while True:
             low, known = done[-1]
             remaining = count - known.sum()
             if remaining <= 0 or low >= limit:
                 return merged(done, largest)
-            # Two per cent and two more: a little too far costs less than one step more.
+            # Two per cent and two more: a little too far costs less than another step.
             goal = min(1.02 * remaining + 2, largest)
             trial = onward(max(low, 0.0), goal / density)
             if len(done) == 1 and 2 * goal < len(bottom.near):
-                # Estimates by Ritz values lie above: at least so many eigenvalues lie below.
+                # Ritz values are upper bounds: at least this many eigenvalues lie below.
                 trial = max(bottom.near[int(goal)], 2 * bottom.zero)
             trial = min(trial, limit)
             if ceiling and trial >= ceiling[0]:
@@ -170,13 +172,13 @@ class Spectrum:
                 ceiling = (trial, below.sum())
                 continue
             rise = np.sqrt(trial) - np.sqrt(max(low, 0.0))
-            # No eigenvalue in the step: step wider, twice each time.
+            # If the step has no eigenvalue, double it each time.
             density = max(new, 0.5 * goal * (new == 0)) / rise if rise else density
             done.append((trial, below))
             ceiling = None
 
     def _found(self, part: int, interval: Interval) -> tuple[np.ndarray, np.ndarray]:
-        """`slices.eigenpairs` of a part, or what the journal has of them. Collective in the team."""
+        """`slices.eigenpairs` of a part, or the journal's copy of them. Collective in the team."""
 
         def solve() -> Entry:
             values, vectors = eigenpairs(self.parts[part].matrix, interval, self.team)
@@ -221,7 +223,7 @@ class Spectrum:
 
 
 def _near(shifted: Shifted) -> np.ndarray:
-    """Rough eigenvalues nearest to the shift, relative to it, by three steps of inverse iteration."""
+    """Rough eigenvalues nearest to the shift, less the shift: three steps of subspace iteration."""
     width, team = min(_PROBES, shifted.size), shifted.team
     basis = team.orthonormal(team.random(3).standard_normal((shifted.rows, width)))[0]
     for _ in range(3):
@@ -233,7 +235,7 @@ def _near(shifted: Shifted) -> np.ndarray:
 
 
 def _owners(counts: list[int], teams: int) -> list[int]:
-    """The team of each task: the largest first, each to the one with least to do."""
+    """The team of each task: the largest first, each to the team with the least load."""
     load, owners = np.zeros(teams), [0] * len(counts)
     for task in sorted(range(len(counts)), key=lambda k: -counts[k]):
         owners[task] = int(np.argmin(load))

@@ -1,13 +1,13 @@
-"""Symmetries of a tire: found from its nodes, verified on its matrix, and used to split the problem.
+"""Symmetries of a tire: found from its nodes, verified on its matrix, used to split the problem.
 
-An isometry R of order two (move the nodes, change the signs of components) with R A R = A leaves the
-symmetric and the antisymmetric fields to themselves: two problems of half the size. Two mirrors make
-four. Belts at +-alpha at different depths take away both mirrors of a loaded tire at rest and leave
-their product, the half turn about the vertical.
+An isometry R of order two (it moves nodes and changes signs of components) with R A R = A decouples
+symmetric from antisymmetric fields: two problems of half the size, or four with two mirrors. Belts
+at +-alpha at different depths break both mirrors of a loaded tire at rest and leave their product,
+the half turn about the vertical.
 
-The parts are Q^T A Q. What couples them is rounding of A, whose entries are symmetric to some 1e-13 of the
-largest. An eigenvalue is off by |R A R - A| / 2 at most; the residual on A itself, twice the relative error
-of a frequency at most, is measured.
+The parts are Q^T A Q. What couples them is rounding of A, whose entries are symmetric to about
+1e-13 of the largest. It changes an eigenvalue by at most |R A R - A| / 2. The residual on A itself,
+a bound on twice the relative error of a frequency, is measured.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from tireroad.fem.collective import joined
 from tireroad.modal.solver.distributed import congruent, largest_entry, less, row_sum, rows_of
 from tireroad.modal.solver.team import Team
 
-# Largest entry of R A R - A relative to that of A: a symmetric state converges to about 1e-13; a road
-# load, a slope of the footprint or another mesh on one side gives 1e-6 and more.
+# Largest entry of R A R - A relative to that of A. A symmetric state converges to about 1e-13; a
+# road load, a slope of the footprint or a different mesh on one side gives 1e-6 and more.
 TOLERANCE = 1e-11
-_NEAR = 1e-6  # of the body's size: nodes are each other's images
+_NEAR = 1e-6  # of the body's size: distance within which nodes are images of each other
 
 
 @dataclass(frozen=True)
 class Isometry:
-    """(x, y, z) -> flip (x, y, z), its own inverse."""
+    """The map (x, y, z) -> flip (x, y, z), its own inverse."""
 
     name: str
     flip: tuple[float, float, float]
 
     def sign(self, component: int) -> float:
-        """Of the image of a motion (0, 1, 2) or of a rotation (3, 4, 5), which a mirror turns round."""
+        """Sign of the image of a displacement (0-2) or a rotation (3-5), which mirrors reverse."""
         if component < 3:
             return self.flip[component]
         return self.flip[component - 3] * float(np.prod(self.flip))
@@ -51,8 +51,10 @@ HALF_TURN = Isometry("half turn about z", (-1.0, -1.0, 1.0))
 
 @dataclass(frozen=True)
 class Sites:
-    """Where unknowns sit: `place` (n, 3) m, undeformed, and `component` (n,): 0, 1, 2 motion along x, y, z,
-    3, 4, 5 rotation about them.
+    """The positions of the unknowns.
+
+    `place` (n, 3) m, undeformed; `component` (n,): 0, 1, 2 for displacements along x, y, z and 3,
+    4, 5 for rotations about them.
     """
 
     place: np.ndarray
@@ -60,16 +62,17 @@ class Sites:
 
     @staticmethod
     def of_nodes(points: np.ndarray) -> Sites:
-        """Three unknowns at each of the points (k, 3)."""
+        """Three displacements at each of the points (k, 3)."""
         return Sites(np.repeat(points, 3, axis=0), np.tile(np.arange(3), len(points)))
 
     def everywhere(self, comm: MPI.Comm) -> Sites:
-        """Those of all processes, one after the other. Collective."""
+        """The sites of all processes, concatenated. Collective."""
         return Sites(*(joined(comm, part) for part in vars(self).values()))
 
     def rank(self) -> np.ndarray:
-        """(n,) the place of each unknown in an order by position, lowest points first, then component:
-        the same for the same tire on any number of processes.
+        """(n,) rank of each unknown, ordered by position, lowest points first, then by component.
+
+        It is the same for the same tire on any number of processes.
         """
         x, y, z = self.place.T
         order = np.lexsort((self.component, x, y, z))
@@ -80,20 +83,23 @@ class Sites:
 
 @dataclass(frozen=True)
 class Sector:
-    """The fields `basis` (n, d), an isometry, that a group of symmetries leaves to themselves, and own rows in the
-    team of A on them."""
+    """An invariant subspace of a group of symmetries.
+
+    `basis` (n, d) is an isometry onto its fields; `matrix` has this process's rows, in its team, of
+    A on them.
+    """
 
     basis: sparse.csr_matrix
     matrix: sparse.csr_matrix
     copies: int = 1
 
     def fields(self, vectors: np.ndarray) -> np.ndarray:
-        """(n, k) from vectors (d, k)."""
+        """Fields (n, k) from vectors (d, k)."""
         return self.basis @ vectors
 
 
 def whole(matrix: PETSc.Mat, team: Team) -> Sector:
-    """The problem as one part. Collective."""
+    """The undivided problem. Collective."""
     size = matrix.getSize()[0]
     return Sector(sparse.identity(size, format="csr"), _own_rows(matrix, team))
 
@@ -105,8 +111,10 @@ def _own_rows(matrix: PETSc.Mat, team: Team) -> sparse.csr_matrix:
 
 @dataclass(frozen=True)
 class Symmetry:
-    """An isometry that a matrix A has: its signed permutation `image` R (n, n), and `defect`, the norm of
-    R A R - A: what rounding, or a slight asymmetry, has left in A, in the units of its eigenvalues.
+    """An isometry that leaves a matrix A unchanged.
+
+    `image` is its signed permutation R (n, n); `defect` the norm of R A R - A, in the units of the
+    eigenvalues: the rounding or slight asymmetry of A.
     """
 
     isometry: Isometry
@@ -115,9 +123,11 @@ class Symmetry:
 
 
 def symmetries(matrix: PETSc.Mat, sites: Sites) -> list[Symmetry]:
-    """Independent symmetries of the matrix (n, n), with the `sites` of all its unknowns. Collective.
+    """Independent symmetries of the matrix (n, n), with the `sites` of all its unknowns.
+    Collective.
 
-    The two mirrors first; the half turn is their product, so it is tried where there is neither.
+    The two mirrors are tried first. The half turn is their product, so it is tried only where there
+    is neither.
     """
     found = [_found(matrix, sites, isometry) for isometry in (MIRROR_Y, MIRROR_X)]
     if not any(found):
@@ -138,8 +148,9 @@ def _found(matrix: PETSc.Mat, sites: Sites, isometry: Isometry) -> Symmetry | No
 
 
 def _may_commute(matrix: PETSc.Mat, image: sparse.csr_matrix) -> bool:
-    """Whether R A R v - A v of a random v is as small as it is where no entry of R A R - A is above the TOLERANCE: a hundredth
-    of the cost of R A R. Collective.
+    """Whether R A R v - A v of a random v is as small as `TOLERANCE` on all entries would make it.
+
+    Costs a hundredth of R A R. Collective.
     """
     start, end = matrix.getOwnershipRange()
     comm, size = matrix.comm.tompi4py(), matrix.getSize()[0]
@@ -158,8 +169,10 @@ def _may_commute(matrix: PETSc.Mat, image: sparse.csr_matrix) -> bool:
 
 
 def sectors(matrix: PETSc.Mat, images: list[sparse.csr_matrix], team: Team) -> list[Sector]:
-    """The parts of a symmetric matrix that commuting signed permutations of order two leave; itself without any.
-    Collective."""
+    """The parts into which commuting signed permutations of order two split a symmetric matrix.
+
+    Without any it stays whole. Collective.
+    """
     bases = [sparse.identity(matrix.getSize()[0], format="csr")]
     for image in images:
         bases = [half for basis in bases for half in _halves(basis, image)]
@@ -174,7 +187,7 @@ def _sector(matrix: PETSc.Mat, basis: sparse.csr_matrix, team: Team) -> Sector:
 
 
 def _permutation(sites: Sites, isometry: Isometry) -> sparse.csr_matrix | None:
-    """The signed permutation that moves a field, or None when an unknown has no image."""
+    """The signed permutation that maps a field to its image; None if an unknown has no image."""
     size = len(sites.component)
     image, sign = np.empty(size, int), np.empty(size)
     near = _NEAR * np.abs(sites.place).max(initial=0.0)
@@ -192,7 +205,7 @@ def _permutation(sites: Sites, isometry: Isometry) -> sparse.csr_matrix | None:
 def _halves(basis: sparse.csr_matrix, image: sparse.csr_matrix) -> list[sparse.csr_matrix]:
     """The symmetric and the antisymmetric part of a space that the isometry maps onto itself."""
     size = basis.shape[1]
-    inner = (basis.T @ image @ basis).tocoo()  # again a signed permutation, beside rounded zeros
+    inner = (basis.T @ image @ basis).tocoo()  # a signed permutation again, besides rounded zeros
     real = np.abs(inner.data) > 0.5
     partner, sign = np.empty(size, int), np.empty(size)
     partner[inner.col[real]], sign[inner.col[real]] = inner.row[real], np.sign(inner.data[real])

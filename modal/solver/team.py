@@ -1,7 +1,8 @@
-"""Processes that factorise one matrix together: a team holds a part's rows, its factor and its vectors spread.
+"""Teams of processes, each of which factorises one matrix together.
 
-As many teams work side by side as the memory there is holds factors: many small ones need no messages inside a
-solve, one of all processes holds the least on each.
+A team holds the rows of a part, its factor and its vectors distributed. As many teams work side by
+side as there is memory for factors: many small teams need no messages inside a solve, a single team
+of all processes needs the least memory on each.
 """
 
 from __future__ import annotations
@@ -18,8 +19,11 @@ from tireroad.fem.collective import summed
 
 @dataclass(frozen=True)
 class Team:
-    """The processes `comm` of the own team, its `number`, and `roots`: the rank, among all processes, of the first
-    one of each team. Methods on arrays take and give this process's rows of them, and are collective in the team.
+    """The team of this process.
+
+    `comm`: its processes; `number`: its number; `roots`: the rank, among all processes, of the
+    first process of each team. Methods on arrays take and return this process's rows, and are
+    collective in the team.
     """
 
     comm: MPI.Comm
@@ -28,7 +32,10 @@ class Team:
 
     @classmethod
     def of(cls, comm: MPI.Comm, teams: int) -> Team:
-        """One of `teams` as large as each other. Collective over all of `comm`."""
+        """The team of this process when all are divided into `teams` of about equal size.
+
+        Collective over all of `comm`.
+        """
         number = comm.rank * teams // comm.size
         roots = tuple(-(-k * comm.size // teams) for k in range(teams))
         own = MPI.COMM_SELF if teams == comm.size else comm.Split(number, comm.rank)
@@ -36,16 +43,16 @@ class Team:
 
     @property
     def alone(self) -> bool:
-        """Whether it is one process."""
+        """Whether the team is a single process."""
         return self.comm.size == 1
 
     def disband(self) -> None:
-        """Free its communicator, after all that uses it. Collective."""
+        """Free the communicator, once nothing uses it any more. Collective."""
         if not self.alone:
             self.comm.Free()
 
     def own(self, size: int) -> slice:
-        """Rows of this process, of `size` of the team: as PETSc spreads them."""
+        """This process's rows of `size` of the team, distributed as PETSc does."""
         each, more = divmod(size, self.comm.size)
         start = self.comm.rank * each + min(self.comm.rank, more)
         return slice(start, start + each + (self.comm.rank < more))
@@ -55,11 +62,11 @@ class Team:
         return summed(self.comm, left.T @ right)
 
     def lengths(self, vectors: np.ndarray) -> np.ndarray:
-        """Of each column."""
+        """Length of each column."""
         return np.sqrt(summed(self.comm, (vectors**2).sum(axis=0)))
 
     def orthonormal(self, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Q (rows, b) and R (b, b) of the vectors: of each process's rows, then of all their R."""
+        """Q (rows, b) and R (b, b) of the vectors: QR of each process's rows, then of all R."""
         q, r = np.linalg.qr(vectors)
         if self.alone:
             return q, r
@@ -69,11 +76,11 @@ class Team:
         return q @ turn[start : start + q.shape[1]], r
 
     def random(self, seed: int) -> np.random.Generator:
-        """Numbers that differ from process to process."""
+        """A generator whose numbers differ from process to process."""
         return np.random.default_rng(seed if self.alone else [seed, self.comm.rank])
 
     def whole(self, rows: sparse.csr_matrix) -> sparse.csr_matrix:
-        """A small matrix on every process of the team, from its rows."""
+        """A small matrix, whole on every process of the team, from its rows."""
         return rows if self.alone else sparse.vstack(self.comm.allgather(rows), format="csr")
 
     def at_root(self, rows: np.ndarray) -> np.ndarray | None:
@@ -93,8 +100,10 @@ ALONE = Team(MPI.COMM_SELF, 0, (0,))
 
 
 def how_many(comm: MPI.Comm, needed: float, room: float) -> int:
-    """Teams of a part that takes `needed` bytes, where the machine of this process has `room` for all its own: as
-    many as fit, one at least. The same on every process. Collective.
+    """Number of teams for a part that takes `needed` bytes, the same on every process. Collective.
+
+    `room`: bytes that this process's machine has for all its processes. As many teams as fit, at
+    least one.
     """
     machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
     share = room / machine.size

@@ -1,10 +1,10 @@
-"""The first eigenproblem: K Phi = M Phi Lambda, Phi^T M Phi = I, with none of the lowest missing.
+"""The first eigenproblem: K Phi = M Phi Lambda, Phi^T M Phi = I, complete from the lowest mode up.
 
-The diagonal mass makes it the standard problem of A = M^-1/2 K M^-1/2, which symmetries split: equal
-segments by wave number (circulant), or else mirror planes or a half turn (symmetry). The
-inertia of each part, L D L^T by MUMPS, says how many eigenvalues lie below a value and so where to slice
-(spectrum); block Lanczos extracts the eigenpairs of each slice (slices, lanczos). Residuals and orthonormality
-are then measured on A itself.
+The diagonal mass makes it the standard problem of A = M^-1/2 K M^-1/2, which symmetries split:
+equal segments by wave number (circulant), otherwise mirror planes or a half turn (symmetry). The
+inertia of each part, from L D L^T by MUMPS, counts the eigenvalues below a value and so determines
+the slices (spectrum). Block Lanczos extracts the eigenpairs of each slice (slices, lanczos).
+Residuals and orthonormality are then measured on A itself.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ from tireroad.modal.solver.symmetry import Sites, sectors, symmetries, whole
 from tireroad.modal.solver.team import Team
 
 RESIDUAL_TOLERANCE = 1e-8  # relative, per eigenpair
-MOST = 1e-6  # where rounding alone is more than the tolerance
+MOST = 1e-6  # where rounding alone exceeds the tolerance
 ORTHONORMALITY_TOLERANCE = 1e-10
-_SAME = 1e-10  # relative distance of equal eigenvalues, where rounding is not more
+_SAME = 1e-10  # relative distance of equal eigenvalues, where rounding is no larger
 
 
 @dataclass(frozen=True)
 class _Split:
-    """Independent `parts` of the problem, what made them, and what A lacks to be so split, 1/s2."""
+    """Independent `parts` of the problem, their origin, and the `defect` of A's symmetry, 1/s2."""
 
     parts: list[Part]
     defect: float = 0.0
@@ -52,7 +52,7 @@ class _Split:
 
 @dataclass(frozen=True)
 class _Proof:
-    """What inertia says: next to zero, and how many eigenvalues lie below `top`."""
+    """What inertia proves: the eigenvalues next to zero, and how many lie below `top`."""
 
     bottom: Bottom
     top: float
@@ -70,14 +70,14 @@ def solve(
     teams: int | None = None,
     journal: Journal | None = None,
 ) -> Modes:
-    """The `count` lowest modes, or all below `up_to` (Hz), of a stiffness (n, n) in N/m and a diagonal
-    mass (own rows) in kg; at least one of the two is given.
+    """The `count` lowest modes, or all below `up_to` (Hz); at least one of the two is given.
 
-    Symmetries are looked for with the `sites` of own unknowns, equal segments unless `waves` is False. A
-    split whose modes are no modes of A is given up for the next. The processes work in `teams`, each of which holds
-    A spread over its own, by default each process in its own (modal.solver.team). What the `journal` has of counts and
-    slices is not computed again.
-    Raises ConvergenceError when a mode is missing, inaccurate or unstable. Collective.
+    The stiffness (n, n) is in N/m, the diagonal mass (own rows) in kg. Symmetries are sought at the
+    `sites` of own unknowns, equal segments unless `waves` is False. A split whose modes are not
+    modes of A is discarded for the next. The processes work in `teams`, each of which distributes A
+    over its members; by default each process is its own (modal.solver.team). Counts and slices that
+    the `journal` holds are not computed again. Raises ConvergenceError if a mode is missing,
+    inaccurate or unstable. Collective.
     """
     comm = stiffness.comm.tompi4py()
     size = stiffness.getSize()[0]
@@ -98,7 +98,7 @@ def solve(
 
 
 def _splits(matrix: PETSc.Mat, sites: Sites | None, waves: bool, team: Team) -> Iterator[_Split]:
-    """Ways to split the problem, the finest first, the last one not at all. Collective."""
+    """Ways to split the problem, the finest first, the undivided problem last. Collective."""
     if sites is not None:
         ring = repeated(matrix, sites) if waves else None
         if ring is not None:
@@ -113,8 +113,10 @@ def _splits(matrix: PETSc.Mat, sites: Sites | None, waves: bool, team: Team) -> 
 
 @dataclass(frozen=True)
 class _Problem:
-    """A distributed, the `team` of this process, the `norm` of A; own rows' `mass` kg and `rank` by position; the `journal`
-    of what is found."""
+    """A distributed, the `team` of this process and the `norm` of A.
+
+    Of own rows: `mass` kg and `rank` by position. `journal`: the results found so far.
+    """
 
     scaled: PETSc.Mat
     team: Team
@@ -128,7 +130,7 @@ class _Problem:
         return self.scaled.comm.tompi4py()
 
     def solve(self, split: _Split, count: int, limit: float) -> Modes:
-        """By slices of the parts. Collective."""
+        """Solve all slices of the parts. Collective."""
         spectrum = Spectrum(self.comm, split.parts, self.team, self.norm, self.journal)
         bottom = spectrum.bottom()
         bottom.check_stable()
@@ -142,12 +144,14 @@ class _Problem:
         return self._together(split, spectrum.slices(boundaries), min(count, proof.inertia), proof)
 
     def _together(self, split: _Split, found: list[Slice], count: int, proof: _Proof) -> Modes:
-        """The lowest `count` modes of all slices, orthonormal and by rule, with residuals. Collective."""
+        """The lowest `count` modes of all slices, orthonormal and by rule, with residuals.
+        Collective.
+        """
         parts, bottom = split.parts, proof.bottom
         values = np.concatenate([one.values for one in found])
         values[values <= bottom.zero] = 0.0
         order, group = ordered(values, _families(parts, found), self._same(values))
-        # A group is turned as a whole, also where the last mode cuts it.
+        # Rotate a group as a whole, even if the last mode divides it.
         end = int(np.searchsorted(group, group[count - 1], side="right"))
         order, group = order[:end], group[:end]
         vectors = collect(self.scaled, parts, found, order, self.team)
@@ -174,15 +178,16 @@ class _Problem:
         return max(_SAME, self._rounding(values))
 
     def _rounding(self, values: np.ndarray, defect: float = 0.0) -> float:
-        """Of A phi, relative to the lowest eigenvalue (measured: 0.05 to 1 times eps |A|), or of A itself where
-        a symmetry shows it; at most `MOST`.
+        """Rounding of A phi relative to the lowest eigenvalue (measured: 0.05 to 1 times eps |A|).
+
+        The `defect` of a symmetry counts where it is larger. At most `MOST`.
         """
         flexible = values[values > 0]
         stiff = np.finfo(float).eps * self.norm
         return min(max(stiff, defect) / flexible.min(), MOST) if len(flexible) else 0.0
 
     def _allowed(self, modes: Modes, defect: float) -> float:
-        """Largest residual. Near incompressibility rounding alone is 1e-8 of the softest mode."""
+        """Largest residual: near incompressibility rounding alone is 1e-8 of the softest mode."""
         return max(RESIDUAL_TOLERANCE, self._rounding(modes.squares, defect))
 
     def accurate(self, modes: Modes, defect: float) -> bool:
@@ -190,7 +195,7 @@ class _Problem:
         return bool(modes.residual.max(initial=0.0) <= self._allowed(modes, defect))
 
     def checked(self, modes: Modes, defect: float) -> Modes:
-        """The modes, or a ConvergenceError where they are not accurate."""
+        """The modes, if they are accurate and orthonormal; ConvergenceError otherwise."""
         if not self.accurate(modes, defect):
             raise ConvergenceError(
                 f"modes: worst relative residual {modes.residual.max():.1e}, allowed "
@@ -205,7 +210,7 @@ class _Problem:
         return modes
 
     def _residuals(self, squares: np.ndarray, vectors: np.ndarray, least: float) -> np.ndarray:
-        """(m,) relative; a rigid mode's by the first flexible one's eigenvalue `least`. Collective."""
+        """Relative residuals (m,); of rigid modes, to the eigenvalue `least`. Collective."""
         defects = np.empty(len(squares))
         root = np.sqrt(self.mass)[:, None]
         for start in range(0, len(squares), CHUNK):
@@ -218,7 +223,7 @@ class _Problem:
 
 
 def _families(parts: list[Part], found: list[Slice]) -> np.ndarray:
-    """(k,) a number for each eigenpair: of its part, and of a part's copies first or second."""
+    """(k,) a number for each eigenpair: of its part and, within it, of the copy."""
     most = max(part.copies for part in parts)
     numbers = [
         most * one.part + np.arange(len(one.values)) % parts[one.part].copies for one in found

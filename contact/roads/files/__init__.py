@@ -1,1 +1,1 @@
-"""Road heights in files: text, NumPy, HDF5 and OpenCRG, each read as data and checked before use."""
+"""Road heights in files: text, NumPy, HDF5 and OpenCRG, read as data and checked before use."""

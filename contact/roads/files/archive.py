@@ -1,4 +1,4 @@
-"""Arrays of numbers in NumPy's archives (.npz), read as data; sizes are checked before memory is taken."""
+"""Arrays of numbers in NumPy archives (.npz), read as data; sizes are checked before allocation."""
 
 import zipfile
 import zlib
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# What the standard library, numpy and h5py raise for damaged files; NotImplementedError and
+# Exceptions of the standard library, numpy and h5py for damaged files; NotImplementedError and
 # RuntimeError are zipfile's for damaged version numbers and flags, KeyError is h5py's.
 UNREADABLE = (
     OSError,
@@ -23,7 +23,7 @@ UNREADABLE = (
 
 
 class Header(NamedTuple):
-    """What stands before the numbers of an array in an archive."""
+    """The header of an array in an archive."""
 
     shape: tuple[int, ...]
     by_columns: bool
@@ -32,14 +32,14 @@ class Header(NamedTuple):
 
 
 def read_header(stream: IO[bytes], info: zipfile.ZipInfo, name: str) -> Header:
-    """ValueError where the header is none of numbers, or does not fit the size of the member."""
+    """The header of an array. ValueError if it has no numbers or does not fit the member's size."""
     version = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0
     if version != (1, 0):
         read = np.lib.format.read_array_header_2_0
     try:
         shape, by_columns, kind = read(stream)
-    # numpy parses it as Python text, and lets errors of the parser out.
+    # numpy parses it as Python text, and passes on any error of the parser.
     except Exception as problem:
         raise ValueError(f"the header of {name} is damaged: {problem}") from problem
     if kind.kind not in "iuf" or 0 in shape:
@@ -55,7 +55,10 @@ def read_header(stream: IO[bytes], info: zipfile.ZipInfo, name: str) -> Header:
 
 
 def read_numbers(archive: zipfile.ZipFile, name: str, most: int) -> Array:
-    """The whole array `name`, of at most `most` numbers. ValueError as in `read_header` and for more; UNREADABLE."""
+    """The whole array `name`. ValueError as in `read_header` or for more than `most` numbers.
+
+    Also raises the exceptions UNREADABLE.
+    """
     info = archive.getinfo(f"{name}.npy")
     if info.file_size > 8 * most + 20_000:
         raise ValueError(f"{name} has {info.file_size:,} bytes, more than {most:,} numbers")

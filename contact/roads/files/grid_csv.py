@@ -12,17 +12,17 @@ from tireroad.contact.roads.rows import ArrayRows, Rows, Spool, check_count
 from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
-Line = tuple[int, str]  # its number, and its text
+Line = tuple[int, str]  # line number and text
 
-BLOCK = 4096  # lines taken at a time, at most
-BLOCK_CHARACTERS = 32_000_000  # and characters
+BLOCK = 4096  # most lines per block
+BLOCK_CHARACTERS = 32_000_000  # most characters per block
 MAX_LINE = 16_000_000  # characters of a line: about a million heights across the road
 
 
 def read_csv(file: Path) -> tuple[Array, Array, Rows]:
-    """x (nx,), y (ny,) and z (nx, ny) of a text file, whose layout `grid_file.read_grid` describes.
+    """x (nx,), y (ny,) and z (nx, ny) of a text file in the layout given in `grid_file.read_grid`.
 
-    InputError with the line of what is wrong.
+    InputError names the line of an error.
     """
     try:
         with file.open(encoding="utf-8-sig") as stream:
@@ -53,11 +53,11 @@ def _blocks(lines: Iterator[Line]) -> Iterator[list[Line]]:
 
 
 def _csv_rows(file: Path, lines: Iterator[Line]) -> tuple[Array, Array, Rows]:
-    """From numbered lines of text, taken block by block."""
+    """x, y and z from numbered lines of text, block by block."""
     number, first = next(lines, (1, ""))
     header = [field.strip().lower() for field in first.split(",")]
     listed = header == ["x", "y", "z"]
-    # The corner's text is nobody's number: a zero takes its place.
+    # The text of the corner is ignored: a zero replaces it.
     _, _, rest = first.partition(",")
     axis = None if listed else _first_line(file, (number, f"0,{rest}"), len(header))
     positions, spool, count = [], Spool(f"road.file {file}"), 0
@@ -77,7 +77,7 @@ def _csv_rows(file: Path, lines: Iterator[Line]) -> tuple[Array, Array, Rows]:
 
 
 def _first_line(file: Path, line: Line, width: int) -> Array:
-    """The positions across of a matrix; says what the layout is where they do not ascend."""
+    """The positions across of a matrix. InputError explains the layout if they do not ascend."""
     axis = _numbers(file, [line], width)[0, 1:]
     if len(axis) > 1 and not np.all(np.diff(axis) > 0):
         raise InputError(
@@ -89,14 +89,14 @@ def _first_line(file: Path, line: Line, width: int) -> Array:
 
 
 def _numbers(file: Path, numbered: list[Line], width: int) -> Array:
-    """(lines, width) numbers; InputError with the line of the first field that is none."""
+    """(lines, width) numbers; InputError names the line of the first field that is not a number."""
     if all(line.count(",") == width - 1 for _, line in numbered):
         try:
             table = np.loadtxt(
                 [line for _, line in numbered], delimiter=",", comments=None, ndmin=2, dtype=float
             )
         except ValueError:
-            pass  # once more, slowly, for the line and the words
+            pass  # again, slowly, to find the line and the wording
         else:
             if table.shape == (len(numbered), width):
                 return table
@@ -115,7 +115,7 @@ def _numbers(file: Path, numbered: list[Line], width: int) -> Array:
 
 
 def _points(file: Path, table: Array) -> tuple[Array, Array, Array]:
-    """The grid of a list of points, which must hold every crossing of its x and y once."""
+    """The grid of a list of points, which must hold each combination of x and y exactly once."""
     if not np.all(np.isfinite(table[:, :2])):
         raise InputError(f"road.file {file}: x and y must be finite numbers")
     x, i = np.unique(table[:, 0], return_inverse=True)

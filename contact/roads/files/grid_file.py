@@ -23,21 +23,21 @@ def read_grid(
     length_unit: str | None = None,
     height_unit: str | None = None,
 ) -> Grid:
-    """The road of a grid file: x (nx,), y (ny,) and z (nx, ny), x in rolling direction, y to the left.
+    """The road of a grid file: x (nx,) in rolling direction, y (ny,) to the left, z (nx, ny).
 
     .npz: arrays x, y, z. .h5 or .hdf5: datasets x, y, z in the root. .csv: with a first line
-    `x,y,z`, one point a line, every point of the grid once, in any order; otherwise a matrix whose
-    first line holds an ignored corner and then all y, and whose further lines hold one x and its
-    heights. Lines starting with # are skipped; `nan` is a hole. InputError names file and place of
-    what is wrong.
+    `x,y,z`, one point per line, every point of the grid once, in any order; otherwise a matrix
+    whose first line holds an ignored corner and then all y, and whose further lines hold one x and
+    its heights. Lines starting with # are skipped; `nan` is a hole. InputError names the file and
+    the place of an error.
 
     `length_unit` is that of x and y, `height_unit` that of z (one of UNITS). None: metres, and the
-    sizes of the road must be plausible in metres (InputError), since a file in millimetres looks the
-    same. A height unit of None is the length unit where that is given.
+    sizes of the road must be plausible in metres (InputError), since a file in millimetres looks
+    the same. A height unit of None is the length unit where that is given.
 
-    Heights stay in the file, whose part under the tire is read when it is needed: .h5, and .npz as
-    numpy.savez writes it. A .csv matrix or a compressed .npz is converted once, at the start, to a
-    temporary file (contact.rows.Spool). Only a list of points is held in memory, 10 million at most.
+    Heights stay in the file, and the part under the tire is read when needed: for .h5, and for .npz
+    as written by numpy.savez. A .csv matrix or a compressed .npz is first converted to a temporary
+    file (contact.roads.rows.Spool). Only a list of points is kept in memory, at most 10 million.
     """
     reader = READERS.get(file.suffix.lower())
     if reader is None:
@@ -68,7 +68,7 @@ def read_grid(
 
 
 def _factors(length_unit: str | None, height_unit: str | None) -> tuple[float, float]:
-    """Metres in a unit of x and y, and of z."""
+    """Metres per unit of x and y, and of z. InputError for an unknown unit."""
     for key, unit in (("length_unit", length_unit), ("height_unit", height_unit)):
         if unit is not None and unit not in UNITS:
             raise InputError(f'road: {key} = "{unit}" is unknown: take one of {", ".join(UNITS)}')

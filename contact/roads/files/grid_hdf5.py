@@ -1,4 +1,4 @@
-"""Road heights in HDF5 files, whose datasets stay in their file until they are driven over."""
+"""Road heights in HDF5 files, whose datasets stay in their file until they are needed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tireroad.contact.roads.rows import Rows, check_count
 from tireroad.fem.errors import InputError
 
-if TYPE_CHECKING:  # imported where a file is read: to check a scene it is not needed
+if TYPE_CHECKING:  # imported where a file is read; checking a scene does not need it
     import h5py
 
 Array = NDArray[np.float64]
@@ -21,13 +21,13 @@ MAX_CHUNK = 256_000_000  # bytes: HDF5 unpacks a chunk as a whole
 
 
 class Hdf5Rows:
-    """A dataset, which stays in its file."""
+    """Rows of a dataset that stays in its file."""
 
     def __init__(self, dataset: h5py.Dataset) -> None:
         self._dataset, self.shape = dataset, dataset.shape
 
     def __reduce__(self) -> tuple[Callable[[str, str], Hdf5Rows], tuple[str, str]]:
-        """Another process opens the file once more."""
+        """Another process reopens the file."""
         return _opened, (self._dataset.file.filename, self._dataset.name)
 
     def read(self, i0: int, i1: int) -> Array:
@@ -44,10 +44,10 @@ def _opened(file: str, name: str) -> Hdf5Rows:
 def read_hdf5(file: Path) -> tuple[Array, Array, Rows]:
     """The datasets x (nx,), y (ny,) and z (nx, ny) in the root of the file.
 
-    Only data of this very file are read: links to other files, external and virtual datasets are
-    refused (InputError).
+    Only data of this file are read: links to other files, external and virtual datasets are refused
+    (InputError).
     """
-    import h5py  # only for the one format that needs it
+    import h5py  # needed for this format only
 
     store = h5py.File(file, "r")
     datasets = {}
@@ -72,7 +72,7 @@ def read_hdf5(file: Path) -> tuple[Array, Array, Rows]:
 
 
 def _check(file: Path, name: str, dataset: h5py.Dataset) -> None:
-    """Numbers, of a shape that fits, in this file, in chunks that fit into memory."""
+    """Require numbers of the right shape, in this file, in chunks that fit into memory."""
     if dataset.external or dataset.is_virtual:
         raise InputError(
             f"road.file {file}: the numbers of {name} are in another file; copy them into this one"

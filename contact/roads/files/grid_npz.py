@@ -1,4 +1,4 @@
-"""Road heights in NumPy's archives (.npz), read as data; sizes are checked before memory is taken."""
+"""Road heights in NumPy archives (.npz), read as data; sizes are checked before allocation."""
 
 import struct
 import zipfile
@@ -26,10 +26,10 @@ Array = NDArray[np.float64]
 
 
 def read_npz(file: Path) -> tuple[Array, Array, Rows]:
-    """The arrays x (nx,), y (ny,) and z (nx, ny) of an archive; z stays in the file where it can.
+    """The arrays x (nx,), y (ny,) and z (nx, ny) of an archive; z stays in the file if possible.
 
-    InputError for missing arrays, arrays without numbers, and headers that announce other sizes than
-    the archive holds.
+    InputError for missing arrays, arrays without numbers, and headers that announce other sizes
+    than the archive holds.
     """
     with zipfile.ZipFile(file) as archive:
         members = {member.filename for member in archive.infolist()}
@@ -45,7 +45,7 @@ def read_npz(file: Path) -> tuple[Array, Array, Rows]:
 
 
 def _rows(file: Path, archive: zipfile.ZipFile) -> Rows:
-    """z, left in the archive where it is not compressed; all of it passes by once, as a check."""
+    """z, left in the archive if it is not compressed; all of it is read once, as a check."""
     info = archive.getinfo("z.npy")
     with archive.open(info) as stream:
         header = read_header(stream, info, "z")
@@ -66,7 +66,7 @@ def _rows(file: Path, archive: zipfile.ZipFile) -> Rows:
 
 
 def _blocks(stream: IO[bytes], packed: Packed) -> Iterator[Array]:
-    """Blocks of rows in their order; beyond the last, the archive checks its sum."""
+    """Blocks of rows in their order; reading past the last lets the archive verify its checksum."""
     (count, width), size = packed.shape, packed.kind.itemsize
     most = max(PIECE // width, 1)
     for first in range(0, count, most):
@@ -79,7 +79,10 @@ def _blocks(stream: IO[bytes], packed: Packed) -> Iterator[Array]:
 
 
 def _stored(file: Path, info: zipfile.ZipInfo, packed: Packed) -> FileRows:
-    """Rows of an archive's member that is not compressed: its own header has two lengths at byte 26."""
+    """Rows of an uncompressed member of an archive.
+
+    Its local header has the lengths of two variable fields at byte 26.
+    """
     with file.open("rb") as stream:
         stream.seek(info.header_offset + 26)
         name, extra = struct.unpack("<HH", stream.read(4))

@@ -1,10 +1,10 @@
 """OpenCRG roads (curved regular grid, ASAM OpenCRG 1.2), text and binary, read as data.
 
 The tire follows the reference line: the height under it at the distance u along and v to the left
-of the line is the grid's z(u, v). The line's curvature is neglected within the patch: 0.12 m ahead
-of the axle a line of radius R has moved aside by 0.12^2/2R, below 0.4 mm for R >= 20 m, and lines
-of smaller radius are refused. Slope and banking of the line, modifiers and options that change
-heights are refused by name where they are not zero.
+of the line is the grid's z(u, v). The curvature of the line is neglected within the patch: 0.12 m
+ahead of the axle a line of radius R has an offset of 0.12^2/2R, below 0.4 mm for R >= 20 m; lines
+of smaller radius are refused. Slope and banking of the line, and modifiers and options that change
+heights, are refused by name unless they are zero.
 """
 
 import re
@@ -23,12 +23,12 @@ Array = NDArray[np.float64]
 Channel = tuple[int, str, str]  # line in the file, name, unit
 
 SMALLEST_RADIUS = 20.0
-# Steps (m) beyond it are damage, and would overflow further on.
+# Larger steps (m) are damage, and would overflow later.
 LONGEST_STEP = 1e6
 FORMATS = ("KRBI", "KDBI", "LRFI", "LDFI")
-# Options that say how to search, check and log: heights do not depend on them.
+# Options for searching, checking and logging, which do not affect heights.
 HARMLESS_OPTIONS = ("REFLINE_SEARCH_", "WARN_", "LOG_", "CHECK_")
-# Modifiers that only move the road in its plane.
+# Modifiers that only move the road within its plane.
 HARMLESS_MODIFIERS = (
     "REFPOINT_U", "REFPOINT_V", "REFPOINT_X", "REFPOINT_Y", "REFPOINT_PHI",
     "REFLINE_ROTCENTER_", "REFLINE_OFFSET_X", "REFLINE_OFFSET_Y", "REFLINE_OFFSET_PHI",
@@ -38,9 +38,9 @@ HARMLESS_MODIFIERS = (
 def read_opencrg(file: Path | str, holes: str = "refuse", end: str = "refuse") -> Grid:
     """The road of an OpenCRG file as a Grid: x = u from its beginning, y = v to the left, z in m.
 
-    Formats LRFI, LDFI, KRBI (also where none is named) and KDBI; long sections numbered or `at v
-    =`. `holes` and `end` as in Grid. InputError names file and line or byte of what is missing,
-    damaged or not supported.
+    Formats LRFI, LDFI, KRBI (also if none is named) and KDBI; long sections are numbered or given
+    `at v =`. `holes` and `end` as in Grid. InputError names the file, and the line or byte, of what
+    is missing, damaged or not supported.
     """
     file = Path(file)
     if not file.is_file():
@@ -65,7 +65,7 @@ def read_opencrg(file: Path | str, holes: str = "refuse", end: str = "refuse") -
 
 
 def _refuse_blocks(file: Path, blocks: Blocks) -> None:
-    """What would change the heights and is not honoured, by name."""
+    """InputError for what would change the heights and is not supported, by name."""
     for name in ("ROAD_CRG", "KD_DEFINITION"):
         if name not in blocks and "ROAD_CRG_FILE" not in blocks:
             raise InputError(f"{file}: no block ${name}: this is no OpenCRG file, or it is damaged")
@@ -104,7 +104,7 @@ def _definition(file: Path, blocks: Blocks) -> tuple[str, list[Channel]]:
 def _rows(
     file: Path, parameters: dict[str, float], definition: list[tuple[int, str]]
 ) -> tuple[float, int | None]:
-    """Step along the line (m), and the number of cross sections where the header gives an end."""
+    """Step along the line (m), and the number of cross sections if the header gives an end."""
     step = parameters.get("REFERENCE_LINE_INCREMENT")
     for number, text in definition:
         # The virtual channel repeats the step: U:reference line u,m,start,step
@@ -193,7 +193,7 @@ def _check_line(
     table: Rows,
     step: float,
 ) -> None:
-    """Refuse lines that slope, bank or turn too sharply for heights to be read at (u, v)."""
+    """Refuse lines whose slope, banking or curvature does not permit reading heights at (u, v)."""
     for letter, name in (("S", "slope"), ("B", "banking")):
         for key in (f"REFERENCE_LINE_START_{letter}", f"REFERENCE_LINE_END_{letter}"):
             if parameters.get(key, 0.0) != 0.0:
@@ -206,16 +206,17 @@ def _check_line(
         if name in ("reference line x", "reference line y"):
             raise InputError(f"{file}, line {line}: channel {name!r} is not supported")
     if lines:
-        # Each piece repeats a row: what turns or slopes between two rows is in one of them.
+        # Each piece repeats a row, so a turn or slope between two rows is within one of them.
         for first, rows in pieces(table, overlap=1):
             _check_rows(file, channels, rows, (first, step))
 
 
 def _check_rows(file: Path, channels: list[Channel], rows: Array, place: tuple[int, float]) -> None:
-    """Refuse slope, banking and sharp turns in some rows; `place`: the first row and the step (m)."""
+    """Refuse slope, banking and sharp turns in rows; `place`: first row and step (m)."""
     first, step = place
     for column, (line, name, _) in enumerate(channels):
-        # Slope and heading belong to the segment before a point: the road's first value is not used.
+        # Slope and heading belong to the segment before a point: the first value of the road is not
+        # used.
         values = rows[0 if first or name == "reference line banking" else 1 :, column]
         if name in ("reference line slope", "reference line banking"):
             if np.any(np.nan_to_num(values) != 0.0):
@@ -225,7 +226,7 @@ def _check_rows(file: Path, channels: list[Channel], rows: Array, place: tuple[i
 
 
 def _check_radius(file: Path, phi: Array, step: float, start: float) -> None:
-    """InputError where heading (rad) turns faster than the smallest radius allows; begins at `start`."""
+    """InputError if the heading (rad), from `start` (m) on, turns faster than permitted."""
     if np.isnan(phi).any():
         missing = int(np.isnan(phi).sum())
         raise InputError(f"{file}: reference line phi is missing at {missing} points")

@@ -1,4 +1,4 @@
-"""The clear-text header of an OpenCRG file: named blocks of lines, in front of the data."""
+"""The clear-text header of an OpenCRG file: named blocks of lines before the data."""
 
 import re
 from pathlib import Path
@@ -10,16 +10,16 @@ from tireroad.fem.errors import InputError
 # Line number and text, by the block's name in capitals.
 Blocks = dict[str, list[tuple[int, str]]]
 
-# Ten thousand channels of 72 bytes each fit; a binary file without separator is not read to its
-# end.
+# Room for ten thousand channels of 72 bytes each; a binary file without separator is not read to
+# its end.
 MAX_HEADER = 1_000_000
-MAX_BYTES = 1_000_000_000_000  # a typing error, not a road
+MAX_BYTES = 1_000_000_000_000  # larger: an error, not a road
 
 
 def read_header(file: Path) -> tuple[Blocks, int, int]:
     """Named blocks of (line number, text) without comments; byte and line where the data begin.
 
-    InputError when no line of $$$$ ends the header.
+    InputError if no line of $$$$ ends the header.
     """
     if file.stat().st_size > MAX_BYTES:
         raise InputError(f"{file}: larger than {MAX_BYTES:,} bytes; cut the road first")
@@ -44,7 +44,7 @@ def read_header(file: Path) -> tuple[Blocks, int, int]:
 
 
 def key_values(file: Path, lines: list[tuple[int, str]]) -> dict[str, float]:
-    """KEY = number of a block, keys in capitals. InputError with the line that is none."""
+    """KEY = number pairs of a block, keys in capitals. InputError names a line that is not one."""
     pairs = {}
     for number, text in lines:
         if not text:

@@ -13,14 +13,14 @@ from tireroad.fem.errors import InputError
 Array = NDArray[np.float64]
 
 RECORD = 80
-BLOCK = 4096  # rows of text taken at a time
+BLOCK = 4096  # rows of text read at a time
 
 
 class Payload(NamedTuple):
-    """Where a file's numbers are and how many.
+    """Position and size of a file's numbers.
 
-    Format code, byte and line where they begin, numbers a row, and the rows the header announces
-    (None if it does not).
+    Format code, byte and line where they begin, numbers per row, and the number of rows that the
+    header announces (None if it does not).
     """
 
     file: Path
@@ -34,7 +34,7 @@ class Payload(NamedTuple):
 def read_payload(payload: Payload) -> Rows:
     """Rows of numbers, NaN where missing. InputError names the place of damage.
 
-    Binary data stay in the file; text is converted once (contact.rows.Spool).
+    Binary data stay in the file; text is converted once (contact.roads.rows.Spool).
     """
     if payload.code in ("KRBI", "KDBI"):
         return _read_binary(payload)
@@ -42,7 +42,7 @@ def read_payload(payload: Payload) -> Rows:
 
 
 def _read_binary(payload: Payload) -> Rows:
-    """Big-endian numbers, packed without regard to rows; the last record is filled with NaN."""
+    """Big-endian numbers, packed across record boundaries; the last record is padded with NaN."""
     kind = np.dtype(">f4" if payload.code == "KRBI" else ">f8")
     size = payload.file.stat().st_size - payload.start
     whole = size - size % RECORD
@@ -50,7 +50,7 @@ def _read_binary(payload: Payload) -> Rows:
     if rows is None:
         rows = whole // row
     needed = -(-rows * row // RECORD) * RECORD
-    # A line's end may follow the last record.
+    # A line end may follow the last record.
     if size < rows * row or size - whole > 2 or (payload.rows is not None and whole > needed):
         raise InputError(
             f"{payload.file}: {size:,} bytes of data from byte {payload.start:,} on, "
@@ -63,7 +63,10 @@ def _read_binary(payload: Payload) -> Rows:
 
 
 def _without_padding(payload: Payload, kind: np.dtype, rows: int, whole: int) -> int:
-    """Rows without those of NaN that fill the last record: a cross section has one valid height."""
+    """Number of rows without the NaN rows that pad the last record.
+
+    A cross section has at least one valid height.
+    """
     row = payload.channels * kind.itemsize
     most = min(RECORD // row, rows)
     with payload.file.open("rb") as stream:
@@ -81,7 +84,7 @@ def _without_padding(payload: Payload, kind: np.dtype, rows: int, whole: int) ->
 
 
 def _read_text(payload: Payload) -> Rows:
-    """Fields of 10 (LRFI) or 20 (LDFI) characters; a row begins a new record (line)."""
+    """Fields of 10 (LRFI) or 20 (LDFI) characters; each row begins a new record (line)."""
     width = 10 if payload.code == "LRFI" else 20
     per_row = -(-payload.channels // (RECORD // width))
     count = _lines(payload)
@@ -105,7 +108,7 @@ def _read_text(payload: Payload) -> Rows:
 
 
 def _lines(payload: Payload) -> int:
-    """Lines of data, without the empty ones at the end."""
+    """Number of lines of data, without empty ones at the end."""
     with payload.file.open("rb") as stream:
         stream.seek(payload.start)
         last = 0
@@ -116,7 +119,7 @@ def _lines(payload: Payload) -> int:
 
 
 def _table(payload: Payload, lines: list[bytes], width: int, per_row: int) -> Array:
-    """Numbers (rows, channels) of some lines, the first of them the payload's."""
+    """Numbers (rows, channels) of some lines, the first of which is the payload's."""
     a_record = RECORD // width
     table = np.empty((len(lines) // per_row, payload.channels))
     for k in range(per_row):
@@ -133,7 +136,7 @@ def _fields(
     """(lines, count) numbers of fixed width; a field that starts with * is missing."""
     size = width * count
     for i, line in enumerate(lines):
-        # A last field may lose its trailing blanks, never all of itself.
+        # A last field may lack its trailing blanks, but not be absent.
         if len(line.rstrip()) > size or len(line.rstrip()) <= size - width:
             number = payload.line + offset + i * step
             raise InputError(

@@ -1,4 +1,4 @@
-"""A generated cobblestone road: rows of rounded blocks with joints, endless and repeatable."""
+"""A generated cobblestone road: rows of rounded blocks with joints, endless and reproducible."""
 
 import math
 
@@ -10,17 +10,17 @@ from tireroad.fem.parameters import ParameterError, flag, integer, number
 
 Array = NDArray[np.float64]
 
-# Blocks stand within three standard deviations, so that bounds exist.
+# Block heights stay within three standard deviations, so that bounds exist.
 SIGMAS = 3.0
 TAIL = 0.5 * math.erfc(SIGMAS / math.sqrt(2.0))
-# A prepared strip keeps its blocks' heights in a table up to this size (16 MB); beyond it they are
-# drawn again at every call, 89 instead of 35 us for 300 points.
+# A prepared strip tabulates its blocks' heights up to this number (16 MB); above, they are
+# generated again in every call, which takes 89 instead of 35 us for 300 points.
 TABLE_LIMIT = 2_000_000
 
 
 @road_kind("cobblestones", "rows of rounded stone blocks with joints, endless, random heights")
 class Cobblestones(Levelled):
-    """Sizes of the pavement; the blocks repeat every block and joint."""
+    """Sizes of the pavement, which repeats with the pitch of block plus joint."""
 
     block_length: float = number(
         0.14, "m", "length of a block along x; the pitch is joint_width more", least=1e-3, most=10
@@ -44,7 +44,7 @@ class Cobblestones(Levelled):
     seed: int = integer(0, "seed of the random generator", least=0, most=2**31 - 1)
 
     def validate(self) -> None:
-        """Joints narrower than blocks, edges that fit on them, blocks that stay above their joints."""
+        """Require joints narrower than blocks, edges that fit, blocks that stay above joints."""
         for side in ("block_length", "block_width"):
             size = getattr(self, side)
             if self.joint_width >= size:
@@ -70,12 +70,12 @@ class Cobblestones(Levelled):
 
 
 class Pavement:
-    """Tops of the blocks at z = 0 plus their scatter, joints down to z = -joint_depth.
+    """Block tops at z = 0 plus their scatter, joints down to z = -joint_depth.
 
-    With q the distance beyond the block's plateau (half size less the edge radius r): the edge
-    falls as a circle, r - sqrt(r^2 - q^2), over q < r, then as a half cosine to the joint's middle,
-    so that z is continuous everywhere, corners included. A block's height is a truncated normal
-    number drawn by a hash of (seed, row, column): the road has no ends and costs no memory.
+    With q the distance beyond the block's plateau (half size less the edge radius r), the edge
+    falls as a circle, r - sqrt(r^2 - q^2), over q < r, then as a half cosine to the middle of the
+    joint, so that z is continuous everywhere, corners included. A block's height is a truncated
+    normal number from a hash of (seed, row, column): the road is endless and takes no memory.
     """
 
     extent = ((-np.inf, np.inf), (-np.inf, np.inf))
@@ -125,7 +125,7 @@ class Pavement:
 
     def _draw(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> Array:
         """Truncated normal heights of the blocks, m, the same for the same (seed, row, column)."""
-        from scipy.special import ndtri  # a second of import that reading a scene does without
+        from scipy.special import ndtri  # a second of import, which reading a scene avoids
 
         key = np.full(row.shape, self._b.seed % 2**64, dtype=np.uint64)
         for index in (row, column):
@@ -135,15 +135,15 @@ class Pavement:
         return self._b.height_scatter * ndtri(TAIL + (1.0 - 2.0 * TAIL) * uniform)
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Bound of any strip, m: no block stands higher."""
+        """Upper bound of any strip, m."""
         return SIGMAS * self._b.height_scatter
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """The joints' bottom, m."""
+        """The bottom of the joints, m."""
         return -self._b.joint_depth
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Pavement":
-        """The same road with the strip's block heights in a table; valid in that strip (m)."""
+        """The same road with the strip's block heights in a table; valid only in that strip (m)."""
         px, py = self._pitch
         rows = np.arange(int(np.floor(x0 / px)) - 1, int(np.floor(x1 / px)) + 2)
         columns = np.arange(int(np.floor(y0 / py)) - 1, int(np.floor(y1 / py)) + 3)
@@ -156,7 +156,7 @@ class Pavement:
 
 
 def _mix(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """One step of splitmix64 (Steele, Lea, Flood 2014): a bit in changes half of the bits out."""
+    """One step of splitmix64 (Steele, Lea, Flood 2014): one bit in changes half of those out."""
     key = key + np.uint64(0x9E3779B97F4A7C15)
     key = (key ^ (key >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     key = (key ^ (key >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)

@@ -13,9 +13,9 @@ Array = NDArray[np.float64]
 # Geometric mean of G_d(n0), m^3, at n0 = 0.1 cycles/m (ISO 8608, table C.1); G_d falls as n^-2.
 CLASSES = {name: 16e-6 * 4.0**k for k, name in enumerate("ABCDEFGH")}
 REFERENCE = 0.1
-LONGEST = 1.0 / 0.011  # m, the standard's range of wavelengths; the shortest is a key
+LONGEST = 1.0 / 0.011  # m, the standard's longest wavelength; the shortest is a parameter
 WAVES = 400
-CHUNK = 4096  # places of the profile made at once: 13 MB of waves at work, 33 kB kept
+CHUNK = 4096  # points of the profile generated at once: 13 MB of working memory, 33 kB kept
 KEPT = 8  # chunks
 
 
@@ -35,11 +35,11 @@ class Iso8608(Levelled):
 
 
 class Profile:
-    """z(x) = sum_k sqrt(2 G_d(n_k) dn_k) cos(2 pi n_k x + phase_k), n_k evenly spaced in log n.
+    """z(x) = sum_k sqrt(2 G_d(n_k) dn_k) cos(2 pi n_k x + phase_k), n_k in equal bands of log n.
 
-    G_d by road class, n up to 1/shortest wave, phases by seed. The profile is made in chunks
-    with 16 places a shortest wave and read by cubic interpolation (Catmull-Rom, error below 1 % of
-    that wave's amplitude): the memory does not grow with the way.
+    G_d by road class, n up to 1/shortest wave, phases by seed. The profile is generated in chunks
+    with 16 points per shortest wave and interpolated cubically (Catmull-Rom, error below 1 % of
+    that wave's amplitude), so memory does not grow with the distance.
     """
 
     extent = ((-np.inf, np.inf), (-np.inf, np.inf))
@@ -51,7 +51,7 @@ class Profile:
         density = CLASSES[spec.road_class] * (n / REFERENCE) ** -2
         self._amplitude = np.sqrt(2.0 * density * np.diff(edges))
         rng = np.random.default_rng(spec.seed)
-        # Each wave anywhere in its band: evenly spaced ones would repeat.
+        # A random position in its band for each wave: evenly spaced waves would repeat.
         n = edges[:-1] * (edges[1:] / edges[:-1]) ** rng.random(WAVES)
         self._wavenumber = 2.0 * np.pi * n
         self._phase = 2.0 * np.pi * rng.random(WAVES)
@@ -60,7 +60,7 @@ class Profile:
         self.spacing = 0.5 * shortest
 
     def height(self, x: Array, y: Array) -> Array:
-        """Heights (m) at x, m; y does not matter."""
+        """Heights (m) at x, m, for any y."""
         place = np.asarray(x, dtype=float) / self._pitch
         chunk = np.floor(place / CHUNK).astype(np.int64)
         if chunk.size and chunk.min() == chunk.max():
@@ -83,7 +83,7 @@ class Profile:
         )  # fmt: skip
 
     def _chunk(self, number: int) -> Array:
-        """Profile from one place before the chunk to two after it."""
+        """The profile from one point before the chunk to two after it."""
         if number not in self._chunks:
             if len(self._chunks) >= KEPT:
                 del self._chunks[next(iter(self._chunks))]
@@ -93,11 +93,11 @@ class Profile:
         return self._chunks[number]
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Highest place of the profile from x0 to x1, m, with what may hide between two."""
+        """Highest point of the profile from x0 to x1, m, plus a bound between two points."""
         return self._extreme(x0, x1, np.max)
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Lowest place of the profile from x0 to x1, m, with what may hide between two."""
+        """Lowest point of the profile from x0 to x1, m, less a bound between two points."""
         return -self._extreme(x0, x1, lambda z: np.max(-z))
 
     def _extreme(self, x0: float, x1: float, pick: Callable[[Array], float]) -> float:
@@ -107,9 +107,9 @@ class Profile:
             place = np.clip(np.array([x0, x1]) / self._pitch - index * CHUNK, 0, CHUNK)
             part = self._chunk(index)[int(place[0]) : int(place[1]) + 4]
             worst = max(worst, float(pick(part)))
-        # z'' p^2/8 of all waves at once bounds what a place between two can add.
+        # z'' p^2/8 of all waves together bounds the excess between two points.
         return worst + float(self._amplitude @ self._wavenumber**2) * self._pitch**2 / 8.0
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Profile":
-        """Nothing to prepare: chunks are made as they come."""
+        """Nothing to prepare: chunks are generated as needed."""
         return self

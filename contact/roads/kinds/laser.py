@@ -1,4 +1,4 @@
-"""A road along a line, as a laser measures it: cleaned openly, and widened to the tire."""
+"""A road measured along a line by a laser: cleaned, documented, and widened to the tire."""
 
 import math
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import ParameterError, choice, filename, integer, number
 
 Array = NDArray[np.float64]
-MOST_HEIGHTS = 20_000_000  # of a widened profile: 160 MB, and four times that on the way
-_EVEN = 0.02  # of a step: positions along must be that even
+MOST_HEIGHTS = 20_000_000  # of a widened profile: 160 MB, and four times that during its making
+_EVEN = 0.02  # of a step: tolerance of even positions
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class _Line:
 
 @road_kind("laser", "heights measured along one line by a laser, cleaned and widened to the tire")
 class LaserFile(Levelled):
-    """The file, how it is read, cleaned, and extended across."""
+    """The file and how it is read, cleaned, and extended across."""
 
     file: str | None = filename(
         "measured profile (.csv): one height per line, or x and a height; nan where it is missing"
@@ -64,17 +64,20 @@ class LaserFile(Levelled):
     )
 
     def validate(self) -> None:
-        """A file is named."""
+        """Require a file."""
         if self.file is None:
             raise ParameterError("file", 'is missing: name a measured line by file = "…"')
 
     @property
     def reads(self) -> Path:
-        """Where the file is."""
+        """Path of the file."""
         return Path(self.file or "")
 
     def make(self) -> Grid:
-        """The road; what was done to the measurement is in its `notes`. InputError where it cannot be used."""
+        """The road, with the processing of the measurement in its `notes`.
+
+        InputError if the measurement cannot be used.
+        """
         source = f"road.file {self.file}"
         line = self._read(self.reads, source)
         sound = cleaned(line.profile, line.pitch, self.outlier, self.longest_gap, source)
@@ -131,7 +134,7 @@ class LaserFile(Levelled):
         return _Line(profile, float(pitch))
 
     def _resampled(self, profile: Array, pitch: float, source: str) -> tuple[Array, float]:
-        """Without waves shorter than `shortest_wave` (ISO 16610-21), at a quarter of that."""
+        """Without waves shorter than `shortest_wave` (ISO 16610-21), sampled at a quarter of it."""
         from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
 
         from tireroad.contact.roads.levelling import DEVIATION
@@ -160,7 +163,7 @@ class LaserFile(Levelled):
 
 
 def _is_heading(line: str) -> bool:
-    """Whether a line's first field is no number."""
+    """Whether the first field of a line is not a number."""
     try:
         float(line.split(",")[0])
     except ValueError:

@@ -17,7 +17,7 @@ _LAYOUT = (
 
 @dataclass(frozen=True, kw_only=True)
 class Measured(Levelled):
-    """What roads in files have in common; `file` is required, `what` is what it holds."""
+    """Common parameters of roads in files; `file` is required, `what` names its content."""
 
     what = "the road"
 
@@ -29,16 +29,16 @@ class Measured(Levelled):
     end: str = choice(
         "refuse", ("refuse", "mirror"), "a run longer than the road: an error, or the road mirrored"
     )
-    file: str | None  # each kind of file has its own description of it
+    file: str | None  # each kind of file describes it differently
 
     @property
     def reads(self) -> Path:
-        """Where the file is."""
+        """Path of the file."""
         assert self.file is not None, "validate() asks for it"
         return Path(self.file)
 
     def validate(self) -> None:
-        """A file is named."""
+        """Require a file."""
         if self.file is None:
             raise ParameterError("file", f'is missing: name a file for {self.what} by file = "…"')
 
@@ -57,7 +57,7 @@ class GridFile(Measured):
     )
 
     def make(self) -> Grid:
-        """The road in the file; InputError where it cannot be used."""
+        """The road in the file; InputError if it cannot be used."""
         return read_grid(
             self.reads,
             holes=self.holes,
@@ -75,5 +75,5 @@ class CrgFile(Measured):
     file: str | None = filename("measured road in OpenCRG 1.1, text or binary")
 
     def make(self) -> Grid:
-        """The road in the file; InputError where it cannot be used."""
+        """The road in the file; InputError if it cannot be used."""
         return read_opencrg(self.reads, holes=self.holes, end=self.end)

@@ -1,4 +1,4 @@
-"""A step, or a cleat, on an otherwise flat road, square to the rolling direction or at an angle."""
+"""A step or a cleat on a flat road, perpendicular to the rolling direction or at an angle."""
 
 import math
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from tireroad.fem.parameters import ParameterError, number
 
 Array = NDArray[np.float64]
 
-SHARP = 1e-3  # m: what counts as the length of an edge without a ramp
+SHARP = 1e-3  # m: assumed length of an edge without a ramp
 
 
 @dataclass(frozen=True, kw_only=True)
 class Edges(RoadKind):
-    """What steps and cleats have in common."""
+    """Common parameters of steps and cleats."""
 
     position: float = number(
         0.3, "m", "x of the foot of the first edge on the road's middle line", least=-1e6, most=1e6
@@ -44,7 +44,7 @@ class Cleat(Edges):
     length: float = number(0.02, "m", "length from foot to foot", least=1e-4, most=1e4)
 
     def validate(self) -> None:
-        """The second edge begins after the first has ended."""
+        """Require that the second edge begins after the first has ended."""
         if self.ramp >= self.length:
             raise ParameterError(
                 "ramp", f"= {self.ramp:g} m must be less than length = {self.length:g} m"
@@ -56,10 +56,11 @@ class Cleat(Edges):
 
 
 class Obstacle:
-    """z = h [s(xi/r) - s((xi - l)/r)], xi = x cos(a) + y sin(a) - position; a step ends nowhere.
+    """z = h [s(xi/r) - s((xi - l)/r)], xi = x cos(a) + y sin(a) - position.
 
-    h, r, a, position: `height`, `ramp`, `angle` and `position` of `edges`; l = `length` (m) from edge
-    to edge, infinite for a step; s(t) = 3 t^2 - 2 t^3 on [0, 1], constant outside (a jump for r = 0).
+    h, r, a, position: `height`, `ramp`, `angle` and `position` of `edges`; l = `length` (m) from
+    edge to edge, infinite for a step; s(t) = 3 t^2 - 2 t^3 on [0, 1], constant outside (a jump for
+    r = 0).
     """
 
     extent = ((-np.inf, np.inf), (-np.inf, np.inf))
@@ -86,11 +87,11 @@ class Obstacle:
         return s * s * (3.0 - 2.0 * s)
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Bound of any strip, m."""
+        """Upper bound of any strip, m."""
         return max(self._height, 0.0)
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Bound of any strip, m."""
+        """Lower bound of any strip, m."""
         return min(self._height, 0.0)
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Obstacle":

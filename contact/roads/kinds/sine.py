@@ -1,4 +1,4 @@
-"""A sine road, waves across the rolling direction."""
+"""A sine road with crests across the rolling direction."""
 
 import math
 
@@ -21,16 +21,16 @@ class Sine(EndlessRoad):
 
     @property
     def spacing(self) -> float:
-        """Half the wavelength, m: two points a wave."""
+        """Half the wavelength, m: two points per wave."""
         return 0.5 * self.wavelength
 
     def height(self, x: Array, y: Array) -> Array:
-        """Heights (m) at x, m; y does not matter."""
+        """Heights (m) at x, m, for any y."""
         wavenumber = 2.0 * np.pi / self.wavelength
         return self.amplitude * np.sin(wavenumber * np.asarray(x) + math.radians(self.phase))
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """The amplitude, m: the bound of any strip."""
+        """The amplitude, m, the upper bound of any strip."""
         return self.amplitude
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:

@@ -1,4 +1,4 @@
-"""A self-affine road texture: random tiles with a given spectrum, blended so that nothing repeats."""
+"""A self-affine road texture: blended random tiles with a given spectrum; nothing repeats."""
 
 from tireroad.contact.roads.kind import RoadKind, road_kind
 from tireroad.contact.roads.texture.tiles import MOST_PLACES, Tiles, tile_places, tile_size
@@ -18,7 +18,7 @@ class Texture(RoadKind):
     seed: int = integer(0, "seed of the random generator", least=0, most=2**31 - 1)
 
     def validate(self) -> None:
-        """A band of waves, and a tile that fits into memory."""
+        """Require a band of waves, and a tile that fits into memory."""
         if self.cut_off >= self.roll_off:
             raise ParameterError(
                 "cut_off", f"= {self.cut_off:g} m must be less than roll_off = {self.roll_off:g} m"

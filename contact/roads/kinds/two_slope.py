@@ -1,4 +1,4 @@
-"""A road of two slopes: ISO 8608 for long waves, a texture spectrum by third octaves below."""
+"""A road of two slopes: ISO 8608 for long waves, a third-octave texture for short ones."""
 
 import numpy as np
 
@@ -10,8 +10,8 @@ from tireroad.contact.roads.texture.tiles import MOST_PLACES, tile_places
 from tireroad.fem.keys import Limits
 from tireroad.fem.parameters import ParameterError, choice, integer, number, numbers
 
-# A stone mastic asphalt of 11 mm, typical (chosen within the 38 to 48 dB at 5 mm of asphalts; at 0.5 m the level of
-# ISO 8608 class A, so that the two meet).
+# A typical stone mastic asphalt of 11 mm (chosen within the 38 to 48 dB at 5 mm of asphalts; at
+# 0.5 m the level of ISO 8608 class A, so that the two meet).
 WAVELENGTHS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
 LEVELS = (42.0, 42.0, 43.0, 44.0, 45.5, 45.0, 42.0, 36.0)
 
@@ -21,7 +21,7 @@ LEVELS = (42.0, 42.0, 43.0, 44.0, 45.5, 45.0, 42.0, 36.0)
     "ISO 8608 for long waves, below them a texture given by third octaves (ISO 13473-4)",
 )
 class TwoSlope(Levelled):
-    """Class of the long waves, levels of the texture, where one ends and the other begins."""
+    """Class of the long waves, levels of the texture, and the wavelength that separates them."""
 
     road_class: str = choice("A", tuple(CLASSES), "road class of ISO 8608 of the long waves")
     crossover: float = number(
@@ -46,7 +46,7 @@ class TwoSlope(Levelled):
     seed: int = integer(0, "seed of the random generator", least=0, most=2**31 - 1)
 
     def validate(self) -> None:
-        """As many levels as wavelengths, a band of waves, tiles that fit into memory."""
+        """Require one level per wavelength, a band of waves, tiles that fit into memory."""
         if len(self.levels) != len(self.wavelengths) or not self.levels:
             raise ParameterError(
                 "levels", f"has {len(self.levels)} numbers, wavelengths {len(self.wavelengths)}: give one "
@@ -64,7 +64,7 @@ class TwoSlope(Levelled):
             raise ParameterError("stone_size", f"= {self.stone_size:g} m makes too fine a texture")
 
     def make(self) -> Layered:
-        """The road: both parts added."""
+        """The road: the sum of both parts."""
         long = Iso8608(road_class=self.road_class, shortest_wave=self.crossover, seed=self.seed)
         edges = bands(self.stone_size, self.crossover)
         power = np.maximum(band_power(self.wavelengths, self.levels, edges), 1e-30)

@@ -1,1 +1,1 @@
-"""Texture of roads: random fields with a given spectrum, what profiles say of it, and levels."""
+"""Texture of roads: random fields with a given spectrum, profile analysis, and levels."""

@@ -1,9 +1,10 @@
-"""A measured profile made whole: outliers of a laser taken out, gaps bridged, and all of it counted.
+"""Cleaning of a measured profile: outliers are removed, gaps bridged, and both are counted.
 
-An outlier lies further from the median of 11 neighbours than `limit` times 1.4826 times the median distance of all points
-from theirs, and further than 50 um: of Gaussian noise the factor is the standard deviation, and a laser's own noise and
-the crests of fine waves stay. Gaps, outliers included, are bridged by straight lines up to a length; longer ones are
-refused, as what would stand there is invented.
+An outlier is farther from the median of 11 neighbours than `limit` times 1.4826 times the median
+such distance of all points, and farther than 50 um. For Gaussian noise the factor yields the
+standard deviation, and the laser's own noise and the crests of fine waves remain. Gaps, outliers
+included, are bridged by straight lines up to a length; longer ones are refused, since their heights
+would be invented.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ MOST_LOST = 0.1  # share of a profile that may be bridged
 
 @dataclass(frozen=True)
 class Cleaned:
-    """`profile` (n,) m without holes; how many points were `missing` and how many `outliers`; `longest` gap, m."""
+    """`profile` (n,) m without holes; counts of `missing` and `outliers`; `longest` gap, m."""
 
     profile: Array
     missing: int
@@ -32,7 +33,7 @@ class Cleaned:
 
     @property
     def summary(self) -> str:
-        """What was done, in a line."""
+        """The processing, in one line."""
         count = len(self.profile)
         lost = 100 * (self.missing + self.outliers) / count
         return (
@@ -42,9 +43,10 @@ class Cleaned:
 
 
 def cleaned(profile: Array, pitch: float, limit: float, longest: float, source: str) -> Cleaned:
-    """Of heights (n,) m every `pitch` m, nan where missing; gaps up to `longest` m are bridged.
+    """Clean heights (n,) m every `pitch` m, nan where missing; gaps up to `longest` m are bridged.
 
-    InputError when nothing is known, when a gap is longer, or when more than a tenth would be bridged.
+    InputError if there is no valid height, if a gap is longer, or if more than a tenth would be
+    bridged.
     """
     missing = np.isnan(profile)
     if missing.all():
@@ -81,7 +83,7 @@ def _bridged(profile: Array, lost: NDArray[np.bool_]) -> Array:
 
 
 def _longest_run(lost: NDArray[np.bool_]) -> tuple[int, int]:
-    """Number of points of the longest run of lost ones, and where it begins."""
+    """Number of points in the longest run of lost ones, and where it begins."""
     change = np.diff(np.concatenate([[0], lost.astype(np.int8), [0]]))
     begin, end = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
     if len(begin) == 0:

@@ -1,4 +1,4 @@
-"""Roads one on top of another: long waves, and a texture of several bands with a skewed distribution."""
+"""Superposed roads: long waves, and a texture of several bands with a skewed distribution."""
 
 from __future__ import annotations
 
@@ -15,15 +15,18 @@ from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Longest over shortest wave of one field of tiles: those of the long waves can be coarse, and its places grow
-# with the fourth power of it where one field has to hold all of them.
+# Longest over shortest wave of one field of tiles. The tiles of long waves can be coarse; the
+# number of points of a single field for all waves would grow with the fourth power of their ratio.
 _RATIO = 8.0
 MOST_SKEW = 1.5
 
 
 class Skewed:
-    """z = rms (h + b (h^2 - 1)) / sqrt(1 + 2 b^2) of a Gaussian h of variance 1: mean 0, variance rms^2, skewness
-    (6 b + 8 b^3) / (1 + 2 b^2)^1.5. Negative: plateaus with pits, as of rolled asphalt."""
+    """z = rms (h + b (h^2 - 1)) / sqrt(1 + 2 b^2) of a Gaussian h of variance 1.
+
+    Mean 0, variance rms^2, skewness (6 b + 8 b^3) / (1 + 2 b^2)^1.5. Negative: plateaus with pits,
+    as on rolled asphalt.
+    """
 
     def __init__(self, skewness: float) -> None:
         from scipy.optimize import brentq  # not needed to read a scene
@@ -38,7 +41,7 @@ class Skewed:
         return (h + b * (h * h - 1.0)) / np.sqrt(1.0 + 2.0 * b * b)
 
     def bounds(self, low: float, high: float) -> tuple[float, float]:
-        """Least and greatest z for h from low to high."""
+        """Lowest and highest z for h from low to high."""
         ends = [float(self(np.array(h))) for h in (low, high)]
         turn = -0.5 / self._b if self._b else np.inf
         if low < turn < high:
@@ -47,7 +50,7 @@ class Skewed:
 
 
 class Layered:
-    """`base` + rms * skew(sum of fields / rms), m; the fields are independent, of `rms` (m) together."""
+    """`base` + rms * skew(sum of fields / rms), m; independent fields with a joint `rms` (m)."""
 
     extent = ((-np.inf, np.inf), (-np.inf, np.inf))
 
@@ -87,10 +90,14 @@ class Layered:
 def textured(
     edges: Array, power: Array, seed: int, base: Road | None = None, skewness: float = 0.0
 ) -> Layered:
-    """An isotropic texture whose profiles have the variances `power` (k,) m^2 in the bands between the `edges`
-    (k + 1,) 1/m, on top of `base`. InputError where no surface has such profiles (isotropic.surface_density)."""
+    """An isotropic texture with given profile variances, on top of `base`.
+
+    `power` (k,) m^2 in the bands between the `edges` (k + 1,) 1/m (isotropic.surface_density).
+    InputError if the resulting surface has no variance.
+    """
     density = surface_density(edges, power)
-    own = np.pi * density * (edges[1:] ** 2 - edges[:-1] ** 2)  # variance of the surface's bands
+    # Variance of the surface in its bands.
+    own = np.pi * density * (edges[1:] ** 2 - edges[:-1] ** 2)
     if not own.sum() > 0:
         raise InputError("road: a texture needs a level above nothing in one band at least")
 
@@ -118,10 +125,13 @@ def _parted(edges: Array) -> list[slice]:
 
 
 def band_power(wavelength: Sequence[float], level: Sequence[float], edges: Array) -> Array:
-    """Variances (k,) m^2 in the bands between the `edges` (1/m) of third-octave levels (dB re 1 um) given at
-    wavelengths (m): straight lines between them over the logarithm, constant beyond."""
+    """Variances (k,) m^2 in the bands between `edges` (1/m) from third-octave levels (re 1 um).
+
+    The levels are given at wavelengths (m) and interpolated linearly over the logarithm, constant
+    beyond.
+    """
     middle = -np.log(np.sqrt(edges[1:] * edges[:-1]))
     order = np.argsort(wavelength)
     of = np.interp(middle, np.log(np.array(wavelength))[order], np.array(level, float)[order])
-    width = np.log10(edges[1:] / edges[:-1]) / 0.1  # third octaves in a band
+    width = np.log10(edges[1:] / edges[:-1]) / 0.1  # third octaves per band
     return 1e-12 * 10 ** (of / 10) * width

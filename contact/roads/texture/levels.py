@@ -1,9 +1,10 @@
-"""What a profile says of a road's texture: mean profile depth and third-octave levels.
+"""Texture characteristics of a profile: mean profile depth and third-octave levels.
 
-Mean profile depth (ISO 13473-1): the profile without waves shorter than 2.5 mm, cut into pieces of 100 mm, each less its
-straight line; the mean of the highest peaks of a piece's two halves, averaged over the pieces. Level of a third octave
-(ISO 13473-4): 20 lg(a / 1 um), a the root mean square of the profile in the band, from a periodogram of Hann-windowed
-pieces that overlap by half, each less its straight line. Bands by wavelength, 10^(k/10) m.
+Mean profile depth (ISO 13473-1): the profile without waves shorter than 2.5 mm is divided into
+pieces of 100 mm, each less its straight line; the mean of the highest peaks in the two halves of a
+piece, averaged over the pieces. Level of a third octave (ISO 13473-4): 20 lg(a / 1 um), a being the
+root mean square of the profile in the band, from a periodogram of Hann-windowed pieces with half
+overlap, each less its straight line. Bands by wavelength, 10^(k/10) m.
 """
 
 from __future__ import annotations
@@ -15,15 +16,17 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 BASE = 0.1  # m, of a piece
-SHORTEST = 2.5e-3  # m, of the waves that count for the mean profile depth
+SHORTEST = 2.5e-3  # m, shortest waves that count for the mean profile depth
 REFERENCE = 1e-6  # m
-_CYCLES = 5  # waves of a piece that a band's centre has at least
+_CYCLES = 5  # waves in a piece at a band's centre, at least
 
 
 @dataclass(frozen=True)
 class Texture:
-    """`depth` m, mean profile depth, None of a profile shorter than 100 mm; `wavelength` (k,) m, descending, and
-    `level` (k,) dB re 1 um of third octaves."""
+    """Mean profile `depth` m, None for a profile shorter than 100 mm, and third-octave levels.
+
+    `wavelength` (k,) m, descending, and `level` (k,) dB re 1 um.
+    """
 
     depth: float | None
     wavelength: Array
@@ -31,12 +34,12 @@ class Texture:
 
 
 def texture_of(profile: Array, pitch: float) -> Texture:
-    """Of heights (n,) m, every `pitch` m."""
+    """The texture of heights (n,) m every `pitch` m."""
     return Texture(mean_profile_depth(profile, pitch), *third_octaves(profile, pitch))
 
 
 def mean_profile_depth(profile: Array, pitch: float) -> float | None:
-    """m; None where there is no whole piece, or where the points lie too far apart to see 2.5 mm and 100 mm apart."""
+    """Mean profile depth, m; None for less than 100 mm, or fewer than 8 points per 100 mm."""
     count = round(BASE / pitch)
     if count < 8 or len(profile) < count:
         return None
@@ -47,7 +50,7 @@ def mean_profile_depth(profile: Array, pitch: float) -> float | None:
 
 
 def third_octaves(profile: Array, pitch: float) -> tuple[Array, Array]:
-    """Wavelengths (k,) m, descending, and levels (k,) dB re 1 um; empty for a profile too short for any band."""
+    """Wavelengths (k,) m, descending, and levels (k,) dB re 1 um; empty for a short profile."""
     length = len(profile) * pitch
     first = int(np.ceil(10 * np.log10(2.5 * pitch)))
     last = int(np.floor(10 * np.log10(length / _CYCLES / 2)))
@@ -66,7 +69,7 @@ def third_octaves(profile: Array, pitch: float) -> tuple[Array, Array]:
 
 
 def _periodogram(profile: Array, pitch: float, count: int) -> tuple[Array, float]:
-    """One-sided density (count // 2 + 1,) m^3 of pieces of `count` points, and the step (1/m) of its lines."""
+    """One-sided density (count // 2 + 1,) m^3 of pieces of `count` points; line spacing (1/m)."""
     window = np.hanning(count + 1)[:-1]
     begin = np.arange(0, len(profile) - count + 1, max(count // 2, 1))
     total = np.zeros(count // 2 + 1)
@@ -84,7 +87,10 @@ def _level(pieces: Array) -> Array:
 
 
 def _without_short(profile: Array, pitch: float) -> Array:
-    """Without waves shorter than 2.5 mm: the Gaussian filter of ISO 16610-21, which passes half of that wave."""
+    """The profile without waves shorter than 2.5 mm, by the Gaussian filter of ISO 16610-21.
+
+    The filter passes half of a wave of that length.
+    """
     from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
 
     from tireroad.contact.roads.levelling import DEVIATION

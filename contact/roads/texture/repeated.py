@@ -1,4 +1,4 @@
-"""A road that comes again, as on a drum: blended over a seam, so that its heights are continuous."""
+"""A road that repeats, as on a drum, blended over a seam so that its heights are continuous."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ if TYPE_CHECKING:
     from tireroad.contact.roads.under_tire import Road
 
 Array = NDArray[np.float64]
-_SEAM = 0.1  # of the length, blended, and this many metres at most
+_SEAM = 0.1  # of the length, and at most this many metres, are blended
 _LONGEST = 0.2
 
 
 class Repeated:
-    """h(x mod L) of a road h; over the last part b of the length it goes over into the mirror image of its beginning:
+    """h(x mod L) of a road h, whose last part b blends into the mirror image of its beginning:
 
         z = (1 - w) h(x) + w h(L - x),   w from 0 to 1 over L - b < x < L.
 
-    So z is continuous and only its slope jumps, and the road is needed from 0 to its `length` L (m), no further.
+    So z is continuous and only its slope jumps, and the road is needed only from 0 to its `length`
+    L (m).
     """
 
     def __init__(self, road: Road, length: float) -> None:
@@ -35,7 +36,7 @@ class Repeated:
 
     @property
     def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Endless along, as wide as the road, m."""
+        """Endless along x, as wide as the road, m."""
         return (-np.inf, np.inf), self._road.extent[1]
 
     def height(self, x: Array, y: Array) -> Array:
@@ -52,13 +53,13 @@ class Repeated:
         return z
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Upper bound of the heights anywhere along, m."""
+        """Upper bound of the heights anywhere along x, m."""
         return self._road.highest(0.0, self._length, y0, y1)
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Lower bound of the heights anywhere along, m."""
+        """Lower bound of the heights anywhere along x, m."""
         return self._road.lowest(0.0, self._length, y0, y1)
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> Repeated:
-        """The road of one turn alone. InputError where it is shorter."""
+        """The repeated road, with one period prepared. InputError if the road is shorter."""
         return Repeated(self._road.prepare(0.0, self._length, y0, y1), self._length)

@@ -9,35 +9,36 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-PER_WAVE = 4  # places of a tile a shortest wave
+PER_WAVE = 4  # points of a tile per shortest wave
 WAVES = (16, 6)  # longest waves in a tile, along and across
-WIDEST = 0.6  # m: a tile is at least as wide, since it does repeat across; no tire is wider
-MOST_PLACES = 16_000_000  # of a tile: 128 MB
-KEPT = 3, 2_000_000  # blended halves of tiles in memory, at least, and places of more (16 MB)
+WIDEST = 0.6  # m, smallest width of a tile, which repeats across; no tire is wider
+MOST_PLACES = 16_000_000  # points of a tile: 128 MB
+KEPT = 3, 2_000_000  # fewest blended halves in memory, and points up to which more are kept (16 MB)
 
 
 def tile_size(longest: float) -> tuple[float, float]:
-    """Length and width (m) of a tile whose longest wave is that."""
+    """Length and width (m) of a tile for the longest wave (m)."""
     return WAVES[0] * longest, max(WAVES[1] * longest, WIDEST)
 
 
 def tile_places(shortest: float, longest: float) -> float:
-    """Number of places of a tile for waves from `shortest` to `longest` (m)."""
+    """Number of points of a tile for waves from `shortest` to `longest` (m)."""
     along, across = tile_size(longest)
     return along * across / (shortest / PER_WAVE) ** 2
 
 
 class Tiles:
-    """Isotropic, Gaussian, of root mean square `rms` (m): the waves from `shortest` to `longest` (m) have the
-    `amplitude` (any unit) of their wave number (1/m), `seed` draws them.
+    """Isotropic Gaussian field of root mean square `rms` (m).
 
-    Along the road independent tiles T_k, each 16 longest waves long and drawn when it is reached, overlap by half:
+    Waves from `shortest` to `longest` (m) have the `amplitude` (any unit) of their wave number
+    (1/m), and are drawn by `seed`. Along the road independent tiles T_k, each 16 longest waves long
+    and drawn when needed, overlap by half:
 
         z = cos(pi s/2) T_k(x) + sin(pi s/2) T_{k+1}(x),   s in [0, 1] over the overlap,
 
-    which keeps the variance, smears the spectrum by 1/16 of its lowest wave number, and never
-    repeats. Across, a tile continues itself after its width (6 longest waves, 0.6 m at least).
-    Heights are bilinear between places a quarter of the shortest wave apart.
+    which preserves the variance, smears the spectrum by 1/16 of its lowest wave number, and never
+    repeats. Across, a tile is periodic in its width (6 longest waves, at least 0.6 m). Heights are
+    bilinear between points a quarter of the shortest wave apart.
     """
 
     extent = ((-np.inf, np.inf), (-np.inf, np.inf))
@@ -61,13 +62,13 @@ class Tiles:
         self._shape = self._places()
         self._filter: Array | None = None
         self._tiles: dict[int, Array] = {}
-        self._halves: dict[int, Array] = {}  # the one asked for last at the end
-        # Lowest and highest place of each half ever drawn: numbers alone, so that bounds draw none again.
+        self._halves: dict[int, Array] = {}  # ordered by use, the last one at the end
+        # Lowest and highest point of each half ever drawn, so that bounds do not draw it again.
         self._ends: dict[int, tuple[float, float]] = {}
         self.spacing = 0.5 * shortest
 
     def _places(self) -> tuple[int, int]:
-        """Places of a tile along and across, the first even."""
+        """Points of a tile along and across, the first number even."""
         from scipy import fft
 
         half, across = (
@@ -77,7 +78,7 @@ class Tiles:
         return 2 * half, across
 
     def _tile(self, number: int) -> Array:
-        """The independent tile `number`: filtered white noise of exactly the expected variance."""
+        """The independent tile `number`: filtered white noise, scaled to the exact variance."""
         from scipy import fft
 
         if self._filter is None:
@@ -87,13 +88,13 @@ class Tiles:
             shortest, longest = self._band
             kept = (q >= 1.0 / longest) & (q <= 1.0 / shortest)
             self._filter = np.where(kept, self._amplitude(np.where(kept, q, 1.0)), 0.0)
-        # Python's remainder: tiles before the beginning have numbers of their own.
+        # Python's remainder: tiles before the beginning have distinct numbers too.
         rng = np.random.default_rng([*self._seed, number % 2**64])
         z = fft.irfft2(fft.rfft2(rng.standard_normal(self._shape)) * self._filter, self._shape)
         return z * (self._rms / z.std())
 
     def _drawn(self, number: int) -> Array:
-        """The tile `number`; the last two are kept, as each takes part in two halves."""
+        """The tile `number`; the last two are kept, since each takes part in two halves."""
         if number not in self._tiles:
             if len(self._tiles) > 1:
                 del self._tiles[next(iter(self._tiles))]
@@ -101,10 +102,11 @@ class Tiles:
         return self._tiles[number]
 
     def _half(self, number: int) -> Array:
-        """Heights over the overlap of tiles number - 1 and number, with the row that follows."""
+        """Heights over the overlap of tiles number - 1 and number, with the following row."""
         found = self._halves.pop(number, None)
         self._halves[number] = self._blended(number) if found is None else found
-        # A footprint lies on several of short waves: with fewer kept than that, each step draws all of them anew.
+        # With short waves a footprint covers several halves: if fewer were kept, each step would
+        # draw all of them again.
         while len(self._halves) > max(KEPT[0], KEPT[1] // self._halves[number].size):
             del self._halves[next(iter(self._halves))]
         return self._halves[number]
@@ -113,7 +115,7 @@ class Tiles:
         half = self._shape[0] // 2
         share = 0.5 * np.pi * (np.arange(half + 1) / half)[:, None]
         before, here = self._drawn(number - 1), self._drawn(number)
-        # The row that follows the earlier tile's end has no weight.
+        # The row that follows the end of the earlier tile has no weight.
         ending = np.concatenate([before[half:], before[:1]])
         z = np.cos(share) * ending + np.sin(share) * here[: half + 1]
         self._ends[number] = float(z.min()), float(z.max())
@@ -145,11 +147,11 @@ class Tiles:
         return near + s * (far - near)
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """The highest place from x0 to x1, m."""
+        """The highest point from x0 to x1, m."""
         return max(high for _, high in self._strip(x0, x1))
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """The lowest place from x0 to x1, m."""
+        """The lowest point from x0 to x1, m."""
         return min(low for low, _ in self._strip(x0, x1))
 
     def _strip(self, x0: float, x1: float) -> Iterator[tuple[float, float]]:

@@ -1,12 +1,12 @@
-"""A surface around a measured profile: isotropic, and the profile itself along its middle.
+"""A surface around a measured profile: isotropic, with the profile itself along its middle.
 
-With the spectrum of the profile taken as that of an isotropic Gaussian surface of density C(q), the part of a wave
-number k along that stands in the middle decays across as
+The spectrum of the profile is taken as that of an isotropic Gaussian surface of density C(q). A
+wave of the profile with wave number k along then decays across as
 
     rho_k(y) = int C(sqrt(k^2 + l^2)) cos(2 pi l y) dl / int C dl,
 
-and what is added, u(k, y) - u(k, 0) rho_k(y) of an independent surface u, makes the whole as rough everywhere
-(simple kriging of the line: Chiles and Delfiner, Geostatistics, 7.3.1).
+and the addition of u(k, y) - u(k, 0) rho_k(y), with an independent surface u, makes the whole
+equally rough everywhere (simple kriging of the line: Chiles and Delfiner, Geostatistics, 7.3.1).
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from tireroad.contact.roads.texture.isotropic import bands, filter_of, surface_density
 
 Array = NDArray[np.float64]
-_LONGEST = 4  # a profile holds that many of the longest waves that its surface is made of, and twice the width one
+_LONGEST = 4  # longest waves of the surface that fit into the profile; twice the width fits one
 
 
 def widened(profile: Array, pitch: float, width: float, seed: int) -> tuple[Array, Array]:
     """y (m,) m, symmetric about 0, and z (n, m) m of a surface with the profile (n,) m at y = 0.
 
-    Waves too long for either length are those of the profile, the same across.
+    Waves too long for either length are those of the profile, constant across.
     """
     from scipy import fft  # not needed to read a scene
 
@@ -45,13 +45,13 @@ def widened(profile: Array, pitch: float, width: float, seed: int) -> tuple[Arra
 
 
 def memory(count: int, pitch: float, width: float) -> float:
-    """Bytes that `widened` takes at the most: 37 for each height of the periodic surface (seen)."""
+    """Largest memory of `widened`, bytes: 37 per height of the periodic surface (measured)."""
     _, _, shape = _sizes(count, pitch, width)
     return 37.0 * shape[0] * shape[1]
 
 
 def _sizes(count: int, pitch: float, width: float) -> tuple[int, float, tuple[int, int]]:
-    """Heights on either side of the profile, longest wave (m) of the surface, its heights along and across."""
+    """Heights on either side of the profile, longest wave (m), and heights along and across."""
     from scipy.fft import next_fast_len  # not needed to read a scene
 
     half = int(np.ceil(0.5 * width / pitch))
@@ -60,7 +60,7 @@ def _sizes(count: int, pitch: float, width: float) -> tuple[int, float, tuple[in
 
 
 def _split(profile: Array, pitch: float, longest: float) -> tuple[Array, Array]:
-    """Waves longer than `longest` (m), straight line included, and the rest."""
+    """Waves longer than `longest` (m), including the straight line, and the rest."""
     from scipy.ndimage import gaussian_filter1d  # not needed to read a scene
 
     from tireroad.contact.roads.levelling import DEVIATION
@@ -79,7 +79,7 @@ def _band_power(profile: Array, pitch: float, edges: Array) -> Array:
 
 
 def _padded(count: int, longest: float, pitch: float) -> int:
-    """A length with few factors in which the profile does not meet its own beginning."""
+    """A length with small factors at which the profile does not meet its own beginning."""
     from scipy.fft import next_fast_len
 
     extra = min(int(longest / pitch), count - 1)
@@ -88,7 +88,7 @@ def _padded(count: int, longest: float, pitch: float) -> int:
 
 
 def _amplitude(edges: Array, power: Array, shape: tuple[int, int], pitch: float) -> Array:
-    """(n // 2 + 1, m) amplitudes of white noise's transform, such that profiles have the `power`."""
+    """(n // 2 + 1, m) amplitudes for white noise, such that profiles have the `power`."""
     density = surface_density(edges, power)
     along, across = np.fft.rfftfreq(shape[0], pitch), np.fft.fftfreq(shape[1], pitch)
     wave = np.hypot(along[:, None], across[None, :])
@@ -96,7 +96,7 @@ def _amplitude(edges: Array, power: Array, shape: tuple[int, int], pitch: float)
 
 
 def _decay(amplitude: Array) -> Array:
-    """rho (n // 2 + 1, m) at the lags across of the transform."""
+    """rho (n // 2 + 1, m) at the transform's lags across."""
     correlation = np.fft.ifft(amplitude**2, axis=1).real
     own = correlation[:, :1]
     return np.where(own > 0, correlation / np.where(own > 0, own, 1.0), 1.0)

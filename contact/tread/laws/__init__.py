@@ -1,1 +1,1 @@
-"""The tread laws, one a file: `contact.tread` of a scene picks one (contact.tread.law)."""
+"""The tread laws, one file each: `contact.tread` of a scene selects one (contact.tread.law)."""

@@ -1,4 +1,4 @@
-"""Elastic treads: a half-space, or a layer bonded to a stiff base, which the belt is."""
+"""Elastic treads: a half-space, or a layer bonded to a rigid base (the belt)."""
 
 from dataclasses import dataclass
 
@@ -53,13 +53,13 @@ class Layer(Elastic):
     thickness: float = number(0.010, "m", "thickness of the layer", least=1e-4, most=1)
 
     def influence(self, farthest: float) -> Influence:
-        """The half-space's with a correction; see contact.tread.layer."""
+        """The half-space's influence with a correction; see contact.tread.layer."""
         from tireroad.contact.tread.layer import LayerInfluence  # scipy, not needed to read a scene
 
         return LayerInfluence(self.youngs_modulus, self.poisson_ratio, self.thickness)
 
     def shear(self, farthest: float) -> Influence:
-        """The half-space's with a correction; see contact.tread.layer_shear."""
+        """The half-space's shear with a correction; see contact.tread.layer_shear."""
         from tireroad.contact.tread.layer_shear import LayerShear
 
         return LayerShear(self.youngs_modulus, self.poisson_ratio, self.thickness)

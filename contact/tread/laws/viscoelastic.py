@@ -1,4 +1,4 @@
-"""A tread that creeps: a half-space or a bonded layer of rubber with one to three relaxation times."""
+"""A viscoelastic tread: a half-space or a bonded layer with up to three relaxation times."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,10 @@ _TERMS = 3
     "viscoelastic rubber, on a grid of points: the history of the pressure travels with the tread",
 )
 class Viscoelastic(Elastic):
-    """E(t) = E [1 - sum_k g_k (1 - exp(-t/t_k))], Poisson's ratio constant; E at once (contact.tread.creep)."""
+    """E(t) = E [1 - sum_k g_k (1 - exp(-t/t_k))] at constant Poisson's ratio.
+
+    E is the instantaneous modulus.
+    """
 
     thickness: float | None = number(
         None, "m", "thickness of a layer on a stiff base; absent: a half-space", least=1e-4, most=1
@@ -33,7 +36,7 @@ class Viscoelastic(Elastic):
     )
 
     def validate(self) -> None:
-        """As many times as shares, and something left of the modulus."""
+        """Require as many times as shares, and a positive relaxed modulus."""
         if not 1 <= len(self.relaxation) <= _TERMS:
             raise ParameterError("relaxation", f"must have one to {_TERMS} numbers")
         try:
@@ -43,17 +46,17 @@ class Viscoelastic(Elastic):
 
     @property
     def creep(self) -> tuple[Array, Array]:
-        """Shares and times (k,) s of the creep."""
+        """Shares and times (k,), - and s, of the creep."""
         from tireroad.contact.tread.creep import creep_of
 
         return creep_of(np.array(self.relaxation), np.array(self.relaxation_time))
 
     def influence(self, farthest: float) -> Influence:
-        """Of the modulus at once: the half-space's, or the layer's."""
+        """The influence at the instantaneous modulus, of a half-space or a layer."""
         return self._at_once().influence(farthest)
 
     def shear(self, farthest: float) -> Influence:
-        """Of the modulus at once."""
+        """The shear at the instantaneous modulus."""
         return self._at_once().shear(farthest)
 
     def _at_once(self) -> Elastic:

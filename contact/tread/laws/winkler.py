@@ -12,14 +12,14 @@ Array = NDArray[np.float64]
 
 @tread_law("winkler", "independent springs")
 class Winkler(TreadLaw):
-    """1/(k A_i) at each point of area A_i."""
+    """Springs of compliance 1/(k A_i) at each point of area A_i."""
 
     winkler_stiffness: float = number(
         2.0e8, "N/m³", "force per area and approach of the springs", least=1e3, most=1e15
     )
 
     def influence(self, farthest: float) -> Influence:
-        """The spring of a point under its own force, 0 under others'."""
+        """The spring of a point under its own force, 0 under others."""
 
         def of(x: Array, y: Array, a: Array, b: Array) -> Array:
             return np.where((x == 0) & (y == 0), 1 / (4 * a * b * self.winkler_stiffness), 0.0)
@@ -33,7 +33,7 @@ class Winkler(TreadLaw):
 
 @tread_law("none", "no compliance: the tread is part of the finite elements")
 class NoTread(TreadLaw):
-    """Zeros."""
+    """No compliance."""
 
     compliant = False
 
