@@ -1,1 +1,2 @@
-"""One module a stage: `inputs` (what it depends on), `compute`, and `reuse` of its file."""
+"""One module per stage: `inputs` (what it depends on), `compute`, and reading and writing its
+file."""
