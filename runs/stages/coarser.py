@@ -31,7 +31,7 @@ STATIC_TO_GREENS: tuple[type[Part], ...] = (
     RotatingStage,
     GreensStage,
 )
-COARSER = "coarser"  # the folder in the run's own where its coarser companion's stages are, until they are of no use
+COARSER = "coarser"  # folder, in the run's own, of the coarser companion's stages
 LEAST = (8, 4)  # fewest elements around and along of a companion's mesh
 
 
