@@ -1,5 +1,4 @@
-"""Part of `validate stability`: the contact loop under extreme conditions, with a synthetic
-tire."""
+"""Part of `validate stability`: the contact loop at its limits, with a synthetic tire."""
 
 from __future__ import annotations
 
