@@ -19,8 +19,7 @@ from tireroad.runs.process.surroundings import check_surroundings
 
 
 def _together(function: Callable[[Any], None]) -> int:
-    """Run `function(comm)` on all processes; returns the exit status. Collective over all
-    processes."""
+    """Run `function(comm)` on all processes; returns the exit status. Collective."""
     status, message = mpi.judged(check_surroundings)
     if status != DONE:
         if rank_before_mpi() == 0:
@@ -194,8 +193,7 @@ ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
 
 
 def _alone(function: Callable[[], None]) -> int:
-    """Run a command of a single process; under mpirun the root process runs it. Returns the exit
-    status."""
+    """Run a single-process command, on the root process under mpirun; returns the exit status."""
     if rank_before_mpi() != 0:
         return DONE
     signals.stop_on_signals()

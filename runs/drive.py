@@ -52,8 +52,7 @@ class History:
         return self.force.sum(axis=1)
 
     def spectrum(self) -> tuple[Array, NDArray[np.complex128]]:
-        """Frequencies (f,) Hz up to the limit and axle-force amplitudes (f, 3) N
-        (contact.results.spectra)."""
+        """Frequencies (f,) Hz up to the limit, axle-force amplitudes (f, 3) N (contact.results)."""
         frequency, amplitude = amplitudes(self.axle_force, self.time[1] - self.time[0])
         below = frequency <= self.limit.frequency
         return frequency[below], amplitude[below]

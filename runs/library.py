@@ -109,8 +109,7 @@ def press(
 
 @dataclass(frozen=True, kw_only=True)
 class Standing:
-    """Modes of the non-rotating tire about its static state: `basis`, and the `motions` (matrices)
-    they solve."""
+    """Modes of the non-rotating tire: `basis`, and the `motions` (matrices) that they solve."""
 
     motions: SmallMotions
     basis: ModalBasis
@@ -145,8 +144,7 @@ def modes(
 
 @dataclass(frozen=True, kw_only=True)
 class RollingTire:
-    """A rotating tire: the modes at rest (`standing`) and the states of the rotating wheel
-    (`states`)."""
+    """A rotating tire: the modes at rest (`standing`) and the states of the wheel (`states`)."""
 
     standing: Standing
     states: RollingModes
@@ -188,7 +186,6 @@ class RollingTire:
 
 
 def roll(standing: Standing, turning: Turning) -> RollingTire:
-    """The states of the rotating tire in the non-rotating frame; at speed 0, those of the modes
-    themselves."""
+    """The states of the rotating tire in the non-rotating frame; at speed 0, those of the modes."""
     comm = standing.motions.body.comm
     return RollingTire(standing=standing, states=rolling_modes(standing.basis, turning, comm))

@@ -1,2 +1,1 @@
-"""Benchmarks of run time against error, scaling and lower bounds: one module each, found by
-name."""
+"""Benchmarks of run time against error, scaling and lower bounds, found by name."""

@@ -24,8 +24,7 @@ BLOCK = 20  # steps between two measurements of the lower bound
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def run() -> list[Table]:
-    """All tables; ratios are of times measured alternately in one run, with one BLAS thread as in a
-    run."""
+    """All tables; ratios are of times measured alternately in one run, with one BLAS thread."""
     tables = [_step(), _friction(), convolution(), orders(), large(), rough(), corner()]
     return [_asked(*tables), *tables, shearing()]
 
@@ -58,8 +57,7 @@ def _asked(step, friction, convolved, order, many, static, moving) -> Table:
 
 
 def _loop(shape, modes: int, height, brush: float | None = None, steps: int = 1000):
-    """(instants, solver, response) of the loop alone; with friction 0.8 and a brush stiffness in
-    N/m."""
+    """(instants, solver, response) of the loop alone; with friction 0.8 and a brush in N/m."""
     patch, tire, tread, response = parts_of(shape, modes, brush is not None)
     count = len(patch.points)
     solver = ActiveSet(tire.same_step[:count, :count] + tread)
@@ -90,8 +88,7 @@ def _beside(loop, *others, blocks: int = 40) -> tuple[float, list[float], list[f
 
 
 def _mean(function) -> float:
-    """Seconds per call, over as many calls as a block has steps: disturbances affect both
-    equally."""
+    """Seconds per call, over as many calls as a block has steps, to share disturbances."""
     began = time.perf_counter()
     for _ in range(BLOCK):
         function()

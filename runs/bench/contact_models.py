@@ -1,5 +1,4 @@
-"""Contact models of the literature on one tire and road, against the half-space with fine
-points."""
+"""Contact models of the literature on one tire and road, against the half-space with fine grid."""
 
 from __future__ import annotations
 
@@ -87,8 +86,7 @@ def _law(name: str, given: Prepared, tread: str, **keys: float) -> Outcome:
 
 
 def _wedges(given: Prepared, states: list[StaticState]) -> Outcome:
-    """The wedge model; its look-up table is not timed, as the tire's matrices of the others are
-    not."""
+    """The wedge model; its look-up table is not timed, like the other models' tire matrices."""
     table, tire = _look_up(given, states), _unloaded(given, states[0])
     setup, load = given.trial.setup, given.run.static.load
     flat = np.zeros(tire.height.shape)
@@ -139,8 +137,7 @@ def _face(
 
 
 def _look_up(given: Prepared, states: list[StaticState]) -> LookUp:
-    """Area within the plane and force per metre of the rings of nodes near the road, at every
-    depth."""
+    """Area within the plane and force per metre, of rings of nodes near the road, at each depth."""
     inflated, lattice = states[0], given.run.job.tire.lattice
     near = np.abs((lattice.ring + np.pi) % (2 * np.pi) - np.pi) < _NEAR
     x0, x1, y0, y1 = given.trial.setup.patch.extent

@@ -1,5 +1,4 @@
-"""The contact loop on several processes: one solves the contact, the states are distributed over
-all."""
+"""The contact loop on several processes: one solves the contact, all share the states."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Residual flexibility in contact: few modes with and without it against all modes of a small
-tire."""
+"""Residual flexibility in contact: few modes with and without it against all, on a small tire."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Frequencies over the mesh, and axisymmetric tires solved by wave number against the general
-method."""
+"""Frequencies over the mesh, and axisymmetric tires by wave number against the general method."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Modes of a deformed tire with 45,000 unknowns against SLEPc's own slicing, and their cost over
-number."""
+"""Modes of a deformed tire with 45,000 unknowns against SLEPc's slicing, and cost over number."""
 
 from __future__ import annotations
 
@@ -20,8 +19,7 @@ RATIO = 500  # modes in the comparison
 
 
 def run() -> list[Table]:
-    """Static state, standing modes by number, SLEPc's slicing, projected states by number.
-    Collective."""
+    """Static state, standing modes by number, SLEPc's slicing, projected states. Collective."""
     comm = MPI.COMM_WORLD
     observe.say("static state of the tire ...")
     operators = _tire(comm)
@@ -129,8 +127,7 @@ def _standing(comm: MPI.Comm, operators):
 
 
 def _plain(comm: MPI.Comm, operators) -> Table:
-    """The same modes by SLEPc's spectrum slicing of the whole standard problem, on one process.
-    Collective."""
+    """The same modes by SLEPc's slicing of the whole problem, on one process. Collective."""
     from tireroad.modal.solver import undamped
     from tireroad.modal.solver.fields import everywhere, scaled_by
     from tireroad.modal.standing import sites
@@ -166,8 +163,7 @@ def _plain(comm: MPI.Comm, operators) -> Table:
 
 
 def _interval(matrix, top: float) -> int:
-    """Number of modes that SLEPc finds from 0 to `top` (1/s2), by EPSSetInterval with MUMPS's
-    inertia."""
+    """Number of modes by SLEPc from 0 to `top` (1/s2), by EPSSetInterval and MUMPS's inertia."""
     from petsc4py import PETSc
     from slepc4py import SLEPc
 
@@ -198,8 +194,7 @@ def _interval(matrix, top: float) -> int:
 
 
 def _rolling(comm: MPI.Comm, operators, modes) -> tuple[Table, float]:
-    """The projected problem at 50 rad/s on leading parts of one basis: time, and error of the
-    lowest states."""
+    """The projected problem at 50 rad/s on parts of a basis: time, error of the lowest states."""
     from tireroad.modal.basis import project
     from tireroad.modal.rotating import checks, matrices, rotating
     from tireroad.modal.solver.agreement import truncation

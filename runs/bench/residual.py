@@ -123,8 +123,7 @@ def _errors(wheel: Wheel, modes: ModalBasis, probes) -> Table:
 
 
 def _figure(wheel: Wheel, modes: ModalBasis, probes) -> Table:
-    """Figure 6.2 of the thesis: ten modes and the full matrices, driving point in the middle.
-    Collective."""
+    """Figure 6.2 of the thesis: ten modes and the full matrices, driving point. Collective."""
     frequency = np.linspace(0, 2 * modes.frequency[9], 25)
     middle = len(PATCH) // 2
     curves = [wheel.receptance(probes, probes, frequency)]

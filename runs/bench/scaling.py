@@ -34,8 +34,7 @@ STEPS = (500, 1000, 2000, 4000)
 
 
 def run() -> list[Table]:
-    """Stages over unknowns, the loop over its sizes, stages over processes, the machine's own
-    rates."""
+    """Stages over unknowns, the loop over its sizes, stages over processes, machine rates."""
     with tempfile.TemporaryDirectory() as folder:
         return [
             machine_rates(),
@@ -55,8 +54,7 @@ def machine_rates() -> Table:
 
 
 def unknowns(folder: Path, meshes: tuple[Mesh, ...], modes: int) -> Table:
-    """Static state, modes and Green's functions over the unknowns, beside one factorisation of
-    K."""
+    """Static state, modes and Green's functions over the unknowns, and one factorisation of K."""
     rows = []
     for mesh in meshes:
         observe.say(f"  {mesh} elements ...")
@@ -125,8 +123,7 @@ def _size(folder: Path, mesh: Mesh, modes: int) -> list:
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def loop(sizes, states, steps) -> Table:
-    """Steps of the contact loop over points, states and their number, beside one pass over
-    memory."""
+    """Steps of the contact loop over points, states and number, and one pass over memory."""
     rows = []
     middle, few = sizes[len(sizes) // 2], states[1]
     for size in sizes:

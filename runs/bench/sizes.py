@@ -1,5 +1,4 @@
-"""The built-in radial tire in sizes from 125/80 R12 to 335/25 R22: does each build and inflate,
-with what shape?"""
+"""The built-in radial tire from 125/80 R12 to 335/25 R22: does each size build and inflate?"""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Savings from skipping, scene by scene: the program with and without what a scene does not
-need."""
+"""Savings from skipping, scene by scene: runs with and without what a scene does not need."""
 
 from __future__ import annotations
 
@@ -31,8 +30,7 @@ def run() -> list[Table]:
 
 
 def table(folder: Path, mesh: Mesh, keys: dict) -> Table:
-    """Rows: what is skipped, seconds with and without it, the ratio, and the change of the
-    result."""
+    """Rows: what is skipped, seconds with and without it, the ratio, the change of the result."""
     observe.say("  rolling, standing, flat, with friction ...")
     rolling = rolled(folder / "rolling", mesh, **keys)
     again = rolled(folder / "rolling", mesh, "road.seed=1", **keys)

@@ -34,8 +34,7 @@ def run() -> list[Table]:
 
 
 def measured(folder: Path, scene: str, members: int) -> list:
-    """Scene, members, CPU time (s) of the sweep and of as many separate runs, and their ratio
-    (%)."""
+    """Scene, members, CPU time (s) of the sweep and of as many separate runs, their ratio (%)."""
     source = ROOT / "runs" / "scenes" / f"{scene}.toml"
     speeds = [LOWEST + STEP * k for k in range(members)]
     family = folder / f"{scene}.toml"

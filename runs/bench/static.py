@@ -36,8 +36,7 @@ speed = {speed}
 
 
 def run() -> list[Table]:
-    """At rest and rolling, each run by the program itself; forms are compiled before. Not
-    collective."""
+    """At rest and rolling, by the program itself; forms are compiled before. Not collective."""
     runs = []
     with tempfile.TemporaryDirectory() as folder:
         for speed, count in RUNS:

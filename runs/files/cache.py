@@ -118,8 +118,7 @@ class Cache:
         return f"{len(old)} stages removed, {sum(one.size for one in old) / 1e9:.2f} GB"
 
     def _prune(self) -> None:
-        """Remove the least recently used stages of the user's own cache until it is within its
-        limit."""
+        """Remove the least recently used stages of the user's own cache beyond its limit."""
         kept = self.entries() if self._own else []
         total = sum(one.size for one in kept)
         for one in kept:

@@ -118,8 +118,7 @@ def contact(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 
 def spectra(file: h5py.File) -> dict[str, Callable[[Path], object]]:
-    """spectra.csv: complex spectra; third_octave.csv: levels of all quantities, with errors;
-    density.csv."""
+    """spectra.csv: complex spectra; third_octave.csv: all levels, with errors; density.csv."""
     columns = {"frequency [Hz]": file["frequency"][()]}
     for name, unit in (("axle_force", "N"), ("contact_force", "N"), ("hub_moment", "N m")):
         if name in file:
@@ -134,8 +133,7 @@ def spectra(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 
 def bands(group: h5py.Group) -> Columns:
-    """Levels by band: nominal frequency (IEC 61260), exact centre, then one column per
-    component."""
+    """Levels by band: nominal frequency (IEC 61260), exact centre, a column per component."""
     centre = group["centre"][()]
     columns = {"band [Hz]": nominal(centre), "exact centre of the band [Hz]": centre}
     if "confidence" in group:

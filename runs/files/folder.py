@@ -44,8 +44,7 @@ def _earlier(directory: Path) -> dict[str, Any] | None:
 
 
 def check_kept_scene(directory: Path) -> None:
-    """Raise InputError if the folder's scene.toml has changed since the run: it cannot be
-    resumed."""
+    """Raise InputError if the folder's scene.toml has changed since the run: no `resume` then."""
     path = directory / "scene.toml"
     try:
         text = path.read_text(encoding="utf-8")
@@ -129,8 +128,7 @@ def held(directory: Path) -> Iterator[None]:
 
 @contextmanager
 def claimed(directory: Path, scene_name: str) -> Iterator[None]:
-    """Create, lock and check the folder of a run, and remove what dead runs left. Root process
-    only."""
+    """Create, lock and check a run's folder, and remove what dead runs left. Root process only."""
     with held(directory):
         check_owner(directory, scene_name)
         _check_purpose(directory)

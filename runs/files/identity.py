@@ -43,8 +43,7 @@ class Identity:
     libraries: Mapping[str, str]
 
     def differs(self, code: str, libraries: Mapping[str, str]) -> str:
-        """What has changed since a result was computed by `code` with `libraries`; "" if
-        nothing."""
+        """What has changed since a result was computed by `code` with `libraries`; "" if none."""
         if code != self.code:
             return "the program's code has changed since"
         changed = [
@@ -84,8 +83,7 @@ def _version(package: str) -> str:
 
 
 def _mumps() -> str:
-    """MUMPS's version, from the name of the loaded library, as no interface provides it; needs
-    PETSc loaded."""
+    """MUMPS's version, from the name of the loaded library: no interface gives it. Needs PETSc."""
     try:
         maps = Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace")
     except OSError:

@@ -48,8 +48,7 @@ def describe(file: Path, as_json: bool = False) -> str:
 
 
 def _held(path: Path, file: h5py.File, checksum_is: str) -> dict:
-    """All contents of the text form, multi-line texts in full, sizes in bytes; NaN and infinity as
-    null."""
+    """The text form's contents, multi-line texts in full, sizes in bytes; NaN and infinity null."""
     datasets: dict[str, dict] = {}
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -100,8 +99,7 @@ def _head(path: Path, file: h5py.File, checksum_is: str) -> Iterator[str]:
 
 
 def _attributes(file: h5py.File) -> Iterator[str]:
-    """Provenance and results stored as attributes, one per line; multi-line texts are
-    summarised."""
+    """Provenance and results stored as attributes, one per line; long texts are summarised."""
     if not len(file.attrs):
         return
     yield ""

@@ -34,8 +34,7 @@ def create(file: h5py.File, name: str, rows: int, width: tuple[int, ...]) -> h5p
 
 
 class Packer:
-    """Appends rows to datasets made by `create`; call `wait` before reading the file, `close` at
-    the end."""
+    """Appends rows to datasets of `create`; `wait` before reading the file, `close` at the end."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1)

@@ -39,8 +39,7 @@ class Page:
         return f"{self.name}_fields.h5"
 
     def write_fields(self, path: Path) -> None:
-        """Write the fields file; its virtual datasets locate their results relative to the file
-        itself."""
+        """Write the fields file; its virtual datasets find the results relative to its place."""
         with h5py.File(path, "w", libver="latest") as file:
             for name, layout in self.rows.items():
                 file.create_virtual_dataset(name, layout)

@@ -51,8 +51,7 @@ summary{cursor:pointer;color:#2f6db5;font-size:.92rem}
 
 
 def page(results: dict[str, list], about: dict[str, str]) -> str:
-    """HTML of tables (runs.measure.tabulate.Table) by the name of their module, with its ABOUT
-    line."""
+    """HTML of tables (runs.measure.tabulate.Table) by module name, with their ABOUT lines."""
     import jinja2
 
     counted = {"tables": 0, "figures": 0}

@@ -87,8 +87,7 @@ def _lines(table: Any) -> str:
 
 
 def _shared_label(names: list[str], columns: _Columns) -> str:
-    """Common label of several curves on one axis: the words that their names begin with, and the
-    unit."""
+    """Common label of several curves on one axis: the first words of their names, and the unit."""
     words = list(commonprefix([name.split() for name in names]))
     while words and words[-1] in ("of", "a", "the"):
         words.pop()

@@ -1,5 +1,4 @@
-"""The torus of the thesis with selectable elements, used by most benchmarks, validations and
-tests."""
+"""The thesis's torus with selectable elements: tire of most benchmarks, validations and tests."""
 
 from __future__ import annotations
 

@@ -30,8 +30,7 @@ def choose_kernels() -> None:
 
 
 def able(processors: Path) -> str:
-    """The widest kernels that the processor of a /proc/cpuinfo supports; "" if the oldest are
-    right."""
+    """The widest kernels that the processor in a /proc/cpuinfo supports; "" if the oldest fit."""
     try:
         lines = processors.read_text().splitlines()
     except OSError:
@@ -41,8 +40,7 @@ def able(processors: Path) -> str:
 
 
 def _kernels() -> bytes:
-    """The kernels OpenBLAS chose; empty if unknown. Unloads OpenBLAS again, so that it chooses
-    anew."""
+    """The kernels OpenBLAS chose; empty if unknown. Unloads it again, so that it chooses anew."""
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:
         return b""  # with little address space OpenBLAS waits forever
     try:

@@ -33,8 +33,7 @@ def start_petsc(options: list[str]) -> None:
 
 
 def on_root(comm: Any, function: Callable[[], T]) -> T:
-    """Like fem.parallel.on_root; a removed result folder is also raised on every process.
-    Collective."""
+    """Like fem.parallel.on_root; a removed result folder is raised on all processes. Collective."""
     return parallel.on_root(comm, function, (InputError, ConvergenceError, Removed))
 
 

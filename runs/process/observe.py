@@ -47,8 +47,7 @@ def log_to(path: Path) -> Iterator[None]:
 
 
 def _own_file(path: Path) -> TextIO:
-    """The log file, opened for appending; a symbolic link in its place is replaced, not
-    followed."""
+    """The log file, opened for appending; a symbolic link in its place is not followed."""
     if path.is_symlink():
         path.unlink()
     flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW

@@ -12,8 +12,7 @@ _UNDER_NOHUP = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1) + (
     () if _UNDER_NOHUP else (signal.SIGHUP,)
 )
-"""mpirun forwards SIGUSR1 to every process; the launcher uses it. Under nohup, SIGHUP is
-ignored."""
+"""mpirun forwards SIGUSR1 to every process; the launcher uses it. nohup ignores SIGHUP."""
 
 TOGETHER = 1.0
 """Seconds within which signals count as one request: a terminal, a batch system or `timeout` may
@@ -61,8 +60,7 @@ DEFERRED = b"d"
 
 
 def tell_when_deferred(descriptor: int) -> None:
-    """Descriptor for messages: DEFERRED when a stop signal has been noted, b"!" when it is
-    raised."""
+    """Descriptor for messages: DEFERRED for a stop signal noted, b"!" for one raised."""
     _Heard.supervisor = descriptor
 
 

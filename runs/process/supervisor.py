@@ -34,8 +34,7 @@ _PR_SET_PDEATHSIG = 1
 
 
 def supervise() -> None:
-    """Fork. Returns in the worker; the calling process remains as supervisor and exits with the
-    worker."""
+    """Fork. Returns in the worker; this process stays as supervisor and exits with the worker."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {*signals.STOP_SIGNALS, signal.SIGCHLD})
     hears, tells = os.pipe()
     supervisor = os.getpid()

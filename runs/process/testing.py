@@ -77,8 +77,7 @@ class Recorder:
 
 
 def worker(folder: Path, processes: int, arguments: list[str]) -> int:
-    """One process of a run: pytest with a recorder. Processes other than the root print to
-    files."""
+    """One process of a run: pytest with a recorder. All but the root print to files."""
     comm, rank = None, 0
     if processes > 1:
         from mpi4py import MPI
@@ -95,8 +94,7 @@ def worker(folder: Path, processes: int, arguments: list[str]) -> int:
 
 
 def _at_once(arguments: list[str]) -> list[str]:
-    """Options for running test files in parallel, if pytest-xdist is installed and there is a
-    gain."""
+    """Options for running test files in parallel, if pytest-xdist is installed and it pays off."""
     alone = {"--collect-only", "--co", "--pdb", "-s", "-n", "-x"} & set(arguments)
     cores = min(os.cpu_count() or 1, 8)
     if alone or cores == 1 or importlib.util.find_spec("xdist") is None:
@@ -112,8 +110,7 @@ def _command(processes: int) -> list[str]:
 
 
 def _run(folder: Path, processes: int, arguments: list[str]) -> tuple[int, dict[str, str], int]:
-    """Status, outcome of each test (failed if it failed on any process), number of tests
-    collected."""
+    """Status, outcome of each test (failed if failed on any process), number of tests collected."""
     command = [*_command(processes), str(folder), str(processes), *arguments]
     path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH")) if part)
     environment = {**os.environ, "PYTHONPATH": path}
@@ -161,8 +158,7 @@ def _from_root(argument: str) -> str:
 
 
 def _chosen(arguments: list[str]) -> tuple[list[str], tuple[int, ...]]:
-    """pytest's arguments with the marks selected by --fast, --all or neither, and the process
-    counts."""
+    """pytest's arguments with the marks for --fast, --all or neither, and the process counts."""
     rest = [one for one in arguments if one not in ("--fast", "--all")]
     if "--fast" in arguments:
         return ["-m", "not slow and not long and not mpi", *rest], (1,)

@@ -1,5 +1,4 @@
-"""Summary of a run in a few figures: load, footprint, forces and levels with their errors, first
-modes."""
+"""Summary of a run: load, footprint, forces and levels with errors, first modes."""
 
 from __future__ import annotations
 
@@ -19,8 +18,7 @@ _MODES = 4
 
 
 def answer(results: Results, stages: Mapping[str, Any]) -> list[Fact]:
-    """Facts (what, value) from the result files and the summary's `stages`; missing ones are left
-    out."""
+    """Facts (what, value) from the result files and the summary's `stages`, as far as available."""
     found: list[Fact] = []
     for part in (_standing, _rolling, _levels, _power, _modes):
         try:
@@ -82,8 +80,7 @@ def _rolling(results: Results, given: Given) -> list[Fact]:
 
 
 def _levels(results: Results, _: Given) -> list[Fact]:
-    """Levels summed over the bands, with the upper bound of their errors, and their frequency
-    limit."""
+    """Levels summed over the bands, the upper bound of their errors, and their frequency limit."""
     end = results.attribute("spectra.h5", "limit")
     found = [("valid up to", quantity(end, "Hz"))] if end else []
     centre = results.array("spectra.h5", "third_octave/centre")

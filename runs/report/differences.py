@@ -144,8 +144,7 @@ def mode_rows(runs: Sequence[RunResults]) -> list[Row]:
 
 
 def assurance(first: Array, second: Array) -> Array:
-    """|a . b|^2 / (a . a)(b . b) of shapes (m, s, 3) and (n, s, 3): (m, n), 1 for identical
-    shapes."""
+    """|a . b|^2 / (a . a)(b . b) of shapes (m, s, 3) and (n, s, 3): (m, n), 1 if identical."""
     a, b = first.reshape(len(first), -1), second.reshape(len(second), -1)
     square = np.einsum("ij,ij->i", a, a)[:, None] * np.einsum("ij,ij->i", b, b)[None, :]
     return (a @ b.T) ** 2 / np.maximum(square, 1e-300)

@@ -1,5 +1,4 @@
-"""Cache of figures drawn by this process: members of a sweep with equal stages show the same
-ones."""
+"""Cache of figures drawn by this process, for members of a sweep that show the same ones."""
 
 from __future__ import annotations
 

@@ -99,8 +99,7 @@ def render(directory: Path) -> str:
 
 
 def remarks(directory: Path) -> str | None:
-    """Figures of a finished run that no real tire has (runs.report.realism); None if all are
-    usual."""
+    """Figures of a run that no real tire has (runs.report.realism); None if all are usual."""
     with Results(directory, read_scene(directory / "scene.toml", [])[1]) as results:
         return unusual(results)
 
@@ -166,8 +165,7 @@ def read_scene(path: Path, problems: list[str]) -> tuple[str, dict]:
 def build_sections(
     directory: Path, scene: Mapping, stages: Mapping, problems: list[str]
 ) -> tuple[list[Section], list[tuple[str, str]], list[tuple[str, str]]]:
-    """Sections of the existing files; those left out, with the reason; provenance of the first
-    file."""
+    """Sections of the existing files; those left out and why; provenance of the first file."""
     sections: list[Section] = []
     left_out: list[tuple[str, str]] = []
     provenance: list[tuple[str, str]] = []

@@ -129,8 +129,7 @@ _CHECKS = (_pressure, _footprint, _stiffness, _mass, _tread, _damping, _road)
 
 
 def mean_load(results: Results) -> str | None:
-    """Explains a mean force while rolling that differs from the static load by 5 % or more; else
-    None."""
+    """Why the mean force while rolling differs from the static load by 5 % or more; else None."""
     try:
         force = results.array("contact.h5", "total_force")[:, 2]
         load = _number(results, "static.h5", "load")

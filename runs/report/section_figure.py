@@ -1,5 +1,4 @@
-"""A drawing of the section: regions, lines of cords with their angles, inner face, tread and
-rim."""
+"""A drawing of the section: regions, lines of cords with angles, inner face, tread and rim."""
 
 from __future__ import annotations
 

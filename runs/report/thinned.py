@@ -24,8 +24,7 @@ def envelope(x: NDArray, y: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArra
 
 
 def peak_hold(frequency: NDArray, level: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArray]:
-    """The highest line in each of `bins` bands of equal width on a logarithmic axis; frequency (n)
-    > 0."""
+    """The highest line in each of `bins` bands equal on a logarithmic axis; frequency (n) > 0."""
     if len(frequency) <= bins:
         return frequency, level
     low, high = np.log(frequency[[0, -1]])

@@ -43,8 +43,7 @@ def verdict(name: str, value: Any) -> str:
 
 
 def verdicts(stages: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, Any, str, str]]:
-    """(stage, indicator, value, unit, verdict) of every indicator in a summary; the poor ones
-    first."""
+    """(stage, indicator, value, unit, verdict) of every indicator in a summary; poor ones first."""
     rows = [
         (stage, name, entry["value"], entry.get("unit", ""), verdict(name, entry["value"]))
         for stage, found in stages.items()

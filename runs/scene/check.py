@@ -49,8 +49,7 @@ def _aligned(rows: list[Row], widths: list[int]) -> list[str]:
 
 
 def explain(scene: Scene, processes: int = 1) -> str:
-    """The output of `check` for a run on that many processes. Raises InputError if the road cannot
-    be used."""
+    """What `check` prints for so many processes. Raises InputError for an unusable road."""
     check_road(scene)
     groups = _rows(scene, "", "scene")
     everything = [HEAD, *(row for _, rows in groups for row in rows)]

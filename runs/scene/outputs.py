@@ -50,8 +50,7 @@ class Output(Parameters):
         return 0
 
     def curves(self, seen: Driven, record: Record) -> Curves:
-        """(values, unit) by their names in response.h5; figures for the reader go into the record.
-        Collective."""
+        """(values, unit) by name in response.h5; figures go into the record. Collective."""
         raise NotImplementedError
 
 

@@ -37,8 +37,7 @@ def _value(text: str) -> Any:
 
 
 def override(raw: dict[str, Any], item: str) -> tuple[str, ...]:
-    """Apply one `table.key=value` to the raw scene; an empty value removes the key. Returns the
-    key's path."""
+    """Apply one `table.key=value`; an empty value removes the key. Returns the key's path."""
     dotted, equals, value = item.partition("=")
     path = locate.parts(dotted)
     if not equals or not all(path):

@@ -33,8 +33,7 @@ def reference() -> str:
 
 
 def _tables(of: type, path: str, doc: str, many: bool, written: dict[type, str]) -> Iterator[str]:
-    """A table of keys, its variants, then its nested tables; a table `written` before is only
-    referred to."""
+    """A table of keys, its variants, its nested tables; one `written` before is only named."""
     name = f"`[[{path}]]`" if many else f"`[{path}]`" if path else "At the top"
     own = [(item, key_of(item)) for item in fields_of(of) if key_of(item)]
     yield f"\n## {name}\n\n{doc[0].upper()}{doc[1:]}.\n"

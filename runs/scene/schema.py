@@ -142,14 +142,12 @@ def variant(selector: str, registry: Registry) -> Any:
 
 
 def collection(registry: Registry) -> Any:
-    """A tuple of (name, object), one per class of the registry for which the scene has a key or
-    table."""
+    """A tuple of (name, object), one per class of the registry that the scene has a key for."""
     return field(default=(), metadata={"collection": Collection(registry)})
 
 
 class Collects(Parameters):
-    """Base of tables with a collection: its names are also attributes, with the values in the
-    scene."""
+    """Base of tables with a collection: its names are also attributes, as the scene has them."""
 
     def __getattr__(self, name: str) -> Any:
         for item in fields(self):
@@ -168,8 +166,7 @@ def collection_of(item: Field) -> Collection | None:
 
 
 def fields_of(of: Any) -> Iterator[Field]:
-    """The fields of a dataclass or of its instance, with those of its collections in their
-    place."""
+    """The fields of a dataclass or its instance, with those of its collections in their place."""
     for item in fields(of):
         part = collection_of(item)
         yield from part.fields() if part else [item]

@@ -11,8 +11,7 @@ Path_ = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Source:
-    """The file, its text and the paths set by --set; `problems` collects (path of the key,
-    message)."""
+    """The file, its text and the paths set by --set; `problems`: (path of the key, message)."""
 
     path: Path
     text: str

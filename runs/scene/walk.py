@@ -37,8 +37,7 @@ def owners(of: type, name: str) -> tuple[str, list[str]] | None:
 
 
 def entries(holder: Any) -> Iterator[tuple[Any, Field]]:
-    """(object, field) of all keys and tables of a table, with those of its variants in their
-    place."""
+    """(object, field) of all keys and tables of a table, those of its variants in their place."""
     for item in fields_of(holder):
         if variant_of(item) is None:
             yield holder, item
@@ -47,8 +46,7 @@ def entries(holder: Any) -> Iterator[tuple[Any, Field]]:
 
 
 def walk(of: type, path: str = "") -> Iterator[tuple[str, type, Field, Key]]:
-    """(dotted name, dataclass, field, description) of every key in every variant; [] marks
-    arrays."""
+    """(dotted name, dataclass, field, key) of every key in every variant; [] marks arrays."""
     for item in fields_of(of):
         name = f"{path}.{item.name}" if path else item.name
         part, kinds, key = table_of(item), variant_of(item), key_of(item)

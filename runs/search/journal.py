@@ -1,5 +1,4 @@
-"""search.json: the trials of a search, so that it can be resumed and is not repeated once
-finished."""
+"""search.json: the trials of a search, so that it can be resumed, and is not repeated."""
 
 from __future__ import annotations
 
@@ -40,8 +39,7 @@ class Trial:
 
 
 class Journal:
-    """The trials of a scene's search in a folder; the file is rewritten after each. Root process
-    only."""
+    """The trials of a search in a folder; the file is rewritten after each. Root process only."""
 
     def __init__(self, directory: Path, scene: Scene) -> None:
         self.path, self.scene = directory / NAME, scene
@@ -73,8 +71,7 @@ class Journal:
 
 
 def read_trials(path: Path) -> list[Trial]:
-    """All trials in a file, of any scene. Raises OSError, ValueError or KeyError if it holds
-    none."""
+    """All trials in a file, of any scene. Raises OSError, ValueError or KeyError without any."""
     return [_trial(one) for one in json.loads(path.read_text(encoding="utf-8"))["trials"]]
 
 
@@ -88,8 +85,7 @@ def _trial(data: dict[str, Any]) -> Trial:
 
 
 def _origin(scene: Scene) -> str:
-    """Hash of everything that trials depend on: the scene without its target, its files, the
-    program."""
+    """Hash of all that trials depend on: the scene without its target, its files, the program."""
     of, up_to = scene.accuracy.of, scene.accuracy.up_to
     bare = replace(scene, accuracy=Accuracy(of=of, up_to=up_to))
     files = [store.file_hash(path) for path in _files(scene)]

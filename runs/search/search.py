@@ -103,8 +103,7 @@ class Search:
         return f"error {shown(trial.found.over(self.scene.accuracy), self.scene.accuracy)}; scheme {trial.scheme}; {cost}"
 
     def _tried(self, settings: Settings) -> Trial:
-        """Run the scene with these settings up to its error bars, in a separate folder.
-        Collective."""
+        """Run the scene with these settings up to its error bars, in its own folder. Collective."""
         began = time.perf_counter()
         folder = self.directory / FOLDER / "trial"
         on_root(self.comm, lambda: folder.mkdir(parents=True, exist_ok=True))
@@ -141,8 +140,7 @@ class Search:
         return ""
 
     def _keep(self, trial: Trial) -> None:
-        """Complete the run with a trial's settings, reusing its stages, and write its scene.
-        Collective."""
+        """Complete the run with a trial's settings from its stages; write its scene. Collective."""
         chosen = applied(self.scene, trial.settings)
         on_root(self.comm, lambda: write_text(self.directory / CHOSEN, signed(dumps(chosen))))
         observe.say(f"  chosen: {trial.settings}; {self.directory / CHOSEN} needs no search")
@@ -163,8 +161,7 @@ class Search:
         _tell(scene, done)
 
     def _give_up(self, tried: list[Trial], why: str) -> None:
-        """Compute the results of the closest trial, then raise ConvergenceError with its error.
-        Collective."""
+        """Compute the closest trial's results, then raise ConvergenceError. Collective."""
         wanted = self.scene.accuracy
         ended = [trial for trial in tried if trial.found is not None]
         if not ended:
@@ -187,8 +184,7 @@ class Search:
 
 
 def seconds(folder: Path) -> dict[str, float]:
-    """Seconds by stage of the run in a folder, as each took when it was computed. Not
-    collective."""
+    """Seconds by stage of the run in a folder, as when each was computed. Not collective."""
     stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
     return {
         name: sum(entry["cost"].values()) or entry["seconds"]

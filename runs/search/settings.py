@@ -1,5 +1,4 @@
-"""The settings that a search chooses: mesh, modes, residual, points and step, on ladders from
-coarse to fine."""
+"""The settings of a search: mesh, modes, residual, points, step, on ladders from coarse to fine."""
 
 from __future__ import annotations
 
@@ -143,8 +142,7 @@ def aim(wanted: Accuracy) -> str:
 
 
 def size_ratio(cause: str, one: Settings, other: Settings) -> float:
-    """Size that causes the error in `other` relative to that in `one`: below 1 if `other` is
-    finer."""
+    """Size that causes the error in `other` over that in `one`: below 1 if `other` is finer."""
     sizes = {
         "mesh": (1 / one.mesh[0], 1 / other.mesh[0]),
         "modes": (1 / one.up_to, 1 / other.up_to),

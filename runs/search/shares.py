@@ -58,8 +58,7 @@ class Found:
 
 
 def worst(over: np.ndarray) -> tuple[float, int]:
-    """The largest total error over its target, and the index of that figure; 1 or less meets the
-    target."""
+    """The largest total error over its target, and the index of that figure; 1 or less meets it."""
     totals = np.sqrt((over**2).sum(axis=0))
     figure = int(totals.argmax())
     return float(totals[figure]), figure

@@ -1,2 +1,1 @@
-"""One module per stage: `inputs` (what it depends on), `compute`, and reading and writing its
-file."""
+"""One module per stage: `inputs` (what it depends on), `compute`, writing and reading its file."""

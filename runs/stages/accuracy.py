@@ -1,5 +1,4 @@
-"""Stage accuracy: error estimates of a run's forces from cheap companion runs with known orders of
-convergence."""
+"""Stage accuracy: error estimates of a run's forces from cheap companion runs of known orders."""
 
 from __future__ import annotations
 
@@ -71,8 +70,7 @@ class Accuracy:
 
 @dataclass(frozen=True, kw_only=True)
 class AccuracyStage(Computed[Accuracy]):
-    """Error bars of the mean, deviation and third octaves of the contact force and the axle
-    force."""
+    """Error bars of mean, deviation and third octaves of the contact force and the axle force."""
 
     name: ClassVar[str] = "accuracy"
     static: Done[StaticState]
@@ -86,8 +84,7 @@ class AccuracyStage(Computed[Accuracy]):
         return {"contact": self.contact.key, "up_to": self.job.scene.accuracy.up_to}
 
     def compute(self, record: Record) -> Accuracy:
-        """Run the companions one by one; if one fails, its cause is reported and the run continues.
-        Collective."""
+        """Run the companions one by one; a failed one is reported, its cause absent. Collective."""
         history, setup = self.contact.product, self.setup.product
         if self._at_rest:
             return self._none("nothing excites the tire: its forces vary by rounding only")
@@ -128,8 +125,7 @@ class AccuracyStage(Computed[Accuracy]):
         return product
 
     def produce(self, key: str, record: Record) -> Accuracy:
-        """As any stage; also removes the coarser companion's folder, which is only needed to
-        resume. Collective."""
+        """As any stage; also removes the coarser companion's checkpoint folder. Collective."""
         product = super().produce(key, record)
         folder = self.job.directory / COARSER
         on_root(self.job.comm, lambda: shutil.rmtree(folder, ignore_errors=True))
@@ -149,8 +145,7 @@ class AccuracyStage(Computed[Accuracy]):
         )
 
     def _window(self, start: int, steps: int) -> int:
-        """Last step of the companion runs, chosen so that they cost `SHARE` of the run's estimated
-        cost."""
+        """Last step of the companion runs, for `SHARE` of the run's estimated cost."""
         work = estimate(self.job.scene).work
         loop = work["contact loop"]
         before = sum(work.values()) - loop
@@ -212,8 +207,7 @@ class AccuracyStage(Computed[Accuracy]):
 def _describe(
     record: Record, product: Accuracy, exact: Mapping[str, Measured], limit: float
 ) -> None:
-    """Record, for the vertical force, the errors of mean and deviation (up to `limit` Hz) and the
-    largest band error."""
+    """Record the vertical force's errors: mean, deviation (up to `limit` Hz), worst band."""
     record.indicators["deviations are taken up to"] = (limit, "Hz")
     for name, figures in exact.items():
         bar, what = product.total(name), name.replace("_", " ")

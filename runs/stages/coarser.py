@@ -62,8 +62,7 @@ class CoarserStatic(StaticStage):
 
 
 def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
-    """The job of the coarser run, and its parts done from the static state to the Green's
-    functions. Collective."""
+    """The coarser job, and its parts from the static state to the Green's functions. Collective."""
     job, done = coarser_job(run), dict[str, Done]()
     if (contact := job.scene.contact) is not None:
         # Contact points as in the run, not those its own footprint would ask for.

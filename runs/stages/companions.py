@@ -120,8 +120,7 @@ def longer_step(given: Given) -> Forces:
 
 
 def other_points(given: Given) -> Forces:
-    """Every other point of the grid both ways or, if the footprint holds few, twice as many.
-    Collective."""
+    """Every other point of the grid both ways or, if these are few, twice as many. Collective."""
     job, patch = given.job, given.setup.patch
     if patch.places is None:
         raise InputError(
@@ -206,8 +205,7 @@ class Companion(NamedTuple):
     def bars(
         self, run: Mapping[str, Measured], since: float, limit: float, up_to: float
     ) -> dict[str, Bars]:
-        """Error bars of the forces of a `run` after `since` s; arguments as in
-        contact.results.error_bars.measured."""
+        """Error bars of a `run` after `since` s; see contact.results.error_bars.measured."""
         off = _figures(self.forces, since, limit, up_to)
         other = _figures(self.beside, since, limit, up_to) if self.beside else run
         return {name: bars(other[name], off[name], self.share) for name in run}

@@ -49,8 +49,7 @@ LINEAR = (
 
 @dataclass(frozen=True, kw_only=True)
 class ContactStage(Stage[ContactHistory]):
-    """The time loop. Its file is written as the loop proceeds, from the last checkpoint if there is
-    one."""
+    """The time loop. Its file is written as it proceeds, from the last checkpoint if any."""
 
     name: ClassVar[str] = "contact"
     static: Done[StaticState]

@@ -1,5 +1,4 @@
-"""Stage greens: Green's functions between the driven points and between the points of the contact
-patch."""
+"""Stage greens: Green's functions between driven points, and between those of the patch."""
 
 from __future__ import annotations
 
@@ -70,8 +69,7 @@ class GreensStage(Computed[Responses]):
 
     @property
     def _stands_with_air(self) -> bool:
-        """Whether the states are first reported here: a tire at rest without air has those of its
-        modes."""
+        """Whether states are first reported here: at rest, those without air are the modes' own."""
         return self.job.speed == 0 and has_air(self.job.scene)
 
     @property
@@ -122,8 +120,7 @@ class GreensStage(Computed[Responses]):
         return made.response
 
     def _apart(self, name: str, whole: Response) -> dict[str, Response]:
-        """Split into the contact's response, prescribed forces among its inputs (contact.driven),
-        and theirs."""
+        """The contact's response, with prescribed forces as inputs (contact.driven), and theirs."""
         forces, more = len(self.job.scene.force), corner.readings(self.job)
         if name == "force" or not (forces or more):
             return {name: whole}
@@ -172,8 +169,7 @@ class GreensStage(Computed[Responses]):
 
 
 def _share_of_residual(record, where: str, response: Response) -> None:
-    """Record the largest share of the static flexibility that the modes lack: the truncation error
-    without the residual."""
+    """Record the largest share of the static flexibility that the modes lack (truncation error)."""
     diagonal = np.diag(response.residual)
     total = diagonal + np.diag(response.static())
     # A point of a coarse mesh may lie on the rim, where its flexibility is zero.

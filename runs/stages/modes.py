@@ -1,5 +1,4 @@
-"""Stage modes: the lowest modes about the static state, and the rotation matrices projected on
-them."""
+"""Stage modes: the lowest modes about the static state, and rotation matrices projected on them."""
 
 from __future__ import annotations
 
@@ -67,8 +66,7 @@ class ModesStage(Computed[ModalBasis]):
 
     @property
     def _shapes(self) -> tuple[float, str] | None:
-        """The speed (rad/s) up to which rotation shapes join the modes, and the inertia used for
-        them."""
+        """The speed (rad/s) up to which rotation shapes join the modes, and their inertia."""
         turning = shapes_of(self.job)
         return (up_to(turning.speed), turning.inertia) if turning else None
 
@@ -102,8 +100,7 @@ class ModesStage(Computed[ModalBasis]):
         return replace(basis, labels=labels)
 
     def produce(self, key: str, record: Record) -> ModalBasis:
-        """As any stage; also caches the fields that other members of a family will need.
-        Collective."""
+        """As any stage; also caches the fields for other members of a family. Collective."""
         basis = super().produce(key, record)
         if self.job.scene.greens.residual == "attachment" and basis.modes is not None:
             fields_file.keep(self.job, key, self.motions.product.operators, basis.modes)

@@ -197,8 +197,7 @@ def _peak(comm: MPI.Comm) -> float:
 
 
 def _report(directory: Path, summary: Summary) -> None:
-    """Write the report. Its summary entry is written first because the page lists it. Root process
-    only."""
+    """Write the report; its summary entry comes first, as the page lists it. Root process only."""
     from tireroad.runs.report.page import remarks, write_report
 
     began = time.perf_counter()

@@ -1,5 +1,4 @@
-"""Stage response: prescribed point forces on the tire, in time and in frequency, and the scene's
-outputs."""
+"""Stage response: prescribed point forces in time and frequency, and the scene's outputs."""
 
 from __future__ import annotations
 

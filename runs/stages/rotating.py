@@ -1,5 +1,4 @@
-"""Stage rotating: the eigenproblem of the rotating tire, on the modal basis or on the finite
-elements."""
+"""Stage rotating: eigenproblem of the rotating tire, on the modal basis or the finite elements."""
 
 from __future__ import annotations
 

@@ -70,8 +70,7 @@ class SpectraStage(Computed[Spectra]):
     accuracy: Done[Accuracy] | None = None
 
     def inputs(self) -> dict:
-        """The contact forces (with modes and run-in length among their inputs) and the error
-        bars."""
+        """The contact forces, whose key covers modes and run-in length, and the error bars."""
         return {"contact": self.contact.key, "bars": self.accuracy.key if self.accuracy else None}
 
     def compute(self, record: Record) -> Spectra:
@@ -175,8 +174,7 @@ class SpectraStage(Computed[Spectra]):
 
 
 def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
-    """Record the largest line of the vertical axle force away from the mean; none for a tire at
-    rest."""
+    """Record the largest line of the vertical axle force away from the mean, if there is any."""
     band = np.arange(min(3, len(frequency)), len(frequency))
     if np.abs(axle[band, 2]).max(initial=0.0) > ROUNDING * np.abs(axle[:, 2]).max(initial=0.0):
         peak = band[np.abs(axle[band, 2]).argmax()]

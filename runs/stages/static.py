@@ -35,8 +35,7 @@ COARSE = 0.02  # estimated relative error of the load above which the user is wa
 
 
 def steady_rolling(job: Job, speed: float | None = None) -> Rolling:
-    """The steady rolling state assumed in statics, at `speed` (rad/s) or the job's; at rest if the
-    scene says so."""
+    """Steady rolling in statics, at `speed` (rad/s) or the job's; at rest if the scene says so."""
     scene = job.scene
     speed = job.speed if speed is None else speed
     if not scene.static.steady_rolling or speed == 0:
@@ -50,8 +49,7 @@ class StaticStage(Computed[StaticState]):
 
     name: ClassVar[str] = "static"
     forgets: ClassVar[bool] = True
-    """Whether matrices kept from an earlier run of the family are discarded: they belong to another
-    state."""
+    """Whether matrices kept from a family's earlier run are discarded: they are another state's."""
 
     def inputs(self) -> dict:
         """The tire without its air, the static loads, and the rolling terms if they act."""
@@ -89,8 +87,7 @@ class StaticStage(Computed[StaticState]):
         return state, loader
 
     def _concluded(self, record: Record, state: StaticState, loader: Loader) -> StaticState:
-        """Add the error estimate, with the footprint of finer elements, and record the figures.
-        Collective."""
+        """Add error estimate and the finer elements' footprint; record the figures. Collective."""
         if self.job.scene.static.error_estimate and state.load:
             with record.timing("error estimate"):
                 state = _estimate(record, state, loader)
@@ -122,16 +119,14 @@ class StaticStage(Computed[StaticState]):
         return static_state(pressed.equilibrium, loader.touch), loader
 
     def _press(self, loader: Loader, rolling: Rolling) -> Loader:
-        """Inflate the tire and press it on the road; returns the loader of the final state.
-        Collective."""
+        """Inflate the tire and press it on the road; returns the final loader. Collective."""
         wanted = self.job.scene.static
         loader.inflate(wanted.inflation)
         placed = wanted.load, wanted.deflection, wanted.road_height
         return place(loader, *placed, friction_of(self.job.scene, rolling))
 
     def _keep_last(self, loader: Loader) -> str:
-        """Write the last converged state, if any; returns a sentence saying where it is.
-        Collective."""
+        """Write the last converged state, if any; returns a sentence saying where. Collective."""
         if not self.job.comm.allreduce(float(np.abs(loader.body.u.x.array).sum())):
             return ""
         job, last = self.job, self.job.path("static_last")

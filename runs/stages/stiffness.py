@@ -1,5 +1,4 @@
-"""Stage stiffness: load and footprint over deflection, and the stiffness of the non-rolling
-tire."""
+"""Stage stiffness: load and footprint over deflection, stiffness of the non-rolling tire."""
 
 from __future__ import annotations
 
@@ -62,8 +61,7 @@ class Stiffness:
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessStage(Computed[Stiffness]):
-    """The load-deflection curve from the undeformed tire, and the stiffness about the scene's own
-    state."""
+    """The load curve from the undeformed tire, and the stiffness about the scene's own state."""
 
     name: ClassVar[str] = "stiffness"
     static: Done[StaticState]
@@ -178,8 +176,7 @@ def _result(points: list[CurvePoint], state: StaticState, stuck: RoadStiffness |
 
 
 def _vertical(curve: dict[str, np.ndarray], state: StaticState) -> tuple[float, float]:
-    """(load, slope) at the scene's own state, which is added to the curve, or at the curve's last
-    point."""
+    """(load, slope) at the scene's own state, added to the curve, or at the curve's last point."""
     own = _own(state)
     if own is None:
         return float(curve["load"][-1]), float(curve["stiffness"][-1])

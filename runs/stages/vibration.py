@@ -84,8 +84,7 @@ class VibrationStage(WholeTire[Vibration]):
     def _coordinates(
         self, basis: Basis, forces: Forces, left_out: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Lines (f,) Hz up to the model's limit, and coordinates a (f, m) at them. Root process
-        only."""
+        """Lines (f,) Hz to the model's limit, and coordinates a (f, m) there. Root process only."""
         start = round(left_out / forces.step)
         pushed = np.concatenate(list(forces.pushes(start)))
         frequency, amplitude = amplitudes(pushed, forces.step)

@@ -1,5 +1,4 @@
-"""The command `sweep`: runs all members, locally or in a batch system, then writes one table and
-one page."""
+"""The command `sweep`: runs all members, here or in a batch system; writes a table and a page."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Gathers settings and results of all members of a sweep into one table, from their result
-folders."""
+"""Gathers settings and results of all members of a sweep from their folders into one table."""
 
 from __future__ import annotations
 

@@ -74,8 +74,7 @@ class Queue:
 
     @classmethod
     def of(cls, sweep: Sweep) -> Queue:
-        """The batch system of the sweep's [queue] table, or Slurm with the options of its [slurm]
-        table."""
+        """The batch system of the sweep's [queue] table, or Slurm with its [slurm] options."""
         given = dict(sweep.queue)
         if not given:
             return cls(directives=sweep.slurm)
@@ -99,8 +98,7 @@ class Queue:
         return cls(**words | {"template": text})
 
     def submission(self, script: Path, count: int | None, before: Sequence[str]) -> list[str]:
-        """The command line that submits a script as an array of `count`, after the jobs
-        `before`."""
+        """The command line that submits a script as an array of `count` after jobs `before`."""
         line = shlex.split(self.submit)
         if count is not None:
             line += shlex.split(self.array.format(count=count))

@@ -18,8 +18,7 @@ from tireroad.runs.process.statuses import DONE, STOPPED, rank_before_mpi
 
 
 def work() -> int:
-    """Compute the members from standard input; returns the worker's exit status. Collective over
-    all processes."""
+    """Compute the members from standard input; returns the exit status. Collective."""
     from mpi4py import MPI
 
     from tireroad.runs.cli import main

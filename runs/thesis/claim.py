@@ -41,8 +41,7 @@ class Claim:
 
     @property
     def agrees(self) -> bool:
-        """Whether this program's value agrees with the thesis; a value that is not finite never
-        does."""
+        """Whether this program's value agrees with the thesis; a non-finite value never does."""
         margin = _margin(self.thesis, self.tolerance)
         if not math.isfinite(self.found):
             return False

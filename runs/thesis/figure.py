@@ -13,8 +13,7 @@ from tireroad.runs.thesis.runner import Scenes
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduced:
-    """The program's result: a line, the `claims`, a `picture` (returns a data URI; root process),
-    its caption."""
+    """The program's result: a line, `claims`, a `picture` (data URI; root process), its caption."""
 
     shows: str
     claims: tuple[Claim, ...]
@@ -29,8 +28,7 @@ class Reproduced:
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """`name` on the command line, `title`, a line on what the `thesis` shows, and `compute`
-    (collective)."""
+    """`name` on the command line, `title`, a line on the `thesis`, and `compute` (collective)."""
 
     name: str
     title: str

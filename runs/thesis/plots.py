@@ -26,8 +26,7 @@ class Curve:
 
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """Curves by their names in the legend, which omits names beginning with "_". `scales` of x and
-    y."""
+    """Curves by name in the legend, which omits names beginning with "_". `scales` of x and y."""
 
     title: str = ""
     x: str

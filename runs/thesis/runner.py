@@ -60,8 +60,7 @@ class Scenes:
             )
 
     def once(self, name: str, make: Callable[[], T]) -> T:
-        """An object shared by figures besides stages: made on first use, kept in memory by name.
-        Collective."""
+        """An object that figures share: made on first use, kept in memory by name. Collective."""
         if name not in self._found:
             self._found[name] = make()
         return self._found[name]

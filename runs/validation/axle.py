@@ -1,5 +1,4 @@
-"""Axle force by momentum and by the free rim (thesis (7.4)), against each other and against full
-finite elements."""
+"""Axle force by momentum and by the free rim (thesis (7.4)), and by full finite elements."""
 
 from __future__ import annotations
 

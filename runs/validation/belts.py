@@ -1,5 +1,4 @@
-"""Modes against full finite elements in time: a tire with cords and lossy compounds on rough
-roads."""
+"""Modes against full finite elements in time: a tire with cords and lossy compounds, rough road."""
 
 from __future__ import annotations
 

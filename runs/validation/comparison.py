@@ -64,8 +64,7 @@ class Comparison:
         }
 
     def full_within(self, error: float) -> Run:
-        """The full run with the largest step whose error is within the given one, else the
-        finest."""
+        """The full run with the largest step whose error is within the given one, or the finest."""
         return next((run for run in self.full if run.error <= error), self.full[-1])
 
     def table(self, title: str) -> Table:

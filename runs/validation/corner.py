@@ -1,5 +1,4 @@
-"""Modes against full finite elements in time, with the wheel as a rigid body on a corner, at rest
-and rolling."""
+"""Modes against full finite elements in time: the wheel as a rigid body on a corner."""
 
 from __future__ import annotations
 

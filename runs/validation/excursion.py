@@ -1,5 +1,4 @@
-"""The error of linearising about the static state: rolling finite elements with large motions as
-reference."""
+"""The error of linearising about the static state, against rolling elements with large motions."""
 
 from __future__ import annotations
 

@@ -30,8 +30,7 @@ class History:
 
 @dataclass(frozen=True)
 class Trial:
-    """The conditions of a run of any tire model: table [contact], patch and road, for
-    `duration` s."""
+    """The conditions of any tire model's run: table [contact], patch and road, `duration` s."""
 
     spec: Spec
     setup: ContactSetup

@@ -1,5 +1,4 @@
-"""Modes against full finite elements in time: a non-rolling tire on a moving flat road (figures
-6.4, 6.5)."""
+"""Modes against full finite elements: a tire at rest on a moving flat road (figures 6.4, 6.5)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""The built-in passenger tire on a rough road: third octaves of modes against full finite elements,
-with air and cords."""
+"""The passenger tire on a rough road: third octaves of modes against full finite elements."""
 
 from __future__ import annotations
 
@@ -65,8 +64,7 @@ def run() -> list[Table]:
 
 
 def compared_table(title: str, compared: dict[str, History], exact: History) -> Table:
-    """Third octaves of the vertical forces minus the `exact` ones, dB: one row per band, one column
-    per history."""
+    """Third octaves of vertical forces minus `exact`, dB: a row per band, a column per history."""
     rows: list[list] = []
     for name in ("contact", "axle"):
         centre, right = _levels(exact, name)

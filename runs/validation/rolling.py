@@ -1,5 +1,4 @@
-"""Modes against full finite elements in time: rolling at 100 rad/s over sine, cleat and rough
-roads."""
+"""Modes against full finite elements in time: 100 rad/s over sine, cleat and rough roads."""
 
 from __future__ import annotations
 

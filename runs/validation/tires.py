@@ -1,5 +1,4 @@
-"""The two tire models of a validation: modes, in any number and with any residual, and full finite
-elements."""
+"""The two tire models of a validation: modes with any residual, and full finite elements."""
 
 from __future__ import annotations
 
@@ -111,8 +110,7 @@ class Tires:
         return self.run.wheel
 
     def modal(self, choice: Choice) -> tuple[Recursion, float, float]:
-        """The lowest modes with their residual between the points of the scene; step; set-up in
-        s."""
+        """The lowest modes with their residual between the scene's points; step; set-up in s."""
         key = choice.modes, choice.residual
         if key not in self._responses:
             began = time.perf_counter()
@@ -124,8 +122,7 @@ class Tires:
         return tire, choice.step, seconds + time.perf_counter() - began
 
     def response(self, count: int, residual: str, counted: bool = True) -> Response:
-        """The response of the lowest modes, as the program's stages make it; the `counted` part, or
-        all."""
+        """The response of the lowest modes as the stages make it; the `counted` part, or all."""
         if count not in self._rolling:
             turning = turning_of(self.job)
             few = fewer(self.modes, self.motions, count, turning, self.job.axle)
@@ -158,8 +155,7 @@ class Tires:
         return tire, step, time.perf_counter() - began
 
     def _damping(self) -> tuple[tuple[float, float], ModalDamping | None]:
-        """Uniform damping of the full matrices, and the additional damping mode by mode.
-        Collective."""
+        """Uniform damping of the full matrices, and additional modal damping. Collective."""
         wheel, modes = self.wheel, self.modes
         if not isinstance(wheel.damping, StrainEnergy):
             return wheel.damping, None

@@ -35,8 +35,7 @@ WEAK = 30.0
 # higher than on the default mesh.
 FINEST = {"segments": 34, "arc": 18, "order": 3, "footprint": 0.15}
 BASE = {"modes": 500, "residual": "static", "pitch": 0.003, "step": 5e-5}
-"""The converged run, of which one setting at a time is made coarser, or finer to confirm
-convergence."""
+"""The converged run; single settings are made coarser, or finer to confirm convergence."""
 DEFAULT = "default settings"
 CHANGES: dict[str, tuple[dict, ...]] = {
     DEFAULT: ({},),
@@ -68,8 +67,7 @@ class Apart:
 
 
 def apart(exact: Rolled, found: Rolled, force: str, duration: float) -> Apart:
-    """Distance of the vertical force in two runs over the same road, up to half the lower highest
-    mode."""
+    """Distance of a vertical force in two runs over one road, up to half the lower highest mode."""
     steps = [run.figure("contact", "step") for run in (exact, found)]
     top = 0.5 * min(run.figure("modes", "highest") for run in (exact, found))
     values = [run.forces[force][:, 2:] for run in (exact, found)]

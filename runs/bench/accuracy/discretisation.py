@@ -1,5 +1,4 @@
-"""Choice of elements: run time against error over order, mesh and grading; locking; diagonal
-mass."""
+"""Choice of elements: run time against error over order, mesh, grading; locking; diagonal mass."""
 
 from __future__ import annotations
 
@@ -75,8 +74,7 @@ def run() -> list[Table]:
 
 
 def _fourier() -> np.ndarray:
-    """The lowest frequencies (Hz) without loads, by Fourier series around the axle on a fine
-    section."""
+    """The lowest frequencies (Hz) without loads, by Fourier series around, on a fine section."""
     section = _section(3, 8, 28, 2, "bead", 1.0).section()
     return lowest(section, {"wall": Rubber(YOUNGS_MODULUS, 0.45, 1200.0)}, COUNT)
 

@@ -66,8 +66,7 @@ def tables(
 def judged(
     case: Case, folder: Path, kept: Path, coarse: dict, fine: dict, duration: float
 ) -> Records:
-    """The figures of a case (Effectivity), estimated and compared with finer runs. On one
-    process."""
+    """The figures of a case (Effectivity), estimated and against finer runs. On one process."""
     where = _Where(folder, kept, case, duration, coarse, fine)
     return [asdict(one) for one in _judged(where)]
 
@@ -111,8 +110,7 @@ _MESH = ("segments", "arc", "order", "footprint", "modes")
 
 
 def _judged(where: _Where) -> Iterator[Effectivity]:
-    """Effectivities of all causes together, and of each from a pair of runs that differ only in
-    it."""
+    """Effectivities of all causes together, and of each from two runs that differ only in it."""
     own = where.own()
     more = where.finer("modes")
     pairs: dict[str, tuple[Recorded, Recorded]] = {

@@ -1,5 +1,4 @@
-"""The headline figure: wall-clock time of one simulated second of rolling on a rough road at 1 %
-error."""
+"""The headline: wall-clock time of one simulated second on a rough road, at 1 % error."""
 
 from __future__ import annotations
 
@@ -52,8 +51,7 @@ def table(folder: Path, mesh: Mesh, modes: int, duration: float, choices) -> Tab
 
 
 def _error(exact: Rolled, found: Rolled, name: str, duration: float) -> float:
-    """Error in percent; of the contact force only the vertical part, the only one without
-    friction."""
+    """Error, %; of the contact force only the vertical part, the only one without friction."""
     part = slice(2, 3) if name == "total_force" else slice(None)
     given = exact.forces[name][:, part], found.forces[name][:, part]
     return 100 * distance(*given, duration, BAND).mean

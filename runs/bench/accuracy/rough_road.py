@@ -60,8 +60,7 @@ step = {step}
 
 @dataclass(frozen=True)
 class Mesh:
-    """Elements around and from bead to bead, and their relative size at the footprint; None: the
-    default."""
+    """Elements around and bead to bead, and their relative size at the footprint; None: default."""
 
     segments: int | None
     arc: int | None
@@ -114,8 +113,7 @@ def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Prepared:
 
 @dataclass(frozen=True)
 class Rolled:
-    """A run as a user starts it: its stages' entries in summary.json, and forces (n, 3) N by
-    name."""
+    """A run as a user starts it: its stages in summary.json, and forces (n, 3) N by name."""
 
     stages: dict[str, dict]
     forces: dict[str, np.ndarray]

@@ -1,5 +1,4 @@
-"""Part of `bench contact`: the recursion against direct convolution, and orders in the time
-step."""
+"""Part of `bench contact`: recursion against direct convolution, and orders in the time step."""
 
 from __future__ import annotations
 

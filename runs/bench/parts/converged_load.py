@@ -1,5 +1,4 @@
-"""Part of `bench discretisation`: load and footprint at given road heights against a convergent
-sequence."""
+"""Part of `bench discretisation`: load and footprint at given road heights, against their limit."""
 
 from __future__ import annotations
 
@@ -55,8 +54,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Converged:
-    """The limit for ever smaller elements, as `values` of Pressed, and its relative `error`
-    (3,)."""
+    """The limit for ever smaller elements: `values` of Pressed, and relative `error` (3,)."""
 
     values: np.ndarray
     error: np.ndarray

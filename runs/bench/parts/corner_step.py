@@ -31,8 +31,7 @@ TURNS = 5
 
 
 def corner() -> Table:
-    """Whole contact stages of two durations, alternately: their difference is that of the
-    additional steps."""
+    """Contact stages of two durations, alternately: their difference is that of the extra steps."""
     costs: dict[str, list[float]] = {name: [] for name in AXLES}
     with tempfile.TemporaryDirectory() as folder, observe.quiet():
         points = {name: _run(Path(folder) / name, name, SHORT)[1] for name in AXLES}

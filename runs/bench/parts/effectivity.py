@@ -22,8 +22,7 @@ FORCES = {"contact_force": "total_force", "axle_force": "axle_force"}
 
 @dataclass(frozen=True)
 class Effectivity:
-    """A figure of a case with its true and its estimated error (N, % or dB), by one `cause` or
-    all."""
+    """A figure of a case with true and estimated error (N, % or dB), by one `cause` or all."""
 
     case: str
     force: str
@@ -47,8 +46,7 @@ class Effectivity:
 
 
 def _judgement(some: list[Effectivity]) -> list[float]:
-    """Number, share of good ones (%), median and 10 % quantiles of estimated over true, where there
-    is an error."""
+    """Number, share of good ones (%), median and 10 % quantiles of estimated over true error."""
     ratio = [one.estimated / one.true for one in some if one.true > one.small] or [float("nan")]
     good = 100 * float(np.mean([float(one.good) for one in some] or [np.nan]))
     return [len(some), good, *map(float, np.quantile(ratio, [0.5, 0.1, 0.9]))]

@@ -1,5 +1,4 @@
-"""Results of a resumable benchmark: one JSON file per case with its settings; each case runs in a
-separate process."""
+"""Results of a resumable benchmark: a JSON file per case; each case runs in its own process."""
 
 from __future__ import annotations
 

@@ -46,8 +46,7 @@ def parts_of(shape: tuple[int, int], modes: int, horizontal: bool = False):
 
 
 def _local(points: np.ndarray) -> np.ndarray:
-    """Local flexibility of truncated modes, m/N in z, x, y: smooth over 2 cm, like that of a
-    wall."""
+    """Local flexibility of truncated modes, m/N in z, x, y: smooth over 2 cm, like a wall's."""
     away = ((points[:, None] - points[None]) ** 2).sum(axis=-1)
     return np.kron([[1.0, 0.1, 0.0], [0.1, 0.5, 0.0], [0.0, 0.0, 0.5]], 1e-6 * np.exp(-away / 4e-4))
 

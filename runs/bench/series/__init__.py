@@ -1,2 +1,1 @@
-"""An independent method: Fourier series around the axle, finite elements in the section, no
-dolfinx."""
+"""An independent method: Fourier series around, finite elements in the section, no dolfinx."""

@@ -32,8 +32,7 @@ class Rubber:
 
 @dataclass(frozen=True)
 class Membrane:
-    """Cords on a ply of the section: E A / s in N/m, rho A / s in kg/m2, angle in rad to the
-    circumference."""
+    """Cords on a ply: E A / s in N/m, rho A / s in kg/m2, angle in rad to the circumference."""
 
     stiffness: float
     angle: float
@@ -47,8 +46,7 @@ def frequencies(
     count: int,
     cords: Mapping[str, Membrane] | None = None,
 ) -> np.ndarray:
-    """The lowest `count` frequencies (Hz) of a wave number with held rim; each stands for a pair if
-    n > 0."""
+    """The `count` lowest frequencies (Hz) of a wave number, rim held; one per pair if n > 0."""
     stiffness, mass = _solid(section, rubbers, wave)
     for name, membrane in (cords or {}).items():
         more, heavier = _cords(section, section.plies[name], membrane, wave)
@@ -100,8 +98,7 @@ def _solid(section: SectionMesh, rubbers: Mapping[str, Rubber], n: int):
 
 
 def _strains(N: np.ndarray, gradient: np.ndarray, r: np.ndarray, n: int) -> np.ndarray:
-    """B (cells, points, 6, dofs) of (e_rr, e_tt, e_yy, g_rt, g_ty, g_ry), dofs (r, t, y) of each
-    node."""
+    """B (cells, points, 6, dofs) of (e_rr, e_tt, e_yy, g_rt, g_ty, g_ry), nodal dofs (r, t, y)."""
     dr, dy = gradient[..., 0], gradient[..., 1]
     over = N / r[..., None]
     B = np.zeros((*r.shape, 6, N.shape[1], 3), complex)

@@ -12,8 +12,7 @@ _UNIT = np.eye(3)
 
 
 class Rule:
-    """Gauss points of the section's cells: shapes N (q, a), their slopes, radius and volume (c, q)
-    per radian."""
+    """Gauss points of the cells: shapes N (q, a), slopes, radius, volume (c, q) per radian."""
 
     def __init__(self, section: SectionMesh, points: int):
         edge, (t, w) = reference.equispaced(section.order), _gauss(points)

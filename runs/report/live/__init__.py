@@ -39,8 +39,7 @@ def packed(values: Any, kind: str) -> dict[str, str]:
 
 
 def thinned(x: NDArray, columns: NDArray) -> tuple[NDArray, NDArray]:
-    """x (n,) and columns (n, k) reduced to at most MOST rows: minimum, then maximum, of each
-    block."""
+    """x (n,) and columns (n, k) in at most MOST rows: minimum, then maximum, of each block."""
     width = -(-len(x) // (MOST // 2))
     if len(x) <= MOST:
         return x, columns

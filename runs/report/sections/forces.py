@@ -96,8 +96,7 @@ def rolling(
 def histories(
     time: NDArray, forces: Mapping[str, NDArray | None], active: NDArray | None
 ) -> dict | None:
-    """Charts of named forces (nt, 3) N by component, and of the number of points in contact
-    (nt,)."""
+    """Charts of named forces (nt, 3) N by component, and of the number of touching points (nt,)."""
     if len(time) < 2:
         return None
     there = {name: force for name, force in forces.items() if force is not None}

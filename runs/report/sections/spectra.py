@@ -18,8 +18,7 @@ _MORE = (  # third octaves, their quantity, reference
 
 
 def spectra(results: Results) -> Section:
-    """Spectra of the varying part of the axle force or, if it is not stored, of the contact
-    force."""
+    """Spectra of the varying axle force or, if it is not stored, of the varying contact force."""
     frequency, force = results.array(_FILE, "frequency"), results.optional(_FILE, "axle_force")
     of = "contact force" if force is None else "axle force"
     contact = results.array(_FILE, "contact_force")

@@ -1,5 +1,4 @@
-"""Report section about load-deflection curve and stiffness of the non-rolling tire
-(stiffness.h5)."""
+"""Report section about load, deflection and stiffness of the non-rolling tire (stiffness.h5)."""
 
 from __future__ import annotations
 

@@ -161,6 +161,5 @@ def modes(results: Results) -> Section:
 
 
 def _named(wave: int, number: int) -> str:
-    """A mode of an axisymmetric tire by its wave number and section mode; "-" without a wave
-    number."""
+    """A mode of an axisymmetric tire by wave number and section mode; "-" without a wave number."""
     return f"{wave}, {number}" if wave >= 0 else "-"

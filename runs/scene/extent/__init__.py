@@ -1,2 +1,1 @@
-"""The extent of a scene, estimated in advance: section, elements, unknowns, memory, disk and
-time."""
+"""The extent of a scene, estimated in advance: elements, unknowns, memory, disk and time."""

@@ -64,8 +64,7 @@ def memory_of(wanted: Estimate, processes: int, on_disk: bool = False) -> dict[s
 
 
 def out_of_core(wanted: Estimate, processes: int) -> bool:
-    """Whether factors must be kept on disk because they would not fit into this machine's
-    memory."""
+    """Whether factors must be kept on disk because this machine's memory is too small for them."""
     return sum(memory_of(wanted, processes).values()) > DOUBTFUL * available_memory()
 
 

@@ -17,8 +17,7 @@ MATRICES = 6
 including the rest: 0.92 GB for the quickstart, 2.3 to 2.8 GB for a passenger tire of 102,060
 unknowns on one process, 1.6 GB on each of two)."""
 TANGENTS = 4
-"""Matrices held in the static state: tangent of the whole ring, half of it folded, and its index
-maps."""
+"""Matrices held in the static state: the whole ring's tangent, half of it folded, index maps."""
 COLUMNS = 250
 """Columns of a tangent's inverse with which the contact set is solved, held twice
 (fem.static.linear_contact has 400 at most).
@@ -39,8 +38,7 @@ DENSE = 1000
 BLOCK = 512
 """Steps of contact results held between two writes (stages.stored.contact_file)."""
 MOST = 1000
-"""Number of touching points up to which "auto" takes the active set
-(contact.model.MOST_TOUCHING)."""
+"""Touching points up to which "auto" takes the active set (contact.model.MOST_TOUCHING)."""
 PIVOT = 5
 """Copies of the matrix of the touching points during pivoting (contact.solver.pivot)."""
 PACKED = 0.3
@@ -88,8 +86,7 @@ class Estimate:
 
 
 def estimate(scene: Scene, until: str | None = None) -> Estimate:
-    """Demand of the stages up to `until`. Memory is within a factor of 1.5 where measured, the rest
-    rougher."""
+    """Demand of the stages up to `until`; memory within a factor of 1.5 where measured."""
     size, left_out = sizes(scene), skipped(scene, until)
     column = _unknowns_through(scene.tire.proportions().through, scene.tire.order)
     dense = "contact" not in left_out and bool(_matrices_of_points(scene, size))
@@ -236,8 +233,7 @@ def _unknowns_through(through: int, order: int) -> int:
 
 
 def _columns_coupled(order: int) -> float:
-    """Columns of nodes that share an element with a given one, averaged over an element's own
-    columns."""
+    """Columns of nodes sharing an element with a given one, averaged over an element's columns."""
     own = np.full(order, order + 1.0)  # inside an element
     own[0] = 2 * order + 1  # between two elements
     return float(np.outer(own, own).mean())

@@ -94,8 +94,7 @@ class _Wall:
 
 
 def _wall(scene: Scene) -> _Wall:
-    """The wall from the section's height and thickness; its tension is that of a circle of that
-    radius."""
+    """The wall, from the section's height and thickness; tension as in a circle of that radius."""
     tire, shape = scene.tire.proportions(), scene.tire.shape
     youngs, poisson, density = shape.rubber(scene.tire)
     plane = density * (1 - poisson**2 + 2 * (1 + poisson)) / youngs
@@ -129,8 +128,7 @@ def highest_frequency(scene: Scene, modes: int) -> float:
 
 
 def road_height(scene: Scene) -> float:
-    """Height (m) of the road above its datum in the first metres, plus the amplitude of its
-    motion."""
+    """Height (m) of the road above its datum in the first metres, plus its motion's amplitude."""
     motion = scene.road.motion
     lift = abs(motion.amplitude) if motion.kind != "none" else 0.0
     surface, start = scene.road.surface, scene.road.start

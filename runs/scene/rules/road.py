@@ -21,8 +21,7 @@ _ROOM = 1.15
 
 
 def check_shape(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Raise an error for a drum too small for the tire, and for held modes on a road that is not a
-    level plane."""
+    """Raise an error for a drum too small for the tire, or held modes without a level plane."""
     road, camber = scene.road, scene.static.camber
     drum = road.drum_radius if road else None
     outer = scene.tire.proportions().outer_radius

@@ -56,8 +56,7 @@ class SectionKind(Parameters):
     tread_law: ClassVar[str] = "layer"
 
     def elements(self, tire: Tire) -> tuple[Self, int, int]:
-        """The kind with its number of elements set; order and segments of the scene, or the
-        defaults."""
+        """The kind with its number of elements set; order and segments, given or by default."""
         return self, tire.order or self.order, tire.segments or self.segments
 
     def check(self, tire: Tire, source: Source) -> None:

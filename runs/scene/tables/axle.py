@@ -105,8 +105,7 @@ class AxleTable:
 
 
 def axle_of(scene: Scene) -> Axle | None:
-    """The moving wheel; None if it is held. Raises InputError if it is not a valid mechanical
-    system."""
+    """The moving wheel; None if held. Raises InputError if it is no valid mechanical system."""
     given = scene.axle
     if given.kind == "fixed" or len(given.locked) == len(DIRECTIONS):
         return None

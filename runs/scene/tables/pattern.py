@@ -72,8 +72,7 @@ class PatternTable:
 
 
 def check_pattern(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Raise an error for an invalid pattern, or for one without a grid of points that resolves
-    it."""
+    """Raise an error for an invalid pattern, or for one without a grid that resolves it."""
     wanted = scene.pattern
     if wanted is None:
         return

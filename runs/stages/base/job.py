@@ -61,8 +61,7 @@ class Job:
         return rotation.travel_speed / (rotation.rolling_radius or state.rolling_radius())
 
     def settle(self, done: Mapping[str, Any]) -> None:
-        """At a travel speed, adopt the wheel speed of the static state once that is `done`.
-        Collective."""
+        """At a travel speed, adopt the static state's wheel speed once it is `done`. Collective."""
         rotation = self.scene.rotation
         if rotation is None or not rotation.travel_speed or self.found or "static" not in done:
             return

@@ -1,5 +1,4 @@
-"""Objects kept in memory from one run of a family to the next with the same static state, mainly
-matrices."""
+"""Objects, mainly matrices, kept in memory for a family's next run with the same static state."""
 
 from __future__ import annotations
 
@@ -34,7 +33,6 @@ def once(kind: str, key: Hashable, make: Callable[[], T]) -> T:
 
 
 def forget() -> None:
-    """Drop everything: a new static state is about to be computed, and matrices belong to one
-    state."""
+    """Drop everything, before a new static state: matrices belong to one state."""
     if _kept is not None:
         _kept.clear()

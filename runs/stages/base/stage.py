@@ -75,8 +75,7 @@ class Stage(Part[P]):
         """The content of the product's file. Root process only."""
 
     def restored(self, held: Any) -> P:
-        """The product from the content of its file, by default that content itself. On every
-        process."""
+        """The product from its file's content, by default that content. On every process."""
         return held
 
     def stored(self) -> P:

@@ -51,8 +51,7 @@ def inputs(job: Job) -> dict | None:
 
 
 def make_air(job: Job, motions: SmallMotions, highest: float) -> Column | None:
-    """The air column inside the deformed wall, or None; `highest` (Hz): frequency of the highest
-    mode. Collective."""
+    """The air inside the deformed wall, or None; `highest` mode's frequency (Hz). Collective."""
     if not has_air(job.scene):
         return None
     from tireroad.fem.cavity.column import make_column

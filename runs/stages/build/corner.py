@@ -1,5 +1,4 @@
-"""The wheel corner in a run: its part of the modes, and its readings, whether the wheel moves or is
-held."""
+"""The wheel corner in a run: its part of the modes, and readings of a moving or held wheel."""
 
 from __future__ import annotations
 
@@ -61,8 +60,7 @@ def layout(job: Job) -> dict[str, tuple[tuple, str]]:
 
 
 def fill(file: h5py.File, corner: Corner | None) -> None:
-    """Write the matrices of the rim's motions with the modes; the axle itself belongs to the
-    scene."""
+    """Write the matrices of the rim's motions with the modes; the axle belongs to the scene."""
     for name in ARRAYS if corner else ():
         put(file, f"corner/{name}", getattr(corner, name), "kg, m, N, rad")
 
@@ -108,8 +106,7 @@ def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def check_blocked(record: Record, rolling: RollingModes, loads, highest: float) -> None:
-    """Record the difference between hub force and blocked force (greens.blocked) up to `highest`
-    Hz."""
+    """Record how far hub force and blocked force (greens.blocked) differ up to `highest` Hz."""
     basis, some = Basis.of(rolling), loads[:: -(-loads.shape[0] // _LOADS)]
     frequency = np.linspace(0, highest, _FREQUENCIES + 1)[1:]
     off = disagreement(basis, rolling.turning, some, frequency)

@@ -53,24 +53,20 @@ class Driven:
 
     @property
     def whole(self) -> Response:
-        """`response` and, if the axle is held and its force wanted, the moments (3) on it after the
-        displacements."""
+        """`response` and, for a held axle whose force is wanted, the moments (3) on it after it."""
         return self.greens.product.force
 
     def moments(self, frequency: Array) -> Array | None:
-        """Moment (f, 3, k) m on the held axle per unit force at `frequency` (f,) Hz; None if it is
-        not available."""
+        """Moment (f, 3, k) m on the held axle per force at `frequency` (f,) Hz; None if unknown."""
         read = self.whole.between(slice(3 * len(self.job.scene.force), None), slice(None))
         return read.receptance(frequency) if len(read.residual) else None
 
     def of_contact(self, name: str) -> Array:
-        """An array of contact.h5 by name, e.g. "normal_force" (nt, c) N, on every process.
-        Collective."""
+        """An array of contact.h5, e.g. "normal_force" (nt, c) N, on every process. Collective."""
         return self.job.read(self.job.path("contact"), lambda file: file[name][:])
 
     def points(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """Loads (k, 3 s) of unit forces in their directions, and readings (3 k, 3 s) of their
-        points."""
+        """Loads (k, 3 s) of unit forces as directed, and readings (3 k, 3 s) of their points."""
         return driven_points(self.job)
 
     def by_free_rim(self, count: int, frequency: Array) -> tuple[Array, float]:

@@ -49,8 +49,7 @@ def works(scheme: str, contact: Work, driven: Driven | None) -> Works:
 
 
 class Losses:
-    """Energy losses of a rolling tire, from its states at each step; empty if they are not
-    known."""
+    """Energy losses of a rolling tire from its states at each step; empty if not known."""
 
     def __init__(self, tire, response: Response, rolling: RollingModes, step: float) -> None:
         self._tire = tire

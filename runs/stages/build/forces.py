@@ -21,8 +21,7 @@ _ROWS = 4096  # steps read at a time
 
 
 def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sparse.csr_matrix:
-    """The driven points (k, 3 s): the patch's nodes in all components, then the prescribed
-    forces."""
+    """The driven points (k, 3 s): the patch's nodes in all components, then prescribed forces."""
     loads = probes(job, state, setup).loads
     if setup is None:
         return loads

@@ -76,8 +76,7 @@ def scene_setup(job: Job, state: StaticState, surface: TreadSurface | None = Non
 
 
 def points_of(job: Job, state: StaticState) -> str | Pitch:
-    """The contact points, "nodes" or the pitch of a grid; chosen from this state if the scene says
-    "auto"."""
+    """The contact points, "nodes" or the pitch of a grid; for "auto" chosen from this state."""
     contact = job.scene.contact
     if contact.on_nodes:
         return "nodes"
@@ -91,8 +90,7 @@ def points_of(job: Job, state: StaticState) -> str | Pitch:
 
 
 def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup:
-    """The setup with the scene's slip and slip angle; at free rolling also the slip of the static
-    shape."""
+    """The setup with slip and slip angle; at free rolling also the slip of the static shape."""
     rotation, slip = job.scene.rotation, wheel_slip(job.scene)
     if rotation is None or not rotation.free_rolling:
         return replace(setup, slip=slip)
@@ -101,8 +99,7 @@ def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup
 
 
 def rolling_speed(job: Job, state: StaticState) -> float:
-    """Speed of the road under the tire, m/s: the wheel's speed times its effective rolling
-    radius."""
+    """Speed of the road under the tire, m/s: wheel speed times effective rolling radius."""
     return job.speed * rolling_radius(job, state)
 
 
@@ -113,8 +110,7 @@ def rolling_radius(job: Job, state: StaticState) -> float:
 
 
 def components(job: Job) -> tuple[int, ...]:
-    """Directions of the contact forces: normal to the road; with a brush also along and across
-    it."""
+    """Directions of the contact forces: normal to the road; with a brush also along and across."""
     return (2, 0, 1) if job.scene.contact.rubs else (2,)
 
 
@@ -144,8 +140,7 @@ class Probes:
 
 
 def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
-    """Probes of the contact patch with those of prescribed forces, or of prescribed forces
-    alone."""
+    """Probes of the contact patch and prescribed forces, or of prescribed forces alone."""
     loads, readings = driven_points(job) if job.scene.force else (None, None)
     more = corner.readings(job)
     if setup is None:

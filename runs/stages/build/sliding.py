@@ -1,5 +1,4 @@
-"""[stiffness] with friction: force over road displacement at rest, or over slip of a rolling
-wheel."""
+"""[stiffness] with friction: force over road displacement at rest, or over slip when rolling."""
 
 from __future__ import annotations
 

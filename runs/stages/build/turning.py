@@ -13,8 +13,7 @@ from tireroad.runs.stages.base.job import Job
 
 
 def damping_of(job: Job) -> Damping:
-    """Proportional damping if the scene has it, else modal strain energy from the compounds' loss
-    factors."""
+    """Proportional damping if the scene has it, else modal strain energy (loss factors)."""
     given = job.scene.damping
     return StrainEnergy() if given is None else Proportional(given.mass, given.stiffness)
 

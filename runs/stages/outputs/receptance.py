@@ -61,8 +61,7 @@ class Receptance(Output):
         return out | (self._by_full_matrices(seen, record) if self.direct else {})
 
     def _by_full_matrices(self, seen: Driven, record: Record) -> Curves:
-        """The same receptances from the full matrices, at a few frequencies; records the modal
-        error."""
+        """The receptances from full matrices at a few frequencies; records the modal error."""
         frequency = self.to * np.arange(1, self.direct + 1) / self.direct
         loads, readings = seen.points()
         with record.timing("receptance of the full matrices"):

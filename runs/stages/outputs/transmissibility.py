@@ -1,5 +1,4 @@
-"""Force and moment on the held axle per force at the driven points, by momentum and by a free
-rim."""
+"""Force and moment on the held axle per force at driven points, by momentum and by a free rim."""
 
 from __future__ import annotations
 

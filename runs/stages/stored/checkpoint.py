@@ -33,8 +33,7 @@ _LARGE = 1e6  # bytes from which the write rate is measured: below, opening the 
 
 @contextmanager
 def checkpointed(stage: Stage, what: str) -> Iterator[Journal]:
-    """The journal of a stage; `what` names its results in messages. On a stop, results are written.
-    Collective."""
+    """The journal of a stage, of results named `what`; a stop writes them. Collective."""
     job = stage.job
     parts = _Parts(job, stage.name, store.wanted_hash(stage.name, stage.inputs()))
     found = parts.read()

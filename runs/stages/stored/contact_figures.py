@@ -20,8 +20,7 @@ LINEAR = (
 
 
 def describe(record: Record, counted: Totals, solver, chosen: Integration, taken: int) -> None:
-    """Record loads, the step and its cost, and solver accuracy; `taken`: steps since the
-    checkpoint."""
+    """Record loads, the step, its cost and accuracy; `taken`: steps since the checkpoint."""
     totals, chattering = counted.figures, counted.alternation.worst
     record.headline |= {
         "mean load": (float(totals.sum / totals.steps), "N"),
@@ -43,15 +42,13 @@ def describe(record: Record, counted: Totals, solver, chosen: Integration, taken
 
 
 def alternation(record: Record, worst: float, scheme: Chosen) -> None:
-    """Warn if points open and close from step to step, unless the road was found to be the
-    cause."""
+    """Warn if points open and close from step to step, unless the road is the known cause."""
     if worst > LIMIT and scheme.reason != ROAD:
         record.warnings.append(warning(worst))
 
 
 def points(record: Record, patch: Patch, extent: Footprint, relief: float) -> None:
-    """Record the static footprint's size in point spacings; warn if it has too few on a rough
-    road."""
+    """Record the static footprint's size in point spacings; warn if too few on a rough road."""
     spacing = patch.spacing
     if not spacing.all():
         return

@@ -93,8 +93,7 @@ def forget_checkpoint(job: Job) -> None:
 
 
 class ContactFile:
-    """Blocks of steps, compressed, on the root process; a checkpoint is a copy plus the loop's
-    state."""
+    """Blocks of steps, compressed, on the root process; a checkpoint adds the loop's state."""
 
     def __init__(self, job: Job, key: str, setup: ContactSetup, attributes: dict):
         self._job, self._key, self._patch = job, key, setup.patch

@@ -24,8 +24,7 @@ _KEPT = ("orthonormality", "inertia_count", "counted_below", "rigid", "slices", 
 
 
 def keep(job: Job, key: str, operators: Operators, modes: Modes) -> None:
-    """Store the fields of the modes with the hash `key` in the cache, if there is one.
-    Collective."""
+    """Store the fields of the modes with the hash `key` in the cache, if any. Collective."""
     body = operators.body
     if job.cache.folder is None or _size(operators, len(modes.squares)) > LARGEST:
         return

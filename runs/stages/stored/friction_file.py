@@ -34,8 +34,7 @@ def read(file: h5py.File) -> dict:
 
 
 def headline(state: StaticState, friction: float | None) -> dict[str, tuple[float, str]]:
-    """Horizontal force, torque on the axle, moment about its vertical, and the share of the load
-    that sticks."""
+    """Horizontal force, axle torque, moment about the vertical, share of the load that sticks."""
     if state.pull is None or friction is None:
         return {}
     force, size = state.pull.sum(axis=0), np.linalg.norm(state.pull, axis=1)

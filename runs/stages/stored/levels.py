@@ -43,8 +43,7 @@ UNITS = _ONE | {
 
 
 def series(history: ContactHistory, start: int) -> dict[str, np.ndarray]:
-    """The available histories by level name, from step `start` on: (n, d) in N, N m, and m for
-    points."""
+    """The histories by level name from step `start` on: (n, d) in N, N m, and m for points."""
     found = {"contact_level": history.total_force, "level": history.axle_force}
     found |= {"hub_moment_level": history.wheel.get("hub_moment")}
     found |= {"point_velocity_level": history.driven}

@@ -1,5 +1,4 @@
-"""modes.h5: frequencies, traces on the outer face, small matrices; not the fields on all
-unknowns."""
+"""modes.h5: frequencies, traces on the outer face, small matrices; no fields on all unknowns."""
 
 from __future__ import annotations
 

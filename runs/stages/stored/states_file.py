@@ -19,8 +19,7 @@ _LAST = ("right",)  # the states lie along the last axis; for all others along t
 
 
 def of_shapes(rolling: RollingModes) -> np.ndarray:
-    """Mask (q,) of the shapes' states: those with the largest share of shapes in their squared
-    norm."""
+    """Mask (q,) of the shapes' states: those with the largest share of shapes in their norm."""
     projection, right = rolling.basis.projection, rolling.states.right
     mask = np.zeros(right.shape[1], bool)
     if projection.shapes and not rolling.full:

@@ -21,8 +21,7 @@ LEFT_OUT = "the thesis leaves Coriolis and centrifugal forces out: with them the
 
 
 def off_lines(frequency: np.ndarray, wave: np.ndarray) -> np.ndarray:
-    """Distance (b,) Hz of branches (v, b) with wave numbers (b,) at their end from the nearer line
-    f ± n Ω/2π."""
+    """Distance (b,) Hz of branches (v, b), wave numbers (b,), from the nearer line f ± n Ω/2π."""
     shift = np.abs(frequency[-1] - frequency[0])
     return np.abs(shift - wave * HIGHEST / (2 * np.pi))
 

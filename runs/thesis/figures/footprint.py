@@ -1,5 +1,4 @@
-"""Figures 7.1 to 7.3: distribution of the contact force over the patch, at rest, rolling,
-damped."""
+"""Figures 7.1 to 7.3: distribution of the contact force in the patch, at rest, rolling, damped."""
 
 from __future__ import annotations
 
@@ -24,8 +23,7 @@ STEADY = "steadily rolling state"
 
 @dataclass(frozen=True)
 class Spread:
-    """Vertical `force` (c,) N at the points (c, 3) m of the patch, each representing `area` (c,)
-    m2."""
+    """Vertical `force` (c,) N at points (c, 3) m of the patch, each for `area` (c,) m2."""
 
     points: Array
     force: Array

@@ -1,5 +1,4 @@
-"""Figure 5.5: an elastic half-space under roughness peaks; the thesis's formula and solution for
-it."""
+"""Figure 5.5: an elastic half-space under roughness peaks; the thesis's formula and solution."""
 
 from __future__ import annotations
 
@@ -26,8 +25,7 @@ RADIUS, PRESSED = 8e-3, 0.5e-3  # m: radius of peaks and sphere; indentation fro
 
 
 def printed(x: Array, y: float, a: float, b: float, put_right: bool = False) -> Array:
-    """The right-hand side of (5.4), m; its third term has the printed factor (x + a), or (x - a) if
-    `put_right`."""
+    """Right-hand side of (5.4), m; third factor (x + a) as printed, or (x - a) if `put_right`."""
 
     def log(p: Array, q: float, r: Array, s: float) -> Array:
         return np.log((q + np.hypot(q, p)) / (s + np.hypot(s, r)))
@@ -52,8 +50,7 @@ def _compliance(points: Array) -> Array:
 
 
 def as_thesis(compliance: Array, overlap: Array) -> Array:
-    """Forces (n,) N by section 5.3.2: those that push every overlapping point back, negative ones
-    set to 0."""
+    """Forces (n,) N by section 5.3.2: push overlapping points back, negative forces set to 0."""
     touching, force = overlap > 0, np.zeros(len(overlap))
     force[touching] = np.linalg.solve(compliance[np.ix_(touching, touching)], overlap[touching])
     return np.maximum(force, 0.0)

@@ -1,5 +1,4 @@
-"""Figures 6.5 and C.2: the simplified tire on a moving flat road, by modes and with all
-unknowns."""
+"""Figures 6.5 and C.2: the simplified tire on a moving flat road, by modes and all unknowns."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""The simplified tire under a point force: any number of its modes, any residual, or all
-unknowns."""
+"""The simplified tire under a point force: any number of modes, any residual, or all unknowns."""
 
 from __future__ import annotations
 
@@ -25,8 +24,7 @@ VERTICAL = slice(2, 3)  # of x, y, z at the driven point
 
 
 class Simplified:
-    """Ten segments, driven at the lowest node, with damping gamma1 (1/s). All methods are
-    collective."""
+    """Ten segments, driven at the lowest node, damping gamma1 (1/s). Methods are collective."""
 
     def __init__(self, scenes: Scenes, damping: float) -> None:
         self.comm = scenes.comm
@@ -48,8 +46,7 @@ class Simplified:
         return made.response.between(VERTICAL, slice(None))
 
     def kept(self, count: int, dynamic: int) -> Response:
-        """The response of `dynamic` modes, with those up to `count` static: (6.1), (6.2). All must
-        oscillate."""
+        """`dynamic` modes, those up to `count` static: (6.1), (6.2). All must oscillate."""
         whole = self.response(count)
         assert len(whole.eigenvalue) == count, "a mode does not oscillate: lower the damping"
         return whole.keeping(np.arange(count) < dynamic)

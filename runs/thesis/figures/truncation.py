@@ -1,5 +1,4 @@
-"""Figures 6.2, 6.3 and C.1: the error of mode truncation, and residual flexibility instead of
-modes."""
+"""Figures 6.2, 6.3 and C.1: mode truncation error, and residual flexibility in place of modes."""
 
 from __future__ import annotations
 

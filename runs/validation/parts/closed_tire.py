@@ -151,8 +151,7 @@ def _soft_modes(operators: Operators) -> Modes:
 
 
 def _oscillator() -> Iterator[tuple]:
-    """u'' + u' + u = 1 (thesis, appendix D): 1 - e^{-t/2} (cos w t + sin w t/sqrt 3), w = sqrt
-    3/2."""
+    """u'' + u' + u = 1 (appendix D): 1 - e^{-t/2} (cos w t + sin w t/sqrt 3), w = sqrt 3/2."""
     one = np.ones((1, 1))
     states = standing(Projection(squares=np.ones(1), momentum=np.ones((3, 1))), (1.0, 0.0))
     tire = Recursion(

@@ -72,7 +72,6 @@ def matrix(patch: Patch) -> np.ndarray:
 
 
 def rolled(time: float) -> np.ndarray:
-    """Pressures (MPa) of the steadily rolling cylinder with one relaxation `time` (s), modulus
-    halved."""
+    """Pressures (MPa) of the rolling cylinder with one relaxation `time` (s), modulus halved."""
     patch, creep = cylinder(), (np.array([1.0]), np.array([time]))
     return pressed(ActiveSet(matrix(patch) @ steady(creep, patch, SPEED)), patch.gap)

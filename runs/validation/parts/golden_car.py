@@ -1,5 +1,4 @@
-"""The golden car, wheel and body without a tire, against its published poles:
-(case, unit, computed, exact)."""
+"""The golden car, without a tire, against its published poles: (case, unit, computed, exact)."""
 
 from __future__ import annotations
 
@@ -60,8 +59,7 @@ def response() -> Response:
 
 
 def poles() -> list[complex]:
-    """Poles 1/s, in the order of PUBLISHED: H(s) + 1/k_t = 0, with a massless tire spring on the
-    road. Collective."""
+    """Poles 1/s as in PUBLISHED: H(s) + 1/k_t = 0 with a massless tire spring. Collective."""
     wheel = response()
 
     def closed(

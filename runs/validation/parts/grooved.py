@@ -88,8 +88,7 @@ def grooves(**given) -> Pattern:
 
 
 def rolled(pattern: Pattern | None, steps: int) -> tuple[np.ndarray, Patch]:
-    """Vertical force (steps,) N of a rigid tire on a bed of springs on a flat road, and its
-    patch."""
+    """Vertical force (steps,) N of a rigid tire on springs on a flat road, and its patch."""
     patch = oval()
     bed = winkler_compliance(patch.area, BED)
     patch = replace(patch, gap=np.where(patch.force > 0, 0.0, patch.gap))

@@ -109,8 +109,7 @@ def plane(equilibrium: E) -> E:
 
 
 def middle(equilibrium: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
-    """Positions x (m) of the nodes in contact in the middle of the width, in order, and their tread
-    indices."""
+    """Positions x (m) of the touching nodes in the middle of the width, and their tread indices."""
     body = equilibrium.body
     points = body.space.tabulate_dof_coordinates()[body.tread]
     x = points[:, 0] + body.owned(body.u.x.array)[body.tread, 0]

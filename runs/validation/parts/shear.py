@@ -110,8 +110,7 @@ def pushed(nu: float, cells: int) -> Iterator[tuple]:
 
 
 def bonded(nu: float, cells: int) -> float:
-    """Load of a sticking flat punch over that of a frictionless one: ln(3 - 4 nu)(1 - nu)/(1 - 2
-    nu)."""
+    """Load of a sticking flat punch over a frictionless one: ln(3 - 4 nu)(1 - nu)/(1 - 2 nu)."""
     disc = Disc(cells)
     count = len(disc.x)
     tread = KernelTread(disc.grid, _down(nu))
@@ -124,8 +123,7 @@ def bonded(nu: float, cells: int) -> float:
 
 
 def creep(nu: float, cells: int) -> tuple[float, float, float]:
-    """C11, C22, C23 of steady rolling without sliding: forces C11 G a^2 xi, C22 G a^2 eta, C23 G
-    a^3 phi."""
+    """C11, C22, C23 of rolling without sliding: C11 G a^2 xi, C22 G a^2 eta, C23 G a^3 phi."""
     disc = Disc(cells, around=True)
     spin = CREEP * np.stack([disc.y, disc.x], axis=-1)
     along, across, turned = (_rolled(disc, nu, slip) for slip in ((CREEP, 0.0), (0.0, CREEP), spin))

@@ -41,8 +41,7 @@ def rows() -> Iterator[tuple]:
 
 
 class Pressed:
-    """A roller under a load (N) without friction; then, by `rubbing`, with the friction of a tread
-    model."""
+    """A roller under a load (N) without friction; `rubbing` adds the friction of a tread model."""
 
     def __init__(self, roller: Roller, load: float, friction: float) -> None:
         self.roller, self.load, self.friction = roller, load, friction
@@ -63,8 +62,7 @@ class Pressed:
 
 
 class Pushed:
-    """`x` (n,) m of the nodes in contact in the middle of the width, their `normal` and `pull` (n,)
-    N."""
+    """`x` (n,) m of the touching nodes in the middle of the width, `normal` and `pull` (n,) N."""
 
     def __init__(self, problem: RubbingEquilibrium, friction: float) -> None:
         self.x, some = middle(problem)

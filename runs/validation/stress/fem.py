@@ -1,5 +1,4 @@
-"""Static states at and beyond the limits: each converges, or stops with a reason and the last good
-state."""
+"""Static states at and beyond the limits: each converges, or stops with reason and last state."""
 
 from __future__ import annotations
 

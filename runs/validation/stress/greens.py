@@ -66,8 +66,7 @@ def _followed(response: Response, force: np.ndarray, step: float, scheme: str) -
 
 
 def _exact(damping: float, force: np.ndarray, step: float, scheme: str) -> np.ndarray:
-    """Displacements (n, 3) after each step, with the force's course over the step as additional
-    states."""
+    """Displacements (n, 3) after each step, the force's course in the step as extra states."""
     wide = np.zeros((12, 12))
     wide[:3, 3:6], wide[3:6, :3], wide[3:6, 3:6] = (
         np.eye(3),

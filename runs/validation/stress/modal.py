@@ -1,5 +1,4 @@
-"""Modes of a small tire at the limits: double eigenvalues, beyond critical speed, damping,
-buckling."""
+"""Modes of a small tire at the limits: double roots, beyond critical speed, damping, buckling."""
 
 from __future__ import annotations
 

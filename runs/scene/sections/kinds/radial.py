@@ -118,8 +118,7 @@ class RadialSection(SectionKind):
 
 
 def _known(table: str, given: Sequence[Region | Line], names: list[str], source: Source) -> None:
-    """Note unknown or repeated names of parts, and keys that place a part whose place follows from
-    the size."""
+    """Note unknown or repeated names of parts, and keys for what follows from the tire's size."""
     default = type(given[0])() if given else None
     known = {name.upper() for name in names}
     for number, one in enumerate(given):

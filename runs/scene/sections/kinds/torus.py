@@ -102,8 +102,7 @@ class TorusSection(SectionKind):
             self._check_cords(tire, which, source)
 
     def _check_circles(self, source: Source) -> None:
-        """Check that the wall fits its circle, the circle the outer radius, and the beads lie
-        outside the axle."""
+        """Check that wall, section circle and outer radius fit, and the beads clear the axle."""
         wall, minor, outer = self.thickness, self.minor_radius, self.outer_radius
         bead = outer - minor + minor * math.cos(math.radians(self.half_angle))
         problems = (

@@ -25,8 +25,7 @@ from tireroad.runs.stages.build.point_forces import directions, histories
 
 
 def driven_tire(job: Job, tire, step: float, steps: int) -> Driven | None:
-    """The tire under prescribed forces and with readings of the wheel; None if the scene has
-    neither."""
+    """The tire under prescribed forces and with wheel readings; None if the scene has neither."""
     forces = job.scene.force
     if not forces and not corner.readings(job):
         return None

@@ -24,8 +24,7 @@ _PER_PERIOD = 16  # steps per shortest period of the excitation
 
 
 def run_time(time: Time) -> float:
-    """Duration of the run, s: whole steps, so slightly longer than a duration that is not a
-    multiple."""
+    """Duration of the run, s: whole steps, so slightly longer than one that is not a multiple."""
     if isinstance(time.step, str):
         return time.duration
     return steps_of(time.duration, time.step).duration
