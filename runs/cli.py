@@ -205,7 +205,7 @@ def _alone(function: Callable[[], None]) -> int:
 
 def main(argv: list[str]) -> int:
     """Run a command line; returns the exit status."""
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # its remarks about a home are not ours
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # mutes its remarks on the home folder
     if argv[:1] == ["test"] and argv[1:] not in (["-h"], ["--help"]):
         from tireroad.runs.process.testing import run_tests
 

@@ -58,8 +58,7 @@ class History:
         return frequency[below], amplitude[below]
 
     def third_octaves(self) -> tuple[Array, Array]:
-        """Third octaves of the axle force: band centres (b,) Hz below the limit, levels (b, 3) dB
-        re 1 N rms."""
+        """Axle force: third-octave centres (b,) Hz to the limit, levels (b, 3) dB re 1 N rms."""
         return third_octaves(self.axle_force, self.time[1] - self.time[0], self.limit.frequency)
 
 

@@ -1,4 +1,4 @@
-"""Contact models of the literature on one tire and road, against the half-space with fine grid."""
+"""Contact models of the literature on one tire and road, against a half-space with fine points."""
 
 from __future__ import annotations
 

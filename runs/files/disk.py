@@ -17,8 +17,7 @@ REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, 
 
 
 class Refused(InputError):
-    """The disk accepts no more data while the program runs: exit status 3, finished stages are
-    kept."""
+    """The disk takes no more data during a run: exit status 3; finished stages are kept."""
 
 
 def explained(error: BaseException, path: Path | str) -> Refused | None:

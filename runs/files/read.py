@@ -21,8 +21,7 @@ class Table:
 
 @dataclass
 class Picture:
-    """A still picture as a data URI, its caption, and the `live` chart that replaces it
-    (runs.report.live)."""
+    """A picture as a data URI, its caption, and the `live` chart for it (runs.report.live)."""
 
     image: str
     caption: str

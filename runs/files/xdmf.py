@@ -66,8 +66,7 @@ class Page:
         )
 
     def states(self, body: str, states: Iterable[tuple[float, str]]) -> Page:
-        """Set the text from geometry and topology `body` and the fields at each time; returns the
-        page."""
+        """Set the text: geometry and topology `body`, and the fields at each time; returns self."""
         grids = []
         for number, (time, fields) in enumerate(states):
             mesh = f"<xi:include xpointer={quoteattr(_BORROWED)}/>" if number else body
@@ -85,16 +84,14 @@ class Page:
 
 
 def static(file: h5py.File) -> Page:
-    """The undeformed outer face as quads, with its displacement (warp by it to see the loaded
-    tire)."""
+    """The undeformed outer face as quads, and its displacement (warp by it to load the tire)."""
     page = Page("static")
     moved = _attribute("displacement", "Vector", _whole(file["surface/displacement"]))
     return page.states(_surface(file, page), [(0.0, moved)])
 
 
 def modes(file: h5py.File) -> Page:
-    """The first mode shapes as vectors on the outer face; the frequency in Hz takes the place of
-    time."""
+    """The first mode shapes as vectors on the outer face; frequency in Hz stands for time."""
     page, shape = Page("modes"), file["surface/shape"]
     fields = [
         (float(value), _attribute("shape", "Vector", page.row(shape, number)))

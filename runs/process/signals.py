@@ -12,7 +12,7 @@ _UNDER_NOHUP = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1) + (
     () if _UNDER_NOHUP else (signal.SIGHUP,)
 )
-"""mpirun forwards SIGUSR1 to every process; the launcher uses it. nohup ignores SIGHUP."""
+"""mpirun forwards SIGUSR1 to every process; the launcher uses it. Under nohup SIGHUP is ignored."""
 
 TOGETHER = 1.0
 """Seconds within which signals count as one request: a terminal, a batch system or `timeout` may

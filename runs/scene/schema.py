@@ -32,8 +32,7 @@ P = TypeVar("P", bound=Parameters)
 
 @dataclass(frozen=True)
 class Table:
-    """A nested table of dataclass `of`: `many` for an array of tables, `optional` if it may be
-    absent."""
+    """A nested table of dataclass `of`; `many`: an array of tables; `optional`: may be absent."""
 
     of: type
     doc: str
@@ -80,8 +79,7 @@ class Pitch:
 
 
 def points(doc: str, *, least: float, most: float) -> Any:
-    """A key for contact points: "nodes", "auto", or the pitch { dx = ..., dy = ... } of a grid in
-    m."""
+    """A key for contact points: "nodes", "auto", or the pitch { dx = ..., dy = ... }, m."""
     limits = Limits(least=least, most=most)
 
     def read(value: Any) -> str | Pitch:

@@ -60,8 +60,7 @@ def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
 def _worthwhile(
     over: np.ndarray, choices: list[tuple[str, Settings]]
 ) -> list[tuple[str, Settings]]:
-    """The choices whose cause contributes significantly; if any error is unknown, only those
-    causes."""
+    """The choices whose cause matters for the error; if any is unknown, only unknown ones."""
     errors = over[:, worst(over)[1]]
     known = dict(zip(CAUSES, errors, strict=True))
     unknown = [one for one in choices if not np.isfinite(known[one[0]])]
@@ -105,8 +104,7 @@ def _worth(
 def _finer(
     over: np.ndarray, cause: str, now: Settings, finer: Settings, rates: Mapping[str, float]
 ) -> np.ndarray:
-    """Predicted errors after refining one cause, by the `rates` of all; an unknown error
-    becomes 0."""
+    """Predicted errors after refining a cause, by the `rates` of all; an unknown one becomes 0."""
     after = over.copy()
     row = CAUSES.index(cause)
     known = np.isfinite(after[row])

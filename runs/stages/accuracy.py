@@ -125,7 +125,7 @@ class AccuracyStage(Computed[Accuracy]):
         return product
 
     def produce(self, key: str, record: Record) -> Accuracy:
-        """As any stage; also removes the coarser companion's checkpoint folder. Collective."""
+        """As any stage; also removes the coarser companion's folder, kept to resume. Collective."""
         product = super().produce(key, record)
         folder = self.job.directory / COARSER
         on_root(self.job.comm, lambda: shutil.rmtree(folder, ignore_errors=True))

@@ -128,8 +128,7 @@ class ContactStage(Stage[ContactHistory]):
         plan: Planned,
         scheme: Chosen,
     ) -> None:
-        """Run the time loop, writing block by block; Chatter is raised beyond the scheme's limit.
-        Collective."""
+        """Run the loop, writing by blocks; raises Chatter beyond the scheme's limit. Collective."""
         response, chosen = self.greens.product.contact, integration(self.job, plan, scheme.scheme)
         with record.timing("tread and solver"):
             driven = driven_tire(self.job, chosen.tire, chosen.step, chosen.steps)
@@ -173,8 +172,7 @@ class ContactStage(Stage[ContactHistory]):
         return min(passing, shortest_period(scene.force))
 
     def _loop(self, record: Record, setup: ContactSetup, tire, step: float) -> Loop:
-        """The loop of tire, normal solver and friction at the patch's points; records the
-        choice."""
+        """The loop of tire, normal solver and friction at the patch's points; recorded."""
         spec = self.job.scene.contact
         loop = make_loop(spec, setup, tire, step)
         if loop.friction is not None:

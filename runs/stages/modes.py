@@ -134,8 +134,7 @@ class ModesStage(Computed[ModalBasis]):
 
 @dataclass(frozen=True, kw_only=True)
 class Fields(Shared[ModalBasis]):
-    """The modes with their fields on all unknowns: from this run, from the shared cache, or solved
-    again."""
+    """The modes with fields on all unknowns: of this run, of the shared cache, or solved again."""
 
     name: ClassVar[str] = "fields"
     modes: Done[ModalBasis]

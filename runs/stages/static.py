@@ -185,8 +185,7 @@ def _extent(attributes) -> Footprint:
 
 
 def _estimate(record: Record, state: StaticState, loader: Loader) -> StaticState:
-    """Report the load error estimated with finer elements; returns the state with their footprint.
-    Collective."""
+    """Report the load error from finer elements; returns the state, their footprint. Collective."""
     if state.pull is not None:  # estimated without friction: the load's error is the same with it
         loader.equilibrium.solve(loader.equilibrium.road_height)
     found = load_error(loader, state.rolling)

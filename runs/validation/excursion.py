@@ -1,4 +1,4 @@
-"""The error of linearising about the static state, against rolling elements with large motions."""
+"""The error of linearising about the static state, against rolling FE with large motions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The passenger tire on a rough road: third octaves of modes against full finite elements."""
+"""Passenger tire with air and cords, rough road: third octaves of modes against full FE."""
 
 from __future__ import annotations
 

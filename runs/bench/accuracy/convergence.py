@@ -1,5 +1,7 @@
-"""Convergence of a rolling tire's forces over mesh, points, modes, step and residual, one at a
-time, and the error of the default settings."""
+"""Convergence of a rolling tire's forces, and the error of the default settings.
+
+Mesh, points, modes, step and residual are varied one at a time.
+"""
 
 from __future__ import annotations
 
@@ -120,8 +122,7 @@ def _kept(folder: Path, road: str, kept: Path) -> Table:
 
 
 def table(folder: Path, road: str, finest: dict, base: dict, changes: dict) -> Table:
-    """The table of one road; `finest` mesh and `base` keys of the converged run, `changes` by what
-    is varied."""
+    """The table of one road: `finest` mesh and `base` keys of the converged run, and `changes`."""
     observe.say(f"  {road}: the converged run ...")
     exact = _rolled(folder, road, finest, base, {})
     rows: list[list] = [["converged", "", "", *[""] * 6, exact.cost]]

@@ -22,8 +22,7 @@ DURATION = 0.01  # s
 
 
 def orders() -> Table:
-    """Forces of a shaken, rolling strip with residual flexibility at decreasing steps, both
-    schemes."""
+    """Forces of a shaken, rolling strip with residual flexibility by step size, both schemes."""
     response = Strip(speed=20.0).response(PATCH.points, 5, 2, residual=6)
     exact = _forces(response, "linear", 6400)
     rows, before = [], None
@@ -119,8 +118,7 @@ def _both(response, shape: np.ndarray, duration: float, steps: int, shown: int):
 
 
 def _many_steps(steps: int) -> list:
-    """500 points and 500 states: steps of the recursion, and steps/2 lags of the convolution
-    each."""
+    """500 points and 500 states: the recursion's steps; steps/2 lags of the convolution each."""
     points, lags = 500, 20
     patch = oval_patch((25, 20), (0.006, 0.006), 500.0)
     tire = Recursion(

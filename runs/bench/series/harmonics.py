@@ -119,8 +119,7 @@ def _hooke(rubber: Rubber) -> np.ndarray:
 
 
 def _cords(section: SectionMesh, edges: np.ndarray, cords: Membrane, n: int):
-    """K_n and M of cords on a ply, over one radian: the strain along the cord from the ply's
-    strains."""
+    """K_n and M of cords on a ply, over one radian; strain along the cord from the ply's own."""
     chain = section.chain(edges)
     order = section.order
     line = chain[order * np.arange(len(edges))[:, None] + np.arange(order + 1)]

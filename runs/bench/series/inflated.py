@@ -67,8 +67,7 @@ class InflatedRing:
                 raise ConvergenceError(f"inflation stops at {share:g} of {self.pressure:g} Pa")
 
     def frequencies(self, wave: int, count: int) -> np.ndarray:
-        """The lowest `count` frequencies (Hz) of a wave number with held rim and dynamic moduli;
-        pairs once."""
+        """The `count` lowest frequencies (Hz) of a wave, rim held, dynamic moduli; pairs once."""
         stiffness = self._inside(self._tangent(wave, self.pressure, dynamic=True))
         stiffness = (stiffness + stiffness.getH()) / 2
         given = {"M": self._inside(self.mass), "sigma": 0.0, "which": "LM"}
@@ -176,6 +175,5 @@ def _moduli(stress, F: np.ndarray) -> np.ndarray:
 
 
 def lowest(tire: InflatedRing, waves: Sequence[int] = (0, 1)) -> np.ndarray:
-    """The two lowest frequencies (Hz) of each wave number: lateral, wind-up; yaw and camber,
-    vertical."""
+    """The two lowest frequencies (Hz) by wave number: lateral, wind-up; yaw/camber, vertical."""
     return np.concatenate([tire.frequencies(wave, 2) for wave in waves])

@@ -156,8 +156,7 @@ def shapes(
 def footprint(
     points: NDArray, half: NDArray, time: NDArray, values: NDArray, label: str
 ) -> dict[str, Any]:
-    """Values (n, c) at points (c, 3) m over time (n,) s; squares of half sizes (2,) m, as an
-    animation."""
+    """Animation of values (n, c) at points (c, 3) m, squares of half sizes (2,) m, over time, s."""
     top = float(np.nan_to_num(values).max(initial=0.0)) or 1.0
     touched = (values > 0).any(axis=0)
     near = touched if touched.any() else np.ones(len(points), bool)

@@ -59,8 +59,7 @@ def _shares(over: NDArray) -> NDArray:
 
 @figures.styled
 def trade(cost: NDArray, error: NDArray, parts: NDArray) -> str:
-    """Errors (n,) relative to the target, and their `parts` (n, causes), over the `cost` (n,) s of
-    a run."""
+    """Errors (n,) over their target, and their `parts` (n, causes), over a run's `cost` (n,) s."""
     figure, axes = figures.line_canvas(6.0, 3.0)
     here = axes[0, 0]
     here.plot(cost, error, "-o", color="#52606d", ms=4, label="all")

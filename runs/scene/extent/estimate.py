@@ -86,7 +86,7 @@ class Estimate:
 
 
 def estimate(scene: Scene, until: str | None = None) -> Estimate:
-    """Demand of the stages up to `until`; memory within a factor of 1.5 where measured."""
+    """Demand of the stages up to `until`; memory within 1.5 where measured, the rest rougher."""
     size, left_out = sizes(scene), skipped(scene, until)
     column = _unknowns_through(scene.tire.proportions().through, scene.tire.order)
     dense = "contact" not in left_out and bool(_matrices_of_points(scene, size))

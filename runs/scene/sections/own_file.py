@@ -120,8 +120,7 @@ def check_cords(tire: Tire, own: OwnSection) -> None:
 
 
 def own_materials(tire: Tire) -> dict[str, Material]:
-    """The compound of each region by name: from [[tire.region]], else the file, else
-    [tire.material]."""
+    """Compound of each region by name: of [[tire.region]], else the file, else [tire.material]."""
     own = own_section(tire)
     return {
         name: _material(tire, name, rubber)

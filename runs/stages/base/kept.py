@@ -19,8 +19,7 @@ def begin() -> None:
 
 
 def once(kind: str, key: Hashable, make: Callable[[], T]) -> T:
-    """The value of `make`, or the one kept from an earlier run under the same key. Collective where
-    `make` is."""
+    """The value of `make`, or that of an earlier run with the same key. Collective if `make` is."""
     if _kept is None:
         return make()
     known = _kept.setdefault(kind, OrderedDict())

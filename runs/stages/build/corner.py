@@ -43,8 +43,8 @@ def readings(job: Job) -> int:
     """Number of additional outputs of a response.
 
     Motions of wheel and body and hub moments for a moving wheel; for a held wheel the moments
-    alone, if the axle force is wanted. None for a free rim, and none if the road holds the
-    footprint, which then carries part of the moments.
+    alone, if the axle force is wanted. 0 for a free rim, and 0 if the road holds the footprint,
+    which then carries part of the moments.
     """
     if job.axle:
         return BESIDE

@@ -53,7 +53,7 @@ class Driven:
 
     @property
     def whole(self) -> Response:
-        """`response` and, for a held axle whose force is wanted, the moments (3) on it after it."""
+        """`response`, then the moments (3) on the axle if it is held and its force wanted."""
         return self.greens.product.force
 
     def moments(self, frequency: Array) -> Array | None:
@@ -102,8 +102,7 @@ class Driven:
         return np.einsum("frdk,rd->frk", components, directions(forces))
 
     def march(self, response: Response) -> Array:
-        """Readings (nt, 3 k) of another response under the prescribed forces, from rest.
-        Collective."""
+        """Readings (nt, 3 k) of another response to the forces given, from rest. Collective."""
         taken = self.integration
         scheme = "linear" if taken.scheme == "convolution" else taken.scheme
         tire = Recursion(response=response, step=taken.step, scheme=scheme, comm=self.job.comm)

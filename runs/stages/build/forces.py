@@ -46,8 +46,7 @@ class Forces:
     def of(
         job: Job, setup: ContactSetup | None, history: ContactHistory | None, seen: np.ndarray
     ) -> Forces:
-        """From the file of the contact, or of the response to prescribed forces. Root process
-        only."""
+        """From the file of the contact, or of the response to given forces. Root process only."""
         if history is not None:
             time, step = history.time, history.step
         else:

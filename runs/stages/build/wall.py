@@ -63,8 +63,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
 
 
 def _outer(tire: Tire, ring: Ring) -> Influence:
-    """Influence of the crown's compound for small motions: a half-space if it is the whole wall,
-    else a layer."""
+    """Influence of the crown's compound: a half-space if it is the whole wall, else a layer."""
     section = ring.section
     cell = section.outer[len(section.outer) // 2, 0]
     material = tire.shape.rubbers(tire)[section.regions[section.region[cell]]]

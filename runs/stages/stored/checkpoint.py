@@ -73,8 +73,7 @@ class _Parts:
         return self._folder / f"{comm.rank}of{comm.size}-{number:04d}.h5"
 
     def read(self) -> list[Entry]:
-        """Results stored for the same inputs and number of processes; reports why any are unusable.
-        Collective."""
+        """Results stored for the same inputs and process count; reports others. Collective."""
         found: list[Entry] = []
         reason = "" if self._job.fresh else self._read(found)
         reasons = [one for one in self._job.comm.allgather(reason) if one not in ("", "absent")]

@@ -65,8 +65,7 @@ def as_thesis(scenes: Scenes, speed: float, damping: float) -> Spread:
 
 
 def steady(scenes: Scenes, speed: float, damping: float) -> Spread:
-    """By steadily rolling finite elements with the thesis's inertia, at that road height.
-    Collective."""
+    """By steadily rolling elements, the thesis's inertia, at that road height. Collective."""
     rest = scenes.run(SCENE, *_settings(0.0, damping), until="static").static
     height = f"static.road_height={rest.road_height + RISE!r}"
     more = "static.load=", height, "static.steady_rolling=true"

@@ -22,8 +22,7 @@ MODES, DAMPING, SPEED = 50, 100.0, 100.0
 
 
 def by_fourier(response: Response) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) s and Green's functions (n, r, k) as the inverse Fourier transform of H, thesis
-    (4.16)."""
+    """Times (n,) s and Green's functions (n, r, k) by inverse Fourier transform of H, (4.16)."""
     frequency = np.arange(round(LONGEST * HIGHEST / 2) + 1) / LONGEST
     values = np.fft.irfft(response.receptance(frequency), axis=0) * HIGHEST
     return np.arange(len(values)) / HIGHEST, values

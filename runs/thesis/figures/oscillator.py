@@ -27,7 +27,7 @@ TIMES = np.linspace(0.0, 12.0, 481)  # s
     "A decaying wave from two eigenvalues, -0.50 + 0.87i and (printed) 0.50 - 0.87i; its Green's function is (D.5).",
 )
 def oscillator(scenes: Scenes) -> Reproduced:
-    """By the program's own eigenproblem for rotating tires. Not collective."""
+    """By the program's own quadratic eigenproblem. Not collective."""
     one = np.ones((1, 1))
     response: Response = couple(rotating(one, one), one, one, np.ones((3, 1)))
     found = response.impulse(TIMES)[:, 0, 0]

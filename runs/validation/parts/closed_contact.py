@@ -79,8 +79,7 @@ def _cylinder() -> Iterator[tuple]:
 
 
 def _punch() -> tuple:
-    """Aitken's extrapolation from three grids: the edge singularity leaves one power of the cell
-    size."""
+    """Aitken's extrapolation of three grids: the edge singularity leaves one power of the size."""
     side, approach, loads = 0.02, 1e-3, []
     for n in (8, 16, 32):
         points, half_sizes = _cells(side, side, n, n)

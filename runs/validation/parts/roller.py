@@ -28,8 +28,11 @@ E = TypeVar("E", bound=Equilibrium)
 
 @dataclass(frozen=True, kw_only=True)
 class Roller:
-    """`outer` radius, rubber `thickness` and `width` m; elements of `size` m up to `reach` m from
-    the lowest point."""
+    """Dimensions of the roller and its mesh, m.
+
+    `outer` radius; `thickness` of the rubber; `width`; elements of `size` up to a distance `reach`
+    from the lowest point.
+    """
 
     outer: float = 0.3
     thickness: float = 0.1

@@ -35,8 +35,7 @@ FINER = ((16, 14), (20, 18), (24, 22), (30, 26), (36, 32), (44, 38), (52, 46), (
 
 @section_kind("radial", "the built-in radial passenger tire (docs/radial-tire.md)")
 class RadialSection(SectionKind):
-    """Layers follow from the size; compounds and cords too, unless [[tire.region]] or
-    [[tire.cords]] change one."""
+    """Layers follow from the size; compounds and cords too, unless the scene changes them."""
 
     # With fewer, modes from 150 Hz up are too low (docs/verification.md, Frequencies of the default
     # mesh).

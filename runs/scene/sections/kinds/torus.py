@@ -46,8 +46,7 @@ ORDER = 3
 
 @section_kind("torus", "a wall between two circles about the section's centre: the thesis's tire")
 class TorusSection(SectionKind):
-    """Order 3 by default, but 2 if the scene gives a number of elements, which then are usually
-    finer."""
+    """Order 3 by default, but 2 for a given number of elements, which are then usually finer."""
 
     air = False
     tread_law = "half-space"

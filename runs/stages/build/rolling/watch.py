@@ -21,7 +21,7 @@ class Watch:
         self._count = 0
 
     def __call__(self, asked: str) -> tuple[str, bool]:
-        """The stop signal ("" for none), and whether a checkpoint is due. Collective at times."""
+        """Stop signal ("" if none), and whether a checkpoint is due. Collective at some steps."""
         self._count += 1
         if self._comm.size > 1 and self._count % _TOGETHER:
             return "", False
