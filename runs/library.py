@@ -130,12 +130,11 @@ def modes(
     road: str = "forces",
     turning: Turning | None = None,
 ) -> Standing:
-    """The `count` lowest undamped modes about a static state, or all below `up_to` Hz; none is
-    missed.
+    """The `count` lowest undamped modes about a static state, or all below `up_to` Hz, none missed.
 
     `rim` "fixed" or "free". `road` "forces": the road is replaced by its contact forces; "held":
-    the touching nodes are held in height. `turning`: how the wheel will rotate; the shapes that belts couple to
-    then join the modes (modal.turning_shapes), as in a run.
+    the touching nodes are held in height. `turning`: how the wheel will rotate; the shapes that
+    belts couple to then join the modes (modal.turning_shapes), as in a run.
     """
     motions = SmallMotions(tire, static, rim=rim, road=road)
     basis = standing_modes(motions, count=count, up_to=up_to, turning=turning)

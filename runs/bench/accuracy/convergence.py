@@ -33,8 +33,8 @@ BANDS = (20.0, 1000.0)  # Hz
 # dB below the strongest band: a sine has all its force in one band, and residues 50 dB below it in
 # another are irrelevant.
 WEAK = 30.0
-# Elements far from the footprint must be fine too: the modes of 36 x 14 with 0.1 there are 1 %
-# higher than on the default mesh.
+# Elements far from the footprint must be fine too: modes of 36 x 14 elements with a footprint size
+# of 0.1 are 1 % higher than those of the default mesh.
 FINEST = {"segments": 34, "arc": 18, "order": 3, "footprint": 0.15}
 BASE = {"modes": 500, "residual": "static", "pitch": 0.003, "step": 5e-5}
 """The converged run; single settings are made coarser, or finer to confirm convergence."""

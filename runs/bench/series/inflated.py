@@ -1,7 +1,9 @@
 """An inflated tire and its small motions, by Fourier series around and finite elements in the
 section.
 
-  F = I + grad u,   int P(F) : grad v + cords + p int (x_theta x x_s) . v = 0   (axisymmetric, three components),
+  F = I + grad u,   int P(F) : grad v + cords + p int (x_theta x x_s) . v = 0
+
+(axisymmetric, three components),
 
 then for each wave number n the tangent on fields Re[v(r, y) e^{i n theta}], with stresses, pressure
 and cords of that state and the rubber's own part at its dynamic modulus. The integration is

@@ -12,8 +12,8 @@ from tireroad.runs.scene.extent.estimate import FACTOR, FOOTPRINT, KEYS, LOAD_ER
 CERTAIN, DOUBTFUL = 1.5, 0.8
 # Parts that the processes of a run share by rows; of everything else each process has its own.
 SPREAD = ("matrices", FACTOR, FOOTPRINT, LOAD_ERROR, "modes", "flexibility of the patch")
-# Share of a factor that MUMPS keeps on disk out of core: of 54,000 and 108,000 unknowns, 26 and 22 %
-# of the memory were still taken.
+# Share of a factor that MUMPS keeps on disk out of core: with 54,000 and 108,000 unknowns, 26 and
+# 22 % of the memory were still taken.
 ON_DISK = 0.7
 LONG = 3600.0  # s: runs estimated to take longer cause a warning
 

@@ -83,7 +83,7 @@ class SectionKind(Parameters):
         return {line.name: line.angle for line in tire.cords}
 
     def rubber(self, tire: Tire) -> tuple[float, float, float]:
-        """Dynamic Young's modulus (Pa), Poisson's ratio and density (kg/m³) of the wall, for estimates."""
+        """Dynamic modulus (Pa), Poisson's ratio and density (kg/m³) of the wall, for estimates."""
         law = tire.material.law
         return tire.dynamic * law.youngs, law.poisson, tire.material.density
 

@@ -1,4 +1,4 @@
-"""`section = "file"`: a tire from an Abaqus deck, a Gmsh mesh or a section file (docs/how-to/own-tire.md)."""
+"""`section = "file"`: an Abaqus deck, a Gmsh mesh or a section file (docs/how-to/own-tire.md)."""
 
 from __future__ import annotations
 
