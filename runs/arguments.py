@@ -43,8 +43,7 @@ Arguments = Callable[[argparse.ArgumentParser], object]
 
 @dataclass(frozen=True)
 class Command:
-    """A command: its line in the list of commands (`text`) and the function that adds its
-    arguments.
+    """A command: its line in the list of commands (`text`), and a function that adds its arguments.
 
     `about` and `usage` replace the help that is otherwise generated from these.
     """

@@ -171,8 +171,7 @@ class RollingTire:
         ).response
 
     def at(self, spots: list[tuple[float, float]], residual: str = "static") -> Response:
-        """The response between points of the outer face (angle around, angle along the section;
-        rad).
+        """The response between points of the outer face (angle around, angle along section; rad).
 
         In all three directions: probes x, y, z of the first point, then of the second, and so on.
         """

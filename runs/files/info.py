@@ -16,10 +16,9 @@ LONG = 96  # longest attribute text printed in full
 
 
 def describe(file: Path, as_json: bool = False) -> str:
-    """Provenance, attributes and datasets (shape, type, unit, stored size) of an HDF5 file, as text
-    or JSON.
+    """The contents of an HDF5 file as text or JSON.
 
-    A result file's checksum is verified first, which reads all of it: about a second per GB. Other
+    Provenance, attributes, and datasets with shape, type, unit and stored size. A result file's checksum is verified first, which reads all of it: about a second per GB. Other
     HDF5 files are described too. Control characters are shown as escapes. Not collective. Raises
     InputError if the file is absent, not HDF5, or damaged.
     """

@@ -21,8 +21,7 @@ SIZES = (4.0, 9.0)  # points: sizes of the marks for the smallest and the larges
 
 
 def drawn(table: Any) -> str | None:
-    """The figure specified by `plot` of a runs.measure.tabulate.Table, as a data URI; None without
-    one.
+    """The figure that `plot` of a runs.measure.tabulate.Table asks for, as a data URI, or None.
 
     kind "lines" (default): `y` columns over column `x`, one curve per value of column `by`, axes in
     `log` logarithmic; "front": `points` (rows like the table's), coloured by column `by`, with

@@ -48,8 +48,7 @@ class Strip:
     def horizontal_response(
         self, points: Array, around: int, across: int, stiff: float
     ) -> Response:
-        """Response (3c, 3c) in z, x, y: the vertical one, and in the road's plane `stiff` times
-        stiffer.
+        """Response (3c, 3c) in z, x, y: vertical, and in the road's plane `stiff` times stiffer.
 
         The tire is slightly tilted: every mode has its own direction, with x up to 0.3 of z.
         """

@@ -40,8 +40,7 @@ class Table:
 
 
 def modules(package: str) -> dict[str, ModuleType]:
-    """The modules in a package and its subfolders by name, each with ABOUT (a line) and run() ->
-    list[Table].
+    """A package's modules by name, subfolders included: each has ABOUT and run() -> list[Table].
 
     Some also have run_large(): the same on a mesh that takes too long to wait for.
     """

@@ -14,8 +14,7 @@ _FLAGS = (  # CPU flags required by each kernel, the widest first
 
 
 def choose_kernels() -> None:
-    """Set OPENBLAS_CORETYPE to the processor's capability if OpenBLAS falls back to its oldest
-    kernels.
+    """Set OPENBLAS_CORETYPE to what the processor can do, if OpenBLAS takes its oldest kernels.
 
     OpenBLAS of Debian 12 (0.3.21) recognises no later processor: there dense products took five
     times as long, the static state of a passenger tire twice. Must be called before anything loads

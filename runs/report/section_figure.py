@@ -23,8 +23,7 @@ _FACES = {"inner": "#2f6db5", "tread": "#3e4c59", "rim": "#c8502d"}
 
 @styled
 def draw_section(mesh: SectionMesh, angles: Mapping[str, float] | None = None) -> Figure:
-    """The section seen along the road's x: y to the right, axle at the top, tread at the bottom;
-    mm.
+    """The section seen along the road's x: y to the right, axle at the top, tread below; mm.
 
     `angles`: degrees to the circumference, by the names of the plies.
     """

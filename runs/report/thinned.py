@@ -7,8 +7,7 @@ DRAWN = 600  # bins of a long series; each keeps its minimum and maximum
 
 
 def envelope(x: NDArray, y: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArray]:
-    """Minimum and maximum of y (n) in each of `bins` blocks of samples, in their order, with their
-    x.
+    """Minimum and maximum of y (n) in each of `bins` blocks of samples, in order, with their x.
 
     A peak of one sample stays visible, which plain subsampling would not ensure. Short series are
     returned unchanged.

@@ -32,8 +32,7 @@ _LEAST = 1e-3  # s
 
 
 def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
-    """The next settings after a trial that misses its target; None if no finer ones exist or fit
-    into memory.
+    """The next settings after a trial that misses its target; None if none are left or fit.
 
     Reads the road's file; on one process only, as the result depends on the available memory.
     """

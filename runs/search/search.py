@@ -41,8 +41,7 @@ class Search:
     cache: Cache = NO_CACHE
 
     def run(self) -> None:
-        """Run trials until one meets the target, then the whole run with its settings, reusing its
-        stages.
+        """Run trials until one meets the target, then the run with its settings and stages.
 
         Raises ConvergenceError if none meets it within the limits; the results are then those of
         the closest trial. Collective.
@@ -203,8 +202,7 @@ def run(
     petsc_options: list[str],
     cache: Cache = NO_CACHE,
 ) -> None:
-    """A run as started by the user, with a search if the scene has a target and `until` includes
-    it.
+    """A run as the user starts it, with a search if the scene has a target and `until` allows.
 
     `fresh`: reuse nothing of earlier runs and trials. Collective.
     """

@@ -82,8 +82,7 @@ def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
 
 
 def coarser_job(job: Job) -> Job:
-    """The same scene with half the elements around and, if the scene sets their number, from bead
-    to bead.
+    """The same scene with half the elements around and, where given, from bead to bead.
 
     Its stages are cached like those of any run, in a subfolder of the run's. Raises InputError if
     the mesh is too coarse to be halved.

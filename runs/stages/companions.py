@@ -68,11 +68,11 @@ class Given:
 
     @cached_property
     def base(self) -> Forces | None:
-        """Reference for the companions of points, modes and mesh: the run with twice the step, at
-        half the cost.
+        """Reference for the companions of points, modes and mesh: the run with twice the step.
 
-        None if the longer step drops a state or does not resolve the contact's oscillation although
-        the run's own step does; the run itself is then the reference. Collective.
+        It halves their cost. None if the longer step drops a state or does not resolve the
+        contact's oscillation although the run's own step does; the run itself is then the
+        reference. Collective.
         """
         step, spec = 2 * self.step, self.job.scene.contact
         kept = self.response.resolved(step)
@@ -145,8 +145,7 @@ def other_points(given: Given) -> Forces:
 
 
 def fewer_modes(given: Given) -> Forces:
-    """States up to `FEWER` of the highest mode; those above it, up to the highest, respond
-    statically.
+    """States up to `FEWER` of the highest mode; those from there to the highest are static.
 
     States above the highest mode are kept: they belong to the shapes that joined the modes, without
     which the band below would shift. Collective.

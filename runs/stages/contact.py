@@ -80,8 +80,7 @@ class ContactStage(Stage[ContactHistory]):
         return self.stored()
 
     def _roll(self, key: str, record: Record) -> None:
-        """Run the time loop with the scheme that suits the contact, or the other one if it chatters
-        after all.
+        """Run the time loop with the scheme that suits the contact; the other one if it chatters.
 
         Collective.
         """

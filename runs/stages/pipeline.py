@@ -90,8 +90,7 @@ def run_scene(
     petsc_options: list[str],
     cache: Cache = NO_CACHE,
 ) -> Finished:
-    """Run the stages that a scene needs; results go into `directory`, products are returned.
-    Collective.
+    """Run the stages of a scene into `directory`; returns their products. Collective.
 
     `cache`: finished stages shared with other runs, by default none.
     """

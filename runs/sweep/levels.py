@@ -1,5 +1,4 @@
-"""Third octaves of a sweep's members in dB relative to the first, with the uncertainty of the
-differences.
+"""Third octaves of a sweep's members in dB relative to the first, with their uncertainty.
 
 Members that differ only in a seed are samples of one road: their powers are averaged, and the mean
 power lies within t s / sqrt(n) of that of all roads in 95 of 100 cases (Student's t with n - 1

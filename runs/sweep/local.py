@@ -51,8 +51,7 @@ def at_once(sweep: Sweep, wanted: int) -> tuple[int, str]:
 
 
 def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
-    """Run every member into folder/members/<name>; returns their outcomes in the order of the
-    sweep.
+    """Run every member into folder/members/<name>; returns the outcomes in the sweep's order.
 
     Each of the workers (runs.sweep.worker) takes one member after the other. They share a cache of
     finished stages, so that equal inputs are computed once: a member waits while another computes

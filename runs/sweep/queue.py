@@ -1,5 +1,4 @@
-"""Submits a sweep to Slurm, or to another batch system through a template: writes and submits
-scripts.
+"""Submits a sweep to Slurm, or through a template to another batch system, as job scripts.
 
 Members share stages through the cache in the sweep's folder. The first job computes one member of
 each group that shares a static state and modes; after it, an array job runs the rest, and a last

@@ -1,5 +1,4 @@
-"""A worker process that computes members of a sweep one after the other, loading the libraries
-once.
+"""A worker that computes members of a sweep one after the other, loading the libraries once.
 
 A line on standard input describes a member: {"run": arguments, "log": file, "status": file}. The
 run's output goes to the log, its exit status to the other file when it has ended. The worker ends

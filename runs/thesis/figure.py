@@ -50,8 +50,7 @@ def figure(name: str, title: str, thesis: str) -> Callable:
 
 
 def chosen(names: Sequence[str], known: dict[str, Figure]) -> list[Figure]:
-    """The figures with these names, each once, in the order of the thesis; all of them without
-    names.
+    """The figures with these names, each once, in the order of the thesis; all without names.
 
     Raises InputError for an unknown name, suggesting the nearest one.
     """

@@ -36,8 +36,7 @@ class Run:
 
 
 class Comparison:
-    """Full finite elements at decreasing steps (two or more), and modal runs compared with the
-    last.
+    """Full finite elements at falling steps (two or more); modal runs compared with the last.
 
     `counts`: the quantities whose error a run is selected by.
     """

@@ -84,8 +84,7 @@ def apart(exact: Rolled, found: Rolled, force: str, duration: float) -> Apart:
 
 
 def levels(exact: tuple, found: tuple) -> tuple[float, float, float]:
-    """Largest difference (dB) of common bands within BANDS, for (centres Hz, levels dB) of two
-    runs.
+    """Largest difference (dB) of common bands within BANDS; each run as (centres Hz, levels dB).
 
     Of those within `WEAK` of the strongest, with its frequency (Hz), and of all; NaN without common
     bands.

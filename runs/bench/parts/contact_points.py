@@ -98,8 +98,7 @@ def rough() -> Table:
 
 
 def _tamaas(surface: np.ndarray, force: np.ndarray) -> list:
-    """Polonsky and Keer's solver in tamaas (Frerot et al., JOSS 2020) under the same load, in free
-    space.
+    """Polonsky and Keer's solver in tamaas (Frerot et al., JOSS 2020), same load, free space.
 
     Its tolerance, 1e-9 in its own measure, gives forces that agree with ours to about 1e-9.
     """

@@ -1,5 +1,4 @@
-"""Small motions of an unloaded ring by an independent method: Fourier series around, finite
-elements in the section.
+"""Small motions of an unloaded ring: Fourier series around, finite elements in the section.
 
   u(r, y, theta) = Re[v(r, y) e^{i n theta}],   K_n v = omega^2 M v   for each wave number n,
 

@@ -1,14 +1,12 @@
-"""An inflated tire and its small motions, by Fourier series around and finite elements in the
-section.
+"""An inflated tire and its small motions: Fourier series around, finite elements in the section.
 
   F = I + grad u,   int P(F) : grad v + cords + p int (x_theta x x_s) . v = 0
 
-(axisymmetric, three components),
-
-then for each wave number n the tangent on fields Re[v(r, y) e^{i n theta}], with stresses, pressure
-and cords of that state and the rubber's own part at its dynamic modulus. The integration is
-selective as in the program (full for the distortion, one point per direction less for dilatation
-and cords); everything else is independent: numpy, no dolfinx.
+(axisymmetric, three components); then for each wave number n the tangent on fields
+Re[v(r, y) e^{i n theta}], with stresses, pressure and cords of that state and the rubber's own part
+at its dynamic modulus. The integration is selective as in the program (full for the distortion, one
+point per direction less for dilatation and cords); everything else is independent: numpy, no
+dolfinx.
 """
 
 from __future__ import annotations

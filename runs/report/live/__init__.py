@@ -1,5 +1,4 @@
-"""Interactive content that replaces still figures if scripts are enabled: zoomable charts, 3D
-shapes.
+"""Interactive charts and shapes in place of still figures, if scripts are enabled.
 
 The scripts are charts.js and shapes.js beside this file, and uPlot 1.6.32 (uplot/, MIT), all
 embedded in the page, which loads nothing from outside. Without scripts, and in print, the still
@@ -133,8 +132,7 @@ def bars(
 def shapes(
     points: NDArray, quads: NDArray, normal: NDArray, moved: NDArray, titles: Sequence[str]
 ) -> dict[str, Any]:
-    """Surface shapes (m, s, 3) on points (s, 3) with quads (q, 4) and unit normals (s, 3), for 3D
-    view.
+    """Shapes (m, s, 3) on points (s, 3) with quads (q, 4) and unit normals (s, 3), for 3D view.
 
     Coordinates as 16-bit shares of the largest one; displacements as signed bytes, each shape's
     largest being full scale.

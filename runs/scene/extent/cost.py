@@ -5,8 +5,7 @@ from tireroad.runs.scene.tables.scene import Scene
 
 
 def seconds(work: dict[str, float], size: Sizes, column: int) -> dict[str, float]:
-    """CPU time (s) of `operations` by stage; `column`: unknowns per column of nodes through the
-    wall.
+    """CPU time (s) of `operations` by stage; `column`: unknowns in a column through the wall.
 
     On a core of a shared server (Intel Xeon), one BLAS thread, 2026-11-23; from 7,020 to 98,100
     unknowns (static state: 224,100) within a factor of 1.6

@@ -19,11 +19,10 @@ unknowns on one process, 1.6 GB on each of two)."""
 TANGENTS = 4
 """Matrices held in the static state: the whole ring's tangent, half of it folded, index maps."""
 COLUMNS = 250
-"""Columns of a tangent's inverse with which the contact set is solved, held twice
-(fem.static.linear_contact has 400 at most).
+"""Columns of a tangent's inverse that solving the contact set takes, held twice.
 
-A torus of 220,500 unknowns took 2.3 GB on each of two processes; the estimate is 1.8, 1.4 without
-them. Released before the modes.
+At most 400 (fem.static.linear_contact). A torus of 220,500 unknowns took 2.3 GB on each of two
+processes; the estimate is 1.8, 1.4 without them. Released before the modes.
 """
 BASES = 3
 """Copies of all modes held at peak: slices, the sorted vectors, their products."""

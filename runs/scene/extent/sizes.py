@@ -177,8 +177,7 @@ def _points(scene: Scene, free: int) -> tuple[int, int]:
 
 
 def _area_within(section: SectionMesh, depth: float) -> float:
-    """Area (m²) of the undeformed outer face that a plane cuts off at a depth (m) above its lowest
-    point.
+    """Area (m²) of the undeformed outer face cut off by a plane `depth` (m) above its lowest point.
 
     Integrates the chord 2 sqrt(2 r (depth - fall)) over the section; for a torus 2 pi depth sqrt(R
     r).

@@ -41,8 +41,7 @@ class Proportions:
 
 
 class SectionKind(Parameters):
-    """Base class of the kinds of section. Methods take the scene's [tire], of which the kind is a
-    part.
+    """Base class of the kinds of section. Methods take the scene's [tire], which has the kind.
 
     `order` and `segments`: defaults of element order and elements around. `air`: whether air is
     included unless [tire.cavity] says otherwise. `tread_law`: default of `contact.tread`; a layer

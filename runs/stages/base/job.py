@@ -50,8 +50,7 @@ class Job:
         return self.scene.rotation.speed if self.scene.rotation else 0.0
 
     def free_speed(self, state: StaticState) -> float:
-        """Speed (rad/s) of a wheel with this rolling radius, free rolling at the scene's travel
-        speed.
+        """Speed (rad/s) of a wheel with this rolling radius, rolling freely at the travel speed.
 
         The job's own speed if the scene has no travel speed.
         """

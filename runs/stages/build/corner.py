@@ -73,8 +73,7 @@ def read(file: h5py.File, axle: Axle | None) -> Corner | None:
 
 
 def widened(probes: sparse.csr_matrix, count: int) -> sparse.csr_matrix:
-    """Probes (k, 3 s) of the outer face, extended by the last `count` readings of wheel, body and
-    hub.
+    """Probes (k, 3 s) of the outer face, plus the last `count` readings of wheel, body, hub.
 
     Returns (k + count, 3 s + 10).
     """

@@ -30,8 +30,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, kw_only=True)
 class Driven:
-    """The k points of the scene's [[force]] tables, and the contact, as seen by every kind of
-    output.
+    """The k points of the scene's [[force]] tables, and the contact, as outputs see them.
 
     `time` (nt,) s, None without [time]; `integration`: how prescribed forces were integrated, None
     with contact or without time integration; `history` of the contact, None without contact.

@@ -20,10 +20,9 @@ class Velocity(Output):
         return 3 * points
 
     def curves(self, seen: Driven, record: Record) -> Curves:
-        """v = C s q + C B f + R df/dt, (nt, k, 3) m/s: states q, eigenvalues s, shapes C, inputs B,
-        residual R.
+        """v = C s q + C B f + R df/dt, (nt, k, 3) m/s: states q, poles s, shapes C, residual R.
 
-        C B is zero for a complete set of states.
+        C B, with the inputs B, is zero for a complete set of states.
         """
         if seen.integration is None:
             return {}

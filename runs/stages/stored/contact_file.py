@@ -113,8 +113,7 @@ class ContactFile:
         self._done = 0
 
     def open(self, stack: ExitStack, path: Path) -> dict[str, np.ndarray] | None:
-        """Begin the temporary file; the stack moves it into place at its end, or removes it after
-        an error.
+        """Begin the temporary file, which the stack moves into place, or removes after an error.
 
         Returns the state of a checkpoint of the same inputs to continue from, or None. Collective.
         """

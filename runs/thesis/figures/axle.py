@@ -28,10 +28,9 @@ def peaks(frequency: Array, size: Array) -> Array:
 
 
 def _curves(scenes: Scenes, *settings: str) -> tuple[Array, Array, Array, Array]:
-    """Frequencies (f,) Hz; vertical axle force per N (f,) by momentum and by the free rim; natural
-    frequencies with held rim.
+    """Frequencies (f,) Hz; vertical axle force per N (f,), two ways; natural frequencies.
 
-    Collective.
+    The force is by momentum and by the free rim, the frequencies with held rim. Collective.
     """
     run = scenes.run(SCENE, *settings, until="response")
     names = FREQUENCY, MOMENTUM, FREE_RIM

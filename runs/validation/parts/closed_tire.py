@@ -108,8 +108,7 @@ def _ring(speed: float) -> Iterator[tuple]:
 
 
 def _bending_waves(points: np.ndarray, shape: np.ndarray, eigenvalue: np.ndarray) -> dict:
-    """Signed frequency (Hz) by wave number n and branch of a ring's in-plane waves exp(i (w t - n
-    a)).
+    """Signed frequency (Hz) by wave number n and branch of in-plane waves exp(i (w t - n a)).
 
     a: angle from the lowest point against the sense of rotation. Branch 1 is the higher of the two
     frequencies, -1 the lower. States are identified by their shapes (3 s, m), not by their

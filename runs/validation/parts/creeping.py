@@ -1,5 +1,4 @@
-"""Rolling cylinders of viscoelastic rubber, against published pressures:
-(case, unit, computed, exact).
+"""Rolling cylinders of creeping rubber, published pressures: (case, unit, computed, exact).
 
 Two cylinders of polyamide: G, nu, common radius, load of 1 m, speed. Wang and Knothe, J. Appl.
 Mech. 60 (1993) 310.

@@ -1,5 +1,4 @@
-"""A tread pattern on a rigid wheel and road, its pitch orders in closed form:
-(case, unit, computed, exact).
+"""Pitch orders of a tread pattern on a rigid wheel: (case, unit, computed, exact).
 
 For grooves that never touch, on a bed of springs, F(t) is the sum of the slick's forces over the
 land. Its order n is the groove's Fourier coefficient sin(n pi w/l)/(n pi), with groove width w and

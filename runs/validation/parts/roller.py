@@ -1,5 +1,4 @@
-"""A rubber roller with a rigid core in plane strain: the finite-element tire as a cylinder with
-closed forms.
+"""A rubber roller in plane strain: the finite-element tire as a cylinder with closed forms.
 
 A torus with such a large section circle that the strip in use is flat; its inner face is held, and
 nothing moves along the axle. Elements are small at the road and grow from there around and inwards.

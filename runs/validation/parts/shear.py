@@ -1,5 +1,4 @@
-"""Tangential compliance of a half-space against closed forms and Kalker's table:
-(case, unit, computed, exact).
+"""A half-space sheared, against closed forms and Kalker: (case, unit, computed, exact).
 
 For a disc of radius 1 m in cells, `n` across it; forces are scaled by the cells' total area. A body
 on a rigid road behaves like two equal ones with twice the shear modulus.

@@ -127,8 +127,7 @@ class Rolling:
 
 
 def over_brush(roller: Roller, creepage: float = 1e-3, half: float = 0.02) -> float:
-    """Force of a layer that sticks over its whole contact, relative to a brush of its shear modulus
-    over its thickness.
+    """Force of a layer that sticks throughout, over that of a brush of its G / thickness.
 
     nu = 0: each column of the layer carries for itself, p = E/h (half^2 - x^2)/2R. It drags its
     neighbours along over a length of its thickness, so the difference is of first order in that.

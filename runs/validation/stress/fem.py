@@ -57,8 +57,7 @@ def attempts() -> Iterator[Attempt]:
 
 @dataclass(frozen=True)
 class Ended:
-    """The final state, the solver's message if it is not the requested one, and the check of
-    equilibrium.
+    """The final state, the solver's message if it is not the one asked for, and the check.
 
     The equations are solved again from the state: `residual`, and Newton `steps`, 0 if in
     equilibrium.
