@@ -18,9 +18,10 @@ LONG = 96  # longest attribute text printed in full
 def describe(file: Path, as_json: bool = False) -> str:
     """The contents of an HDF5 file as text or JSON.
 
-    Provenance, attributes, and datasets with shape, type, unit and stored size. A result file's checksum is verified first, which reads all of it: about a second per GB. Other
-    HDF5 files are described too. Control characters are shown as escapes. Not collective. Raises
-    InputError if the file is absent, not HDF5, or damaged.
+    Provenance, attributes, and datasets with shape, type, unit and stored size. A result file's
+    checksum is verified first, which reads all of it: about a second per GB. Other HDF5 files are
+    described too. Control characters are shown as escapes. Not collective. Raises InputError if the
+    file is absent, not HDF5, or damaged.
     """
     if not file.is_file():
         raise InputError(f"{file}: there is no such file")
