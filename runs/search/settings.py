@@ -13,7 +13,7 @@ from tireroad.runs.scene.tables.scene import Scene
 
 FINER = 2**0.5  # factor per rung of modes and points; the step is halved
 RUNGS = 10
-MODES = 2.25  # highest mode over highest frequency of interest on the lowest rung
+MODES = 2.25  # highest mode over highest frequency of interest, lowest rung: valid to half of it
 SAMPLES = 8  # steps per period of that frequency on the lowest rung
 PASSING = 2.25  # contact points that pass per period of it, at least
 POINTS = 1 / 32  # of the outer radius: largest spacing of points

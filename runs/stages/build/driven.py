@@ -101,7 +101,7 @@ class Driven:
         return np.einsum("frdk,rd->frk", components, directions(forces))
 
     def march(self, response: Response) -> Array:
-        """Readings (nt, 3 k) of another response to the forces given, from rest. Collective."""
+        """Readings (nt, 3 k) of another response to prescribed forces, from rest. Collective."""
         taken = self.integration
         scheme = "linear" if taken.scheme == "convolution" else taken.scheme
         tire = Recursion(response=response, step=taken.step, scheme=scheme, comm=self.job.comm)
