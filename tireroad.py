@@ -1,8 +1,8 @@
 """tireroad: a rolling tire on a rough road.
 
-The packages `fem`, `modal`, `greens`, `contact` and `runs` beside this file are
-`tireroad.fem` and so on. Installed, this file is the package's `__init__`; in a checkout it is a
-module that finds them where they lie. So nothing but `tireroad` is a top-level name anywhere.
+The packages `fem`, `modal`, `greens`, `contact` and `runs` beside this file are imported as
+`tireroad.fem` and so on, so that `tireroad` is the only top-level name. When installed, this file
+is the package's `__init__`; in a checkout it is a module that finds the packages beside it.
 """
 
 from importlib import import_module
@@ -13,8 +13,8 @@ __path__ = [str(Path(__file__).resolve().parent)]
 
 import_module("tireroad.runs.process.kernels").choose_kernels()  # before anything loads BLAS
 
-# Where each public name lives; imported when it is first asked for, so that `import tireroad` costs
-# nothing and reading results needs no finite elements.
+# Module of each public name. A name is imported on first use, so that `import tireroad` is cheap
+# and reading results does not load the finite elements.
 _HOMES = {
     "torus": "tireroad.runs.library",
     "press": "tireroad.runs.library",

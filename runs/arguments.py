@@ -1,4 +1,4 @@
-"""What the command line takes: commands, options, help."""
+"""The command line's commands, options and help texts."""
 
 import argparse
 from collections.abc import Callable
@@ -43,8 +43,9 @@ Arguments = Callable[[argparse.ArgumentParser], object]
 
 @dataclass(frozen=True)
 class Command:
-    """A command of the program: its line in the list of commands, and the function that adds its
-    arguments; `about` and `usage` are its own help where they differ from those made of the rest.
+    """A command: its line in the list of commands (`text`), and a function that adds its arguments.
+
+    `about` and `usage` replace the help that is otherwise generated from these.
     """
 
     text: str

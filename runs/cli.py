@@ -1,4 +1,4 @@
-"""The command line. Nothing heavy is imported before the command that needs it."""
+"""The command line. Heavy imports are deferred to the command that needs them."""
 
 import argparse
 import logging
@@ -19,7 +19,7 @@ from tireroad.runs.process.surroundings import check_surroundings
 
 
 def _together(function: Callable[[Any], None]) -> int:
-    """A command of all processes, `function(comm)`: its exit status. Collective over all processes."""
+    """Run `function(comm)` on all processes; returns the exit status. Collective."""
     status, message = mpi.judged(check_surroundings)
     if status != DONE:
         if rank_before_mpi() == 0:
@@ -36,14 +36,14 @@ def _together(function: Callable[[Any], None]) -> int:
 
 @cache
 def _only_warnings() -> None:
-    """Keep the compiler's chatter (distutils, at its first use of a form) off the terminal."""
+    """Keep log output below warnings (distutils, at the first use of a form) off the terminal."""
     handler = logging.StreamHandler()
     handler.setLevel(logging.WARNING)
     logging.getLogger().addHandler(handler)
 
 
 def _run(args: argparse.Namespace, petsc_options: list[str]) -> int:
-    """The main job. Collective over all processes."""
+    """The command `run`. Collective over all processes."""
     return _together(lambda comm: _run_inside(args, petsc_options, comm))
 
 
@@ -93,7 +93,7 @@ def _check_processes(args: argparse.Namespace, size: int) -> None:
 
 
 def _reproduce(args: argparse.Namespace, comm) -> None:
-    """Figures of the thesis. Collective."""
+    """Recompute figures and tables of the thesis. Collective."""
     _check_processes(args, comm.size)
     mpi.start_petsc([])
     from tireroad.runs.thesis.command import reproduce
@@ -102,7 +102,7 @@ def _reproduce(args: argparse.Namespace, comm) -> None:
 
 
 def _resumed(args: argparse.Namespace) -> argparse.Namespace:
-    """`resume DIR` as the run of the scene that DIR keeps."""
+    """Turn `resume DIR` into a `run` of the scene stored in DIR."""
     args.resumed = True
     args.command, args.scene, args.out = "run", args.directory / "scene.toml", args.directory
     args.set, args.until, args.fresh = [], None, False
@@ -193,7 +193,7 @@ ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
 
 
 def _alone(function: Callable[[], None]) -> int:
-    """A command of one process; under mpirun the root does it."""
+    """Run a single-process command, on the root process under mpirun; returns the exit status."""
     if rank_before_mpi() != 0:
         return DONE
     signals.stop_on_signals()
@@ -204,12 +204,12 @@ def _alone(function: Callable[[], None]) -> int:
 
 
 def main(argv: list[str]) -> int:
-    """The exit status of a command line."""
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # its remarks about a home are not ours
+    """Run a command line; returns the exit status."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # mutes its remarks on the home folder
     if argv[:1] == ["test"] and argv[1:] not in (["-h"], ["--help"]):
         from tireroad.runs.process.testing import run_tests
 
-        return run_tests(argv[1:])  # all of it is pytest's
+        return run_tests(argv[1:])  # pytest parses all of its arguments
     options: list[str] = []
     if "--" in argv and argv[0] == "run":
         cut = argv.index("--")

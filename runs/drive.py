@@ -1,4 +1,4 @@
-"""Rolling over a road, for scripts and notebooks: the time loop with its histories collected."""
+"""Rolling over a road, for scripts and notebooks: runs the time loop and collects its histories."""
 
 from __future__ import annotations
 
@@ -25,15 +25,18 @@ from tireroad.runs.library import RollingTire
 from tireroad.runs.stages.build.rolling.loop import make_loop
 
 Array = NDArray[np.float64]
-_TURN = 0.3  # rad that the fastest mode turns in a step by default: under a percent in its phase
+_TURN = 0.3  # rad: default turn of the fastest mode per step; its phase error is below 1 %
 _LEAST_STEPS = 200
 
 
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """What happened: `time` (n,) s; `force` (n, c) N of each contact point, `axle_force` (n, 3) N,
-    `displacement` (n, c) m of the tire under the points, `gap` (n, c) m; the `patch` of points;
-    the `limit` in frequency of what this is an answer to."""
+    """Histories of a run over n instants and c contact points.
+
+    `time` (n,) s; `force` (n, c) N of each contact point; `axle_force` (n, 3) N; `displacement`
+    (n, c) m of the tire at the points; `gap` (n, c) m; `patch`: the contact points; `limit`: the
+    highest frequency up to which the results are valid.
+    """
 
     time: Array
     force: Array
@@ -49,13 +52,13 @@ class History:
         return self.force.sum(axis=1)
 
     def spectrum(self) -> tuple[Array, NDArray[np.complex128]]:
-        """Frequencies (f,) Hz up to the limit and amplitudes (f, 3) N of the axle force (contact.results.spectra)."""
+        """Frequencies (f,) Hz up to the limit, axle-force amplitudes (f, 3) N (contact.results)."""
         frequency, amplitude = amplitudes(self.axle_force, self.time[1] - self.time[0])
         below = frequency <= self.limit.frequency
         return frequency[below], amplitude[below]
 
     def third_octaves(self) -> tuple[Array, Array]:
-        """Band centres (b,) Hz below the limit and levels (b, 3), dB re 1 N rms, of the axle force."""
+        """Axle force: third-octave centres (b,) Hz to the limit, levels (b, 3) dB re 1 N rms."""
         return third_octaves(self.axle_force, self.time[1] - self.time[0], self.limit.frequency)
 
 
@@ -77,11 +80,12 @@ def drive(
     spacing: tuple[float, float] | None = None,
     residual: str = "static",
 ) -> History:
-    """Let the road pass under the tire for `duration` s, in steps of `step` s or as small as the modes ask.
+    """Roll the tire over the road for `duration` s.
 
-    `tread`: a law of contact.tread.laws, by default a half-space of 10 MPa; `spacing` (m, m) of a grid of
-    contact points, by default the nodes of the mesh. ConvergenceError where the road touches beyond the
-    patch of points. Frictionless. Collective.
+    `step` s: time step, by default small enough for the fastest mode. `tread`: a law of
+    contact.tread.laws, by default a half-space of 10 MPa. `spacing` (m, m) of a grid of contact
+    points, by default the nodes of the mesh. Frictionless. Raises ConvergenceError if the road
+    touches the tire outside the patch of contact points. Collective.
     """
     if duration <= 0:
         raise InputError(f"drive: duration = {duration:g} s must be above 0")
@@ -108,7 +112,7 @@ def drive(
 def _instants(
     spec: _Spec, setup: ContactSetup, response: Response, chosen: Steps, comm: MPI.Comm
 ) -> list[Instant]:
-    """The time loop by the scheme that the contact asks for. Collective."""
+    """Run the time loop with the integration scheme that suits the contact. Collective."""
     kept = response.resolved(chosen.size)
     scheme = choose(oscillation(spec, setup.patch, kept, chosen.size)).scheme
     recursion = Recursion(response=kept, step=chosen.size, scheme=scheme, comm=comm)
@@ -118,7 +122,7 @@ def _instants(
 
 
 def _history(patch: Patch, instants: list[Instant], limit: Limit) -> History:
-    """The instants one after the other. ConvergenceError where the road touches beyond the patch."""
+    """Stack the instants. Raises ConvergenceError if the road touches the edge of the patch."""
     kept = {
         name: np.stack([getattr(instant, name) for instant in instants])
         for name in ("time", "force", "axle_force", "displacement", "gap")

@@ -1,14 +1,14 @@
-"""The chain as functions of typed inputs, without scenes and files: for scripts and notebooks.
+"""The computation as functions of typed inputs, without scenes or files, for scripts and notebooks.
 
-    tire = torus(youngs_modulus=48e6, segments=24, elements_arc=10)
-    turning = Turning(speed=50.0, damping=(500.0, 0.0))
-    static = press(tire, inflation=2e5, load=500.0, turning=turning)
-    standing = modes(tire, static, count=60)
-    rolling = roll(standing, turning)
-    run = drive(rolling, make_road(kind="sine", amplitude=1e-3), duration=0.1)     # runs.drive
+  tire = torus(youngs_modulus=48e6, segments=24, elements_arc=10)
+  turning = Turning(speed=50.0, damping=(500.0, 0.0))
+  static = press(tire, inflation=2e5, load=500.0, turning=turning)
+  standing = modes(tire, static, count=60)
+  rolling = roll(standing, turning)
+  run = drive(rolling, make_road(kind="sine", amplitude=1e-3), duration=0.1)     # runs.drive
 
-SI units, angles in radians. Every function is collective: all processes of the tire's communicator call
-it with the same arguments, and all get the same arrays.
+SI units, angles in radians. Every function is collective: all processes of the tire's communicator
+call it with the same arguments and get the same arrays.
 """
 
 from __future__ import annotations
@@ -60,9 +60,10 @@ def torus(
     density: float = 1200.0,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> TireModel:
-    """A toroidal tire without loads. Lengths m, `half_angle` rad from the crown to each bead.
+    """A toroidal tire without loads. Lengths in m; `half_angle` in rad from the crown to each bead.
 
-    `material`, or a neo-Hookean rubber of `youngs_modulus` Pa, `poisson_ratio`, `density` kg/m3.
+    `material`, or else a neo-Hookean rubber of `youngs_modulus` Pa, `poisson_ratio` and `density`
+    kg/m3.
     """
     section = Torus(
         outer_radius=outer_radius,
@@ -90,11 +91,11 @@ def press(
     road_height: float | None = None,
     turning: Turning | None = None,
 ) -> StaticState:
-    """The tire inflated (Pa), and pressed on a flat road by a load (N), a deflection (m) from first touch,
-    or a height of the road (m, negative); without any of them there is no road.
+    """Inflate the tire (Pa) and press it on a flat road; returns the static state.
 
-    `turning`: also the inertia and damping of the steadily rolling shape. ConvergenceError when the
-    tire finds no balance.
+    Give one of: the load (N), the deflection (m) from first contact, or the road height
+    (m, negative); without any of them there is no road. `turning` adds the inertia and damping
+    forces of steady rolling. Raises ConvergenceError if no equilibrium is found.
     """
     return press_tire(
         tire,
@@ -108,7 +109,7 @@ def press(
 
 @dataclass(frozen=True, kw_only=True)
 class Standing:
-    """The standing modes of a tire at its static state: `basis`, and the `motions` they are modes of."""
+    """Modes of the non-rotating tire: `basis`, and the `motions` (matrices) that they solve."""
 
     motions: SmallMotions
     basis: ModalBasis
@@ -129,10 +130,11 @@ def modes(
     road: str = "forces",
     turning: Turning | None = None,
 ) -> Standing:
-    """The `count` lowest undamped modes at a static state, or all below `up_to` Hz; none is missing.
+    """The `count` lowest undamped modes about a static state, or all below `up_to` Hz, none missed.
 
-    `rim` "fixed" or "free"; `road` "forces": replaced by its forces, or "held". `turning`: how the wheel will turn, so
-    that what belts couple then joins the modes (modal.turning_shapes), as in a run.
+    `rim` "fixed" or "free". `road` "forces": the road is replaced by its contact forces; "held":
+    the touching nodes are held in height. `turning`: how the wheel will rotate; the shapes that
+    belts couple to then join the modes (modal.turning_shapes), as in a run.
     """
     motions = SmallMotions(tire, static, rim=rim, road=road)
     basis = standing_modes(motions, count=count, up_to=up_to, turning=turning)
@@ -141,33 +143,38 @@ def modes(
 
 @dataclass(frozen=True, kw_only=True)
 class RollingTire:
-    """A tire that turns: its `standing` modes and what they become, `states`."""
+    """A rotating tire: the modes at rest (`standing`) and the states of the wheel (`states`)."""
 
     standing: Standing
     states: RollingModes
 
     @property
     def eigenvalue(self) -> NDArray[np.complex128]:
-        """Eigenvalues s (q,) 1/s with Im s >= 0; frequency Im s / 2 pi, decay -Re s."""
+        """Eigenvalues s (q,) 1/s with Im s >= 0: frequency Im s / 2 pi, decay rate -Re s."""
         return self.states.states.eigenvalue
 
     @cached_property
     def wheel(self) -> Wheel:
-        """The full matrices as the wheel turns."""
+        """The full matrices of the rotating wheel."""
         projection = self.standing.basis.projection
         return wheel_of(self.standing.motions, self.states.turning, projection=projection)
 
     def respond(self, outputs, loads, residual: str = "static") -> Response:
-        """Green's functions between probes (r, 3 s) and loads (k, 3 s) on the outer face, completed by the
-        `residual` flexibility of the modes left out (greens.responses)."""
+        """Green's functions between probes (r, 3 s) and loads (k, 3 s) on the outer face.
+
+        `residual`: kind of residual flexibility that replaces the truncated modes
+        (greens.responses).
+        """
         basis = self.standing.basis
         return make_response(
             lambda: self.wheel, self.states, outputs, loads, residual, lambda: basis
         ).response
 
     def at(self, spots: list[tuple[float, float]], residual: str = "static") -> Response:
-        """The response between points of the outer face (angle around, angle along the section; rad),
-        in all three directions: probes x, y, z of the first, of the second, and so on."""
+        """The response between points of the outer face (angle around, angle along section; rad).
+
+        In all three directions: probes x, y, z of the first point, then of the second, and so on.
+        """
         lattice = self.standing.motions.lattice
         rows = [
             probe.directed(probe.spot(lattice, *spot), axis) for spot in spots for axis in np.eye(3)
@@ -177,6 +184,6 @@ class RollingTire:
 
 
 def roll(standing: Standing, turning: Turning) -> RollingTire:
-    """The modes of the tire as it turns, seen in the frame that does not turn; at speed 0 those it has."""
+    """The states of the rotating tire in the non-rotating frame; at speed 0, those of the modes."""
     comm = standing.motions.body.comm
     return RollingTire(standing=standing, states=rolling_modes(standing.basis, turning, comm))

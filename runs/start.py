@@ -1,4 +1,4 @@
-"""The first thing that runs: streams and signals are in order before anything heavy is imported."""
+"""Entry point: sets up streams and signals before anything heavy is imported."""
 
 import os
 import signal
@@ -10,7 +10,7 @@ from tireroad.runs.process.statuses import DONE, INPUT, STOPPED, handed_over
 
 
 def program() -> None:
-    """The command `tireroad`: the process's own arguments and exit status."""
+    """The command `tireroad`: takes the process's arguments and sets its exit status."""
     signal.pthread_sigmask(signal.SIG_BLOCK, signals.STOP_SIGNALS)
     streams.mend()
     # A second BLAS thread waits by spinning: half as much processor time again for no second less, from
@@ -18,7 +18,7 @@ def program() -> None:
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     arguments = sys.argv[1:]
-    sys.argv[1:] = []  # libraries that read them stumble over names that are no text
+    sys.argv[1:] = []  # some libraries parse argv and fail on names that are not valid text
     if arguments[:1] in (["run"], ["resume"], ["work"]) and not {"-h", "--help"} & set(arguments):
         from tireroad.runs.process.supervisor import supervise
 
@@ -35,7 +35,7 @@ def program() -> None:
 
 def _status(arguments: list[str]) -> int:
     try:
-        if arguments == ["work"]:  # a sweep's own, for its members
+        if arguments == ["work"]:  # internal: computes members of a sweep
             from tireroad.runs.sweep.worker import work
 
             return work()

@@ -1,4 +1,4 @@
-"""The version of the program and of its result files; everything that is written carries both."""
+"""The version of the program and of its result files; both are written to every output."""
 
 PROGRAM = "tireroad"
 VERSION = "0.1.0"

@@ -1,1 +1,1 @@
-"""Run time against error, scaling and floors: one module a benchmark, found by name."""
+"""Benchmarks of run time against error, scaling and lower bounds, found by name."""

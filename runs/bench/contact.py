@@ -1,4 +1,4 @@
-"""What a step of the contact loop costs: against its floor, against convolution, with friction."""
+"""Cost of a step of the contact loop: against its lower bound, convolution, and with friction."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from tireroad.runs.bench.parts.shear_step import STEP, on_a_grid, parts_of, shea
 from tireroad.runs.measure.tabulate import Table
 
 ABOUT = "the contact loop: cost of a step, friction, convolution, many points; asked and measured"
-BLOCK = 20  # steps between two looks at the floor
+BLOCK = 20  # steps between two measurements of the lower bound
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def run() -> list[Table]:
-    """The tables; ratios are of times measured in one run, in turns, with one BLAS thread as in a run."""
+    """All tables; ratios are of times measured alternately in one run, with one BLAS thread."""
     tables = [_step(), _friction(), convolution(), orders(), large(), rough(), corner()]
     return [_asked(*tables), *tables, shearing()]
 
 
 def _asked(step, friction, convolved, order, many, static, moving) -> Table:
-    """What was asked for beside what the other tables measured."""
+    """Targets beside what the other tables measured."""
     limits = [row[-1] for row in convolved.rows if row[-1] != ""]
     rows = [
         ["a step, 500 points x 500 states, wavy road", "at most", 2.0, step.rows[1][4], "passes"],
@@ -57,7 +57,7 @@ def _asked(step, friction, convolved, order, many, static, moving) -> Table:
 
 
 def _loop(shape, modes: int, height, brush: float | None = None, steps: int = 1000):
-    """(instants, solver, response) of the loop alone; with friction 0.8 at a brush stiffness in N/m."""
+    """(instants, solver, response) of the loop alone; with friction 0.8 and a brush in N/m."""
     patch, tire, tread, response = parts_of(shape, modes, brush is not None)
     count = len(patch.points)
     solver = ActiveSet(tire.same_step[:count, :count] + tread)
@@ -72,8 +72,11 @@ def _loop(shape, modes: int, height, brush: float | None = None, steps: int = 10
 
 
 def _beside(loop, *others, blocks: int = 40) -> tuple[float, list[float], list[float], int]:
-    """Median seconds of a step and of each of `others`, the medians over blocks, run in turns, of the
-    ratios to them, and the most points that touched."""
+    """Times of a loop and of `others`, run alternately in blocks.
+
+    Median seconds of a step and of each of `others`, median ratios of a step to them, and the
+    largest number of touching points.
+    """
     steps, times, most = [], [], 0
     for _ in range(blocks):
         began = time.perf_counter()
@@ -85,7 +88,7 @@ def _beside(loop, *others, blocks: int = 40) -> tuple[float, list[float], list[f
 
 
 def _mean(function) -> float:
-    """Seconds a call, over as many as there are steps in a block: whatever disturbs one disturbs both."""
+    """Seconds per call, over as many calls as a block has steps, to share disturbances."""
     began = time.perf_counter()
     for _ in range(BLOCK):
         function()
@@ -103,7 +106,7 @@ def _step() -> Table:
             lambda m=matrices, v=vector, f=force: (m[0] @ v, f @ m[1]),
             lambda: long @ long,
         )
-        share = matrices.nbytes / long.nbytes  # of the long sum's bytes that a pass has
+        share = matrices.nbytes / long.nbytes  # bytes of a pass relative to those of the long sum
         rows.append([name, most, step * 1e6, floors[0] * 1e6, ratios[0], share * floors[1] * 1e6,
                      ratios[1] / share, solver.factorisations])  # fmt: skip
     columns = [("case", ""), ("touching", "-"), ("time a step", "us"), ("a pass", "us"),

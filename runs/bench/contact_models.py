@@ -1,4 +1,4 @@
-"""The contact models of the literature on one tire and one road, against the half-space with fine points."""
+"""Contact models of the literature on one tire and road, against a half-space with fine points."""
 
 from __future__ import annotations
 
@@ -32,17 +32,20 @@ RUBBER = {"youngs_modulus": 1e7, "poisson_ratio": 0.49}
 STONE, SUNK = (
     0.005,
     5e-4,
-)  # m: the sphere by which the Winkler bed is fitted, and how far it is pressed in
-THICKNESS = 0.01  # m of the bonded layer
-DEPTHS = 8  # heights of the road of the look-up
-_NEAR = np.radians(60)  # of the lowest point: rings of nodes looked at
-SETTLED = 0.15  # of the run, left out: the road's heights grow from flat
+)  # m: the sphere to which the Winkler bed is fitted, and its indentation
+THICKNESS = 0.01  # m: thickness of the bonded layer
+DEPTHS = 8  # road heights in the look-up table
+_NEAR = np.radians(60)  # from the lowest point: rings of nodes included
+SETTLED = 0.15  # share of the run left out while the road's heights grow from flat
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Contact force (n,) N of a model every STEP, the processor time (s) of its loop, and whether it follows the
-    road itself or its statistics alone."""
+    """Result of a contact model.
+
+    Contact force (n,) N every STEP; `seconds`: CPU time of its loop; `follows`: whether it follows
+    the road itself rather than only its statistics.
+    """
 
     name: str
     force: np.ndarray
@@ -51,7 +54,7 @@ class Outcome:
 
 
 def run() -> list[Table]:
-    """One table: mean, deviation, history, third octaves and cost of each."""
+    """One table: mean, deviation, history, third octaves and cost of each model."""
     with TemporaryDirectory() as folder:
         fine, coarse = (
             prepared(
@@ -83,7 +86,7 @@ def _law(name: str, given: Prepared, tread: str, **keys: float) -> Outcome:
 
 
 def _wedges(given: Prepared, states: list[StaticState]) -> Outcome:
-    """The look-up is made first and not counted, as the tire's matrices of the others are not."""
+    """The wedge model; its look-up table is not timed, like the other models' tire matrices."""
     table, tire = _look_up(given, states), _unloaded(given, states[0])
     setup, load = given.trial.setup, given.run.static.load
     flat = np.zeros(tire.height.shape)
@@ -112,7 +115,7 @@ def _pressed(given: Prepared) -> list[StaticState]:
 
 
 def _unloaded(given: Prepared, state: StaticState) -> Wedges:
-    """The inflated tire's face over its lowest point, on the grid of the fine points."""
+    """The inflated tire's face above its lowest point, on the grid of the fine points."""
     x0, x1, y0, y1 = given.trial.setup.patch.extent
     x, y = (
         np.arange(np.ceil(a / FINE), np.floor(b / FINE) + 1) * FINE for a, b in ((x0, x1), (y0, y1))
@@ -123,7 +126,7 @@ def _unloaded(given: Prepared, state: StaticState) -> Wedges:
 def _face(
     given: Prepared, state: StaticState, x: np.ndarray, length: np.ndarray, y: np.ndarray
 ) -> Wedges:
-    """Wedges at x (a,) m, `length` (a,) m long, seen at y (b,) m, evenly spaced."""
+    """Wedges at x (a,) m, `length` (a,) m long, evaluated at evenly spaced y (b,) m."""
     surface = TreadSurface(given.run.job.tire.lattice, state.positions)
     places = [part.ravel() for part in np.meshgrid(x, y, indexing="ij")]
     ring, arc, found = surface.locate(*places)
@@ -134,7 +137,7 @@ def _face(
 
 
 def _look_up(given: Prepared, states: list[StaticState]) -> LookUp:
-    """Area inside the plane and force per metre of the rings of nodes near the road, at every depth."""
+    """Area within the plane and force per metre, of rings of nodes near the road, at each depth."""
     inflated, lattice = states[0], given.run.job.tire.lattice
     near = np.abs((lattice.ring + np.pi) % (2 * np.pi) - np.pi) < _NEAR
     x0, x1, y0, y1 = given.trial.setup.patch.extent
@@ -142,7 +145,8 @@ def _look_up(given: Prepared, states: list[StaticState]) -> LookUp:
     middle = inflated.shape[1] // 2
     x = inflated.positions.reshape(*inflated.shape, 3)[near, middle, 0]
     order = np.argsort(x)
-    # Nodes in a ring carry what their element's rule gives them: the length each ring stands for is in their areas.
+    # Nodal areas within a ring follow from the elements' quadrature: so does the length each ring
+    # represents.
     areas = inflated.area.reshape(inflated.shape)[near][order]
     length = np.gradient(x[order]).sum() * areas[:, middle] / areas[:, middle].sum()
     wedges = _face(given, inflated, x[order], length, y)
@@ -155,7 +159,7 @@ def _look_up(given: Prepared, states: list[StaticState]) -> LookUp:
 
 
 def _asperities(given: Prepared) -> Outcome:
-    """By the statistics of the road's own middle line."""
+    """From the statistics of the road's middle line."""
     setup, static = given.trial.setup, given.run.static
     pitch = 0.25 * setup.road.spacing
     line: np.ndarray = setup.patch.extent[1] + np.arange(

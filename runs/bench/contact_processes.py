@@ -1,4 +1,4 @@
-"""The contact loop on several processes: one solves for the contact, the states are spread over the others."""
+"""The contact loop on several processes: one solves the contact, all share the states."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ ABOUT = (
     "a step of the contact loop on 1 and 2 processes: few points and modes, 1,000 and more of both"
 )
 SIZES = ((400, 25), (1000, 36), (2000, 50))
-"""(states, points on a side of the grid, of which an oval takes part)."""
+"""(states, points per side of the grid, of which an oval takes part)."""
 STEPS, BLOCK, STEP, SPEED = 600, 50, 1e-4, 20.0
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def run() -> list[Table]:
-    """Microseconds a step, and how many times faster two processes are."""
+    """Microseconds per step, and the speed-up on two processes."""
     rows = []
     for states, side in SIZES:
         one, two = (_launched(states, side, count) for count in (1, 2))
@@ -72,7 +72,7 @@ def _launched(states: int, side: int, count: int) -> dict:
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def measured(states: int, side: int, comm: MPI.Comm) -> dict:
-    """Seconds of a step (median over blocks), mean load N, sizes. Collective."""
+    """Seconds per step (median over blocks), mean load N, sizes. Collective."""
     patch = oval_patch((side, side), (0.16 / side, 0.12 / side), 500.0)
     response = Strip(speed=SPEED).response(patch.points, max(states // 20, 1), 10)
     sharing = sharers(response, comm)

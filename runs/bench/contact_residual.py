@@ -1,4 +1,4 @@
-"""Residual flexibility in contact: few modes with and without it against all modes of a small tire."""
+"""Residual flexibility in contact: few modes with and without it against all, on a small tire."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ duration = 0.04
 """
 STEP = 2e-5
 OPTIONS = ("none", "static", "second-order", "attachment")
-# Errors in % of a trial on another mesh with as many unknowns: without, with static residual.
+# Errors in % of an earlier trial on another mesh of the same size: without, with static residual.
 TRIAL = {10: (198.0, 21.0), 50: (88.0, 5.0), 100: (63.0, 2.3), 200: (42.0, 0.9)}
 
 
 def run() -> list[Table]:
-    """One table: a row a number of modes."""
+    """One table with a row per number of modes."""
     with tempfile.TemporaryDirectory() as folder:
         tires = Tires(SCENE, Path(folder))
         every = len(tires.modes.frequency)

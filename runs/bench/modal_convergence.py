@@ -1,4 +1,4 @@
-"""Frequencies against the mesh, and a round tire by wave number against mirrors and slices."""
+"""Frequencies over the mesh, and axisymmetric tires by wave number against the general method."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RINGS = ((20, 8, 200), (40, 16, 500), (80, 16, 1000))  # elements around, along,
 
 
 def run() -> list[Table]:
-    """Errors by mesh and order, and seconds of both ways. Collective."""
+    """Errors by mesh and order, and seconds of both methods. Collective."""
     return [_meshes(), _rings()]
 
 
@@ -65,7 +65,7 @@ def _meshes() -> Table:
 
 
 def _rings() -> Table:
-    """The same modes of a round tire both ways."""
+    """The same modes of an axisymmetric tire by both methods."""
     rows = []
     for around, along, count in RINGS:
         operators = _operators(around, along, 2)

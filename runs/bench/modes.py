@@ -1,4 +1,4 @@
-"""The modes of a deformed 45,000-dof tire against SLEPc's own slicing, and their cost over number."""
+"""Modes of a deformed tire with 45,000 unknowns against SLEPc's slicing, and cost over number."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tireroad.runs.process.memory import peak_memory
 
 ABOUT = "time, memory and accuracy of standing and rolling modes"
 COUNTS = (250, 500, 1000, 2000)
-RATIO = 500  # modes of the comparison
+RATIO = 500  # modes in the comparison
 
 
 def run() -> list[Table]:
-    """Static state, standing modes by number, SLEPc's slicing, projected states by number. Collective."""
+    """Static state, standing modes by number, SLEPc's slicing, projected states. Collective."""
     comm = MPI.COMM_WORLD
     observe.say("static state of the tire ...")
     operators = _tire(comm)
@@ -31,7 +31,7 @@ def run() -> list[Table]:
 
 
 def _asked(standing, exponent: float, plain, rolling, biorthogonality: float) -> Table:
-    """Every figure that is asked for beside the one of this run."""
+    """Every target beside the figure of this run."""
     of = {row[0]: row for row in standing}
     measured = [
         ("500 modes: faster than SLEPc's interval slicing", "-", ">=", 2.0, plain[2]),
@@ -127,7 +127,7 @@ def _standing(comm: MPI.Comm, operators):
 
 
 def _plain(comm: MPI.Comm, operators) -> Table:
-    """The same modes by SLEPc's interval slicing of the whole standard problem, on one process. Collective."""
+    """The same modes by SLEPc's slicing of the whole problem, on one process. Collective."""
     from tireroad.modal.solver import undamped
     from tireroad.modal.solver.fields import everywhere, scaled_by
     from tireroad.modal.standing import sites
@@ -163,7 +163,7 @@ def _plain(comm: MPI.Comm, operators) -> Table:
 
 
 def _interval(matrix, top: float) -> int:
-    """Modes that SLEPc finds from 0 to `top` (1/s2), by EPSSetInterval with the inertia of MUMPS."""
+    """Number of modes by SLEPc from 0 to `top` (1/s2), by EPSSetInterval and MUMPS's inertia."""
     from petsc4py import PETSc
     from slepc4py import SLEPc
 
@@ -173,7 +173,7 @@ def _interval(matrix, top: float) -> int:
     eps = SLEPc.EPS().create(PETSc.COMM_SELF)
     eps.setOptionsPrefix("interval_")
     options = PETSc.Options()
-    # Null pivots are found, as the slicing needs them; no ScaLAPACK root, which knows no inertia.
+    # Detect null pivots, as slicing needs them; no ScaLAPACK root, which does not give the inertia.
     for name, value in (("icntl_13", 1), ("icntl_24", 1), ("cntl_3", 1e-12)):
         options[f"interval_st_mat_mumps_{name}"] = value
     eps.setOperators(A)
@@ -194,7 +194,7 @@ def _interval(matrix, top: float) -> int:
 
 
 def _rolling(comm: MPI.Comm, operators, modes) -> tuple[Table, float]:
-    """The projected problem at 50 rad/s on leading parts of one basis: time, and error of the lowest states."""
+    """The projected problem at 50 rad/s on parts of a basis: time, error of the lowest states."""
     from tireroad.modal.basis import project
     from tireroad.modal.rotating import checks, matrices, rotating
     from tireroad.modal.solver.agreement import truncation

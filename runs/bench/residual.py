@@ -1,4 +1,4 @@
-"""What the modes left out cost, with each residual, and what the residual itself costs."""
+"""Truncation error with each residual, and the cost of the residual itself."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ DAMPING = (500.0, 0.0)
 SPEED = 50.0
 BAND = 5  # frequencies up to half the highest kept mode
 INFLATION = 2e5
-# What the set-up times are asked for.
+# Sizes for the set-up times.
 MODES, FORCES = 1000, 300
-# Vertical forces and displacements around the lowest point, as a contact patch has them, in rad.
+# Vertical forces and displacements around the lowest point, like those of a contact patch, in rad.
 PATCH = [(ring, arc) for ring in (-0.1, 0.0, 0.1) for arc in (-0.15, 0.0, 0.15)]
 
 
 def run() -> list[Table]:
-    """Error tables standing and rolling, the receptance itself, the choice of modes, and times."""
+    """Error tables at rest and rolling, the receptance itself, the choice of states, and times."""
     comm = MPI.COMM_WORLD
     motions = _tire(comm, 20, 7)
     modes = standing_modes(motions, count=max(COUNTS))
@@ -73,7 +73,7 @@ def _tire(comm: MPI.Comm, segments: int, elements_arc: int) -> SmallMotions:
 
 
 def _respond(wheel: Wheel, modes: ModalBasis, probes, count: int, option: str):
-    """The response of the first `count` modes, without a limit on the residual's states. Collective."""
+    """The response of the first `count` modes, with all states of the residual kept. Collective."""
     rolling = _rolling(wheel, modes.first(count))
     basis = Basis.of(rolling)
     if option == "none":
@@ -92,7 +92,7 @@ def _off(found: np.ndarray, exact: np.ndarray) -> float:
 
 
 def _errors(wheel: Wheel, modes: ModalBasis, probes) -> Table:
-    """Thesis figure 6.2 as numbers: every option for every number of modes. Collective."""
+    """Figure 6.2 of the thesis in numbers: every residual for every number of modes. Collective."""
     rows = []
     for count in COUNTS:
         top = modes.frequency[count - 1]
@@ -123,7 +123,7 @@ def _errors(wheel: Wheel, modes: ModalBasis, probes) -> Table:
 
 
 def _figure(wheel: Wheel, modes: ModalBasis, probes) -> Table:
-    """Thesis figure 6.2: ten modes and the full matrices, driving point in the middle. Collective."""
+    """Figure 6.2 of the thesis: ten modes and the full matrices, driving point. Collective."""
     frequency = np.linspace(0, 2 * modes.frequency[9], 25)
     middle = len(PATCH) // 2
     curves = [wheel.receptance(probes, probes, frequency)]
@@ -164,7 +164,7 @@ def _choice(wheel: Wheel, modes: ModalBasis, probes) -> Table:
 
 
 def _times(comm: MPI.Comm) -> Table:
-    """Set-up of the residual and of the recursion at full size. Collective."""
+    """Set-up times of the residual and of the recursion at full size. Collective."""
     motions = _tire(comm, 80, 16)
     body, operators = motions.body, motions.operators
     nearest = np.argsort(body.lattice.points(body.surface.ids)[:, 2], kind="stable")

@@ -1,4 +1,4 @@
-"""What each stage costs over its sizes, on how many processes, and beside its floor."""
+"""Cost of each stage over its sizes and number of processes, and its lower bound."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ STEPS = (500, 1000, 2000, 4000)
 
 
 def run() -> list[Table]:
-    """Stages over unknowns, the loop over its sizes, stages over processes, the machine's own rates."""
+    """Stages over unknowns, the loop over its sizes, stages over processes, machine rates."""
     with tempfile.TemporaryDirectory() as folder:
         return [
             machine_rates(),
@@ -54,7 +54,7 @@ def machine_rates() -> Table:
 
 
 def unknowns(folder: Path, meshes: tuple[Mesh, ...], modes: int) -> Table:
-    """Static state, modes and Green's functions over the unknowns, beside one factorisation of K."""
+    """Static state, modes and Green's functions over the unknowns, and one factorisation of K."""
     rows = []
     for mesh in meshes:
         observe.say(f"  {mesh} elements ...")
@@ -123,7 +123,7 @@ def _size(folder: Path, mesh: Mesh, modes: int) -> list:
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def loop(sizes, states, steps) -> Table:
-    """Steps of the contact loop over points, states and their number, beside a pass over memory."""
+    """Steps of the contact loop over points, states and number, and one pass over memory."""
     rows = []
     middle, few = sizes[len(sizes) // 2], states[1]
     for size in sizes:
@@ -157,7 +157,7 @@ def loop(sizes, states, steps) -> Table:
 
 
 def _steps(size: int, states: int, steps: int) -> list:
-    """(points, states, steps, us a step, s in all, us a pass, ratio) of a made-up tire."""
+    """(points, states, steps, us per step, s in all, us per pass, ratio) for a synthetic tire."""
     step, speed = 1e-4, 20.0
     patch = oval_patch((size, size), (0.16 / size, 0.12 / size), 500.0)
     response = Strip(speed=speed).response(patch.points, max(states // 20, 1), 10)
@@ -222,7 +222,7 @@ def processes(folder: Path, mesh: Mesh, modes: int, most: int) -> Table:
 
 
 def _on(folder: Path, kind: str, mesh: Mesh, modes: int, count: int) -> list:
-    """A run of its own, started as a user does."""
+    """A separate run, started as by a user."""
     place = folder / f"{kind}-{count}"
     place.mkdir()
     scene = write_scene(place / "given.toml", mesh, modes=modes, duration=0.05)

@@ -1,4 +1,4 @@
-"""The built-in radial tire in sizes from 125/80 R12 to 335/25 R22: whether each builds and inflates, and to what."""
+"""The built-in radial tire from 125/80 R12 to 335/25 R22: does each size build and inflate?"""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SIZES = (
     *("245/30 R20", "255/55 R18", "255/35 R20", "275/30 R20", "285/25 R20", "305/30 R19"),
     *("315/35 R20", "335/25 R22"),
 )
-ELEMENTS, ORDER, PRESSURE = 26, 2, 2.2e5  # as by default; Pa
+ELEMENTS, ORDER, PRESSURE = 26, 2, 2.2e5  # the defaults; Pa
 COLUMNS = [
     ("size", ""),
     ("mass", "kg"),
@@ -37,13 +37,13 @@ NOTE = (
 
 
 def run() -> list[Table]:
-    """A row a size. Not collective."""
+    """One row per size. Not collective."""
     table = Table("The built-in radial tire", COLUMNS, [row(size) for size in SIZES], [NOTE])
     return [table]
 
 
 def row(size: str) -> list:
-    """A size with its figures, or with what is wrong."""
+    """A size with its figures, or with its error."""
     try:
         tire = InflatedRing(radial(size), ELEMENTS, ORDER, PRESSURE)
     except (InputError, ConvergenceError) as error:

@@ -1,4 +1,4 @@
-"""What skipping saves, scene by scene: the same program with and without what a scene does not need."""
+"""Savings from skipping, scene by scene: runs with and without what a scene does not need."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ ABOUT = (
 
 MESH = Mesh(24, 10, 0.35)
 KEYS = {"modes": 200, "residual": "static", "duration": 0.2, "step": 1e-4}
-FAR = 0.03  # m, the reach of a patch that leaves hardly anything out
+FAR = 0.03  # m: reach of a patch that leaves out hardly any point
 BRUSH = "contact.brush_stiffness=2e4", "contact.friction=0.8"
 FLAT = "road.kind=flat", "road.rms=", "road.roll_off=", "road.cut_off="
 
 
 def run() -> list[Table]:
-    """One table; every ratio is of two measurements of this run."""
+    """One table; every ratio is of two measurements in this run."""
     with tempfile.TemporaryDirectory() as folder:
         return [table(Path(folder), MESH, KEYS)]
 
 
 def table(folder: Path, mesh: Mesh, keys: dict) -> Table:
-    """Rows: what is skipped, with and without it in s, the ratio, and what it changes."""
+    """Rows: what is skipped, seconds with and without it, the ratio, the change of the result."""
     observe.say("  rolling, standing, flat, with friction ...")
     rolling = rolled(folder / "rolling", mesh, **keys)
     again = rolled(folder / "rolling", mesh, "road.seed=1", **keys)
@@ -38,7 +38,7 @@ def table(folder: Path, mesh: Mesh, keys: dict) -> Table:
     flat = rolled(folder / "flat", mesh, *FLAT, **keys)
     rubbing = rolled(folder / "rubbing", mesh, *BRUSH, **keys)
     far = rolled(folder / "far", mesh, f"contact.reach={FAR}", **keys)
-    # The road is eased in before the foremost point: what that left behind has decayed by then.
+    # The road is eased in before the foremost point: the effect of that has decayed by then.
     late = slice(-len(rolling.forces["total_force"]) // 4, None)
     off = np.abs(far.forces["total_force"] - rolling.forces["total_force"])[late].max()
     points = [run.figure("greens", "contact points") for run in (far, rolling)]
@@ -76,7 +76,7 @@ def _row(
 
 
 def _seconds(run: Rolled, stages: tuple[str, ...]) -> float:
-    """What the stages took in this run; one that was reused took nothing."""
+    """Seconds of the stages in this run; a reused one counts as 0."""
     return sum(
         run.stages[stage]["seconds"]
         for stage in stages
@@ -85,7 +85,7 @@ def _seconds(run: Rolled, stages: tuple[str, ...]) -> float:
 
 
 def _mirrors(folder: Path, mesh: Mesh, keys: dict) -> list:
-    """The modes of a tire whose mirror plane is used, and is not."""
+    """The modes of a symmetric tire with and without using its mirror plane."""
     from tireroad.modal.solver import undamped
     from tireroad.modal.standing import solved
 

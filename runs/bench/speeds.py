@@ -1,4 +1,4 @@
-"""A family of speeds about one static state: what its members share, in processor time."""
+"""A family of speeds about one static state: savings from shared stages, in CPU time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SCENES = ("quickstart", "passenger")
 MEMBERS, ALONE = 20, 2
 LOWEST, STEP = 40.0, 1.0  # rad/s
-SHAPE = "static.steady_rolling=false"  # or each speed has a static state of its own
+SHAPE = "static.steady_rolling=false"  # otherwise each speed has its own static state
 NOTE = (
     f"{MEMBERS} speeds from {LOWEST:g} rad/s on, {STEP:g} rad/s apart, about the shape of the tire at rest "
     f"(static.steady_rolling = false), with error bars and pages. Separate runs: {MEMBERS} times the mean of {ALONE}, "
@@ -26,7 +26,7 @@ NOTE = (
 
 
 def run() -> list[Table]:
-    """One row a scene. Not collective: members are processes of their own."""
+    """One row per scene. Not collective: members are separate processes."""
     with tempfile.TemporaryDirectory() as folder:
         rows = [measured(Path(folder), scene, MEMBERS) for scene in SCENES]
     columns = [("scene", ""), ("members", "-"), ("sweep", "s"), ("separate runs", "s"), ("share", "%")]  # fmt: skip
@@ -34,7 +34,7 @@ def run() -> list[Table]:
 
 
 def measured(folder: Path, scene: str, members: int) -> list:
-    """Scene, members, processor time (s) of the sweep and of as many separate runs, and their ratio (%)."""
+    """Scene, members, CPU time (s) of the sweep and of as many separate runs, their ratio (%)."""
     source = ROOT / "runs" / "scenes" / f"{scene}.toml"
     speeds = [LOWEST + STEP * k for k in range(members)]
     family = folder / f"{scene}.toml"
@@ -55,7 +55,7 @@ def measured(folder: Path, scene: str, members: int) -> list:
 
 
 def _processor_time(*command: str) -> float:
-    """Of a command of the program and all that it starts, s."""
+    """CPU time of a command of the program and all processes it starts, s."""
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     environment.pop("TIREROAD_CACHE", None)
     if command[0] == "run":

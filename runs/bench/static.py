@@ -1,4 +1,4 @@
-"""Where the time of a static state of 45,000 unknowns goes, on one process and on two."""
+"""Time by part of a static state with 45,000 unknowns, on one process and on two."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ speed = {speed}
 
 
 def run() -> list[Table]:
-    """Standing and rolling, each by the program itself; forms are compiled before. Not collective."""
+    """At rest and rolling, by the program itself; forms are compiled before. Not collective."""
     runs = []
     with tempfile.TemporaryDirectory() as folder:
         for speed, count in RUNS:

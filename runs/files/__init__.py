@@ -1,1 +1,1 @@
-"""Result files: written whole, reused by hash, read, exported."""
+"""Result files: written atomically, reused by hash, read, exported."""

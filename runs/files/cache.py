@@ -1,9 +1,10 @@
-"""Finished stages that several result folders share, kept by stage and hash of inputs.
+"""Cache of finished stages shared by several result folders, by stage and hash of inputs.
 
-The environment variable TIREROAD_CACHE names the folder of a command, "off" none; where it is not set that is one
-in the user's cache: of the stages that another road or another time does not change, up to `LARGEST` bytes, the
-longest unused going first. A run from a script has the cache that it is given, by default none. Files are linked, not copied, where the file system allows it: result files are never
-written to in place.
+The environment variable TIREROAD_CACHE names the folder for a command; "off" disables it. If unset,
+a folder in the user's cache is used: it keeps the stages that another road or time does not change,
+up to `LARGEST` bytes, and drops the least recently used first. A run from a script uses the cache
+it is given, by default none. Files are hard-linked, not copied, where the file system allows it:
+result files are never modified in place.
 """
 
 from __future__ import annotations
@@ -34,18 +35,18 @@ SHARED = (
     "rotating",
     "greens",
     "stiffness",
-)  # what the user's own folder keeps
-LARGEST = 10e9  # bytes of it
+)  # stages kept in the user's own cache
+LARGEST = 10e9  # bytes: largest size of the user's own cache
 
 
 def own_folder() -> Path:
-    """The folder of stages in the user's cache."""
+    """The folder for stages in the user's cache."""
     return user_folder() / "stages"
 
 
 @dataclass(frozen=True)
 class Kept:
-    """A finished stage in a cache: its file, bytes, and the time (s since 1970) of its last use."""
+    """A finished stage in a cache: its file, bytes, and time (s since 1970) of its last use."""
 
     path: Path
     size: int
@@ -53,11 +54,11 @@ class Kept:
 
     @property
     def stage(self) -> str:
-        """Its name."""
+        """Name of the stage."""
         return self.path.name.partition("-")[0]
 
     def remove(self) -> None:
-        """Take it out of the cache; result folders that have it keep it."""
+        """Remove it from the cache; result folders that share it keep it."""
         for path in (self.path.with_suffix(".json"), self.path):
             with suppress(OSError):
                 path.unlink()
@@ -65,27 +66,27 @@ class Kept:
 
 @dataclass(frozen=True)
 class Cache:
-    """The shared `folder`, or nothing. What reads and writes it is for the root process only."""
+    """The shared `folder`, or None. Reading and writing are for the root process only."""
 
     folder: Path | None = None
 
     @classmethod
     def of_user(cls) -> Cache:
-        """As the variable says, by default the user's own."""
+        """The cache named by TIREROAD_CACHE, by default the user's own."""
         given = os.environ.get(VARIABLE) or str(own_folder())
         return cls(None if given == OFF else Path(given))
 
     def of_family(self, folder: Path) -> Cache:
-        """Where a family of runs keeps all its stages: in its own `folder`, unless the user has named one."""
+        """The cache of a family of runs: its own `folder`, unless the user has named one."""
         return Cache(folder) if self.folder is None or self._own else self
 
     @property
     def _own(self) -> bool:
-        """Whether it is the user's own, which is bounded."""
+        """Whether it is the user's own cache, which is limited in size."""
         return self.folder == own_folder()
 
     def entries(self) -> list[Kept]:
-        """What is kept, the longest unused first."""
+        """The stages kept, least recently used first."""
         found = []
         for path in self.folder.glob("*-*.h5") if self.folder else ():
             with suppress(OSError):  # another process has just removed it
@@ -94,7 +95,7 @@ class Cache:
         return sorted(found, key=lambda one: one.used)
 
     def described(self) -> str:
-        """A table of what is kept, the last used first, with its size as a whole."""
+        """A table of the stages kept, most recently used first, and their total size."""
         kept = self.entries()[::-1]
         lines = [f"{'stage':10s}{'scene':26s}{'MB':>9s}  last used"]
         for one in kept:
@@ -107,7 +108,7 @@ class Cache:
         return "\n".join([*lines, f"{len(kept)} stages, {total:.2f} GB in {self.folder}{most}"])
 
     def clear(self, unused_for: float) -> str:
-        """Remove what was not used for so many days; says what."""
+        """Remove the stages unused for that many days; returns a report."""
         old = [one for one in self.entries() if time.time() - one.used >= 86400 * unused_for]
         for one in old:
             one.remove()
@@ -117,7 +118,7 @@ class Cache:
         return f"{len(old)} stages removed, {sum(one.size for one in old) / 1e9:.2f} GB"
 
     def _prune(self) -> None:
-        """Remove the longest unused of the user's own cache until it is no larger than it may be."""
+        """Remove the least recently used stages of the user's own cache beyond its limit."""
         kept = self.entries() if self._own else []
         total = sum(one.size for one in kept)
         for one in kept:
@@ -127,13 +128,14 @@ class Cache:
             total -= one.size
 
     def place(self, stage: str, key: str) -> Path:
-        """Where a stage's file is kept."""
+        """The path of a stage's file in the cache."""
         assert self.folder is not None
         return self.folder / f"{stage}-{key}.h5"
 
     def fetch(self, stage: str, key: str, path: Path) -> dict[str, Any] | None:
-        """Put the kept file at `path`; the figures kept with it, or None where there is no file that is
-        whole and of these inputs.
+        """Put the cached file at `path`; returns the figures stored with it.
+
+        None if there is no intact file of these inputs.
         """
         if self.folder is None or store.why_not(self.place(stage, key), key, stage):
             return None
@@ -147,7 +149,7 @@ class Cache:
         return figures
 
     def keep(self, stage: str, key: str, path: Path, figures: Mapping[str, Any]) -> None:
-        """Keep a finished file and its figures for others. What cannot be kept is computed again there."""
+        """Store a finished file and its figures; if that fails, others compute the stage again."""
         if self.folder is not None and (stage in SHARED or not self._own):
             with suppress(OSError):
                 self.folder.mkdir(parents=True, exist_ok=True)
@@ -161,9 +163,9 @@ class Cache:
 
     @contextmanager
     def claimed(self, stage: str, key: str) -> Iterator[None]:
-        """While inside, other runs that want the same file wait: it is computed once.
+        """Within the context, other runs that need the same file wait, so that it is computed once.
 
-        Where the folder or its file system has no locks, it may be computed twice.
+        Without file locks in that folder it may be computed twice.
         """
         if self.folder is None:
             yield
@@ -184,7 +186,7 @@ NO_CACHE = Cache()
 
 
 def _link(source: Path, target: Path) -> None:
-    """`target` becomes the same file, or a copy where it cannot be linked."""
+    """Make `target` a hard link to `source`, or a copy if it cannot be linked."""
     with replacing(target) as part:
         try:
             os.link(source, part)

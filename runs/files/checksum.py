@@ -1,8 +1,8 @@
-"""A checksum in every result file, looked at before its content is.
+"""Checksums in result files, verified before their content is read.
 
-HDF5 files may begin with a block of the user's. Ours holds the SHA-256 of all bytes after it, so that
-data, shapes, attributes and HDF5's own structures are covered, the file stays whole when it is
-copied elsewhere, and a damaged one never reaches the HDF5 library, which may crash on it.
+HDF5 files may begin with a user block. Ours holds the SHA-256 of all bytes after it, so that data,
+shapes, attributes and HDF5's own structures are covered, the checksum moves with a copied file, and
+a damaged file never reaches the HDF5 library, which may crash on it.
 """
 
 import hashlib
@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-BLOCK = 512  # bytes, the least that HDF5 allows
+BLOCK = 512  # bytes, the minimum in HDF5
 _TITLE = b"tireroad result (HDF5). SHA-256 of all bytes from 512 on:\n"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -20,15 +20,15 @@ _SIGNATURE = "# SHA-256 of the lines above: "
 _ENTRY = "checksum"
 
 _known: dict[str, tuple[int, ...]] = {}
-"""Files of this process that were found whole, with what would change if they were written to."""
+"""Files that this process found intact, with file attributes that change on writing."""
 
 
 class NoChecksum(Exception):
-    """An HDF5 file that another program wrote, or this one before it kept checksums."""
+    """An HDF5 file from another program, or from a version before checksums."""
 
 
 def seal(path: Path) -> None:
-    """Put the checksum into a closed file that was made with a user block of `BLOCK` bytes."""
+    """Write the checksum into a closed file that has a user block of `BLOCK` bytes."""
     with path.open("r+b") as file:
         block = _block(file)
         file.seek(0)
@@ -36,10 +36,10 @@ def seal(path: Path) -> None:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether the file is byte for byte what `seal` saw.
+    """Whether the file is unchanged since `seal`.
 
-    Reads all of it once a process, 1 to 2 GB/s. Raises NoChecksum for an HDF5 file without one,
-    OSError where it cannot be read.
+    Reads all of it once per process, at 1 to 2 GB/s. Raises NoChecksum for an HDF5 file without
+    one, OSError if it cannot be read.
     """
     state = _state(path)
     if _known.get(str(path)) == state:
@@ -55,12 +55,12 @@ def is_whole(path: Path) -> bool:
 
 
 def signed(text: str) -> str:
-    """A text of comments in #, with a last line that tells whether the lines above have changed."""
+    """A text with # comments, plus a last line with the checksum of the lines above."""
     return f"{text}{_SIGNATURE}{_text_digest(text)}\n"
 
 
 def is_as_signed(text: str) -> bool:
-    """Whether a text is what `signed` made: one cut before its last line is not."""
+    """Whether a text is unchanged since `signed`; a truncated text is not."""
     lines, found, digest = text.rpartition(_SIGNATURE)
     return bool(found) and digest.strip() == _text_digest(lines)
 
@@ -71,7 +71,7 @@ def signed_table(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def is_table_as_signed(table: Mapping[str, Any]) -> bool:
-    """Whether an object read from JSON is what `signed_table` made; so is one it never saw."""
+    """Whether an object read from JSON is unchanged since `signed_table`, or was never signed."""
     return _ENTRY not in table or table[_ENTRY] == _table_digest(table)
 
 

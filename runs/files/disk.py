@@ -1,4 +1,4 @@
-"""Files that are whole or not there, and what to say when a disk refuses."""
+"""Atomic file writes, and messages for a disk that is full or read-only."""
 
 import errno
 import os
@@ -11,19 +11,19 @@ from pathlib import Path
 
 from tireroad.fem.errors import InputError
 
-_SLACK = 1.0  # s by which clocks of files and of processes may differ
+_SLACK = 1.0  # s: tolerance between file and process clocks
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG}
 
 
 class Refused(InputError):
-    """A disk that takes no more while the program runs: exit status 3, what is finished is kept."""
+    """The disk takes no more data during a run: exit status 3; finished stages are kept."""
 
 
 def explained(error: BaseException, path: Path | str) -> Refused | None:
-    """A full disk or a refused write as one message, or None when it is neither.
+    """A full disk or a refused write as one message; None for any other error.
 
-    HDF5 reports the operating system's error inside its own text, hence the search.
+    HDF5 reports the operating system's error within its own text, hence the search.
     """
     number = getattr(error, "errno", None)
     text = str(error)
@@ -49,20 +49,20 @@ class Removed(FileNotFoundError):
 
 
 def part_of(path: Path) -> Path:
-    """The temporary name of this process beside `path`."""
+    """The temporary name that this process uses beside `path`."""
     return path.with_name(f".{path.name}.{socket.gethostname()}.{os.getpid()}.part")
 
 
-FACTORS = ".factors"  # the folder in a run's own of factors that memory does not hold
+FACTORS = ".factors"  # subfolder of a result folder for factors that do not fit into memory
 
 
 def remove_factors(directory: Path) -> None:
-    """Those of a run that has ended, or was killed."""
+    """Remove the factors of a run that has ended or was killed."""
     shutil.rmtree(directory / FACTORS, ignore_errors=True)
 
 
 def remove_leftovers(directory: Path) -> None:
-    """Remove the temporary files of processes of this machine that were killed while they wrote, and factors."""
+    """Remove factors, and temporary files of killed processes of this machine."""
     remove_factors(directory)
     for part in directory.glob(".*.part"):
         rest, _, process = part.name.removesuffix(".part").rpartition(".")
@@ -73,8 +73,10 @@ def remove_leftovers(directory: Path) -> None:
 
 
 def _lives(process: int, written: float) -> bool:
-    """Whether another process that wrote at this time (s since the epoch) still runs: one that is over and has not been waited
-    for does not, nor does a later one that has its number."""
+    """Whether another process that wrote at this time (s since the epoch) is still running.
+
+    Neither a zombie counts, nor a later process with the same number.
+    """
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -93,7 +95,7 @@ def _lives(process: int, written: float) -> bool:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` that takes its place at the end, or vanishes on failure."""
+    """A temporary name beside `path`, renamed to it at the end, removed on failure."""
     part = part_of(path)
     try:
         yield part
@@ -115,6 +117,6 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a small text file at once or not at all."""
+    """Write a small text file atomically."""
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Results for other programs: CSV for spreadsheets, and XDMF (runs/xdmf.py) for ParaView."""
+"""Exports for other programs: CSV for spreadsheets, and XDMF (runs/files/xdmf.py) for ParaView."""
 
 from collections.abc import Callable
 from functools import partial
@@ -15,7 +15,7 @@ from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.store import opened
 
 AXES = ("x", "y", "z")
-NAMES = {  # of levels in third_octave/ whose names are older than the other quantities
+NAMES = {  # levels in third_octave/ whose names do not give the quantity
     "level": "axle force level",
     "level_a_weighted": "axle force level a weighted",
     "level_error": "error of the axle force level",
@@ -27,12 +27,12 @@ Columns = dict[str, NDArray]  # heading with unit -> values (n)
 
 
 def export(directory: Path) -> list[Path]:
-    """Writes directory/export/*.csv and *.xdmf from the result files there are; returns the paths.
+    """Write directory/export/*.csv and *.xdmf from the existing result files; returns the paths.
 
-    XDMF files point into the HDF5 results beside `export` and copy no data: leave it where it is.
-    Every column of a CSV names its unit. Each file is written to a temporary name and renamed. Not
-    collective: call it on one process. Raises InputError where there is nothing to export, where a
-    result file is damaged (nothing is written then), or where `export` cannot be written.
+    XDMF files refer to the HDF5 results beside `export` and copy no data: do not move that folder.
+    Every CSV column names its unit. Each file is written to a temporary name and renamed. Not
+    collective: call it on one process. Raises InputError if there is nothing to export, a result
+    file is damaged (then nothing is written), or `export` cannot be written.
     """
     if not directory.is_dir():
         raise InputError(f"{directory} is no folder: give the result folder of a run")
@@ -62,7 +62,7 @@ def _read(path: Path, reader: Callable[[h5py.File], dict]) -> dict:
 
 
 def write_csv(path: Path, columns: Columns) -> None:
-    """One row of headings, then the numbers to 10 digits, commas between."""
+    """One row of headings, then the numbers to 10 digits, separated by commas."""
     header = ",".join(f'"{heading}"' for heading in columns)
     values = np.column_stack(list(columns.values()))
     np.savetxt(path, values, fmt="%.10g", delimiter=",", header=header, comments="")
@@ -73,7 +73,7 @@ def _table(name: str, columns: Columns) -> dict[str, Callable[[Path], object]]:
 
 
 def _components(name: str, values: NDArray, unit: str) -> Columns:
-    """Columns of a vector (n, 3); a complex one gives real and imaginary parts."""
+    """Columns of a vector (n, 3); a complex vector gives real and imaginary parts."""
     columns: Columns = {}
     for axis, column in zip(AXES, values.T, strict=True):
         columns |= _parts(f"{name} {axis}", column, unit)
@@ -105,7 +105,7 @@ def static(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 
 def contact(file: h5py.File) -> dict[str, Callable[[Path], object]]:
-    """contact_force.csv: total force, axle force and moments on the hub over time."""
+    """contact_force.csv: total force, axle force and hub moments over time; contact.xdmf."""
     columns = {"time [s]": file["time"][()]}
     columns |= _components("contact force", file["total_force"][()], "N")
     if "axle_force" in file:
@@ -118,7 +118,7 @@ def contact(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 
 def spectra(file: h5py.File) -> dict[str, Callable[[Path], object]]:
-    """spectra.csv: complex spectra; third_octave.csv: levels of all quantities, with their errors; density.csv."""
+    """spectra.csv: complex spectra; third_octave.csv: all levels, with errors; density.csv."""
     columns = {"frequency [Hz]": file["frequency"][()]}
     for name, unit in (("axle_force", "N"), ("contact_force", "N"), ("hub_moment", "N m")):
         if name in file:
@@ -133,7 +133,7 @@ def spectra(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 
 def bands(group: h5py.Group) -> Columns:
-    """Levels by band: its name of IEC 61260, its exact centre, then column by column."""
+    """Levels by band: nominal frequency (IEC 61260), exact centre, a column per component."""
     centre = group["centre"][()]
     columns = {"band [Hz]": nominal(centre), "exact centre of the band [Hz]": centre}
     if "confidence" in group:
@@ -144,7 +144,7 @@ def bands(group: h5py.Group) -> Columns:
 
 
 def _spread(group: h5py.Group, over: h5py.Dataset) -> Columns:
-    """The vectors (n, 3), or (n, k, 3) at k points, that a group holds beside what they are given over."""
+    """Columns of the vectors (n, 3), or (n, k, 3) at k points, in a group with abscissa `over`."""
     columns: Columns = {}
     for name, held in group.items():
         if held.ndim < 2 or held.shape[-1] != 3 or len(held) != len(over):
@@ -194,12 +194,12 @@ def vibration(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 
 def motion(file: h5py.File) -> dict[str, Callable[[Path], object]]:
-    """motion.xdmf: the outer face in time, for ParaView."""
+    """motion.xdmf: the outer face over time, for ParaView."""
     return _page(xdmf.motion(file))
 
 
 def _page(page: xdmf.Page | None) -> dict[str, Callable[[Path], object]]:
-    """A page and, where it wants one, the file of its fields."""
+    """A page and, if needed, its file of fields."""
     if page is None:
         return {}
     files: dict[str, Callable[[Path], object]] = {

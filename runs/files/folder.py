@@ -1,4 +1,4 @@
-"""The result folder: whose it is, that it can be written, and its summary."""
+"""The result folder: its owner, whether it is writable, and its summary."""
 
 import fcntl
 import json
@@ -22,7 +22,7 @@ OTHER = "choose another folder with --out, or remove this one; nothing was writt
 
 
 def _earlier(directory: Path) -> dict[str, Any] | None:
-    """The summary of an earlier run, None when there is none."""
+    """The summary of an earlier run, or None. Raises InputError if it is unreadable or damaged."""
     path = directory / "summary.json"
     try:
         text = path.read_text(encoding="utf-8")
@@ -44,7 +44,7 @@ def _earlier(directory: Path) -> dict[str, Any] | None:
 
 
 def check_kept_scene(directory: Path) -> None:
-    """Raise InputError where the folder's scene.toml is not as the run left it: no `resume` then."""
+    """Raise InputError if the folder's scene.toml has changed since the run: no `resume` then."""
     path = directory / "scene.toml"
     try:
         text = path.read_text(encoding="utf-8")
@@ -67,7 +67,7 @@ def _check_name(directory: Path, found: Any, scene_name: str) -> None:
 
 
 def _check_scene(directory: Path, scene_name: str) -> None:
-    """A folder without summary: its scene.toml must be one that a run of this scene left."""
+    """Check a folder without a summary: its scene.toml must come from a run of this scene."""
     try:
         text = (directory / "scene.toml").read_text(encoding="utf-8")
         name = tomllib.loads(text).get("name")
@@ -81,7 +81,7 @@ def _check_scene(directory: Path, scene_name: str) -> None:
 
 
 def check_owner(directory: Path, scene_name: str) -> None:
-    """Raise InputError where the folder holds results of another scene or another version."""
+    """Raise InputError if the folder holds results of another scene or another version."""
     found = _earlier(directory)
     if found is None:
         _check_scene(directory, scene_name)
@@ -97,7 +97,7 @@ def check_owner(directory: Path, scene_name: str) -> None:
 
 
 def make_folder(directory: Path) -> None:
-    """The folder and those above it, where they are not there. Root process only; InputError where they cannot be."""
+    """Create the folder and its parents. Root process only. Raises InputError if that fails."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -106,7 +106,7 @@ def make_folder(directory: Path) -> None:
 
 @contextmanager
 def held(directory: Path) -> Iterator[None]:
-    """The folder made, and held against a second command while inside. Root process only."""
+    """Create the folder and lock it against a second command. Root process only."""
     make_folder(directory)
     try:
         handle = os.open(directory, os.O_RDONLY)
@@ -120,7 +120,7 @@ def held(directory: Path) -> Iterator[None]:
                 f"{directory}: another run is writing here: wait for it, or use --out"
             ) from None
         except OSError:
-            pass  # a file system without locks
+            pass  # file system without locks
         yield
     finally:
         os.close(handle)
@@ -128,7 +128,7 @@ def held(directory: Path) -> Iterator[None]:
 
 @contextmanager
 def claimed(directory: Path, scene_name: str) -> Iterator[None]:
-    """The folder of a run, held, checked, and cleared of what dead runs left. Root process only."""
+    """Create, lock and check a run's folder, and remove what dead runs left. Root process only."""
     with held(directory):
         check_owner(directory, scene_name)
         _check_purpose(directory)
@@ -141,7 +141,7 @@ def claimed(directory: Path, scene_name: str) -> Iterator[None]:
 
 
 def _check_purpose(directory: Path) -> None:
-    """The folder one stands in is taken only when it is empty or holds results already."""
+    """Refuse the working folder unless it is empty or holds results already."""
     if directory.resolve() != Path.cwd() or (directory / "summary.json").exists():
         return
     if (directory / "scene.toml").exists() or not any(directory.iterdir()):
@@ -162,7 +162,7 @@ def _unusable(directory: Path, error: OSError) -> InputError:
 
 
 class Summary:
-    """`summary.json`: one entry a stage, rewritten whole after each of them. Root process only."""
+    """`summary.json`: one entry per stage, rewritten completely after each. Root process only."""
 
     def __init__(self, directory: Path, scene_name: str, processes: int) -> None:
         self.path = directory / "summary.json"
@@ -210,7 +210,7 @@ def _figures(given: dict[str, tuple[Any, str]] | None) -> dict[str, Any]:
 
 
 def _finite(value: Any) -> Any:
-    """JSON has no infinities: they become null."""
+    """Replace infinities and NaN, which JSON does not have, by null."""
     if isinstance(value, dict):
         return {key: _finite(part) for key, part in value.items()}
     if isinstance(value, list | tuple):

@@ -1,14 +1,15 @@
-"""The disk as HDF5 sees it while a result file is written."""
+"""The file object under HDF5 while a result file is written."""
 
 import io
 from typing import Any
 
 
 class Disk(io.RawIOBase):
-    """The file under HDF5. The first refused write is raised; later ones are taken and dropped.
+    """The file under HDF5. The first write error is raised; later writes are dropped.
 
-    HDF5's own file driver cannot close a file on a full disk: it tries again until the process ends
-    with a segmentation fault (seen with 1.10.8). Dropped writes let it close; the file is removed.
+    HDF5's own file driver cannot close a file on a full disk: it retries until the process ends
+    with a segmentation fault (seen with 1.10.8). Dropping writes lets it close; the file is then
+    removed.
     """
 
     def __init__(self, file: io.FileIO) -> None:
@@ -48,7 +49,7 @@ class Disk(io.RawIOBase):
         return self._file.seek(0, io.SEEK_END) if size is None else size
 
     def _attempt(self, call: Any, argument: Any) -> int | None:
-        """What `call` returns; None once the disk has refused."""
+        """The value of `call`; None once the disk has failed."""
         if self.error is not None:
             return None
         try:

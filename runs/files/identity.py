@@ -1,6 +1,6 @@
-"""What computed a result besides its inputs: the program's own sources and the libraries under them.
+"""What a result depends on besides its inputs: the program's sources and the libraries.
 
-Part of every stage's hash, so that a result is not reused after the code or a library has changed.
+Part of every stage's hash, so that no result is reused after the code or a library has changed.
 """
 
 import functools
@@ -14,12 +14,13 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 
 # Imports go one way, so a stage is computed by its own package and those below it. A later stage
-# has all packages of an earlier one: whatever changes an earlier result changes its hash too.
-# Damping comes with the static state, which rolls; with an axle that moves, the modes know of the loop.
+# includes all packages of an earlier one: whatever changes an earlier result changes its hash too.
+# Damping affects the static state of a rolling tire; with a moving axle, the modes depend on the
+# time loop.
 _TIRE = ("fem", "runs/stages", "modal")
 _ALL = (*_TIRE, "greens", "contact")
 PACKAGES: Mapping[str, tuple[str, ...]] = {"static": _TIRE}
-"""Folders of sources a stage depends on; all five packages where it is not named here."""
+"""Source folders that a stage depends on; all five packages if it is not listed here."""
 
 LIBRARIES = {
     "dolfinx": "fenics-dolfinx",
@@ -31,7 +32,7 @@ LIBRARIES = {
     "numpy": "numpy",
     "scipy": "scipy",
 }
-"""Libraries whose version can change a result, with the name their installation goes by."""
+"""Libraries whose version can change a result, with the names of their distributions."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Identity:
     libraries: Mapping[str, str]
 
     def differs(self, code: str, libraries: Mapping[str, str]) -> str:
-        """What has changed since a result was computed by `code` on `libraries`; "" if nothing."""
+        """What has changed since a result was computed by `code` with `libraries`; "" if none."""
         if code != self.code:
             return "the program's code has changed since"
         changed = [
@@ -54,7 +55,7 @@ class Identity:
 
 
 def identity(stage: str) -> Identity:
-    """Of what computes a stage in this process. Reads the sources once a process, some 10 ms."""
+    """The identity of a stage in this process. Reads the sources once per process, about 10 ms."""
     return Identity(_code(PACKAGES.get(stage, _ALL)), _libraries())
 
 
@@ -82,7 +83,7 @@ def _version(package: str) -> str:
 
 
 def _mumps() -> str:
-    """From the name of the loaded library, which no interface tells; known once PETSc is loaded."""
+    """MUMPS's version, from the name of the loaded library: no interface gives it. Needs PETSc."""
     try:
         maps = Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace")
     except OSError:

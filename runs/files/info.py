@@ -1,4 +1,4 @@
-"""What a result file holds, as text."""
+"""Describes the contents of a result file."""
 
 import json
 import tomllib
@@ -12,15 +12,16 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files import checksum
 from tireroad.runs.files.store import verify
 
-LONG = 96  # characters of an attribute printed on one line
+LONG = 96  # longest attribute text printed in full
 
 
 def describe(file: Path, as_json: bool = False) -> str:
-    """Provenance, attributes, datasets (shape, type, unit, size in the file) of an HDF5 result, as text or JSON.
+    """The contents of an HDF5 file as text or JSON.
 
-    A result file's checksum is verified first, which reads all of it: about a second per GB. Other
-    HDF5 files are described too. Control characters are shown as escapes. Not collective. Raises
-    InputError where the file is absent, is no HDF5 or is damaged.
+    Provenance, attributes, and datasets with shape, type, unit and stored size. A result file's
+    checksum is verified first, which reads all of it: about a second per GB. Other HDF5 files are
+    described too. Control characters are shown as escapes. Not collective. Raises InputError if the
+    file is absent, not HDF5, or damaged.
     """
     if not file.is_file():
         raise InputError(f"{file}: there is no such file")
@@ -42,12 +43,12 @@ def describe(file: Path, as_json: bool = False) -> str:
                 return json.dumps(_held(file, opened, whole), indent=1)
             lines = (*_head(file, opened, whole), *_attributes(opened), *_datasets(opened))
             return "\n".join(_printable(line) for line in lines)
-    except Exception as error:  # HDF5 and h5py raise whatever comes of a damaged foreign file
+    except Exception as error:  # HDF5 and h5py raise all kinds of errors on a damaged foreign file
         raise InputError(f"{file} is damaged: {type(error).__name__}: {error}") from error
 
 
 def _held(path: Path, file: h5py.File, checksum_is: str) -> dict:
-    """All that the text tells, texts of many lines in full, sizes in bytes; not a number is null."""
+    """The text form's contents, multi-line texts in full, sizes in bytes; NaN and infinity null."""
     datasets: dict[str, dict] = {}
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -71,7 +72,7 @@ def _held(path: Path, file: h5py.File, checksum_is: str) -> dict:
 
 
 def _plain(value: object) -> object:
-    """An attribute as JSON has it; what JSON has not, as text."""
+    """An attribute as a JSON value; other types as text."""
     if isinstance(value, bytes):
         return value.decode(errors="replace")
     if isinstance(value, (np.ndarray, np.generic)):
@@ -84,7 +85,7 @@ def _plain(value: object) -> object:
 
 
 def _printable(line: str) -> str:
-    """A line whose control characters, which a terminal would obey, are written as escapes."""
+    """A line with control characters, which a terminal would interpret, written as escapes."""
     return "".join(
         c if c.isprintable() else c.encode("unicode_escape", "backslashreplace").decode()
         for c in line
@@ -98,7 +99,7 @@ def _head(path: Path, file: h5py.File, checksum_is: str) -> Iterator[str]:
 
 
 def _attributes(file: h5py.File) -> Iterator[str]:
-    """Provenance and results kept as attributes, one a line; texts of many lines are summarised."""
+    """Provenance and results stored as attributes, one per line; long texts are summarised."""
     if not len(file.attrs):
         return
     yield ""
@@ -125,7 +126,7 @@ def _value(name: str, value: object) -> str:
 
 
 def _scene(text: str) -> str:
-    """Name and tables of the resolved scene, which is 100 lines long."""
+    """Name and tables of the resolved scene, which is about 100 lines long."""
     lines = len(text.splitlines())
     try:
         tables = tomllib.loads(text)

@@ -1,4 +1,4 @@
-"""The result files of one folder, for reading, and one section of the report made of them."""
+"""Reading the result files of one folder, and the section of a report made from them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ class Table:
 
 @dataclass
 class Picture:
-    """A still picture as a data URI, what it shows, and what a page with script draws in its place (runs.report.live)."""
+    """A picture as a data URI, its caption, and the `live` chart for it (runs.report.live)."""
 
     image: str
     caption: str
@@ -39,16 +39,16 @@ class Section:
     warnings: list[str] = field(default_factory=list)
 
     def show(self, image: str, caption: str, live: dict | None = None) -> None:
-        """One more picture."""
+        """Add a picture."""
         self.figures.append(Picture(image, caption, live))
 
 
 class Absent(LookupError):
-    """A file or dataset a section needs is not there; the message names it."""
+    """A required file or dataset does not exist; the message names it."""
 
 
 class Results:
-    """The result files of one folder, opened when first asked for; a context manager."""
+    """The result files of one folder, opened on first use; a context manager."""
 
     def __init__(self, directory: Path, scene: Mapping) -> None:
         self.directory, self.scene = directory, scene
@@ -62,7 +62,7 @@ class Results:
             file.close()
 
     def file(self, name: str) -> h5py.File:
-        """The open HDF5 file; Absent where there is none, InputError where it is damaged."""
+        """The open HDF5 file. Raises Absent if it does not exist, InputError if it is damaged."""
         if name not in self._open:
             path = self.directory / name
             if not path.is_file():
@@ -87,7 +87,7 @@ class Results:
             return None
 
     def borrowed(self, name: str, path: str) -> NDArray | None:
-        """An optional array of another section's file, whose damage is that section's to report."""
+        """An optional array of another section's file; that section reports any damage."""
         try:
             return self.optional(name, path)
         except InputError:
@@ -99,6 +99,6 @@ class Results:
 
 
 def attributes(results: Results, name: str, wanted: tuple[tuple[str, str], ...]) -> list:
-    """Facts from the attributes (key, unit) the file has."""
+    """Facts from those attributes (key, unit) that the file has."""
     found = [(key, unit, results.attribute(name, key)) for key, unit in wanted]
     return [(key.replace("_", " "), quantity(v, unit)) for key, unit, v in found if v is not None]

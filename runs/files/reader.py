@@ -17,13 +17,13 @@ from tireroad.runs.files.store import verify
 
 
 class RunResults(Mapping[str, NDArray[Any]]):
-    """The datasets of all result files in a folder: `run["contact/total_force"]` is the dataset
-    `total_force` of `contact.h5`, read when asked for.
+    """The datasets of all result files in a folder, read on access.
 
-    `unit(name)` is its unit, `attributes(file)` what the file says of itself (for example
-    `run.attributes("static")["load"]`, N), `scene` the resolved scene and `summary` the stages as in
-    `summary.json`. Nothing is kept open. Raises InputError for a folder that holds no results and for
-    a file that cannot be read; KeyError, with the names there are, for a dataset that is not there.
+    `run["contact/total_force"]` is the dataset `total_force` of `contact.h5`; `unit(name)` is its
+    unit; `attributes(file)` are a file's attributes (for example
+    `run.attributes("static")["load"]`, N); `scene` is the resolved scene, `summary` the stages as
+    in `summary.json`. No file stays open. Raises InputError for a folder without results and for an
+    unreadable file; KeyError, with the names available, for a dataset that does not exist.
     """
 
     def __init__(self, directory: str | Path) -> None:
@@ -34,22 +34,22 @@ class RunResults(Mapping[str, NDArray[Any]]):
 
     @property
     def scene(self) -> dict[str, Any]:
-        """The resolved scene, every default written back."""
+        """The resolved scene with every default."""
         return tomllib.loads((self.directory / "scene.toml").read_text(encoding="utf-8"))
 
     @property
     def summary(self) -> dict[str, Any]:
-        """Each stage: seconds, headline figures and indicators with units, warnings."""
+        """Per stage: seconds, headline figures and indicators with units, warnings."""
         text = (self.directory / "summary.json").read_text(encoding="utf-8")
         return json.loads(text)["stages"]
 
     def unit(self, name: str) -> str:
-        """The unit of a dataset; "-" for a pure number."""
+        """The unit of a dataset; "-" if dimensionless."""
         self._known(name)
         return self._listed()[name]
 
     def attributes(self, file: str) -> dict[str, Any]:
-        """The attributes of a file, "static" for `static.h5`: figures, provenance."""
+        """The attributes of a file, e.g. "static" for `static.h5`: figures and provenance."""
         with self._opened(file) as opened:
             found = dict(opened.attrs)
         return {key: v.item() if isinstance(v, np.generic) else v for key, v in found.items()}
@@ -76,7 +76,7 @@ class RunResults(Mapping[str, NDArray[Any]]):
             raise KeyError(f"{name}; there are {', '.join(near or self._listed())}")
 
     def _listed(self) -> dict[str, str]:
-        """Every dataset's unit by its name."""
+        """The unit of every dataset, by name."""
         if self._units is None:
             found: dict[str, str] = {}
             for path in sorted(self.directory.glob("*.h5")):
@@ -109,5 +109,5 @@ def _units(file: h5py.File) -> list[tuple[str, str]]:
 
 
 def load(directory: str | Path) -> RunResults:
-    """The results in a folder, for reading."""
+    """Open the results in a folder for reading."""
     return RunResults(directory)

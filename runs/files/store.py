@@ -1,8 +1,8 @@
-"""Result files: written to a temporary name and renamed, so that a file that exists is whole.
+"""Result files, written to a temporary name and renamed, so that an existing file is complete.
 
-Only the root process calls what writes; arrays are gathered by the caller. Every HDF5 file carries
-the resolved scene, the hash of what it was computed from, program, library versions, process count,
-and a checksum that `opened` verifies before the file is read.
+Only the root process writes; callers gather the arrays. Every HDF5 file carries the resolved scene,
+the hash of its inputs, program and library versions, the number of processes, and a checksum that
+`opened` verifies before the file is read.
 """
 
 import hashlib
@@ -26,14 +26,14 @@ from tireroad.runs.files.identity import Identity, identity
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
 LOADED = ("mpi4py", "h5py")
-"""Libraries named in result files beside those that `identity` knows."""
+"""Libraries named in result files besides those in `identity`."""
 
 AGAIN = "run its scene again, which computes it anew"
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a result file comes from."""
+    """The origin of a result file."""
 
     scene_name: str
     scene_text: str
@@ -42,7 +42,7 @@ class Provenance:
     processes: int
 
     def attributes(self) -> dict[str, Any]:
-        """The attributes of the file, library versions included."""
+        """The attributes of the file, including library versions."""
         computed = identity(self.stage)
         loaded = {
             name: str(getattr(sys.modules[name], "__version__", "unknown"))
@@ -65,10 +65,10 @@ class Provenance:
 
 @contextmanager
 def writing(path: Path, provenance: Provenance, begin: Path | None = None) -> Iterator[h5py.File]:
-    """An HDF5 file open for writing; it appears as `path`, whole, when the block ends well.
+    """An HDF5 file open for writing; it is moved to `path` when the block ends without error.
 
-    It is empty at first, or a copy of the file `begin`.
-    Root process only. Raises InputError when the disk is full or the folder not writable.
+    Initially empty, or a copy of the file `begin`. Root process only. Raises InputError if the disk
+    is full or the folder not writable.
     """
     with replacing(path) as part:
         if begin is not None:
@@ -92,14 +92,14 @@ def writing(path: Path, provenance: Provenance, begin: Path | None = None) -> It
 
 @contextmanager
 def sealed(path: Path) -> Iterator[h5py.File]:
-    """A new HDF5 file that carries a checksum and no provenance, e.g. one gathered from results."""
+    """A new HDF5 file with a checksum but no provenance, e.g. one gathered from results."""
     with h5py.File(path, "w", userblock_size=checksum.BLOCK) as file:
         yield file
     checksum.seal(path)
 
 
 def put(file: h5py.Group, name: str, array: Any, unit: str, **attributes: Any) -> h5py.Dataset:
-    """A dataset with its unit, groups on the way made as needed."""
+    """Write a dataset with its unit, creating groups as needed."""
     dataset = file.create_dataset(name, data=np.asarray(array))
     dataset.attrs["unit"] = unit
     for key, value in attributes.items():
@@ -108,19 +108,19 @@ def put(file: h5py.Group, name: str, array: Any, unit: str, **attributes: Any) -
 
 
 def stage_hash(inputs: Mapping[str, Any]) -> str:
-    """SHA-256 of the canonical JSON of what a stage depends on (numbers by their exact repr)."""
+    """SHA-256 of the canonical JSON of a stage's inputs (numbers by their exact repr)."""
     text = json.dumps(inputs, sort_keys=True, separators=(",", ":"), default=plain)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def file_hash(path: str | Path) -> str:
-    """SHA-256 of a file's content: what a stage that reads it depends on."""
+    """SHA-256 of a file's content, as the input of a stage that reads it."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def wanted_hash(stage: str, inputs: Mapping[str, Any]) -> str:
-    """The hash of a stage: of its name, its inputs, and the code and libraries that compute it."""
+    """The hash of a stage: its name, its inputs, and the code and libraries that compute it."""
     computed = identity(stage)
     return stage_hash(
         {"stage": stage, "code": computed.code, "libraries": computed.libraries, **inputs}
@@ -128,10 +128,9 @@ def wanted_hash(stage: str, inputs: Mapping[str, Any]) -> str:
 
 
 def why_not(path: Path, wanted: str, stage: str) -> str:
-    """Why a stage's file cannot be used in place of computing it; "" when it can.
+    """Why a stage's file cannot be reused; "" if it can, "absent" if it does not exist.
 
-    `wanted` is the hash of what the stage would be computed from now. A file that is absent is the
-    answer "absent".
+    `wanted`: hash of the stage's present inputs.
     """
     if not path.exists():
         return "absent"
@@ -146,7 +145,7 @@ def why_not(path: Path, wanted: str, stage: str) -> str:
 
 
 def _changed(found: Mapping[str, Any], now: Identity) -> str:
-    """What is not as it was when a file with these attributes was written."""
+    """What has changed since a file with these attributes was written."""
     if "code" not in found:
         return "it is of an earlier version"
     libraries = json.loads(found["libraries"])
@@ -155,9 +154,9 @@ def _changed(found: Mapping[str, Any], now: Identity) -> str:
 
 @contextmanager
 def opened(path: Path) -> Iterator[h5py.File]:
-    """A result file for reading, once its checksum is found right. Not collective.
+    """A result file opened for reading after its checksum is verified. Not collective.
 
-    Raises InputError where it is absent, cannot be read or is damaged.
+    Raises InputError if it is absent, unreadable or damaged.
     """
     verify(path)
     with h5py.File(path, "r") as file:
@@ -165,9 +164,9 @@ def opened(path: Path) -> Iterator[h5py.File]:
 
 
 def verify(path: Path, foreign: bool = False) -> None:
-    """Raise InputError where a result file is absent, unreadable or not as it was written.
+    """Raise InputError if a result file is absent, unreadable or not as it was written.
 
-    `foreign`: an HDF5 file without a checksum, by another program, will do.
+    `foreign`: accept an HDF5 file without a checksum, written by another program.
     """
     try:
         if not checksum.is_whole(path):
@@ -185,7 +184,7 @@ def verify(path: Path, foreign: bool = False) -> None:
 
 
 def plain(value: Any) -> Any:
-    """numpy values, paths and dataclasses for JSON."""
+    """Convert numpy values, paths and dataclasses for JSON."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     if isinstance(value, Path):

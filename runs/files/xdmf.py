@@ -1,8 +1,9 @@
-"""XDMF pages for ParaView, pyvista and meshio, that point into the HDF5 results, one folder up, and copy no data.
+"""XDMF pages for ParaView, pyvista and meshio; they refer to the HDF5 results and copy no data.
 
-A page is a series of states with a time each, the first of which holds geometry and topology for all (XInclude, as
-DOLFINx writes it). Readers want every field to be a dataset of its own: one row of a larger dataset is made one by a
-virtual dataset (HDF5), in a small file beside the page.
+A page is a time series of states; the first holds geometry and topology for all (XInclude, as
+DOLFINx writes it). The results lie one folder up. Readers expect every field to be a separate
+dataset: a row of a larger dataset becomes one through a virtual dataset (HDF5) in a small file
+beside the page.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from numpy.typing import NDArray
 
 from tireroad.runs.files.store import opened
 
-SHAPES = 20  # modes offered
-INSTANTS = 400  # contact states offered: every one costs 1 kB of page and a line in the time slider
+SHAPES = 20  # modes written
+INSTANTS = 400  # contact states written: each takes 1 kB of page and an entry of the time slider
 _BORROWED = 'xpointer(//Grid[@Name="states"]/Grid[1]/*[self::Topology or self::Geometry])'
 
 
@@ -34,11 +35,11 @@ class Page:
 
     @property
     def beside(self) -> str:
-        """The name of the small file; it is wanted where there are `rows` or `arrays`."""
+        """Name of the fields file; it is needed if there are `rows` or `arrays`."""
         return f"{self.name}_fields.h5"
 
     def write_fields(self, path: Path) -> None:
-        """The small file: virtual datasets find their results by the place of the file itself."""
+        """Write the fields file; its virtual datasets find the results relative to its place."""
         with h5py.File(path, "w", libver="latest") as file:
             for name, layout in self.rows.items():
                 file.create_virtual_dataset(name, layout)
@@ -46,7 +47,7 @@ class Page:
                 file[name] = values
 
     def row(self, dataset: h5py.Dataset, row: int) -> str:
-        """Row `row` of a dataset (n, …), as a dataset of its own."""
+        """Row `row` of a dataset (n, …) as a separate dataset."""
         name = f"{dataset.name.strip('/').replace('/', '_')}_{row}"
         above = f"../{Path(dataset.file.filename).name}"
         source = h5py.VirtualSource(above, dataset.name, dataset.shape, dataset.dtype)
@@ -56,7 +57,7 @@ class Page:
         return _item(dataset.shape[1:], dataset.dtype, f"{self.beside}:/{name}")
 
     def vertices(self, count: int) -> str:
-        """Topology of so many single points."""
+        """Topology of that many single points."""
         self.arrays["vertices"] = np.arange(count)[:, None]
         places = _item((count, 1), np.dtype(np.int64), f"{self.beside}:/vertices")
         return (
@@ -65,7 +66,7 @@ class Page:
         )
 
     def states(self, body: str, states: Iterable[tuple[float, str]]) -> Page:
-        """The text, of geometry and topology `body` and fields at each time."""
+        """Set the text: geometry and topology `body`, and the fields at each time; returns self."""
         grids = []
         for number, (time, fields) in enumerate(states):
             mesh = f"<xi:include xpointer={quoteattr(_BORROWED)}/>" if number else body
@@ -83,14 +84,14 @@ class Page:
 
 
 def static(file: h5py.File) -> Page:
-    """The outer face as made, quads, with its displacement (warp by it to see the loaded tire)."""
+    """The undeformed outer face as quads, and its displacement (warp by it to load the tire)."""
     page = Page("static")
     moved = _attribute("displacement", "Vector", _whole(file["surface/displacement"]))
     return page.states(_surface(file, page), [(0.0, moved)])
 
 
 def modes(file: h5py.File) -> Page:
-    """The first mode shapes as vectors on the outer face; their frequencies in Hz stand for the time."""
+    """The first mode shapes as vectors on the outer face; frequency in Hz stands for time."""
     page, shape = Page("modes"), file["surface/shape"]
     fields = [
         (float(value), _attribute("shape", "Vector", page.row(shape, number)))
@@ -112,7 +113,7 @@ def contact(file: h5py.File) -> Page | None:
 
 
 def motion(file: h5py.File) -> Page | None:
-    """The outer face over time: warp it by its displacement beyond the static state."""
+    """The outer face over time: warp it by its displacement from the static state."""
     time, moved = file["time"][()], {"displacement": file["displacement"]}
     if not len(time):
         return None
@@ -135,7 +136,7 @@ def _over_time(
 
 
 def _surface(file: h5py.File, page: Page) -> str:
-    """Topology and geometry of the outer face; its quads are kept in static.h5 alone."""
+    """Topology and geometry of the outer face; its quads are stored in static.h5 only."""
     points = file["surface/points"]
     beside = Path(file.filename).with_name("static.h5")
     if beside.is_file():
@@ -157,7 +158,7 @@ def _attribute(name: str, kind: str, data: str) -> str:
 
 
 def _whole(dataset: h5py.Dataset) -> str:
-    """A whole dataset, by its place in the result file."""
+    """A whole dataset, by its path in the result file."""
     place = f"../{Path(dataset.file.filename).name}:{dataset.name}"
     return _item(dataset.shape, dataset.dtype, place)
 

@@ -1,1 +1,1 @@
-"""What benches and validation share: tables, pages, pictures, a synthetic tire."""
+"""Shared by benchmarks and validation: tables, pages, figures, a synthetic tire."""

@@ -1,4 +1,4 @@
-"""The page of benchmarks and validations: numbered tables and figures, needing nothing from outside."""
+"""The self-contained page of benchmarks and validations, with numbered tables and figures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from tireroad.runs.measure.plots import drawn
 from tireroad.runs.version import PROGRAM, VERSION
 
-LONG = 16  # rows from which a table is folded away
+LONG = 16  # rows above which a table is collapsed
 
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -51,7 +51,7 @@ summary{cursor:pointer;color:#2f6db5;font-size:.92rem}
 
 
 def page(results: dict[str, list], about: dict[str, str]) -> str:
-    """HTML of tables (runs.measure.tabulate.Table) by the name of what made them, each with its line."""
+    """HTML of tables (runs.measure.tabulate.Table) by module name, with their ABOUT lines."""
     import jinja2
 
     counted = {"tables": 0, "figures": 0}
@@ -64,7 +64,7 @@ def page(results: dict[str, list], about: dict[str, str]) -> str:
 
 
 def machine() -> str:
-    """What the figures were measured on, and when."""
+    """The machine and the date of the measurement."""
     bytes_here = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     cores = len(os.sched_getaffinity(0))
     return (
@@ -84,7 +84,7 @@ def _processor() -> str:
 
 
 def _shaped(table: Any, counted: dict[str, int]) -> dict:
-    """What the template needs of a table; numbers it and its picture."""
+    """A table as the template needs it; numbers it and its figure."""
     image = drawn(table)
     counted["tables"] += 1
     counted["figures"] += image is not None
@@ -108,7 +108,7 @@ def _shaped(table: Any, counted: dict[str, int]) -> dict:
 
 
 def _shown(value: Any) -> str:
-    """Three figures; powers of ten as such below a thousandth and from a million on."""
+    """Three digits; powers of ten below a thousandth and from a million up."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if not isinstance(value, float):
@@ -117,6 +117,6 @@ def _shown(value: Any) -> str:
         return f"{value:.3g}" if abs(value) < 100 else f"{value:.0f}"
     mantissa, _, power = f"{value:.2e}".partition("e")
     if not power:
-        return mantissa  # not a number, infinity
+        return mantissa  # NaN or infinity
     raised = str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{mantissa.rstrip('0').rstrip('.')}·10{raised}"

@@ -1,4 +1,4 @@
-"""Pictures of measured tables: curves, the front of run time against error, ratios as bars."""
+"""Figures of measured tables: curves, the front of run time against error, ratios as bars."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from tireroad.runs.report.figures import canvas, encode, styled
 COLOURS = ("#2f6db5", "#c8502d", "#2e8b6a", "#7a4fa3", "#b58a1f", "#52606d")
 MARKS = ("o", "s", "^", "D", "v", "P")
 INK, MUTED = "#1d2733", "#9aa5b1"
-MOST_MARKS = 40  # points of a curve from which on it is a line only
-SIZES = (4.0, 9.0)  # points, of the marks for the fewest and for the most
+MOST_MARKS = 40  # curves with more points are drawn without marks
+SIZES = (4.0, 9.0)  # points: sizes of the marks for the smallest and the largest value
 
 
 def drawn(table: Any) -> str | None:
-    """The picture that a runs.measure.tabulate.Table asks for in its `plot`, as a data URI; None without one.
+    """The figure that `plot` of a runs.measure.tabulate.Table asks for, as a data URI, or None.
 
-    kind "lines" (default): `y` columns over column `x`, a curve for every value of column `by`, axes
-    logarithmic as `log` says; "front": `points` (rows like the table's), coloured by column `by`, their
-    marks by column `mark` and their sizes by column `size`, the rows `front` joined and labelled by
-    column `label`, the rows `beside` as a curve of their own; "bars": ratios of column `y`, from 1 on, named by the columns `x`.
-    `targets` are lines across, `limits` upright ones: (value, text) each.
+    kind "lines" (default): `y` columns over column `x`, one curve per value of column `by`, axes in
+    `log` logarithmic; "front": `points` (rows like the table's), coloured by column `by`, with
+    marks by column `mark` and sizes by column `size`, the rows `front` joined and labelled by
+    column `label`, the rows `beside` as a separate curve; "bars": ratios of column `y`, starting at
+    1, named by the columns `x`. `targets` are horizontal lines, `limits` vertical ones:
+    (value, text) each.
     """
     if table.plot is None:
         return None
@@ -35,7 +36,7 @@ def drawn(table: Any) -> str | None:
 
 
 class _Columns:
-    """Columns of rows by name, with their unit in the axis label."""
+    """Columns of rows by name; their units appear in axis labels."""
 
     def __init__(self, table: Any) -> None:
         self.names = [name for name, _ in table.columns]
@@ -85,7 +86,7 @@ def _lines(table: Any) -> str:
 
 
 def _shared_label(names: list[str], columns: _Columns) -> str:
-    """What several curves on one axis have in common: the words they begin with, and their unit."""
+    """Common label of several curves on one axis: the first words of their names, and the unit."""
     words = list(commonprefix([name.split() for name in names]))
     while words and words[-1] in ("of", "a", "the"):
         words.pop()
@@ -121,7 +122,7 @@ def _front(table: Any) -> str:
     best = [place(row) for row in plot["front"]]
     here.step([x for x, _ in best], [y for _, y in best], where="post", color=INK, lw=1.3, zorder=2)
     for k, row in enumerate(plot["front"]):
-        # Every other letter on the other side: neighbours on a front may be close.
+        # Alternate sides of labels: neighbours on a front may be close.
         aside = {"ha": "left", "va": "bottom"} if k % 2 else {"ha": "right", "va": "top"}
         offset = (4, 4) if k % 2 else (-4, -4)
         text = str(columns.pick(row, plot["label"]))
@@ -144,7 +145,7 @@ def _front(table: Any) -> str:
 
 
 def _styles(rows: list[list], columns: _Columns, name: str, styles: tuple) -> dict:
-    """A colour or a mark for every value of a column, in the order in which they come."""
+    """A colour or a mark for every value of a column, in order of appearance."""
     values = dict.fromkeys(columns.pick(row, name) for row in rows)
     return {value: styles[k % len(styles)] for k, value in enumerate(values)}
 
@@ -179,14 +180,14 @@ def _bars(table: Any) -> str:
 
 
 def _scales(axes: Axes, log: str) -> None:
-    """Logarithmic axes, with plain numbers where they are short."""
+    """Set logarithmic axes, with plain numbers where they are short."""
     for name, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
         if name not in log:
             continue
         (axes.set_xscale if name == "x" else axes.set_yscale)("log")
         low, high = axis.get_view_interval()
         axis.set_major_formatter(_number)
-        if high < 30 * low:  # hardly a power of ten in between
+        if high < 30 * low:  # few powers of ten in between
             axis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
             axis.set_minor_formatter(_number)
         else:
@@ -200,7 +201,7 @@ def _number(value: float, _: int) -> str:
 
 
 def _guides(axes: Axes, plot: dict) -> None:
-    """Asked values, as lines with their text at the line's end."""
+    """Draw target values as lines labelled at their end."""
     style = {"color": "#c8502d", "lw": 0.9, "ls": (0, (4, 3)), "zorder": 1}
     for value, text in plot.get("targets", ()):
         axes.axhline(value, **style)

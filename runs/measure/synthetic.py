@@ -1,11 +1,11 @@
-"""A made-up tire without finite elements: a rolling strip on springs, for tests and benchmarks.
+"""A synthetic tire without finite elements, for tests and benchmarks: a rolling strip on springs.
 
 A periodic strip of length L and width B, simply supported at its sides, with travelling waves
 
-    w = Y_j(y) cos(k_n x), sin(k_n x),  k_n = 2 pi n/L,  Y_j = sin(j pi (y/B + 1/2)),
-    omega^2 = omega_0^2 + c^2 (k_n^2 + (j pi/B)^2),
+  w = Y_j(y) cos(k_n x), sin(k_n x),  k_n = 2 pi n/L,  Y_j = sin(j pi (y/B + 1/2)),
+  omega^2 = omega_0^2 + c^2 (k_n^2 + (j pi/B)^2),
 
-carried along by the rolling at v: a mode n > 0 splits into omega +- k_n v, as those of a tire do.
+convected at the rolling speed v: a mode n > 0 splits into omega +- k_n v, as modes of a tire do.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Strip:
     """Mass (kg), length and width (m), lowest circular frequency (1/s), wave speed (m/s), damping
-    gamma1 (1/s), rolling speed (m/s).
-    """
+    gamma1 (1/s), rolling speed (m/s)."""
 
     mass: float = 8.0
     length: float = 2.0
@@ -38,7 +37,7 @@ class Strip:
     def response(self, points: Array, around: int, across: int, residual: int = 0) -> Response:
         """Vertical response between points (c, 2) m from the waves n <= around, j <= across.
 
-        `residual` further orders of both kinds follow statically (0: none).
+        `residual`: number of further orders of both kinds that respond statically (0: none).
         """
         kept = self._waves(points, around, across)
         if not residual:
@@ -49,15 +48,15 @@ class Strip:
     def horizontal_response(
         self, points: Array, around: int, across: int, stiff: float
     ) -> Response:
-        """Response (3c, 3c) in z, x, y: the vertical one, and `stiff` times stiffer in the road's plane.
+        """Response (3c, 3c) in z, x, y: vertical, and in the road's plane `stiff` times stiffer.
 
-        The tire leans a little: every mode moves in its own direction, x up to 0.3 of z.
+        The tire is slightly tilted: every mode has its own direction, with x up to 0.3 of z.
         """
         plain = self._waves(points, around, across)
         q = len(plain.eigenvalue)
         lean = 0.3 * np.cos(np.arange(q))
         direction = np.stack([np.ones(q), lean, 0.2 * np.ones(q)])
-        # A second set of the same waves moves in the plane alone.
+        # A second set of the same waves moves in the plane only.
         plane = np.stack([-lean, np.ones(q), 0.5 * lean]) / stiff
         out = np.hstack([_stacked(plain.output, d) for d in (direction, plane)])
         into = np.vstack([_stacked(plain.input.T, d).T for d in (direction, plane * stiff)])
@@ -75,12 +74,12 @@ class Strip:
 
     def _waves(self, points: Array, around: int, across: int) -> Response:
         n, j = (a.ravel() for a in np.meshgrid(np.arange(around + 1), np.arange(1, across + 1)))
-        # A standing wave and its mirror image: two states for n > 0, one for n = 0.
+        # A wave and its mirror image: two states for n > 0, one for n = 0.
         n, j = np.concatenate([n, -n[n > 0]]), np.concatenate([j, j[n > 0]])
         along = 2 * np.pi * n / self.length
         sideways = j * np.pi / self.width
         omega = np.sqrt(self.lowest**2 + self.wave_speed**2 * (along**2 + sideways**2))
-        # Im of one pole of a pair stands for both; overdamped modes have two real ones.
+        # One pole of a conjugate pair stands for both; overdamped modes have two real poles.
         root = np.sqrt(self.damping**2 / 4 - omega.astype(complex) ** 2)
         over = np.flatnonzero(root.real > 0)
         pick = np.concatenate([np.arange(len(n)), over])
@@ -114,7 +113,7 @@ def _stacked(values: Array, direction: Array) -> Array:
 def oval_patch(shape: tuple[int, int], spacing: tuple[float, float], load: float) -> Patch:
     """A grid of points (m) around the origin that carries a load (N) inside an ellipse.
 
-    The ellipse reaches to 0.6 of the half sides; outside, the gap grows with the square.
+    The ellipse extends to 0.6 of the half sides; outside, the gap grows quadratically.
     """
     x, y = ((np.arange(n) - (n - 1) / 2) * d for n, d in zip(shape, spacing, strict=True))
     px, py = (a.ravel() for a in np.meshgrid(x, y, indexing="ij"))

@@ -1,4 +1,4 @@
-"""Tables of measured figures: printed, kept as JSON, and drawn on a page of their own."""
+"""Tables of measured figures: printed, saved as JSON, and drawn on a page."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ from tireroad.runs.version import PROGRAM, VERSION
 
 @dataclass
 class Table:
-    """Rows under (name, unit) columns; notes say what was measured and what the target is.
+    """Rows under (name, unit) columns; `notes` say what was measured and what the target is.
 
-    `plot`: what runs.measure.plots draws of it. `failed`: what could not be measured, a line each with the reason.
+    `plot`: figure specification for runs.measure.plots. `failed`: what could not be measured, one
+    line each with the reason.
     """
 
     title: str
@@ -34,14 +35,14 @@ class Table:
 
     @property
     def remarks(self) -> list[str]:
-        """What stands under the table."""
+        """The remarks under the table."""
         return [*self.notes, *(f"not measured: {line}" for line in self.failed)]
 
 
 def modules(package: str) -> dict[str, ModuleType]:
-    """The modules of a package and its folders by name, each with ABOUT (a line) and run() -> list[Table].
+    """A package's modules by name, subfolders included: each has ABOUT and run() -> list[Table].
 
-    Some have run_large() too: the same on a mesh that takes longer than one would wait for.
+    Some also have run_large(): the same on a mesh that takes too long to wait for.
     """
     path = importlib.import_module(package).__path__
     names = [found.name for found in pkgutil.walk_packages(path, f"{package}.") if not found.ispkg]
@@ -50,10 +51,10 @@ def modules(package: str) -> dict[str, ModuleType]:
 
 
 def run_all(package: str, names: list[str], out: Path | None, large: bool = False) -> None:
-    """Run the named modules of a package (all by default), show their tables, keep them in files. ConvergenceError at the end
-    where something could not be measured.
+    """Run the named modules of a package (all by default), show their tables and save them.
 
-    With `large` those that can run at full size, and by default only those.
+    `large`: run only modules with a full-size version, in that version. Raises ConvergenceError at
+    the end if something could not be measured.
     """
     known = modules(package)
     if large:
@@ -78,7 +79,7 @@ def run_all(package: str, names: list[str], out: Path | None, large: bool = Fals
 
 
 def _run(module: ModuleType, out: Path | None) -> list[Table]:
-    """Of a module that goes on where it was stopped, with a folder beside `out` for what it has."""
+    """Run a module; one that can resume gets a folder beside `out` for its results so far."""
     if out is not None and "kept" in inspect.signature(module.run).parameters:
         return module.run(kept=out.with_suffix(".kept"))
     return module.run()
@@ -111,7 +112,7 @@ def _shown(value) -> str:
 
 
 def _keep(results: dict[str, list[Table]], about: dict[str, str], out: Path) -> None:
-    """JSON at `out`, and a page with plots beside it."""
+    """Write JSON at `out`, and a page with figures beside it."""
     from tireroad.runs.measure.measured_page import machine, page
 
     data = {name: [asdict(table) for table in tables] for name, tables in results.items()}

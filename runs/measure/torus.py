@@ -1,4 +1,4 @@
-"""The torus of the thesis, with elements of one's own: the tire of most benches, validations and tests."""
+"""The thesis's torus with selectable elements: tire of most benchmarks, validations and tests."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tireroad.fem.sections.torus import Torus
 def thesis_torus(
     *, segments: int, elements_arc: int, elements_thickness: int = 1, order: int = 2, **more: Any
 ) -> Torus:
-    """0.32 m to the crown, a section of 0.1 m, a wall of 12 mm, 120 deg from the crown to each bead.
+    """Outer radius 0.32 m, section radius 0.1 m, wall 12 mm, 120 deg from the crown to each bead.
 
     `more`: grading and footprint_size of the Torus.
     """

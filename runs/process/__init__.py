@@ -1,1 +1,1 @@
-"""Processes, signals, memory, printing, and the test runner."""
+"""Processes, signals, memory, terminal output, and the test runner."""

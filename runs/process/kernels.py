@@ -1,4 +1,4 @@
-"""The kernels of OpenBLAS, where it does not know the processor."""
+"""Choice of OpenBLAS kernels on processors that OpenBLAS does not recognise."""
 
 import _ctypes
 import ctypes
@@ -6,19 +6,20 @@ import os
 import resource
 from pathlib import Path
 
-UNKNOWN = b"Prescott"  # what OpenBLAS takes on x86-64 for want of a better one: SSE3, two numbers at a time
-_FLAGS = (  # what a kernel needs, the widest first
+UNKNOWN = b"Prescott"  # OpenBLAS's fallback on x86-64: SSE3, two numbers at a time
+_FLAGS = (  # CPU flags required by each kernel, the widest first
     ("SkylakeX", {"avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl", "fma"}),
     ("Haswell", {"avx2", "fma"}),
 )
 
 
 def choose_kernels() -> None:
-    """Set OPENBLAS_CORETYPE to what the processor can, where OpenBLAS takes its oldest kernels.
+    """Set OPENBLAS_CORETYPE to what the processor can do, if OpenBLAS takes its oldest kernels.
 
-    OpenBLAS of Debian 12 (0.3.21) knows no processor made since: there dense products took five times as long,
-    the static state of a passenger tire twice. To call before anything loads OpenBLAS; a value of the user's
-    stays, and so does an OpenBLAS by another name. Not collective.
+    OpenBLAS of Debian 12 (0.3.21) recognises no later processor: there dense products took five
+    times as long, the static state of a passenger tire twice. Must be called before anything loads
+    OpenBLAS. A value set by the user is kept; an OpenBLAS under another name is not changed. Not
+    collective.
     """
     if "OPENBLAS_CORETYPE" in os.environ or _kernels() != UNKNOWN:
         return
@@ -28,7 +29,7 @@ def choose_kernels() -> None:
 
 
 def able(processors: Path) -> str:
-    """The widest kernels that the processor of a /proc/cpuinfo can run; empty where the oldest are right."""
+    """The widest kernels that the processor in a /proc/cpuinfo supports; "" if the oldest fit."""
     try:
         lines = processors.read_text().splitlines()
     except OSError:
@@ -38,9 +39,9 @@ def able(processors: Path) -> str:
 
 
 def _kernels() -> bytes:
-    """What OpenBLAS chose; empty where it cannot be asked. It is unloaded again, so that it may choose anew."""
+    """The kernels OpenBLAS chose; empty if unknown. Unloads it again, so that it chooses anew."""
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:
-        return b""  # with little room OpenBLAS waits for ever
+        return b""  # with little address space OpenBLAS waits forever
     try:
         library = ctypes.CDLL("libopenblas.so.0")
         name = library.openblas_get_corename

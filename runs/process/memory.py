@@ -1,4 +1,4 @@
-"""How much memory this process has taken, and how much there is."""
+"""Memory used by this process and available on this machine."""
 
 import math
 import os
@@ -9,16 +9,15 @@ from pathlib import Path
 
 
 def forget_peak() -> None:
-    """Let `peak_memory` begin anew, where the kernel can (/proc/self/clear_refs)."""
+    """Reset the maximum of `peak_memory`, if the kernel supports it (/proc/self/clear_refs)."""
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
 
 
 def peak_memory() -> float:
-    """Largest resident memory of this process since it began, or since `forget_peak`, bytes.
+    """Largest resident memory (bytes) of this process since it began, or since `forget_peak`.
 
-    Linux carries the maximum of getrusage over from the process that started this one: there it is
-    read from /proc.
+    Read from /proc, because on Linux the maximum of getrusage includes that of the parent process.
     """
     try:
         lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
@@ -28,14 +27,17 @@ def peak_memory() -> float:
     return 1024.0 * float(own)
 
 
-# Of the options of PETSc's objects that factorise: modes and responses, static state, full states of a turning tire.
+# Option prefixes of the PETSc objects that factorise: modes and responses, static state, full
+# states of a rotating tire.
 _PREFIXES = "", "static_", "rotating_st_"
 
 
 @contextmanager
 def factors_on_disk(folder: Path) -> Iterator[None]:
-    """While inside, MUMPS keeps factors in files of the folder, and removes each with its factor. What the user's
-    PETSc options say stays."""
+    """Within the context, MUMPS keeps factors in files of the folder, removed with each factor.
+
+    The user's own PETSc options take precedence.
+    """
     from petsc4py import PETSc
 
     os.environ["MUMPS_OOC_TMPDIR"] = str(folder.resolve())
@@ -44,7 +46,7 @@ def factors_on_disk(folder: Path) -> Iterator[None]:
     ours = [name for name in names if not options.hasName(name)]
     for name in ours:
         options[name] = 1
-        options.getInt(name)  # read once: else PETSc calls it unused
+        options.getInt(name)  # read once, or PETSc reports it as unused
     try:
         yield
     finally:
@@ -53,8 +55,9 @@ def factors_on_disk(folder: Path) -> Iterator[None]:
 
 
 def available_memory() -> float:
-    """Memory that this machine can still give, bytes: what the kernel reckons, within the limit of
-    the control group; infinite where neither can be read.
+    """Memory (bytes) still available: the kernel's estimate, within the control group's limit.
+
+    Infinite if neither can be read.
     """
     free = math.inf
     with suppress(OSError, ValueError):

@@ -1,4 +1,4 @@
-"""How a run on several processes ends: all together, with one message and one exit status."""
+"""Ends a run on several processes consistently: one message and one exit status."""
 
 import signal
 import sys
@@ -18,14 +18,14 @@ from tireroad.runs.process.statuses import BUG, DONE, GAVE_UP, INPUT, STOPPED
 T = TypeVar("T")
 
 TOGETHER = 3.0
-"""Seconds a failing process waits for the others to fail likewise before it ends them all."""
+"""Seconds that a failing process waits for the others to fail as well before it ends them all."""
 
 
 def start_petsc(options: list[str]) -> None:
-    """Initialise PETSc with the user's options, before anything else does.
+    """Initialise PETSc with the user's options; must be the first use of PETSc.
 
-    PETSc's own signal handlers would end the process without a word to the others.
-    Collective over all processes.
+    PETSc's own signal handlers are disabled: they would end this process without notifying the
+    others. Collective over all processes.
     """
     import petsc4py
 
@@ -33,12 +33,12 @@ def start_petsc(options: list[str]) -> None:
 
 
 def on_root(comm: Any, function: Callable[[], T]) -> T:
-    """As fem.parallel.on_root; a result folder that was removed is an error on every process too. Collective."""
+    """Like fem.parallel.on_root; a removed result folder is raised on all processes. Collective."""
     return parallel.on_root(comm, function, (InputError, ConvergenceError, Removed))
 
 
 def judged(function: Callable[[], None]) -> tuple[int, str]:
-    """Run `function`; the exit status it earns and the message for the user."""
+    """Run `function`; returns the resulting exit status and the message for the user."""
     status, message = _judged(function)
     if status == BUG and raised():
         return STOPPED, f"stopped by {raised()}: the same command or resume goes on"
@@ -73,10 +73,10 @@ def _judged(function: Callable[[], None]) -> tuple[int, str]:
 def guarded(comm: Any, function: Callable[[], None]) -> int:
     """Run `function` on every process of `comm`; the exit status, the same on all of them.
 
-    Where all processes end, in whatever way, each message is shown once and the worst status is
-    returned. Where one fails and the others do not come along within three seconds, they are inside
-    a call that will never end: the failing one says why and ends them all.
-    Collective: called at the same place on every process.
+    If all processes end, in whatever way, each distinct message is shown once and the worst status
+    is returned. If one fails and the others do not follow within three seconds, they are stuck in a
+    collective call: the failing process prints its message and aborts them all. Collective: called
+    at the same place on every process.
     """
     agreement = comm.Dup()
     status, message = judged(function)
@@ -85,7 +85,7 @@ def guarded(comm: Any, function: Callable[[], None]) -> int:
     higher = range(comm.rank + 1, comm.size) if status else ()
     notices = [agreement.isend(None, rank) for rank in higher]
     if not all_here(agreement, TOGETHER if status else None):
-        if agreement.iprobe():  # a lower rank failed too: it speaks and ends us
+        if agreement.iprobe():  # a lower rank failed too: it prints its message and aborts all
             time.sleep(TOGETHER)
         else:
             print(message, file=sys.stderr, flush=True)
@@ -100,7 +100,8 @@ def guarded(comm: Any, function: Callable[[], None]) -> int:
         for one in dict.fromkeys(text for _, text in endings if text):
             print(one, file=sys.stderr, flush=True)
     if comm.size > 1:
-        # mpirun ends the others by SIGTERM when the first has exited; ignored, it costs two seconds
+        # mpirun sends SIGTERM to the others once the first has exited; if ignored, it costs two
+        # seconds
         for number in STOP_SIGNALS:
             signal.signal(number, signal.SIG_DFL)
     failed = [code for code, _ in endings if code != DONE]
@@ -108,7 +109,7 @@ def guarded(comm: Any, function: Callable[[], None]) -> int:
 
 
 def all_here(comm: Any, patience: float | None) -> bool:
-    """Whether all processes came here within `patience` seconds (None: wait for ever)."""
+    """Whether all processes arrive within `patience` seconds (None: wait forever)."""
     if comm.size == 1:
         return True
     request = comm.Ibarrier()

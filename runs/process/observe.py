@@ -1,7 +1,7 @@
-"""What the user sees while the program runs: lines, progress with rate and time left, the log.
+"""Output to the user: lines, progress with rate and remaining time, and the log.
 
-Only the root process shows anything; the other processes call the same functions to no effect, so
-callers need no rank tests. Nothing here is collective.
+Only the root process prints; on other processes the same functions have no effect, so callers need
+no rank tests. Nothing here is collective.
 """
 
 import os
@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any, TextIO
 
 PATIENCE = 2.0
-"""Seconds before a progress display appears: shorter things are not worth a look."""
+"""Seconds before a progress display appears; shorter operations are not worth showing."""
 PLAIN_EVERY = 10.0
-"""Seconds between progress lines where the output is no terminal."""
+"""Seconds between progress lines if the output is not a terminal."""
 
 
 class _State:
-    """The one console of this process."""
+    """Output state of this process."""
 
     root: bool = True
     log: TextIO | None = None
@@ -28,13 +28,13 @@ class _State:
 
 
 def set_root(root: bool) -> None:
-    """Tell whether this process is the one that shows; called once at the start."""
+    """Set whether this process prints; called once at the start."""
     _State.root = root
 
 
 @contextmanager
 def log_to(path: Path) -> Iterator[None]:
-    """While inside, everything shown also goes to the end of `path`, on the root process."""
+    """Within the context, all output is also appended to `path`, on the root process."""
     if not _State.root:
         yield
         return
@@ -47,7 +47,7 @@ def log_to(path: Path) -> Iterator[None]:
 
 
 def _own_file(path: Path) -> TextIO:
-    """The file for appending; a link in its place is replaced, what it points to is not ours."""
+    """The log file, opened for appending; a symbolic link in its place is not followed."""
     if path.is_symlink():
         path.unlink()
     flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW
@@ -56,7 +56,7 @@ def _own_file(path: Path) -> TextIO:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """While inside, nothing is shown."""
+    """Within the context, nothing is shown."""
     root, _State.root = _State.root, False
     try:
         yield
@@ -66,7 +66,7 @@ def quiet() -> Iterator[None]:
 
 @contextmanager
 def only_log() -> Iterator[None]:
-    """While inside, lines and warnings go to the log alone; progress is shown."""
+    """Within the context, lines and warnings go to the log alone; progress is still shown."""
     before, _State.only_log = _State.only_log, True
     try:
         yield
@@ -75,7 +75,7 @@ def only_log() -> Iterator[None]:
 
 
 def log(text: str) -> None:
-    """A line for the log only, e.g. the settings of a solver."""
+    """Write a line to the log only, e.g. the settings of a solver."""
     if _State.root and _State.log is not None:
         print(text, file=_State.log, flush=True)
 
@@ -90,24 +90,24 @@ def _show(text: str, stream: TextIO) -> None:
 
 
 def say(text: str = "") -> None:
-    """One line for the user, shown on the root process and kept in the log."""
+    """Print one line for the user, and log it."""
     if _State.root:
         _show(text, sys.stdout)
 
 
 def warn(text: str) -> None:
-    """A warning: to stderr and the log."""
+    """Print a warning to stderr, and log it."""
     if _State.root:
         _show(f"warning: {text}", sys.stderr)
 
 
 def is_terminal() -> bool:
-    """Whether stderr reaches a terminal; the launcher knows when mpirun stands in between."""
+    """Whether stderr is a terminal; the launcher sets TIREROAD_TERMINAL if mpirun is in between."""
     return sys.stderr.isatty() or os.environ.get("TIREROAD_TERMINAL") == "1"
 
 
 def seconds(value: float) -> str:
-    """A duration for people: 12 s, 3 min 05 s, 2 h 10 min."""
+    """A duration in words: 12 s, 3 min 05 s, 2 h 10 min."""
     whole = int(round(value))
     if whole < 60:
         return f"{whole} s"
@@ -117,12 +117,12 @@ def seconds(value: float) -> str:
 
 
 class Progress:
-    """Progress of something that may take long: `with Progress("contact", 4000, "steps") as bar`.
+    """Progress of a long operation: `with Progress("contact", 4000, "steps") as bar`.
 
-    Appears after two seconds, with rate and time left; on a terminal as a bar (rich), else as a
-    line every ten seconds. `advance` costs about 0.1 µs to 0.2 µs until there is something to show.
-    `total` None: only what is done and the time so far are shown. `begun` are done already, in an
-    earlier run: they count in what is done and not in the rate.
+    Appears after two seconds, with rate and remaining time: on a terminal as a bar (rich), else as
+    a line every ten seconds. `advance` costs about 0.1 µs to 0.2 µs until there is something to
+    show. `total` None: only the count and the elapsed time are shown. `begun`: count done in an
+    earlier run, included in the progress but not in the rate.
     """
 
     def __init__(
@@ -147,31 +147,31 @@ class Progress:
             _State.bar = None
 
     def advance(self, steps: int = 1) -> None:
-        """Count `steps` more."""
+        """Add `steps` to the count."""
         self.done += steps
         if time.perf_counter() >= self._next:
             self._refresh()
 
     def update(self, done: int) -> None:
-        """Set how many are done."""
+        """Set the count."""
         self.done = done
         if time.perf_counter() >= self._next:
             self._refresh()
 
     def note(self, text: str) -> None:
-        """A live figure beside the bar, e.g. a residual."""
+        """Show a live figure beside the bar, e.g. a residual."""
         self.text = text
         if time.perf_counter() >= self._next:
             self._refresh()
 
     def hide(self) -> None:
-        """Take a bar off the terminal; the next refresh puts it back."""
+        """Remove the bar from the terminal; the next refresh shows it again."""
         if self._rich is not None:
             self._rich.stop()
             self._rich = None
 
     def line(self) -> str:
-        """The state in words: done of total, rate, time left."""
+        """The progress in words: done of total, rate, remaining time."""
         spent = time.perf_counter() - self._began
         rate = (self.done - self.begun) / spent if spent > 0 else 0.0
         words = [f"{self.title}: {self.done}"]

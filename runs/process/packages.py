@@ -1,4 +1,4 @@
-"""What to say where a package that the program needs is not installed."""
+"""Message for a required package that is not installed."""
 
 NEEDED = {
     "dolfinx", "basix", "ffcx", "ufl", "petsc4py", "slepc4py", "mpi4py", "h5py", "numpy", "scipy",
@@ -12,7 +12,7 @@ _INSTALL = (
 
 
 def missing(error: ModuleNotFoundError) -> str | None:
-    """One line about a package that is not installed; None where the module is another one."""
+    """One line about a required package that is missing; None for any other module."""
     package = (error.name or "").partition(".")[0]
     if package not in NEEDED:
         return None

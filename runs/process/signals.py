@@ -1,4 +1,4 @@
-"""What a signal to stop does to this process."""
+"""Handling of stop signals in this process."""
 
 import os
 import signal
@@ -12,25 +12,25 @@ _UNDER_NOHUP = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1) + (
     () if _UNDER_NOHUP else (signal.SIGHUP,)
 )
-"""SIGUSR1 is what mpirun hands on to every process; the launcher uses it. Under nohup a hangup is none."""
+"""mpirun forwards SIGUSR1 to every process; the launcher uses it. Under nohup SIGHUP is ignored."""
 
 TOGETHER = 1.0
-"""Seconds within which signals are one request: a terminal, a batch system or `timeout` may send it to
-a process, its group and its parent, who hands it on."""
+"""Seconds within which signals count as one request: a terminal, a batch system or `timeout` may
+send one to a process, its group and its parent, which forwards it."""
 
 
 class Stopped(BaseException):
-    """The user or the batch system asked to stop: exit status 4.
+    """The user or the batch system requested a stop: exit status 4.
 
-    Not an Exception, so that no solver callback takes it for its own failure.
+    Not an Exception, so that no solver callback mistakes it for its own failure.
     """
 
 
 class Deferred:
-    """While one is entered, the first stop signal is only noted: `asked` is its name, or "".
+    """While entered, the first stop signal is only noted: `asked` is its name, or "".
 
-    A loop that can be gone on with looks at it after each step, stops where its state is whole, and
-    raises `Stopped` itself. A second request stops at once.
+    A resumable loop checks it after each step, stops where its state is consistent, and raises
+    `Stopped` itself. A second request stops at once.
     """
 
     _current: "Deferred | None" = None
@@ -47,7 +47,7 @@ class Deferred:
 
 
 class _Heard:
-    """The last request of this process, and who wants to know that it was heard."""
+    """The last request to this process, and the supervisor to notify."""
 
     raised = ""
 
@@ -56,16 +56,16 @@ class _Heard:
 
 
 DEFERRED = b"d"
-"""What the supervisor hears of a request that the loop has noted, and ends of by itself."""
+"""Message to the supervisor: the loop has noted the request and will end by itself."""
 
 
 def tell_when_deferred(descriptor: int) -> None:
-    """Write DEFERRED there when a stop signal has been noted, and b"!" when it has been raised instead."""
+    """Descriptor for messages: DEFERRED for a stop signal noted, b"!" for one raised."""
     _Heard.supervisor = descriptor
 
 
 def stop_on_signals() -> None:
-    """Turn the stop signals into `Stopped`, or into a note where they are deferred."""
+    """Turn stop signals into `Stopped`, or into a note while deferred."""
     for number in STOP_SIGNALS:
         signal.signal(number, _stop)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
@@ -73,8 +73,10 @@ def stop_on_signals() -> None:
 
 
 def raised() -> str:
-    """The name of the signal for which `Stopped` was raised, "" for none. Raised while a library loads its
-    compiled part, it comes out as that library's own error.
+    """The name of the signal for which `Stopped` was raised, or "".
+
+    Needed because an exception raised while a library loads its compiled part appears as that
+    library's own error.
     """
     return _Heard.raised
 
@@ -87,7 +89,7 @@ def _stop(number: int, _frame: Any) -> None:
     name, current = signal.Signals(number).name, Deferred._current
     defers = current is not None and not current.asked
     if _Heard.supervisor is not None:
-        with suppress(OSError):  # the supervisor may be what has ended
+        with suppress(OSError):  # the supervisor itself may have ended
             os.write(_Heard.supervisor, DEFERRED if defers else b"!")
     if not defers:
         _Heard.raised = name
@@ -96,7 +98,7 @@ def _stop(number: int, _frame: Any) -> None:
 
 
 def _not_lost(unraisable: Any) -> None:
-    """A request that met Python where nothing can be raised (a finaliser) is made again."""
+    """Repeat a request that arrived where nothing can be raised (in a finaliser)."""
     if isinstance(unraisable.exc_value, Stopped):
         _Heard.at = -1e9
         number = signal.Signals[str(unraisable.exc_value)]

@@ -1,4 +1,4 @@
-"""Exit statuses, and how they reach the shell from under mpirun."""
+"""Exit statuses, and how they reach the shell through mpirun."""
 
 import os
 
@@ -6,7 +6,7 @@ DONE, BUG, INPUT, GAVE_UP, STOPPED = 0, 1, 2, 3, 4
 
 
 def rank_before_mpi() -> int:
-    """The rank as the process manager tells it, for commands that never start MPI."""
+    """The rank according to the process manager, for commands that never start MPI."""
     for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"):
         if os.environ.get(name, "").isdigit():
             return int(os.environ[name])
@@ -22,10 +22,11 @@ def in_parallel() -> bool:
 
 
 def handed_over(status: int, for_all: bool = True) -> int:
-    """Leave the status where the launcher asked for it (TIREROAD_STATUS), and 0 to mpirun.
+    """Write the status to the launcher's file (TIREROAD_STATUS) and return 0 for mpirun.
 
-    The root does it where the status is that of `all` processes; who ends alone does it for itself.
-    What was left first stays. Without a launcher on this machine, the status itself. Not collective.
+    The root process writes a status common to all; with `for_all` False, each process writes its
+    own. The first entry is kept. Without a launcher on this machine, returns the status itself. Not
+    collective.
     """
     file = os.environ.get("TIREROAD_STATUS", "")
     if not os.path.exists(file):

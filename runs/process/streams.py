@@ -1,4 +1,4 @@
-"""Standard streams that may be closed, or close, while the program goes on."""
+"""Standard streams that may be closed, or get closed, while the program runs."""
 
 import io
 import os
@@ -6,9 +6,9 @@ import sys
 
 
 class _Sink(io.RawIOBase):
-    """A file descriptor to write to. Once it refuses, what is written is dropped and `error` says why.
+    """A file descriptor for output. Once it fails, output is dropped and `error` holds the reason.
 
-    A run of hours must not end because the terminal or the reader of a pipe has gone.
+    A run of hours must not end because the terminal or the reader of a pipe is gone.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -44,10 +44,10 @@ def _point_nowhere(descriptor: int) -> None:
 
 
 def mend() -> None:
-    """Make the standard streams ones that never raise; first thing in the process.
+    """Replace the standard streams by ones that never raise; called first in the process.
 
-    A closed one is opened on nothing: otherwise the first file that is opened, a result file,
-    would take its number, and what a library prints would end up in it.
+    A closed one is opened on the null device: otherwise the first file opened, a result file, would
+    get its number, and the output of libraries would end up in it.
     """
     for descriptor in (0, 1, 2):
         try:
@@ -71,7 +71,7 @@ def _stream(descriptor: int) -> io.TextIOWrapper:
 
 
 def refused() -> OSError | None:
-    """Why standard output could not be written, where that was no reader who had had enough."""
+    """Why standard output could not be written; None also if its reader closed the pipe."""
     sys.stdout.flush()
     sink = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
     error = sink.error if isinstance(sink, _Sink) else None

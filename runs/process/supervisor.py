@@ -1,9 +1,9 @@
-"""A run has two processes: one that computes, and this one, which sees to it that it ends well.
+"""The supervisor process of a run, which ensures that the computing process ends properly.
 
-Python hears of a signal only between two of its own instructions, so a process inside a library's
-eigensolver or factorisation is deaf for minutes, and one that is killed cannot say so. The
-supervisor holds nothing: it hands signals on, ends a worker that has not heard of one in time, says
-what happened to a worker that died, and gives the exit status.
+Python handles a signal only between two of its own instructions, so a process inside a library's
+eigensolver or factorisation does not react for minutes, and one that is killed cannot report it.
+The supervisor holds no data: it forwards signals, kills a worker that does not react in time,
+reports why a worker died, and returns the exit status.
 """
 
 import ctypes
@@ -25,15 +25,16 @@ from tireroad.runs.process.statuses import (
 )
 
 PATIENCE = 8.0
-"""Seconds from a request to the end; then the worker is killed. A loop that has noted the request writes its
-checkpoint first, however long that takes; elsewhere files are whole or absent, and nothing is lost."""
+"""Seconds from a stop request to killing the worker. A loop that has noted the request writes its
+checkpoint first, however long that takes; elsewhere files are complete or absent, so nothing is
+lost."""
 
 _AGAIN = "what was finished is kept, the same command or resume goes on"
 _PR_SET_PDEATHSIG = 1
 
 
 def supervise() -> None:
-    """Fork. Returns in the worker; the caller's process stays here and exits as the worker ends."""
+    """Fork. Returns in the worker; this process stays as supervisor and exits with the worker."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {*signals.STOP_SIGNALS, signal.SIGCHLD})
     hears, tells = os.pipe()
     supervisor = os.getpid()
@@ -54,7 +55,8 @@ def supervise() -> None:
 def _end_with(supervisor: int) -> None:
     """Have the kernel stop this process when its supervisor is killed.
 
-    Alone it stops in order and can be resumed; one of many has lost the others and just ends.
+    A single process stops in order and can be resumed; one of several has lost the others and
+    exits.
     """
     number = signal.SIGKILL if in_parallel() else signal.SIGTERM
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(number))
@@ -63,7 +65,7 @@ def _end_with(supervisor: int) -> None:
 
 
 def _watch(worker: int, hears: int) -> int:
-    """Hand signals on until the worker has ended; the exit status."""
+    """Forward signals until the worker has ended; returns the exit status."""
     asked, deadline = "", float("inf")
     while True:
         left = min(deadline - time.monotonic(), 3600.0)
@@ -83,7 +85,7 @@ def _watch(worker: int, hears: int) -> int:
 
 
 def _deferred(descriptor: int) -> bool:
-    """Whether the worker's last message since this was last asked says that its loop will stop."""
+    """Whether the worker's latest message says that its loop will stop by itself."""
     os.set_blocking(descriptor, False)
     try:
         return os.read(descriptor, 4096).endswith(signals.DEFERRED)
@@ -92,7 +94,7 @@ def _deferred(descriptor: int) -> bool:
 
 
 def _killed(worker: int, asked: str) -> int:
-    """End a worker that is inside a library, and remove the file it was writing."""
+    """Kill a worker that is inside a library, and remove the file it was writing."""
     parts = _parts(worker)
     os.kill(worker, signal.SIGKILL)
     os.waitpid(worker, 0)
@@ -117,7 +119,7 @@ def _parts(worker: int) -> list[Path]:
 
 
 def _verdict(worker: int, state: int, asked: str) -> int:
-    """The exit status of a worker that has ended, with a word where it could not say it itself."""
+    """The exit status of a worker that has ended; prints the reason if the worker could not."""
     if os.WIFEXITED(state):
         return os.WEXITSTATUS(state)
     _end_compilers(worker)

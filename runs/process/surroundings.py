@@ -1,4 +1,4 @@
-"""What a run finds around it, looked at before MPI and HDF5 fail of it without a word."""
+"""Checks of a run's environment, made before MPI and HDF5 would fail without a message."""
 
 import os
 import resource
@@ -7,13 +7,13 @@ from pathlib import Path
 
 from tireroad.fem.errors import InputError
 
-LEAST_ADDRESSES = 2e9  # bytes; the libraries alone reserve 1 GB, OpenBLAS waits for ever for more
-LEAST_FILE = 64e6  # bytes of a file: shared memory of MPI, results
+LEAST_ADDRESSES = 2e9  # bytes; the libraries reserve 1 GB, and OpenBLAS waits forever for more
+LEAST_FILE = 64e6  # bytes of a file: MPI's shared memory, results
 LEAST_TEMPORARY = 16e6  # bytes free for MPI's session and shared memory
 
 
 def check_surroundings() -> None:
-    """Raise InputError where the program could not even start. Not collective."""
+    """Raise InputError if the program could not even start. Not collective."""
     try:
         os.getcwd()
     except FileNotFoundError:

@@ -1,10 +1,10 @@
 """`tireroad test`: the suite on one process, then its tests marked `mpi` on 2 and on 3.
 
-Tests marked `long` run with `--all` and where they are named; with `--fast` only those on one process that are
-not marked `slow`, of a few seconds at most each.
-A test under mpirun fails when it fails on any process. When it fails on one and the others wait
-for ever in a collective call, they are ended together. Run as a module, this file is the worker:
-`python3 -m tireroad.runs.process.testing FOLDER PROCESSES [pytest arguments]`.
+Tests marked `long` run with `--all`, or if named; with `--fast` only tests on one process that are
+not marked `slow` run, a few seconds each at most. A test under mpirun fails if it fails on any
+process. If it fails on one while the others wait in a collective call, all are ended together. Run
+as a module, this file is the worker: `python3 -m tireroad.runs.process.testing FOLDER PROCESSES
+[pytest arguments]`.
 """
 
 import importlib.util
@@ -21,13 +21,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PARALLEL = (2, 3)
 LONGEST = 4 * 3600.0
-"""Seconds after which a whole run under mpirun counts as stuck."""
+"""Seconds after which a whole run under mpirun counts as hung."""
 PATIENCE = 120.0
-"""Seconds the processes wait for each other after a test that failed on one of them."""
+"""Seconds that processes wait for each other after a test that failed on one of them."""
 
 
 class Recorder:
-    """Keeps what was collected and how each test ended, in a file for the parent process."""
+    """Stores the number of collected tests and their outcomes in a file for the parent process."""
 
     def __init__(self, file: Path, comm: Any) -> None:
         self.file, self.comm = file, comm
@@ -56,7 +56,7 @@ class Recorder:
             self.outcomes.setdefault(report.nodeid, report.outcome)
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
-        """Under mpirun: go on only together."""
+        """Under mpirun: continue only when all processes have finished the test."""
         if self.comm is None:
             return
         from tireroad.runs.process.mpi import all_here
@@ -77,7 +77,7 @@ class Recorder:
 
 
 def worker(folder: Path, processes: int, arguments: list[str]) -> int:
-    """One process of a run: pytest with a recorder. The others than the root print to files."""
+    """One process of a run: pytest with a recorder. All but the root print to files."""
     comm, rank = None, 0
     if processes > 1:
         from mpi4py import MPI
@@ -94,7 +94,7 @@ def worker(folder: Path, processes: int, arguments: list[str]) -> int:
 
 
 def _at_once(arguments: list[str]) -> list[str]:
-    """Tests of different files at once, where pytest-xdist is there and there is something to gain."""
+    """Options for running test files in parallel, if pytest-xdist is installed and it pays off."""
     alone = {"--collect-only", "--co", "--pdb", "-s", "-n", "-x"} & set(arguments)
     cores = min(os.cpu_count() or 1, 8)
     if alone or cores == 1 or importlib.util.find_spec("xdist") is None:
@@ -110,7 +110,7 @@ def _command(processes: int) -> list[str]:
 
 
 def _run(folder: Path, processes: int, arguments: list[str]) -> tuple[int, dict[str, str], int]:
-    """Status, outcome of each test (failed on any process is failed), tests collected."""
+    """Status, outcome of each test (failed if failed on any process), number of tests collected."""
     command = [*_command(processes), str(folder), str(processes), *arguments]
     path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH")) if part)
     environment = {**os.environ, "PYTHONPATH": path}
@@ -139,7 +139,7 @@ def _run(folder: Path, processes: int, arguments: list[str]) -> tuple[int, dict[
 
 
 def _show_others(folder: Path, processes: int, merged: dict[str, str]) -> None:
-    """What the other processes printed, when something failed."""
+    """Print the output of the other processes if something failed."""
     if "failed" not in merged.values():
         return
     for rank in range(1, processes):
@@ -150,7 +150,7 @@ def _show_others(folder: Path, processes: int, merged: dict[str, str]) -> None:
 
 
 def _from_root(argument: str) -> str:
-    """A path argument as seen from the repository root, where pytest runs."""
+    """A path argument relative to the repository root, where pytest runs."""
     path, colons, test = argument.partition("::")
     if argument.startswith("-") or not path or not Path(path).exists():
         return argument
@@ -158,7 +158,7 @@ def _from_root(argument: str) -> str:
 
 
 def _chosen(arguments: list[str]) -> tuple[list[str], tuple[int, ...]]:
-    """pytest's arguments with the marks that --fast, --all or neither leave, and the numbers of processes."""
+    """pytest's arguments with the marks for --fast, --all or neither, and the process counts."""
     rest = [one for one in arguments if one not in ("--fast", "--all")]
     if "--fast" in arguments:
         return ["-m", "not slow and not long and not mpi", *rest], (1,)
@@ -167,7 +167,10 @@ def _chosen(arguments: list[str]) -> tuple[list[str], tuple[int, ...]]:
 
 
 def run_tests(arguments: list[str]) -> int:
-    """The whole suite; prints `N passed, N failed, N skipped` over all runs. Exit status 0 or 1."""
+    """Run the whole suite and print `N passed, N failed, N skipped` over all runs.
+
+    Exit status 0 or 1; 2 for a usage error or if the tests are not installed.
+    """
     if not (ROOT / "tests").is_dir():
         print("error: the tests are not installed: run them in a checkout", file=sys.stderr)
         return 2
@@ -190,7 +193,7 @@ def run_tests(arguments: list[str]) -> int:
                 if outcome == "failed":
                     print(f"failed on {processes}: {test}")
             if not outcomes and not found or status == int(pytest.ExitCode.INTERRUPTED):
-                break  # nothing to run, or not even collected: no different on more processes
+                break  # nothing to run, or collection failed: more processes would not change that
     if "--collect-only" in arguments or "--co" in arguments:
         print(f"{collected} collected")
         return 0 if collected and not totals["failed"] else 1

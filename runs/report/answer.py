@@ -1,4 +1,4 @@
-"""The answer of a run in a few figures: load, footprint, forces and levels with their errors, first modes."""
+"""Summary of a run: load, footprint, forces and levels with errors, first modes."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ _MODES = 4
 
 
 def answer(results: Results, stages: Mapping[str, Any]) -> list[Fact]:
-    """Facts (what, value) from the files there are and the summary's stages `stages`; what is missing is left out."""
+    """Facts (what, value) from the result files and the summary's `stages`, as far as available."""
     found: list[Fact] = []
     for part in (_standing, _rolling, _levels, _power, _modes):
         try:
             found += part(results, _Headlines(stages))
         except (Absent, InputError, LookupError, ValueError):
-            continue  # the file's own section says what is wrong
+            continue  # the file's own section reports the problem
     return found
 
 
 class _Headlines:
-    """Headline figures and indicators of the summary by stage and name."""
+    """Headline figures and indicators of the summary, by stage and name."""
 
     def __init__(self, stages: Mapping[str, Any]) -> None:
         self._stages = stages
@@ -46,7 +46,7 @@ Given = Callable[[str, str], float | None]
 
 
 def _standing(results: Results, given: Given) -> list[Fact]:
-    """Load, deflection, footprint."""
+    """Load, deflection and footprint."""
     load, sunk, length, width = (
         float(results.attribute("static.h5", name) or 0.0)
         for name in ("load", "deflection", "footprint_length", "footprint_width")
@@ -62,7 +62,7 @@ def _standing(results: Results, given: Given) -> list[Fact]:
 
 
 def _rolling(results: Results, given: Given) -> list[Fact]:
-    """The vertical contact force as the tire rolls."""
+    """The vertical contact force while rolling."""
     force = results.array("contact.h5", "total_force")[:, 2]
     if not len(force):
         return []
@@ -80,7 +80,7 @@ def _rolling(results: Results, given: Given) -> list[Fact]:
 
 
 def _levels(results: Results, _: Given) -> list[Fact]:
-    """Sums of the bands, with the error that their bands' errors make at most, and where they end."""
+    """Levels summed over the bands, the upper bound of their errors, and their frequency limit."""
     end = results.attribute("spectra.h5", "limit")
     found = [("valid up to", quantity(end, "Hz"))] if end else []
     centre = results.array("spectra.h5", "third_octave/centre")
@@ -112,7 +112,7 @@ def _summed(level: np.ndarray, error: np.ndarray | None) -> str:
 
 
 def _power(results: Results, _: Given) -> list[Fact]:
-    """What the outer face would radiate at most."""
+    """The equivalent radiated power: an upper bound of what the outer face radiates."""
     level = results.array("vibration.h5", "third_octave/radiated_power_level_a_weighted")
     if not len(level):
         return []
@@ -121,7 +121,7 @@ def _power(results: Results, _: Given) -> list[Fact]:
 
 
 def _modes(results: Results, _: Given) -> list[Fact]:
-    """The lowest, standing and undamped."""
+    """The lowest undamped modes of the non-rotating tire."""
     lowest = results.array("modes.h5", "frequency")[:_MODES]
     named = ", ".join(f"{value:.4g}" for value in lowest)
     return [("lowest modes, undamped", f"{named} Hz")] if len(lowest) else []

@@ -1,4 +1,4 @@
-"""`compare`: two to twelve runs in one page and one table. Reads result folders, computes nothing anew."""
+"""`compare`: two to twelve runs in one page and one table, from their result folders alone."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tireroad.runs.report.quantities import quantity
 from tireroad.runs.version import PROGRAM, VERSION
 
 MOST = 12
-# Groups of levels that are drawn, and what they are called.
+# Groups of levels that are drawn, and their names.
 DRAWN = {
     "axle force z": "vertical axle force",
     "contact force z": "vertical contact force",
@@ -36,9 +36,8 @@ DRAWN = {
 def compare(directories: Sequence[Path], out: Path) -> Path:
     """Write out/compare.html and out/compare.csv; returns the page. Not collective.
 
-    The first run is the one that others are compared with. What a run does not have is left out
-    and said. Raises InputError for fewer than 2 or more than 12 folders, and for one that holds no
-    results.
+    The first run is the reference. Quantities that a run does not have are left out and listed.
+    Raises InputError for fewer than 2 or more than 12 folders, and for one without results.
     """
     if not 2 <= len(directories) <= MOST:
         raise InputError(f"compare takes 2 to {MOST} result folders, not {len(directories)}")
@@ -58,7 +57,7 @@ def compare(directories: Sequence[Path], out: Path) -> Path:
 
 
 def _names(directories: Sequence[Path]) -> list[str]:
-    """The folders' names, with as much of their paths as tells them apart."""
+    """The folders' names, with as much of their paths as makes them unique."""
     whole = [directory.resolve() for directory in directories]
     for depth in range(1, 1 + max(len(path.parts) for path in whole)):
         names = ["/".join(path.parts[-depth:]) for path in whole]
@@ -79,7 +78,7 @@ def _groups(runs: Sequence[RunResults]) -> dict[str, list[Row]]:
 
 
 def _table(names: Sequence[str], groups: dict[str, list[Row]]) -> str:
-    """The CSV: a row a quantity, a column a run."""
+    """The CSV: one row per quantity, one column per run."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["group", "quantity", "unit", *names])
@@ -108,7 +107,7 @@ def _page(runs: Sequence[RunResults], names: Sequence[str], groups: dict[str, li
 
 
 def _change(row: Row, index: int) -> str:
-    """A value's difference from the first run's: dB for levels, percent for other numbers."""
+    """A value's difference from the first run's: in dB for levels, in percent for other numbers."""
     first, value = row.values[0], row.values[index]
     numbers = all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in (first, value))
     if index == 0 or not numbers or first == value:
@@ -144,7 +143,7 @@ def _figures(
 
 
 def _missing(runs: Sequence[RunResults], names: Sequence[str]) -> list[str]:
-    """What some runs have and others lack, file by file."""
+    """Result files that some runs have and others lack."""
     files = [{key.partition("/")[0] for key in run} for run in runs]
     return [
         f"{name} has no {', '.join(f'{file}.h5' for file in sorted(set.union(*files) - own))}"

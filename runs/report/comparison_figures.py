@@ -1,4 +1,4 @@
-"""Pictures of several runs side by side, as data URIs."""
+"""Figures of several runs side by side, as data URIs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DASHES = ("-", "--")
 
 
 def pen(number: int) -> dict[str, str]:
-    """Colour and dashes of the curve of run number `number`."""
+    """Colour and dashes for the curve of run `number`."""
     return {"color": CYCLE[number % len(CYCLE)], "ls": DASHES[number // len(CYCLE) % 2]}
 
 
@@ -55,7 +55,7 @@ def histories(runs: Mapping[str, tuple[Array, Array]]) -> str:
 
 @styled
 def footprints(runs: Mapping[str, tuple[Array, Array]]) -> str:
-    """Pressure (c,) Pa at contact points (c, 3) m, one scale for all."""
+    """Pressure (c,) Pa at contact points (c, 3) m, on one colour scale."""
     columns = min(len(runs), 3)
     rows = -(-len(runs) // columns)
     figure, axes = canvas(WIDE, 2.6 * rows, rows, columns, sharex=True, sharey=True)

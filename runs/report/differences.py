@@ -1,4 +1,4 @@
-"""What differs between runs: scenes, figures, levels, modes, cost, as rows of one table."""
+"""Differences between runs in scene, figures, levels, modes and cost, as rows of one table."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ LEVELS = (
     ("moment on the hub", "spectra/third_octave/hub_moment_level", "dB re 1 N m"),
     ("radiated power", "vibration/third_octave/radiated_power_level", "dB re 1 pW"),
 )
-MATCHED = 24  # lowest modes of the first run that are sought in the others
+MATCHED = 24  # lowest modes of the first run that are matched in the others
 
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity in every run; None where a run does not have it."""
+    """One quantity in every run; None for a run that does not have it."""
 
     group: str
     name: str
@@ -35,7 +35,7 @@ class Row:
 
 
 def scene_rows(scenes: Sequence[Mapping[str, Any]]) -> list[Row]:
-    """The scene keys whose values are not the same in all runs; a key that is absent is None."""
+    """The scene keys whose values differ between runs; None for an absent key."""
     flat = [dict(_flattened(scene)) for scene in scenes]
     keys = sorted({key for one in flat for key in one} - {"name"})
     rows = [Row("scene", key, "", tuple(one.get(key) for one in flat)) for key in keys]
@@ -71,7 +71,7 @@ def figure_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
 
 
 def cost_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
-    """Seconds of each stage; None where it was reused or skipped."""
+    """Seconds of each stage; None if it was reused or skipped."""
     stages = list(dict.fromkeys(stage for summary in summaries for stage in summary))
     computed = [
         {stage: record.get("seconds") for stage, record in summary.items()} for summary in summaries
@@ -84,7 +84,7 @@ def cost_rows(summaries: Sequence[Mapping[str, Any]]) -> list[Row]:
 
 
 def level_rows(runs: Sequence[RunResults]) -> list[Row]:
-    """Third-octave levels by quantity, component and band (`LEVELS`), in dB of the unit that comes with them."""
+    """Third-octave levels by quantity, component and band, in dB re the reference in `LEVELS`."""
     return [
         row
         for quantity, path, unit in LEVELS
@@ -119,8 +119,8 @@ def _bands(runs: Sequence[RunResults], quantity: str, path: str, unit: str) -> l
 def mode_rows(runs: Sequence[RunResults]) -> list[Row]:
     """Frequencies of the first run's lowest modes, and of the most similar mode in each other run.
 
-    Similarity is the modal assurance criterion of the motion of the outer face, on the nodes of the
-    first run that lie next to one of the other's. In a name: the least MAC of that row.
+    Similarity is the modal assurance criterion (MAC) of the motion of the outer face: nodes of the
+    first run against the nearest nodes of the other. The row's name states its least MAC.
     """
     if not all("modes/surface/shape" in run for run in runs):
         return []
@@ -144,7 +144,7 @@ def mode_rows(runs: Sequence[RunResults]) -> list[Row]:
 
 
 def assurance(first: Array, second: Array) -> Array:
-    """|a . b|^2 / (a . a)(b . b) of shapes (m, s, 3) and (n, s, 3): (m, n), 1 where they are alike."""
+    """|a . b|^2 / (a . a)(b . b) of shapes (m, s, 3) and (n, s, 3): (m, n), 1 if identical."""
     a, b = first.reshape(len(first), -1), second.reshape(len(second), -1)
     square = np.einsum("ij,ij->i", a, a)[:, None] * np.einsum("ij,ij->i", b, b)[None, :]
     return (a @ b.T) ** 2 / np.maximum(square, 1e-300)

@@ -1,4 +1,4 @@
-"""Pictures that this process has drawn: members of a sweep with the same static state and modes show the same ones."""
+"""Cache of figures drawn by this process, for members of a sweep that show the same ones."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import numpy as np
 
 P = ParamSpec("P")
 
-MOST = 16  # pictures, of up to some hundred kB
+MOST = 16  # figures, each up to some hundred kB
 _drawn: OrderedDict[bytes, str] = OrderedDict()
 
 
 def once(draw: Callable[P, str]) -> Callable[P, str]:
-    """`draw`, whose last pictures are kept: of the same arguments, to the last bit, it need not draw again."""
+    """Decorate `draw` to keep its latest figures and reuse them for bitwise equal arguments."""
 
     @wraps(draw)
     def drawn(*given: P.args, **named: P.kwargs) -> str:
@@ -33,7 +33,7 @@ def once(draw: Callable[P, str]) -> Callable[P, str]:
 
 
 def _digest(*given: Any) -> bytes:
-    """Of arrays by their bytes, of sequences item by item, of anything else as it is written."""
+    """Hash of arrays by their bytes, of sequences item by item, of anything else by its repr."""
     digest = hashlib.sha256()
     for one in given:
         if isinstance(one, np.ndarray):

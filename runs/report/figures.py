@@ -1,6 +1,6 @@
 """Line charts and bars of the report, as data URIs.
 
-matplotlib's Figure objects only: no window, no global state.
+Uses matplotlib's Figure objects only: no window, no global state.
 """
 
 from base64 import b64encode
@@ -19,7 +19,7 @@ from tireroad.contact.results.levels import nominal
 from tireroad.runs.report.thinned import envelope, peak_hold
 
 COMPONENTS = ("x, forward", "y, along the axle", "z, up")
-# Okabe and Ito's colours, which colour-blind readers tell apart.
+# Okabe and Ito's colours, distinguishable for colour-blind readers.
 CYCLE = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#e69f00", "#56b4e9")
 COLOURS = CYCLE[:3]
 MUTED = "#9aa5b1"
@@ -39,20 +39,18 @@ STYLE = {
     "svg.hashsalt": "tireroad",
     "path.simplify_threshold": 0.5,
 }
-styled = matplotlib.rc_context(STYLE)  # decorates every picture
-WIDE = (
-    6.3  # inches of the widest picture: its letters can still be read where a phone shows it whole
-)
-RANGE_DB = 100.0  # what lies further below the highest line of a spectrum is not drawn
-LEAST_RANGE_DB = 20.0  # over less, hairs between bars look like mountains
+styled = matplotlib.rc_context(STYLE)  # decorator for every figure
+WIDE = 6.3  # inches: widest figure whose text is still readable when a phone shows it in full
+RANGE_DB = 100.0  # dB: lines further below the highest one of a spectrum are not drawn
+LEAST_RANGE_DB = 20.0  # dB: on a smaller range, tiny differences between bars look large
 
 
-SILENT = -1000.0  # dB: nothing at all, rounded
-LEAST_BANDS = 8  # for which there is room
+SILENT = -1000.0  # dB: level of zero, up to rounding
+LEAST_BANDS = 8  # least number of bands that get space
 
 
 def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **more: Any) -> tuple:
-    """Figure of width × height inches and its axes (rows, columns), laid out so that nothing overlaps."""
+    """Figure of width × height inches and its axes (rows, columns), laid out without overlap."""
     figure, axes = bare_canvas(width, height, rows, columns, **more)
     figure.set_layout_engine("constrained")
     return figure, axes
@@ -68,8 +66,10 @@ def bare_canvas(width: float, height: float, rows: int = 1, columns: int = 1, **
 def line_canvas(
     width: float, height: float, rows: int = 1, below: float = 0.42, **more: Any
 ) -> tuple:
-    """The same for one column of line charts, with margins known beforehand: in half the time. `below` inches for
-    the labels of the lowest axis."""
+    """The same for one column of line charts with fixed margins, in half the time.
+
+    `below`: inches for the labels of the lowest axis.
+    """
     figure, axes = bare_canvas(width, height, rows, **more)
     figure.subplots_adjust(
         left=0.66 / width,
@@ -82,7 +82,7 @@ def line_canvas(
 
 
 def encode(figure: Figure, kind: str = "svg", dpi: int = 130) -> str:
-    """The figure as a data URI: svg for lines, png for coloured surfaces."""
+    """The figure as a data URI: SVG for lines, PNG for coloured surfaces."""
     stream = BytesIO()
     metadata = {"Date": None} if kind == "svg" else {}
     figure.savefig(stream, format=kind, dpi=dpi, metadata=metadata)
@@ -91,7 +91,7 @@ def encode(figure: Figure, kind: str = "svg", dpi: int = 130) -> str:
 
 
 def decibels(amplitude: NDArray) -> NDArray:
-    """20 lg |a|, re 1 of its unit; nothing and not-a-number lie at −6000 dB, out of sight."""
+    """20 lg |a|, re 1 in its unit; zero and NaN give −6000 dB, far out of range."""
     return 20.0 * np.log10(np.maximum(np.nan_to_num(np.abs(amplitude)), 1e-300))
 
 
@@ -132,7 +132,7 @@ def spectrum(frequency: NDArray, axle: NDArray, of: str = "axle force") -> str:
 
 
 def level_range(level: NDArray) -> tuple[float, float]:
-    """From which level, a multiple of 10 dB, to which the bars of levels in dB are drawn."""
+    """Lower end (a multiple of 10 dB) and upper end of the bars of levels in dB."""
     heard = level[level > SILENT]
     top = float(heard.max(initial=0.0))
     least = max(float(heard.min(initial=top)), top - RANGE_DB)
@@ -143,8 +143,10 @@ def level_range(level: NDArray) -> tuple[float, float]:
 def third_octaves(
     centre: NDArray, level: NDArray, error: NDArray | None, label: str, few: NDArray
 ) -> str:
-    """Third-octave levels (nb, 3) dB as bars over band centres (nb) Hz, with their errors (nb, 3) dB; pale where
-    a band holds `few` (nb) lines."""
+    """Third-octave levels (nb, 3) dB as bars over band centres (nb) Hz, with errors (nb, 3) dB.
+
+    Pale where a band has `few` (nb) lines.
+    """
     figure, axes = line_canvas(WIDE, 3.2, below=0.62)
     here, place = axes[0, 0], np.arange(len(centre))
     finite = np.where(level > SILENT, level, -np.inf)
@@ -225,7 +227,7 @@ def receptance(frequency: NDArray, pairs: Sequence[tuple[str, NDArray]]) -> str:
 
 def _over_time(axes: Axes, time: NDArray) -> None:
     axes.set_xlabel("time in s")
-    if len(time) > 1:  # one instant has no extent, and matplotlib warns of it
+    if len(time) > 1:  # matplotlib warns of a range without extent
         axes.set_xlim(time[0], time[-1])
 
 
@@ -237,6 +239,6 @@ def _over_frequency(axes: Axes, frequency: NDArray) -> None:
 
 
 def _top_decibels(axes: Axes, level: NDArray) -> None:
-    """The upper RANGE_DB of the levels, less where they need less."""
+    """Limit the axis to the upper RANGE_DB of the levels, or less if they span less."""
     top = level.max(initial=-RANGE_DB)
     axes.set_ylim(max(level.min(initial=top), top - RANGE_DB) - 3.0, top + 3.0)

@@ -44,11 +44,11 @@ SECTIONS: Mapping[str, Callable[[Results], Section]] = {
 
 
 def write_report(directory: Path) -> Path:
-    """Writes directory/report.html from the result files that are there; returns its path.
+    """Write directory/report.html from the existing result files; returns its path.
 
-    The page needs no network and no other file. A file that is absent or damaged leaves its section
-    out, and the page says so. It is written to a temporary name and renamed. Not collective: call
-    it on one process. Raises InputError where the folder holds no results or cannot be written to.
+    The page needs no network and no other file. A missing or damaged file drops its section, and
+    the page says so. It is written to a temporary name and renamed. Not collective: call it on one
+    process. Raises InputError if the folder holds no results or cannot be written to.
     """
     if not directory.is_dir():
         raise InputError(f"{directory} is no folder: give the result folder of a run")
@@ -99,18 +99,18 @@ def render(directory: Path) -> str:
 
 
 def remarks(directory: Path) -> str | None:
-    """What of a finished run no tire has (runs.report.realism); None where all is usual."""
+    """Figures of a run that no real tire has (runs.report.realism); None if all are usual."""
     with Results(directory, read_scene(directory / "scene.toml", [])[1]) as results:
         return unusual(results)
 
 
 def in_script(given: Mapping) -> str:
-    """JSON that cannot end the <script> it stands in."""
+    """JSON that is safe inside a <script> element."""
     return json.dumps(given, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def read_summary(path: Path, problems: list[str]) -> dict:
-    """summary.json with every key a stage may lack filled in, stages in order; {} if unreadable."""
+    """summary.json with missing keys of stages filled in and stages in order; {} if unreadable."""
     if not path.is_file():
         problems.append(
             "There is no summary.json: times, warnings and error indicators are unknown."
@@ -157,7 +157,7 @@ def read_scene(path: Path, problems: list[str]) -> tuple[str, dict]:
         if not is_as_signed(text):
             problems.append("scene.toml is not what the run wrote (checksum).")
         return text, tomllib.loads(text)
-    except ValueError as error:  # UnicodeDecodeError and TOMLDecodeError are both of it
+    except ValueError as error:  # also covers UnicodeDecodeError and TOMLDecodeError
         problems.append(f"scene.toml cannot be read ({error}).")
         return "", {}
 
@@ -165,7 +165,7 @@ def read_scene(path: Path, problems: list[str]) -> tuple[str, dict]:
 def build_sections(
     directory: Path, scene: Mapping, stages: Mapping, problems: list[str]
 ) -> tuple[list[Section], list[tuple[str, str]], list[tuple[str, str]]]:
-    """Sections of the files there are; what is left out and why; provenance of the first file."""
+    """Sections of the existing files; those left out and why; provenance of the first file."""
     sections: list[Section] = []
     left_out: list[tuple[str, str]] = []
     provenance: list[tuple[str, str]] = []
@@ -184,7 +184,7 @@ def build_sections(
 
 
 def short_attributes(results: Results, name: str) -> list[tuple[str, str]]:
-    """Attributes of the file that are one line of text: versions, hash; libraries spelled out."""
+    """Single-line text attributes of the file: versions, hash; libraries listed in full."""
     values = ((key, results.attribute(name, key)) for key in results.file(name).attrs)
     lines = {key: v for key, v in values if isinstance(v, str) and "\n" not in v}
     if lines.get("libraries", "").startswith("{"):
@@ -194,7 +194,7 @@ def short_attributes(results: Results, name: str) -> list[tuple[str, str]]:
 
 
 def computed(directory: Path) -> str:
-    """When the newest result was written, UTC."""
+    """Time of the newest result, UTC."""
     files = [directory / name for name in (*SECTIONS, "summary.json", "scene.toml")]
     newest = max(file.stat().st_mtime for file in files if file.is_file())
     return datetime.fromtimestamp(newest, UTC).strftime("%Y-%m-%d %H:%M UTC")
@@ -215,7 +215,7 @@ def costs(stages: Mapping) -> list[dict]:
 
 
 def parameters(scene: Mapping) -> list[tuple[str, list[tuple[str, str]]]]:
-    """The scene's tables as (title, [(key, value with its unit)]), sub-tables on their own."""
+    """The scene's tables as (title, [(key, value with unit)]), sub-tables listed separately."""
     found: list[tuple[str, list[tuple[str, str]]]] = []
 
     def visit(title: str, table: Mapping, kind: type | None) -> None:

@@ -1,4 +1,4 @@
-"""Numbers with units, as a reader wants them: 4 digits and the usual prefixes."""
+"""Formats numbers with units for readers: 4 digits and the usual prefixes."""
 
 from math import isfinite
 
@@ -13,7 +13,7 @@ PREFIXES = {
 
 
 def quantity(value: object, unit: str = "") -> str:
-    """`value` with its unit: 0.0123 "m" is "12.3 mm"; texts and flags pass as they are."""
+    """`value` with its unit: 0.0123 "m" gives "12.3 mm"; texts and flags pass unchanged."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if value is None:
@@ -31,7 +31,7 @@ def quantity(value: object, unit: str = "") -> str:
 
 
 def digits(value: float) -> str:
-    """4 significant digits; whole numbers in full up to a million; powers of ten as 3.1·10⁻¹²."""
+    """4 significant digits; integers in full up to a million; powers of ten as 3.1·10⁻¹²."""
     if float(value).is_integer() and abs(value) < 1e6:
         return f"{int(value):,}".replace(",", "\u202f").replace("-", "−")
     text = f"{value:.4g}"

@@ -1,6 +1,7 @@
-"""What no tire has: figures of a run that lie far out of the usual, told once with the usual range.
+"""Plausibility check: figures of a run far outside the usual range of tires.
 
-The ranges are wide: motorcycle to truck, slick to winter tire. A figure within them may still be wrong.
+The ranges are wide: motorcycle to truck, slick to winter tire. A figure within them may still be
+wrong.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.read import Absent, Results
 from tireroad.runs.report.quantities import digits, quantity
 
-_LOWEST = 6  # modes of which the damping is looked at
-_DIFFERS = 0.05  # of the static load, from which the rolling mean is explained
-_OBSTACLES = ("step", "cleat", "iso8608")  # roads that may be high
+_LOWEST = 6  # modes whose damping is checked
+_DIFFERS = 0.05  # relative to the static load; above it the mean force while rolling is explained
+_OBSTACLES = ("step", "cleat", "iso8608")  # roads with heights of their own
 
 
 def unusual(results: Results) -> str | None:
-    """One sentence that names all figures out of the usual; None where there are none."""
+    """One sentence with all unusual figures; None if there are none."""
     found = [text for check in _CHECKS for text in _asked(check, results)]
     if not found:
         return None
@@ -27,7 +28,7 @@ def unusual(results: Results) -> str | None:
 
 
 def _asked(check: Callable[[Results], Iterator[str]], results: Results) -> list[str]:
-    """What a check says; nothing where a file or dataset it needs is missing or damaged."""
+    """The result of a check; empty if a file or dataset that it needs is missing or damaged."""
     try:
         return list(check(results))
     except (Absent, InputError):
@@ -35,7 +36,7 @@ def _asked(check: Callable[[Results], Iterator[str]], results: Results) -> list[
 
 
 def _number(results: Results, name: str, key: str) -> float:
-    """An attribute; 0 where there is none."""
+    """An attribute as a number; 0 if there is none."""
     value = results.attribute(name, key)
     return float(value) if isinstance(value, int | float) else 0.0
 
@@ -45,7 +46,7 @@ def _outside(value: float, low: float, high: float) -> bool:
 
 
 def _pressure(results: Results) -> Iterator[str]:
-    """Load over area: near the inflation, more of a stiff carcass and a light load."""
+    """Load over area: close to the inflation, higher for a stiff carcass and a light load."""
     force = results.array("static.h5", "contact/force")[:, 2]
     inflation, area = (
         _number(results, "static.h5", key) for key in ("inflation", "footprint_area")
@@ -71,7 +72,7 @@ def _footprint(results: Results) -> Iterator[str]:
 
 
 def _stiffness(results: Results) -> Iterator[str]:
-    """Secant of load over deflection, and how far the tire is pressed."""
+    """Secant stiffness, and deflection relative to the section height."""
     load, sunk = (_number(results, "static.h5", name) for name in ("load", "deflection"))
     if load <= 0 or sunk <= 0:
         return
@@ -101,7 +102,7 @@ def _tread(results: Results) -> Iterator[str]:
 
 
 def _damping(results: Results) -> Iterator[str]:
-    """Of the lowest motions that swing: half critical and more is no rubber's."""
+    """Damping of the lowest modes: half critical or more is beyond that of rubber."""
     value = results.array("rotating.h5", "eigenvalue")
     value = value[np.abs(value) > 1.0]
     lowest = value[np.argsort(np.abs(value))][: 2 * _LOWEST]
@@ -128,7 +129,7 @@ _CHECKS = (_pressure, _footprint, _stiffness, _mass, _tread, _damping, _road)
 
 
 def mean_load(results: Results) -> str | None:
-    """Why the mean force while rolling is not the static load, where it differs by 5 % and more; else None."""
+    """Why the mean force while rolling differs from the static load by 5 % or more; else None."""
     try:
         force = results.array("contact.h5", "total_force")[:, 2]
         load = _number(results, "static.h5", "load")

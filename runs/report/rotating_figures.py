@@ -1,4 +1,4 @@
-"""Pictures of the rolling tire's eigenvalues: in the complex plane, and over speed."""
+"""Figures of the rolling tire's eigenvalues: in the complex plane, and over speed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ORDERS = range(1, 9)
 
 @styled
 def eigenvalues(eigenvalue: NDArray) -> str:
-    """Growth rate Re s over frequency Im s / 2π of eigenvalues (n) 1/s, from 0 Hz up."""
+    """Growth rate Re s over frequency Im s / 2π of eigenvalues (n) 1/s, for Im s >= 0."""
     figure, axes = line_canvas(WIDE, 3.0)
     here = axes[0, 0]
     shown = eigenvalue[eigenvalue.imag >= 0.0]
@@ -36,8 +36,10 @@ def eigenvalues(eigenvalue: NDArray) -> str:
 def campbell(
     speed: NDArray, damped: NDArray, undamped: NDArray | None, radius: float | None
 ) -> str:
-    """Branches (v, b) Hz over speed (v,) rad/s, and in km/h where the rolling `radius` (m) is known; behind them the
-    lines n Omega / 2 pi, n = 1, 2, ..., of a standing road."""
+    """Branches (v, b) Hz over speed (v,) rad/s, in km/h if the rolling `radius` (m) is known.
+
+    Also the lines n Omega / 2 pi, n = 1, 2, ..., at which a stationary road excites.
+    """
     figure, ((axes,),) = canvas(WIDE, 4.2)
     x, label, scale = _axis(speed, radius)
     highest = 1.05 * np.nanmax(damped if undamped is None else np.fmax(damped, undamped))
@@ -61,7 +63,7 @@ def campbell(
 def campbell_live(
     speed: NDArray, damped: NDArray, undamped: NDArray | None, radius: float | None
 ) -> dict:
-    """The same as a chart whose branches are named under the pointer."""
+    """The same as an interactive chart that names the branch under the pointer."""
     x, label, _ = _axis(speed, radius)
     curves = {f"branch {k + 1}, damped": column for k, column in enumerate(damped.T)}
     colours = [COLOURS[0]] * len(curves)
@@ -79,7 +81,7 @@ def campbell_live(
 
 
 def _axis(speed: NDArray, radius: float | None) -> tuple[NDArray, str, float]:
-    """Speeds in km/h, their label and the km/h of one rad/s; without a radius rad/s, and 0."""
+    """Speeds in km/h, axis label and km/h per rad/s; without a radius rad/s, and 0."""
     if not radius:
         return speed, "speed of the wheel in rad/s", 0.0
     return 3.6 * radius * speed, "travelling speed in km/h", 3.6 * radius

@@ -1,4 +1,4 @@
-"""A drawing of the section: regions, lines of cords with their angles, inner face, tread and rim."""
+"""A drawing of the section: regions, lines of cords with angles, inner face, tread and rim."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.runs.report.figures import canvas, styled
 
-_CURVE = np.linspace(0, 1, 7)  # places at which a side is drawn
+_CURVE = np.linspace(0, 1, 7)  # positions along a side at which it is drawn
 _FACES = {"inner": "#2f6db5", "tread": "#3e4c59", "rim": "#c8502d"}
 
 
 @styled
 def draw_section(mesh: SectionMesh, angles: Mapping[str, float] | None = None) -> Figure:
-    """The section seen along the road's x: y to the right, the axle above, the tread below; mm.
+    """The section seen along the road's x: y to the right, axle at the top, tread below; mm.
 
-    `angles` (degrees from the circumference) by the names of the plies.
+    `angles`: degrees to the circumference, by the names of the plies.
     """
     width, height = np.ptp(mesh.nodes[:, 1]), np.ptp(mesh.nodes[:, 0])
     figure, ((axes,),) = canvas(8.0, min(max(6.5 * height / width + 1.8, 4.0), 14.0))
@@ -59,7 +59,7 @@ def _curves(mesh: SectionMesh, edges: NDArray) -> NDArray:
 
 
 def _regions(axes: Axes, mesh: SectionMesh) -> list[Patch]:
-    """All cells filled with the colour of their region."""
+    """Fill all cells with the colour of their region; returns the legend entries."""
     cells = np.arange(len(mesh.cells))
     sides = [_curves(mesh, np.column_stack([cells, np.full_like(cells, s)])) for s in range(4)]
     outline = np.concatenate([sides[2], sides[1], sides[3][:, ::-1], sides[0][:, ::-1]], axis=1)
@@ -73,7 +73,7 @@ def _regions(axes: Axes, mesh: SectionMesh) -> list[Patch]:
 
 
 def _plies(axes: Axes, mesh: SectionMesh, angles: Mapping[str, float]) -> list[Line2D]:
-    """Each ply as a line, with its angle in the legend."""
+    """Draw each ply as a line, with its angle in the legend."""
     handles = []
     colours = colormaps["Dark2"](np.arange(max(len(mesh.plies), 1)) % 8)
     for (name, edges), colour in zip(mesh.plies.items(), colours, strict=False):
@@ -84,7 +84,7 @@ def _plies(axes: Axes, mesh: SectionMesh, angles: Mapping[str, float]) -> list[L
 
 
 def _shortened(handles: list[Line2D]) -> list[Line2D]:
-    """At most fifteen entries."""
+    """At most fifteen legend entries."""
     if len(handles) <= 15:
         return handles
     more = Line2D([], [], color="none", label=f"and {len(handles) - 14} more")

@@ -1,4 +1,4 @@
-"""The drawing of a scene's section, in its result folder."""
+"""Draws a scene's section into its result folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ NAME = "section.png"
 
 
 def write_section(scene: Scene, directory: Path) -> str:
-    """Draw the section of the scene's tire; says where, or why it could not be kept."""
+    """Draw the section of the scene's tire; returns a message: where it is, or why it failed."""
     tire = scene.tire
     try:
         directory.mkdir(parents=True, exist_ok=True)

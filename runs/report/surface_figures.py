@@ -1,7 +1,6 @@
-"""Pictures of the tire's outer face and of the footprint, as data URIs.
+"""Figures of the tire's outer face and of the footprint, as data URIs.
 
-Surfaces are projected and sorted here instead of by mplot3d, which takes 0.3 s a view for 4,000
-quads where this takes 0.05 s.
+Surfaces are projected and sorted here: mplot3d takes 0.3 s per view for 4,000 quads, this 0.05 s.
 """
 
 from collections.abc import Sequence
@@ -21,8 +20,8 @@ PRESSURE = LinearSegmentedColormap.from_list(
     "pressure", ("#ffffff", "#fdd9a0", "#f59053", "#d4402f", "#7f1d3f", "#2b0a2e")
 )
 VIEW = (np.radians(-55.0), np.radians(18.0))  # azimuth of the viewer from +x, elevation
-BULGE = 0.14  # greatest displacement of a drawn mode over the tire's radius
-COLUMNS = 64  # most cells along x of the space-time map
+BULGE = 0.14  # largest drawn displacement of a mode over the tire's radius
+COLUMNS = 64  # most cells along x in the space-time map
 
 
 def camera(azimuth: float, elevation: float) -> NDArray:
@@ -32,7 +31,7 @@ def camera(azimuth: float, elevation: float) -> NDArray:
 
 
 def paint(axes: Axes, points: NDArray, quads: NDArray, colours: NDArray) -> None:
-    """Draws the quads (q, 4) of points (s, 3), far ones first, lit from the upper left."""
+    """Draw the quads (q, 4) of points (s, 3), far ones first, lit from the upper left."""
     seen = (points @ camera(*VIEW).T)[quads]
     normal = np.cross(seen[:, 2] - seen[:, 0], seen[:, 3] - seen[:, 1])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
@@ -49,7 +48,7 @@ def paint(axes: Axes, points: NDArray, quads: NDArray, colours: NDArray) -> None
 
 
 def paint_road(axes: Axes, height: float, reach: float) -> None:
-    """The road plane z = height (m) as a square of half width `reach` (m), behind all else."""
+    """Draw the road plane z = height (m) as a square of half width `reach` (m), behind all else."""
     square = reach * np.array(((-1, -1), (1, -1), (1, 1), (-1, 1)))
     corners = np.column_stack((square, np.full(4, height))) @ camera(*VIEW).T
     axes.add_collection(
@@ -60,10 +59,10 @@ def paint_road(axes: Axes, height: float, reach: float) -> None:
 def cut(
     points: NDArray, quads: NDArray, distance: NDArray, keep: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Cuts the surface where `distance` (s) changes sign.
+    """Cut the surface where `distance` (s) changes sign.
 
-    Returns node pairs (n, 2, 2) and the weight (n, 2) of the second node of each: with them any
-    field on the surface is carried to the cut. Only quads for which `keep` (q) holds.
+    Returns node pairs (n, 2, 2) and the weight (n, 2) of the second node of each, which interpolate
+    any field on the surface to the cut. Only quads for which `keep` (q) holds are cut.
     """
     value = np.where(distance == 0.0, 1e-12, distance)[quads]
     crossed = (value > 0) != (np.roll(value, -1, axis=1) > 0)
@@ -76,14 +75,14 @@ def cut(
 
 
 def carry(field: NDArray, ends: NDArray, weight: NDArray) -> NDArray:
-    """A field (s, 3) on the segments (n, 2, 3) of a cut."""
+    """Interpolate a field (s, 3) to the segments (n, 2, 3) of a cut."""
     return field[ends[..., 0]] * (1 - weight[..., None]) + field[ends[..., 1]] * weight[..., None]
 
 
 @once
 @styled
 def deformed(points: NDArray, moved: NDArray, quads: NDArray, road: float | None) -> str:
-    """The loaded tire in three panels: surface, side view and, below, section; road (m) or None."""
+    """The loaded tire in three panels: surface, side view, section below; `road` (m) or None."""
     figure, axes = bare_canvas(
         WIDE, 4.7, 2, 2, gridspec_kw={"width_ratios": (1.2, 1.0), "height_ratios": (1.45, 1)}
     )
@@ -119,13 +118,13 @@ def _profile(
     cuts: Sequence[tuple[tuple[NDArray, NDArray], str, str]],
     road: float | None,
 ) -> None:
-    """Cuts of the tire as it was made (dashed) and as it is, in the plane of two coordinates."""
+    """Draw cuts of the undeformed (dashed) and deformed tire in the plane of two coordinates."""
     ends, weight = cuts[-1][0]
     before = carry(points, ends, weight)[:, :, plane] * 1e3
     axes.add_collection(LineCollection(before, colors=MUTED, linewidths=0.9, label="as made"))
     for (ends, weight), colour, label in cuts:
         line = carry(points + moved, ends, weight)
-        if line[..., 2].mean() > 1e-3:  # the half above the axle is turned down for comparison
+        if line[..., 2].mean() > 1e-3:  # turn down the half above the axle, for comparison
             line = line * (1, 1, -1)
         drawn = 1e3 * line[:, :, plane]
         axes.add_collection(LineCollection(drawn, colors=colour, linewidths=1.4, label=label))
@@ -139,10 +138,10 @@ def _profile(
 @once
 @styled
 def modes(points: NDArray, quads: NDArray, shapes: NDArray, titles: Sequence[str]) -> str:
-    """Mode shapes (m, s, 3), m ≤ 6, exaggerated; coloured by the displacement along the normal."""
+    """Mode shapes (m, s, 3), m ≤ 6, exaggerated; coloured by the normal displacement."""
     rows = 1 + (len(titles) > 3)
     height = 2.3 * rows
-    # Axes without labels need no layout, which takes as long as the drawing.
+    # Axes without labels need no layout, which would take as long as the drawing.
     figure, axes = bare_canvas(WIDE, height, rows, 3)
     figure.subplots_adjust(0.0, 0.6 / height, 1.0, 1 - 0.25 / height, 0.05, 0.1)
     radius = np.hypot(points[:, 0], points[:, 2]).max()
@@ -163,7 +162,7 @@ def modes(points: NDArray, quads: NDArray, shapes: NDArray, titles: Sequence[str
 
 
 def outward(points: NDArray, quads: NDArray) -> NDArray:
-    """Unit normals (s, 3), away from the middle of the section."""
+    """Unit normals (s, 3), pointing away from the middle of the section."""
     corners = points[quads]
     flat = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal = np.zeros_like(points)
@@ -179,7 +178,7 @@ def outward(points: NDArray, quads: NDArray) -> NDArray:
 @once
 @styled
 def footprints(points: NDArray, maps: Sequence[NDArray], titles: Sequence[str], unit: str) -> str:
-    """Maps (n of (c)) of pressure or force on contact points (c, 3) m, two in a row, one colour scale for all."""
+    """Maps (c) of pressure or force at contact points (c, 3) m, two per row, one colour scale."""
     place = 1e3 * points[:, :2]
     touched = np.any([values > 0 for values in maps], axis=0)
     low, high = frame(place[touched] if touched.any() else place)
@@ -206,14 +205,14 @@ def footprints(points: NDArray, maps: Sequence[NDArray], titles: Sequence[str], 
 
 
 def frame(place: NDArray) -> tuple[NDArray, NDArray]:
-    """Corners around points (n, 2) mm, a fifth of their extent and at least 10 mm beyond."""
+    """Corners of a frame around points (n, 2) mm, wider by a fifth, at least 10 mm, all round."""
     low, high = place.min(axis=0), place.max(axis=0)
     margin = np.maximum(0.2 * (high - low), 10.0)
     return low - margin, high + margin
 
 
 def triangles(place: NDArray) -> Triangulation | None:
-    """Delaunay triangles of points (c, 2), or None where they are too few or in one line."""
+    """Delaunay triangles of points (c, 2), or None if they are too few or collinear."""
     if len(place) < 3 or np.linalg.matrix_rank(place - place[0], tol=1e-9) < 2:
         return None
     return Triangulation(*place.T)
@@ -223,8 +222,9 @@ def triangles(place: NDArray) -> Triangulation | None:
 def space_time(time: NDArray, points: NDArray, force: NDArray) -> str:
     """Normal force (n, c) N at n > 1 instants, summed across the width, over time and x.
 
-    Each point's force goes to the two nearest of a row of cells as wide as the widest gap between
-    points, in proportion: the sum is kept and no cell stays empty between columns of nodes.
+    Each point's force is split linearly between the two nearest cells of a row; cells are as wide
+    as the widest gap between points. This preserves the sum and leaves no cell empty between
+    columns of nodes.
     """
     place = np.sort(1e3 * points[:, 0])
     extent = max(place[-1] - place[0], 1e-9)

@@ -1,16 +1,16 @@
-"""Long series thinned for drawing, so that no peak is lost."""
+"""Thins long series for drawing without losing peaks."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-DRAWN = 600  # bins of a long series: each keeps its least and its greatest value
+DRAWN = 600  # bins of a long series; each keeps its minimum and maximum
 
 
 def envelope(x: NDArray, y: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArray]:
-    """Least and greatest y (n) of each of `bins` runs of samples, in the order they come; x alike.
+    """Minimum and maximum of y (n) in each of `bins` blocks of samples, in order, with their x.
 
-    A peak of one sample stays visible, which skipping samples would not grant. Short series are
-    returned as they are.
+    A peak of one sample stays visible, which plain subsampling would not ensure. Short series are
+    returned unchanged.
     """
     width = len(y) // bins
     if width <= 2:
@@ -23,7 +23,7 @@ def envelope(x: NDArray, y: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArra
 
 
 def peak_hold(frequency: NDArray, level: NDArray, bins: int = DRAWN) -> tuple[NDArray, NDArray]:
-    """The highest line of each of `bins` bands equal on a logarithmic axis; frequency (n) > 0."""
+    """The highest line in each of `bins` bands equal on a logarithmic axis; frequency (n) > 0."""
     if len(frequency) <= bins:
         return frequency, level
     low, high = np.log(frequency[[0, -1]])

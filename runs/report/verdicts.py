@@ -1,4 +1,4 @@
-"""What an error indicator means: a limit below which it is good, and a word for the reader."""
+"""Rates error indicators: limits, and a word for the reader."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Mapping
 from math import inf
 from typing import Any
 
-# (part of the indicator's name, largest good value, largest usable value), the first that fits.
-# Limits are those at which a figure of the report would begin to change: 1e-6 of an eigenvector is
-# 1e-12 of its frequency; a percent of the load is a percent of the forces.
+# (part of the indicator's name, largest good value, largest usable value); the first match counts.
+# At these limits a figure of the report would begin to change: 1e-6 of an eigenvector is 1e-12 of
+# its frequency; 1 % of the load is 1 % of the forces.
 LIMITS: tuple[tuple[str, float, float], ...] = (
-    ("least contact force", 0.0, 0.0),  # none may pull; see `verdict`
+    ("least contact force", 0.0, 0.0),  # no point may pull; see `verdict`
     ("largest penetration", 1e-9, 1e-6),
     ("estimated error of the load", 1.0, 3.0),
     ("residual in the static flexibility", 0.5, 1.0),
     ("worst complementarity residual", 1e-9, 1e-6),
-    ("energy", inf, inf),  # in joules: whether it is much, the others say
-    ("residual states", inf, inf),  # how many
+    ("energy", inf, inf),  # in joules: rated by the other energy figures
+    ("residual states", inf, inf),  # a count
     ("residual", 1e-8, 1e-5),
     ("orthonormality", 1e-9, 1e-6),
     ("identity", 1e-9, 1e-6),
@@ -29,7 +29,7 @@ GOOD, FAIR, POOR = "good", "fair", "poor"
 
 
 def verdict(name: str, value: Any) -> str:
-    """ "good", "fair", "poor", or "" for a figure that only informs."""
+    """ "good", "fair", "poor", or "" for a figure without a rating."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return ""
     if name == "least contact force":
@@ -43,7 +43,7 @@ def verdict(name: str, value: Any) -> str:
 
 
 def verdicts(stages: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, Any, str, str]]:
-    """(stage, indicator, value, unit, verdict) of every indicator in a summary; the poor ones first."""
+    """(stage, indicator, value, unit, verdict) of every indicator in a summary; poor ones first."""
     rows = [
         (stage, name, entry["value"], entry.get("unit", ""), verdict(name, entry["value"]))
         for stage, found in stages.items()

@@ -1,1 +1,1 @@
-"""The scene file: keys, ranges, rules, what will run and what it takes."""
+"""The scene file: keys, ranges, rules, the stages it needs and their demand."""

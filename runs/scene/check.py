@@ -1,4 +1,4 @@
-"""`tireroad check`: the resolved scene, the stages, the memory; no solver runs."""
+"""`tireroad check`: the resolved scene, its stages and its memory; no solver runs."""
 
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ HEAD: Row = ("key", "value", "unit", "range", "meaning")
 
 
 def _rows(holder: Any, path: str, title: str) -> list[tuple[str, list[Row]]]:
-    """One (title, rows) for each table, in the order of the scene."""
+    """One (title, rows) per table, in the order of the scene."""
     own: list[Row] = []
     below: list[tuple[str, list[Row]]] = []
     for owner, item in entries(holder):
@@ -49,7 +49,7 @@ def _aligned(rows: list[Row], widths: list[int]) -> list[str]:
 
 
 def explain(scene: Scene, processes: int = 1) -> str:
-    """What `check` prints of a run on that many processes. InputError where the road cannot be used."""
+    """What `check` prints for so many processes. Raises InputError for an unusable road."""
     check_road(scene)
     groups = _rows(scene, "", "scene")
     everything = [HEAD, *(row for _, rows in groups for row in rows)]
@@ -72,7 +72,10 @@ def explain(scene: Scene, processes: int = 1) -> str:
 
 
 def _demand(scene: Scene, processes: int) -> list[str]:
-    """Memory, disk and time, and what the machine has too little of (InputError where by far)."""
+    """Memory, disk and time, with warnings where the machine falls short.
+
+    Raises InputError if it has far too little.
+    """
     wanted = estimate(scene)
     on_disk = out_of_core(wanted, processes)
     size, parts = wanted.sizes, memory_of(wanted, processes, on_disk)

@@ -1,8 +1,7 @@
-"""A scene: read from TOML, checked in full, written back with every default.
+"""Reads a scene from TOML, checks it completely and fills in every default.
 
-`load` ends with a `Scene` in which every value has its type and lies in its range and no two tables
-contradict each other, or with one InputError that lists all that is wrong: the key, where it stands
-and what to do.
+`load` returns a `Scene` whose values have their types, lie in their ranges and do not contradict
+each other, or raises one InputError that lists all problems: the key, its place and the remedy.
 """
 
 import difflib
@@ -29,9 +28,9 @@ NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 
 
 def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
-    """The scene of a file with `overrides` ("table.key=value", as of --set) laid over it.
+    """The scene of a file, with `overrides` ("table.key=value", as for --set) applied.
 
-    Raises InputError with all that is wrong with it. Not collective; reads one file.
+    Raises InputError with all problems. Reads one file. Not collective.
     """
     path = Path(path)
     text = read_text(path)
@@ -62,7 +61,7 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
 
 
 def _by_section(raw: dict[str, Any]) -> None:
-    """Defaults that follow from another table: the section of a mesh, and the tread of the section's kind."""
+    """Set defaults that follow from another table: a mesh's section, a section's tread."""
     tire, contact = raw.get("tire"), raw.get("contact")
     if not isinstance(tire, dict):
         return
@@ -74,7 +73,7 @@ def _by_section(raw: dict[str, Any]) -> None:
 
 
 def _with_speed(scene: Scene) -> Scene:
-    """The wheel's speed for a speed over the road, until the static state tells its rolling radius."""
+    """Set the wheel's speed for a travel speed until the static state gives its rolling radius."""
     rotation = scene.rotation
     if rotation is None or rotation.travel_speed is None:
         return scene
@@ -85,13 +84,13 @@ def _with_speed(scene: Scene) -> Scene:
 
 
 def _with_damping(scene: Scene) -> Scene:
-    """The default damping in proportion, where neither it nor the loss factor of a compound is given."""
+    """Set the default proportional damping if neither it nor a compound's loss factor is given."""
     loses = scene.tire.shape.has_losses(scene.tire)
     return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
 
 
 def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:
-    """Dataclass `of` from a raw table; what is wrong is noted, and has its default in the result."""
+    """Dataclass `of` from a raw table; bad values are noted and replaced by their defaults."""
     if not isinstance(raw, dict):
         source.add(path, f"must be a table, not {described(raw)}")
         return of()
@@ -125,7 +124,7 @@ _WRONG = object()
 
 
 def _without_checks(of: type, values: dict[str, Any]) -> Any:
-    """The table as far as it goes, for the checks of other tables; its own may not hold."""
+    """The table as far as it is valid, for the checks of other tables."""
     try:
         return of(**values)
     except (InputError, TypeError):
@@ -133,7 +132,7 @@ def _without_checks(of: type, values: dict[str, Any]) -> Any:
 
 
 def _kind(of: type, item: Field, values: dict[str, Any]) -> type:
-    """The class that a key of the table names; the default one where the name is wrong."""
+    """The class selected by a key of the table; the default class if the name is invalid."""
     part = variant_of(item)
     default: Any = next(f.default for f in fields(of) if f.name == part.selector)
     selected = values.get(part.selector, default)
@@ -141,7 +140,7 @@ def _kind(of: type, item: Field, values: dict[str, Any]) -> type:
 
 
 def _variant(kind: type, raw: dict, path: tuple[str, ...], source: Source) -> Any:
-    """An object of the class from that class's own keys; _WRONG where it cannot be made."""
+    """An object of the class from that class's own keys; _WRONG if it cannot be made."""
     before = len(source.problems)
     own = {
         f.name: _field(f, raw[f.name], (*path, f.name), source)
@@ -160,7 +159,7 @@ def _variant(kind: type, raw: dict, path: tuple[str, ...], source: Source) -> An
 
 
 def _check_kinds(result: Any, raw: dict, path: tuple[str, ...], source: Source) -> None:
-    """Keys that belong to another kind of this very table."""
+    """Note keys that belong to another kind of the same table."""
     for item in fields_of(result):
         key = key_of(item)
         if key and item.name in raw and not applies(key, result):
@@ -196,9 +195,9 @@ def _key(key: Key, raw: Any, path: tuple[str, ...], source: Source) -> Any:
 
 
 def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
-    """The absolute path of a file; relative ones start at the scene's folder.
+    """The absolute path of a file; relative paths start at the scene's folder.
 
-    One given by --set is first looked for from the current folder, as shells complete it there.
+    A path given by --set is first looked for in the current folder, where shells complete it.
     """
     folders = [source.path.resolve().parent]
     if path in source.overridden:
@@ -208,7 +207,7 @@ def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
         candidates = [(folder / given).resolve() for folder in folders]
         file = next((one for one in candidates if one.is_file()), candidates[0])
         found, why = file.is_file(), ""
-    except (OSError, RuntimeError) as error:  # no name that a file can have, no such user
+    except (OSError, RuntimeError) as error:  # not a valid file name, or no such user
         cut = name if len(name) <= 60 else f"{name[:60]}…"
         found, file, why = False, Path(cut), f" ({getattr(error, 'strerror', error)})"
     if not found:
@@ -229,7 +228,7 @@ def _everywhere(of: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
 
 
 def _unknown(of: type, path: tuple[str, ...], name: str, values: dict, source: Source) -> None:
-    """A key of another kind; else the nearest known one, here or in another table."""
+    """Note an unknown key: one of another kind, or the nearest known one, here or elsewhere."""
     other = owners(of, name)
     if other is not None:
         selector, kinds = other

@@ -1,4 +1,4 @@
-"""Where a key stands in the text of a scene: the TOML reader gives values, messages need lines."""
+"""Finds the line of a key in a scene's text, for messages: the TOML reader returns values only."""
 
 import re
 
@@ -7,12 +7,12 @@ ASSIGNMENT = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*[^
 
 
 def parts(dotted: str) -> tuple[str, ...]:
-    """A dotted key without quotes and blanks."""
+    """The parts of a dotted key, without quotes and blanks."""
     return tuple(part.strip().strip("\"'") for part in dotted.split("."))
 
 
 def _paths(text: str) -> list[tuple[int, tuple[str, ...]]]:
-    """Every header and assignment with its line number (from 1) and its full path."""
+    """Every header and assignment with its line number (from 1) and full path."""
     found: list[tuple[int, tuple[str, ...]]] = []
     here: tuple[str, ...] = ()
     counts: dict[tuple[str, ...], int] = {}
@@ -35,7 +35,7 @@ def _paths(text: str) -> list[tuple[int, tuple[str, ...]]]:
 
 
 def line_of(text: str, path: tuple[str, ...]) -> int | None:
-    """The line of `path` (table, …, key), or of the closest table or inline table that holds it."""
+    """The line of `path` (table, …, key), or of the innermost table that contains it."""
     best: tuple[int, int] | None = None
     for line_number, found in _paths(text):
         if path[: len(found)] == found and (best is None or len(found) > best[1]):

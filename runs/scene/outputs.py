@@ -1,8 +1,8 @@
-"""What a kind of output is: its own keys, and the curves that follow from the driven points or the contact.
+"""Base of the kinds of output: own keys, and curves from the driven points or the contact.
 
-A new kind is one file in runs.stages.outputs, or a class in a user's own script. `[output]`, `check`, the key
-reference and the range tests follow from it: a class without parameters is a switch, `output.impulse = true`,
-one with parameters a table, `[output.receptance]`.
+A new kind is one file in runs.stages.outputs, or a class in a user's script. `[output]`, `check`,
+the key reference and the range tests derive from it: a class without parameters is a switch,
+`output.impulse = true`; one with parameters is a table, `[output.receptance]`.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ MOST_FREQUENCIES = 1_000_000
 
 
 class Output(Parameters):
-    """Base of the kinds of output.
+    """Base class of the kinds of output.
 
-    `of`: whether it is of the driven "points", hence needs a [[force]], or of the "contact"; `in_contact`: whether
-    a scene with [contact] can have it. `check` says what a scene lacks.
+    `of`: "points" for the driven points, which needs a [[force]], or "contact"; `in_contact`:
+    whether it is available in a scene with [contact]. `check` reports what a scene lacks.
     """
 
     owner = "output"
@@ -39,25 +39,25 @@ class Output(Parameters):
     in_contact: ClassVar[bool] = True
 
     def check(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
-        """Raise error((*path, key), reason) where the rest of the scene does not go with it."""
+        """Raise error((*path, key), reason) if the rest of the scene does not allow this output."""
 
     def frequencies(self) -> int:
-        """Number of frequencies at which all driven points answer to each other."""
+        """Number of frequencies at which responses between all driven points are computed."""
         return 0
 
     def numbers(self, points: int) -> int:
-        """Numbers that each time step adds to the file, with so many driven points."""
+        """Values per time step that it adds to the file, for that many driven points."""
         return 0
 
     def curves(self, seen: Driven, record: Record) -> Curves:
-        """(values, unit) by the name in response.h5; figures for the reader go to the record. Collective."""
+        """(values, unit) by name in response.h5; figures go into the record. Collective."""
         raise NotImplementedError
 
 
 def check_steps(
     path: tuple[str, ...], what: str, to: float, step: float, unit: str, error: Where, *, most: int
 ) -> None:
-    """A step into a range from 0 that makes neither none nor too many of what is counted."""
+    """Check that a step into a range from 0 gives at least one value and at most `most`."""
     if step > to:
         raise error(path, f"= {step:g} {unit} must not be more than to = {to:g} {unit}")
     if to / step > most:

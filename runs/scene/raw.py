@@ -1,4 +1,4 @@
-"""A scene before its checks: the text of its file, and single keys laid over it by --set."""
+"""A scene before its checks: the text of its file, and single keys overridden by --set."""
 
 import tomllib
 from pathlib import Path
@@ -28,7 +28,7 @@ def read_text(path: Path) -> str:
 
 
 def _value(text: str) -> Any:
-    """A value of --set: TOML where it is TOML, else the text itself."""
+    """A value of --set: parsed as TOML if possible, else the text itself."""
     try:
         read = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:
@@ -37,7 +37,7 @@ def _value(text: str) -> Any:
 
 
 def override(raw: dict[str, Any], item: str) -> tuple[str, ...]:
-    """Lay one `table.key=value` over the raw scene; an empty value takes the key away."""
+    """Apply one `table.key=value`; an empty value removes the key. Returns the key's path."""
     dotted, equals, value = item.partition("=")
     path = locate.parts(dotted)
     if not equals or not all(path):

@@ -1,8 +1,8 @@
-"""The key reference of the documentation, made from the scene's schema.
+"""Generates the key reference of the documentation from the scene's schema.
 
-    PYTHONPATH=. python3 -m tireroad.runs.scene.reference docs/keys.md
+  PYTHONPATH=. python3 -m tireroad.runs.scene.reference docs/keys.md
 
-A test holds the file in the repository to what this makes.
+A test compares the file in the repository with the output.
 """
 
 import sys
@@ -28,12 +28,12 @@ COLUMNS = "| key | default | unit | values | meaning |\n|---|---|---|---|---|\n"
 
 
 def reference() -> str:
-    """The whole page, Markdown."""
+    """The whole page in Markdown."""
     return HEAD + "".join(_tables(Scene, "", "scene", False, {}))
 
 
 def _tables(of: type, path: str, doc: str, many: bool, written: dict[type, str]) -> Iterator[str]:
-    """A table of keys, its variants, then the tables in it; one that is `written` already is named."""
+    """A table of keys, its variants, its nested tables; one `written` before is only named."""
     name = f"`[[{path}]]`" if many else f"`[{path}]`" if path else "At the top"
     own = [(item, key_of(item)) for item in fields_of(of) if key_of(item)]
     yield f"\n## {name}\n\n{doc[0].upper()}{doc[1:]}.\n"
@@ -56,7 +56,7 @@ def _tables(of: type, path: str, doc: str, many: bool, written: dict[type, str])
 
 
 def _variants(part: Variant, path: str) -> Iterator[str]:
-    """The further keys of each kind of a table."""
+    """The additional keys of each kind of a table."""
     for name in part.registry:
         own = [(item, key_of(item)) for item in fields(part.registry[name]) if key_of(item)]
         doc = part.registry.doc(name)

@@ -1,4 +1,4 @@
-"""The resolved scene as text: every default written back, units and meaning beside each key."""
+"""The resolved scene as text: every default written out, with unit and meaning of each key."""
 
 import json
 from typing import Any
@@ -14,7 +14,7 @@ HEADER = f"{MARK}{VERSION}, format {RESULT_FORMAT}: the resolved scene, every de
 
 
 def literal(value: Any) -> str:
-    """A value in TOML."""
+    """A value as TOML."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -30,13 +30,13 @@ def literal(value: Any) -> str:
 
 
 def note(key: Key) -> str:
-    """Unit, range and meaning of a key, for a comment."""
+    """Unit, range and meaning of a key, as a comment."""
     unit = "" if key.unit == "-" else key.unit
     return "; ".join(part for part in (unit, key.allowed, key.doc) if part)
 
 
 def _lines(holder: Any, path: str) -> list[str]:
-    """The keys of one table, then its tables."""
+    """The keys of one table, then its nested tables."""
     own, below = [], []
     for owner, item in entries(holder):
         value = getattr(owner, item.name)
@@ -61,5 +61,5 @@ def _lines(holder: Any, path: str) -> list[str]:
 
 
 def dumps(scene: Scene) -> str:
-    """The scene as TOML that `load` reads back to an equal scene."""
+    """The scene as TOML; `load` reads it back to an equal scene."""
     return "\n".join([HEADER, *_lines(scene, "")]) + "\n"

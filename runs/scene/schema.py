@@ -1,12 +1,13 @@
-"""The tables of a scene: dataclasses of parameters (fem.parameters), of tables, and of variants.
+"""The schema of a scene: dataclasses of parameters (fem.parameters), of tables, and of variants.
 
 A table's fields are made by the functions of `fem.parameters` and by `table`, `tables`, `points`,
-`registered` and `variant`. They are the only description of the scene: reading, writing, `check`, the
-key reference and the error messages all come from them.
+`registered` and `variant`. They are the only description of the scene: reading, writing, `check`,
+the key reference and the error messages all derive from them.
 
-A variant is a class found in a registry by a key of the same table, e.g. the road by `road.kind`: its
-parameters are keys of that table, and the scene holds an object of that class. A collection has a key for
-each class of a registry, e.g. `output.impulse`: a switch, or a table where the class has parameters.
+A variant is a class selected from a registry by a key of the same table, e.g. the road by
+`road.kind`: its parameters are keys of that table, and the scene holds an object of that class. A
+collection has one key per class of a registry, e.g. `output.impulse`: a switch, or a table if the
+class has parameters.
 """
 
 from collections.abc import Iterator
@@ -31,7 +32,7 @@ P = TypeVar("P", bound=Parameters)
 
 @dataclass(frozen=True)
 class Table:
-    """A nested table of dataclass `of`: `many` in an array, `optional` when it may be absent."""
+    """A nested table of dataclass `of`; `many`: an array of tables; `optional`: may be absent."""
 
     of: type
     doc: str
@@ -41,7 +42,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Variant:
-    """Parameters of the class that `registry` has under the value of the key `selector`."""
+    """Parameters of the class registered in `registry` under the value of the key `selector`."""
 
     selector: str
     registry: Registry
@@ -49,12 +50,12 @@ class Variant:
 
 @dataclass(frozen=True)
 class Collection:
-    """A key for each class that `registry` has, by its name."""
+    """One key per class of `registry`, by name."""
 
     registry: Registry
 
     def fields(self) -> Iterator[Field]:
-        """As of a dataclass: a switch of a class without parameters, else an optional table."""
+        """Dataclass fields: a switch for a class without parameters, else an optional table."""
         for name in self.registry:
             of, doc = self.registry[name], self.registry.doc(name)
             made = table(of, doc, optional=True) if fields(of) else flag(False, doc)
@@ -62,7 +63,7 @@ class Collection:
             yield made
 
     def gathered(self, values: dict[str, Any]) -> tuple[tuple[str, Any], ...]:
-        """(name, object) of what the values by name switch on or describe."""
+        """(name, object) for each key that is switched on or given as a table."""
         on = {name: value for name, value in values.items() if value not in (None, False)}
         return tuple(
             (name, self.registry[name]() if value is True else value) for name, value in on.items()
@@ -78,7 +79,7 @@ class Pitch:
 
 
 def points(doc: str, *, least: float, most: float) -> Any:
-    """ "nodes", "auto", or the pitch { dx = ..., dy = ... } of a grid in m."""
+    """A key for contact points: "nodes", "auto", or the pitch { dx = ..., dy = ... }, m."""
     limits = Limits(least=least, most=most)
 
     def read(value: Any) -> str | Pitch:
@@ -110,7 +111,7 @@ def points(doc: str, *, least: float, most: float) -> Any:
 
 
 def table(of: type, doc: str, *, optional: bool = False) -> Any:
-    """A nested table; absent it is None where optional, else all its defaults."""
+    """A nested table; if absent, None when optional, else all its defaults."""
     meta = {"table": Table(of, doc, optional)}
     return (
         field(default=None, metadata=meta) if optional else field(default_factory=of, metadata=meta)
@@ -118,12 +119,12 @@ def table(of: type, doc: str, *, optional: bool = False) -> Any:
 
 
 def tables(of: type, doc: str) -> Any:
-    """An array of tables, a tuple of `of`."""
+    """An array of tables, as a tuple of `of`."""
     return field(default=(), metadata={"table": Table(of, doc, many=True)})
 
 
 def registered(registry: Registry, default: str, doc: str) -> Any:
-    """The name of a variant; which there are is looked up each time, as a user may register one."""
+    """The name of a variant; the registry is read on each use, because a user may register more."""
 
     def read(value: Any) -> str:
         if not isinstance(value, str) or value not in registry:
@@ -134,17 +135,17 @@ def registered(registry: Registry, default: str, doc: str) -> Any:
 
 
 def variant(selector: str, registry: Registry) -> Any:
-    """The parameters of the class named by the key `selector`; all its defaults where not given."""
+    """The parameters of the class selected by the key `selector`; all its defaults if not given."""
     return field(default=None, metadata={"variant": Variant(selector, registry)})
 
 
 def collection(registry: Registry) -> Any:
-    """A tuple of (name, object), one for each class of the registry that the scene has a key or table of."""
+    """A tuple of (name, object), one per class of the registry that the scene has a key for."""
     return field(default=(), metadata={"collection": Collection(registry)})
 
 
 class Collects(Parameters):
-    """Base of tables with a collection: its names are attributes too, as the scene has them."""
+    """Base of tables with a collection: its names are also attributes, as the scene has them."""
 
     def __getattr__(self, name: str) -> Any:
         for item in fields(self):
@@ -158,19 +159,19 @@ class Collects(Parameters):
 
 
 def collection_of(item: Field) -> Collection | None:
-    """The collection of a field, None where it is none."""
+    """The collection of a field, or None."""
     return item.metadata.get("collection")
 
 
 def fields_of(of: Any) -> Iterator[Field]:
-    """The fields of a dataclass or of an object of it, those of its collections in their place."""
+    """The fields of a dataclass or its instance, with those of its collections in their place."""
     for item in fields(of):
         part = collection_of(item)
         yield from part.fields() if part else [item]
 
 
 def gathered(of: type, values: dict[str, Any]) -> dict[str, Any]:
-    """Arguments for the constructor from values by key: those of a collection together."""
+    """Constructor arguments from values by key; values of a collection are combined."""
     rest = dict(values)
     for item in fields(of):
         if part := collection_of(item):
@@ -180,7 +181,7 @@ def gathered(of: type, values: dict[str, Any]) -> dict[str, Any]:
 
 
 class Variants(Parameters):
-    """Base of tables with variants: puts the named class's defaults where none is given."""
+    """Base of tables with variants: fills in the selected class's defaults if none is given."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -196,12 +197,12 @@ class Variants(Parameters):
 
 
 def table_of(item: Field) -> Table | None:
-    """The nested table of a field, None where it is none."""
+    """The nested table of a field, or None."""
     return item.metadata.get("table")
 
 
 def variant_of(item: Field) -> Variant | None:
-    """The variant of a field, None where it is none."""
+    """The variant of a field, or None."""
     return item.metadata.get("variant")
 
 

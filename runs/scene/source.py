@@ -1,4 +1,4 @@
-"""Where the values of a scene come from, and what is wrong with them: all of it, not the first thing."""
+"""The origin of a scene's values, and the collection of all its problems."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +11,7 @@ Path_ = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Source:
-    """The file, its text and the paths set by --set; `problems` collects (path of the key, message)."""
+    """The file, its text and the paths set by --set; `problems`: (path of the key, message)."""
 
     path: Path
     text: str
@@ -27,23 +27,23 @@ class Source:
         return f"{self.path}, line {line}" if line else f"{self.path}"
 
     def add(self, path: Path_, message: str) -> None:
-        """Note what is wrong with a key."""
+        """Note a problem with a key."""
         self.problems.append((path, f"{self.where(path)}: {shortened(path)} {message}"))
 
     def add_as_is(self, path: Path_, message: str) -> None:
-        """Note what is wrong, in a message that names the key itself."""
+        """Note a problem whose message names the key itself."""
         self.problems.append((path, f"{self.where(path)}: {message}"))
 
     def error(self, path: Path_, message: str) -> InputError:
-        """One thing that is wrong, as an exception."""
+        """A single problem, as an exception."""
         return InputError(f"{self.where(path)}: {shortened(path)} {message}")
 
     def broken(self) -> set[str]:
-        """The tables in which something is wrong."""
+        """The tables that have a problem."""
         return {path[0] for path, _ in self.problems if path}
 
     def refuse(self) -> None:
-        """InputError with all that is wrong, if anything is."""
+        """Raise InputError with all problems, if there are any."""
         messages = list(dict.fromkeys(message for _, message in self.problems))
         if len(messages) == 1:
             raise InputError(messages[0])
@@ -58,5 +58,5 @@ _SHOWN = 30
 
 
 def shortened(path: Path_) -> str:
-    """A dotted key; parts that are too long to be one of ours are cut."""
+    """A dotted key; parts too long to be valid keys are truncated."""
     return ".".join(part if len(part) <= 60 else f"{part[:57]}..." for part in path[:12])

@@ -1,4 +1,4 @@
-"""Walking through the tables of a scene and their keys, in every variant that there is."""
+"""Iterates over the tables of a scene and their keys, in all variants."""
 
 from collections.abc import Iterator
 from dataclasses import Field, fields
@@ -9,7 +9,7 @@ from tireroad.runs.scene.schema import fields_of, table_of, variant_of
 
 
 def names(of: type) -> list[str]:
-    """The keys and tables that dataclass `of` has in every variant, in their order."""
+    """The keys and tables that dataclass `of` has in every variant, in order."""
     return [item.name for item in fields_of(of) if variant_of(item) is None]
 
 
@@ -27,7 +27,7 @@ def every_field(of: type) -> dict[str, Field]:
 
 
 def owners(of: type, name: str) -> tuple[str, list[str]] | None:
-    """(selecting key, its values) of the variants that have a key; None where none has."""
+    """(selecting key, its values) of the variants that have a key; None if none has."""
     for item in fields(of):
         part = variant_of(item)
         kinds = part.registry.owners(name) if part else []
@@ -46,7 +46,7 @@ def entries(holder: Any) -> Iterator[tuple[Any, Field]]:
 
 
 def walk(of: type, path: str = "") -> Iterator[tuple[str, type, Field, Key]]:
-    """(dotted name, dataclass, field, description) of every key in every variant; [] marks arrays."""
+    """(dotted name, dataclass, field, key) of every key in every variant; [] marks arrays."""
     for item in fields_of(of):
         name = f"{path}.{item.name}" if path else item.name
         part, kinds, key = table_of(item), variant_of(item), key_of(item)
@@ -60,5 +60,5 @@ def walk(of: type, path: str = "") -> Iterator[tuple[str, type, Field, Key]]:
 
 
 def applies(key: Key, holder: Any) -> bool:
-    """Whether a key belongs to the kind that its table is."""
+    """Whether a key applies to the kind selected in its table."""
     return key.only_for is None or getattr(holder, key.only_for[0]) in key.only_for[1]

@@ -1,1 +1,1 @@
-"""Settings that meet an error asked for ([accuracy] target), at least cost."""
+"""Search for settings that meet a target error ([accuracy] target) at the lowest cost."""

@@ -1,4 +1,4 @@
-"""search.json: what a search has tried, so that a search that is stopped goes on and one that ended is not repeated."""
+"""search.json: the trials of a search, so that it can be resumed, and is not repeated."""
 
 from __future__ import annotations
 
@@ -24,8 +24,11 @@ NAME = "search.json"
 
 @dataclass(frozen=True)
 class Trial:
-    """Settings and what they gave: `found` errors, or why there are none (`failed`); `seconds` by stage of a run
-    with them, reused stages as they once were; `spent` s of this trial alone, and the `scheme` of its loop."""
+    """Settings and their result: `found` errors, or the reason (`failed`) why there are none.
+
+    `seconds` by stage of a run with these settings, reused stages at their original cost; `spent` s
+    by this trial alone; `scheme` of its time loop.
+    """
 
     settings: Settings
     seconds: Mapping[str, float]
@@ -36,7 +39,7 @@ class Trial:
 
 
 class Journal:
-    """The trials of a scene's search in a folder, written whole after each. Root process only."""
+    """The trials of a search in a folder; the file is rewritten after each. Root process only."""
 
     def __init__(self, directory: Path, scene: Scene) -> None:
         self.path, self.scene = directory / NAME, scene
@@ -48,7 +51,7 @@ class Journal:
         return next((trial for trial in self.trials if trial.settings == settings), None)
 
     def add(self, trial: Trial) -> None:
-        """Keep a trial."""
+        """Add a trial."""
         self.trials.append(trial)
         data = {"of": self._of, "trials": [asdict(one) for one in self.trials]}
         write_text(self.path, json.dumps(data, indent=1) + "\n")
@@ -59,7 +62,7 @@ class Journal:
         (directory / NAME).unlink(missing_ok=True)
 
     def _kept(self) -> list[Trial]:
-        """Trials of an earlier search for the same scene by the same program, whatever its target."""
+        """Trials of an earlier search for the same scene by the same program, for any target."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             data = json.loads(self.path.read_text(encoding="utf-8"))
             if data["of"] == self._of:
@@ -68,7 +71,7 @@ class Journal:
 
 
 def read_trials(path: Path) -> list[Trial]:
-    """All trials that a file holds, whatever they are of; OSError, ValueError or KeyError where it holds none."""
+    """All trials in a file, of any scene. Raises OSError, ValueError or KeyError without any."""
     return [_trial(one) for one in json.loads(path.read_text(encoding="utf-8"))["trials"]]
 
 
@@ -82,7 +85,7 @@ def _trial(data: dict[str, Any]) -> Trial:
 
 
 def _origin(scene: Scene) -> str:
-    """A hash of all that trials depend on: the scene but for how much is asked of it, its files, the program."""
+    """Hash of all that trials depend on: the scene without its target, its files, the program."""
     of, up_to = scene.accuracy.of, scene.accuracy.up_to
     bare = replace(scene, accuracy=Accuracy(of=of, up_to=up_to))
     files = [store.file_hash(path) for path in _files(scene)]

@@ -1,8 +1,9 @@
-"""Which settings to try next: those that are predicted to meet the target at least cost.
+"""Chooses the next settings: those predicted to meet the target at the lowest cost.
 
-From a trial's errors by cause, each falling as a known power of its size (contact.results.error_bars.orders), and from its
-measured seconds by stage, scaled by how the sizes of the stages grow (scene.extent.estimate), rungs are climbed one
-by one: each time the one that takes away most of the squared error for its cost, until the target would be met.
+Starts from a trial's errors by cause, each with a known order in its size
+(contact.results.error_bars.orders), and its measured seconds by stage, scaled with the sizes of the
+stages (scene.extent.estimate). Rungs are climbed one at a time, each time the one that removes most
+squared error per cost, until the target is predicted to be met.
 """
 
 from __future__ import annotations
@@ -20,19 +21,20 @@ from tireroad.runs.search.journal import Trial
 from tireroad.runs.search.settings import CAUSES, Ladders, Settings, applied, size_ratio
 from tireroad.runs.search.shares import worst
 
-AIM = 0.9  # of the target: what a plan is made for, as the known orders hold in the limit only
-AT_ONCE = {"mesh": 2, "modes": 2, "points": 2, "step": 1}  # rungs in one plan at most: likewise
-# Of the target: a cause is made smaller only above the first; above the second (as four equal shares are) where
-# another cause alone keeps the plan from the target, so that none is finer than that one will need.
+AIM = 0.9  # of the target: margin of a plan, as the orders hold only asymptotically
+AT_ONCE = {"mesh": 2, "modes": 2, "points": 2, "step": 1}  # most rungs per plan: same reason
+# Of the target. A cause is refined only above SMALL; above EVEN (the value of four equal shares) if
+# another cause that cannot be refined alone misses the target, so that none becomes finer than that
+# one requires.
 SMALL, EVEN = 0.25, 0.5
-_STAGE = {"contact": "contact loop"}  # by its name in the estimate
+_STAGE = {"contact": "contact loop"}  # name in the estimate
 _LEAST = 1e-3  # s
 
 
 def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
-    """The next settings after a trial that misses its target; None where no finer ones are left or fit into memory.
+    """The next settings after a trial that misses its target; None if none are left or fit.
 
-    Reads the road's file; on one process, as what it finds depends on the memory that is free.
+    Reads the road's file; on one process only, as the result depends on the available memory.
     """
     scene = ladders.scene
     if trial.found is None:
@@ -57,25 +59,25 @@ def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
 def _worthwhile(
     over: np.ndarray, choices: list[tuple[str, Settings]]
 ) -> list[tuple[str, Settings]]:
-    """The choices whose cause is a part of the error that counts; those that are unknown alone, where some are."""
+    """The choices whose cause matters for the error; if any is unknown, only unknown ones."""
     errors = over[:, worst(over)[1]]
     known = dict(zip(CAUSES, errors, strict=True))
     unknown = [one for one in choices if not np.isfinite(known[one[0]])]
     if not np.isfinite(errors).all():
-        return unknown  # its companion fails: what is that coarse is made finer first
+        return unknown  # its companion run fails: the coarse setting behind it is refined first
     climbing = {cause for cause, _ in choices}
     stuck = any(error > AIM for cause, error in known.items() if cause not in climbing)
     return [one for one in choices if known[one[0]] > AIM * (EVEN if stuck else SMALL)]
 
 
 def fits(scene: Scene, settings: Settings, processes: int) -> bool:
-    """Whether the memory that is free holds a run with these settings."""
+    """Whether the available memory holds a run with these settings."""
     needed = processes * sum(estimate(applied(scene, settings)).memory.values())
     return needed < DOUBTFUL * available_memory()
 
 
 def _after_failure(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
-    """A rung up with the mesh and the step: what does not come to an end at all is coarse in one of them."""
+    """One rung up for mesh and step: a run that fails altogether is too coarse in one of them."""
     rungs = trial.settings.rungs
     found = ladders.at(rungs | {"mesh": rungs["mesh"] + 1, "step": rungs["step"] + 1})
     return found if found is not None and fits(ladders.scene, found, processes) else None
@@ -89,7 +91,7 @@ def _worth(
     costs: _Costs,
     rates: Mapping[str, float],
 ) -> float:
-    """Squared error that the finer settings take away, for the seconds that they add."""
+    """Squared error removed by the finer settings per second that they add."""
     row, figure = CAUSES.index(cause), worst(over)[1]
     if not np.isfinite(over[row, figure]):
         return np.inf
@@ -101,7 +103,7 @@ def _worth(
 def _finer(
     over: np.ndarray, cause: str, now: Settings, finer: Settings, rates: Mapping[str, float]
 ) -> np.ndarray:
-    """Predicted errors with a cause's size made smaller, by the `rates` of all; one that was unknown is hoped to be as asked for."""
+    """Predicted errors after refining a cause, by the `rates` of all; an unknown one becomes 0."""
     after = over.copy()
     row = CAUSES.index(cause)
     known = np.isfinite(after[row])
@@ -119,7 +121,7 @@ class _Costs:
         self._base = self._estimated(trial.settings)
 
     def __call__(self, settings: Settings) -> float:
-        """Of all stages; of those that the model does not know, as the others grow."""
+        """Seconds of all stages; stages unknown to the model are scaled like the others."""
         wanted, known, before = self._estimated(settings), 0.0, 0.0
         for stage, seconds in self._measured.items():
             part = _STAGE.get(stage, stage)

@@ -1,4 +1,4 @@
-"""The search: trials of ever finer settings, from coarse, until the estimated error is as asked for."""
+"""The search: trials from coarse to fine until the estimated error meets the target."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FOLDER = "search"
 
 @dataclass(frozen=True)
 class Search:
-    """A scene whose settings are searched for, with results in `directory`; `cache`: of the user."""
+    """A search for a scene's settings, with results in `directory`; `cache`: the user's."""
 
     scene: Scene
     directory: Path
@@ -41,10 +41,10 @@ class Search:
     cache: Cache = NO_CACHE
 
     def run(self) -> None:
-        """Trials until one meets the target, then the run with its settings, from its stages.
+        """Run trials until one meets the target, then the run with its settings and stages.
 
-        Collective. ConvergenceError where none meets it within the limits: the results are then those of the
-        trial that came nearest.
+        Raises ConvergenceError if none meets it within the limits; the results are then those of
+        the closest trial. Collective.
         """
         on_root(self.comm, lambda: self._begin())
         observe.say(f"search    for {aim(self.scene.accuracy)}")
@@ -69,16 +69,16 @@ class Search:
 
     @cached_property
     def _journal(self) -> Journal:
-        """Root process only."""
+        """The trials so far. Root process only."""
         return Journal(self.directory, self.scene)
 
     @property
     def _cache(self) -> Cache:
-        """Where the stages of trials are kept."""
+        """The cache of the trials' stages."""
         return self.cache.of_family(self.directory / FOLDER / "cache")
 
     def _begin(self) -> None:
-        """The scene as it is asked for stands in the folder until settings are found. Root process only."""
+        """Write the scene as given, until settings are found. Root process only."""
         write_text(self.directory / "scene.toml", signed(dumps(self.scene)))
         _ = self._journal
 
@@ -86,7 +86,7 @@ class Search:
         return planned(self._ladders, last, self.comm.size)
 
     def _trial(self, settings: Settings, number: int) -> Trial:
-        """A trial, or what is known of it from before; its line is shown. Collective."""
+        """Run a trial, or take it from an earlier search; reports its result. Collective."""
         before = on_root(self.comm, lambda: self._journal.known(settings))
         observe.say(f"  trial {number}: {settings}{' (from before)' if before else ''}")
         trial = before or self._tried(settings)
@@ -102,7 +102,7 @@ class Search:
         return f"error {shown(trial.found.over(self.scene.accuracy), self.scene.accuracy)}; scheme {trial.scheme}; {cost}"
 
     def _tried(self, settings: Settings) -> Trial:
-        """Run the scene with settings up to its error bars, in a folder of its own. Collective."""
+        """Run the scene with these settings up to its error bars, in its own folder. Collective."""
         began = time.perf_counter()
         folder = self.directory / FOLDER / "trial"
         on_root(self.comm, lambda: folder.mkdir(parents=True, exist_ok=True))
@@ -129,7 +129,7 @@ class Search:
         return trial.found is not None and worst(trial.found.over(self.scene.accuracy))[0] <= 1
 
     def _limit(self, tried: list[Trial]) -> str:
-        """Which limit of the search is reached; "" where it may go on."""
+        """The limit of the search that is reached; "" if none."""
         wanted = self.scene.accuracy
         spent = sum(trial.spent for trial in tried)
         if len(tried) >= wanted.trials:
@@ -139,7 +139,7 @@ class Search:
         return ""
 
     def _keep(self, trial: Trial) -> None:
-        """The run with a trial's settings, from its stages; its scene written back. Collective."""
+        """Complete the run with a trial's settings from its stages; write its scene. Collective."""
         chosen = applied(self.scene, trial.settings)
         on_root(self.comm, lambda: write_text(self.directory / CHOSEN, signed(dumps(chosen))))
         observe.say(f"  chosen: {trial.settings}; {self.directory / CHOSEN} needs no search")
@@ -147,7 +147,7 @@ class Search:
         on_root(self.comm, lambda: shutil.rmtree(self.directory / FOLDER, ignore_errors=True))
 
     def _final(self, scene: Scene) -> None:
-        """The results of settings that were tried, in the folder. Collective."""
+        """Compute the results of tried settings in the result folder. Collective."""
         done = run_scene(
             scene,
             self.directory,
@@ -160,7 +160,7 @@ class Search:
         _tell(scene, done)
 
     def _give_up(self, tried: list[Trial], why: str) -> None:
-        """Results of the nearest trial, and ConvergenceError with what it reached. Collective."""
+        """Compute the closest trial's results, then raise ConvergenceError. Collective."""
         wanted = self.scene.accuracy
         ended = [trial for trial in tried if trial.found is not None]
         if not ended:
@@ -183,7 +183,7 @@ class Search:
 
 
 def seconds(folder: Path) -> dict[str, float]:
-    """Seconds by stage of the run in a folder, as each took when it was computed. Not collective."""
+    """Seconds by stage of the run in a folder, as when each was computed. Not collective."""
     stages = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["stages"]
     return {
         name: sum(entry["cost"].values()) or entry["seconds"]
@@ -202,8 +202,9 @@ def run(
     petsc_options: list[str],
     cache: Cache = NO_CACHE,
 ) -> None:
-    """A run as the user starts it: with a search where the scene has a target and goes on to its forces; `fresh`:
-    nothing of earlier runs and trials is reused. Collective.
+    """A run as the user starts it, with a search if the scene has a target and `until` allows.
+
+    `fresh`: reuse nothing of earlier runs and trials. Collective.
     """
     if not scene.accuracy.searches or (until and STAGES.index(until) < STAGES.index("accuracy")):
         done = run_scene(
@@ -223,7 +224,7 @@ def run(
 
 
 def _tell(scene: Scene, done: Finished) -> None:
-    """Whether the error that is asked for is met, where it has been estimated. Collective."""
+    """Report whether the target error is met, if it was estimated. Collective."""
     if not scene.accuracy.aimed or "accuracy" not in done.done:
         return
     over = Found.of(done.done["accuracy"].product, scene.accuracy).over(scene.accuracy)
@@ -237,6 +238,6 @@ def _tell(scene: Scene, done: Finished) -> None:
 
 
 def _forget(directory: Path) -> None:
-    """Root process only."""
+    """Remove the trials and their stages. Root process only."""
     shutil.rmtree(directory / FOLDER, ignore_errors=True)
     Journal.forget(directory)

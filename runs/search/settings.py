@@ -1,4 +1,4 @@
-"""What a search chooses: mesh, modes, residual, points and step of a scene, each on a ladder from coarse to fine."""
+"""The settings of a search: mesh, modes, residual, points, step, on ladders from coarse to fine."""
 
 from __future__ import annotations
 
@@ -11,18 +11,21 @@ from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.scene.tables.scene import Scene
 
-FINER = 2**0.5  # of a rung of modes and points; of the step, twice that
+FINER = 2**0.5  # factor per rung of modes and points; the step is halved
 RUNGS = 10
-MODES = 2.25  # highest mode over the highest frequency of interest on the lowest rung: an answer ends at half of it
-SAMPLES = 8  # steps in the period of that frequency on the lowest rung
-PASSING = 2.25  # contact points that pass in that period at least
-POINTS = 1 / 32  # of the outer radius: the largest spacing of points
+MODES = 2.25  # highest mode over highest frequency of interest, lowest rung: valid to half of it
+SAMPLES = 8  # steps per period of that frequency on the lowest rung
+PASSING = 2.25  # contact points that pass per period of it, at least
+POINTS = 1 / 32  # of the outer radius: largest spacing of points
 
 
 @dataclass(frozen=True)
 class Settings:
-    """One choice: `mesh` (elements around and from bead to bead) of an `order`, modes `up_to` Hz, `residual`,
-    `pitch` m of the points, `step` s. `rungs` on the ladders by cause."""
+    """One choice of settings.
+
+    `mesh`: elements around and from bead to bead, of an `order`; modes `up_to` Hz; `residual`;
+    `pitch` m of the points; `step` s; `rungs`: position on the ladder of each cause.
+    """
 
     mesh: tuple[int, int]
     order: int
@@ -42,19 +45,19 @@ class Settings:
 
 @dataclass(frozen=True)
 class Ladders:
-    """The rungs that a `scene` (its wheel at `speed` m/s over the road) has for each cause of error."""
+    """The ladder of a `scene` for each cause of error; `speed` m/s of its wheel over the road."""
 
     scene: Scene
     speed: float
 
     @classmethod
     def of(cls, scene: Scene) -> Ladders:
-        """Of a resolved scene; the speed by its outer radius."""
+        """The ladders of a resolved scene; the speed is that of its outer radius."""
         turning = scene.rotation.speed if scene.rotation else 0.0
         return cls(scene, turning * scene.tire.proportions().outer_radius)
 
     def at(self, rungs: dict[str, int]) -> Settings | None:
-        """The settings on these rungs; None where a ladder has no such rung."""
+        """The settings on these rungs; None if a ladder has no such rung."""
         meshes = self._meshes
         if rungs["mesh"] >= len(meshes) or max(rungs.values()) > RUNGS:
             return None
@@ -76,14 +79,14 @@ class Ladders:
         return found
 
     def finest(self) -> Settings:
-        """The finest ones."""
+        """The finest settings."""
         top = {cause: RUNGS for cause in CAUSES} | {"mesh": len(self._meshes) - 1}
         found = self.at(top)
         assert found is not None
         return found
 
     def finer(self, settings: Settings) -> Iterator[tuple[str, Settings]]:
-        """(cause, settings one rung up on its ladder) of each that has one."""
+        """(cause, settings one rung up its ladder) for each cause that has a higher rung."""
         for cause in CAUSES:
             found = self.at(settings.rungs | {cause: settings.rungs[cause] + 1})
             if found is not None:
@@ -95,8 +98,11 @@ class Ladders:
 
     @property
     def _residual(self) -> str:
-        """Rolling belts: attachment modes, which have mass. Without it what is left out of a stiff tire's few modes lets the
-        contact ring above the band, where coarse steps do not resolve it (docs/verification.md)."""
+        """Attachment modes, which have mass, for rolling belts.
+
+        Without their mass, the residual of a stiff tire with few modes lets the contact ring above
+        the band, where coarse steps do not resolve it (docs/verification.md).
+        """
         turning = self.scene.rotation is not None and self.scene.rotation.speed > 0
         belted = bool(self.scene.tire.cords) or self.scene.tire.section != "torus"
         simple = self.scene.rotation is None or self.scene.rotation.method == "projected"
@@ -117,7 +123,7 @@ class Ladders:
 
 
 def bounds(scene: Scene) -> list[str]:
-    """What `check` says of the search that a run of the scene begins with."""
+    """Lines for `check` about the search that the run begins with."""
     ladders, wanted = Ladders.of(scene), scene.accuracy
     limit = f" or {wanted.budget:g} s" if wanted.budget is not None else ""
     return [
@@ -136,7 +142,7 @@ def aim(wanted: Accuracy) -> str:
 
 
 def size_ratio(cause: str, one: Settings, other: Settings) -> float:
-    """Size of what makes the error in `other` over that in `one`: below 1 where `other` is finer."""
+    """Size that causes the error in `other` over that in `one`: below 1 if `other` is finer."""
     sizes = {
         "mesh": (1 / one.mesh[0], 1 / other.mesh[0]),
         "modes": (1 / one.up_to, 1 / other.up_to),
@@ -148,7 +154,7 @@ def size_ratio(cause: str, one: Settings, other: Settings) -> float:
 
 
 def applied(scene: Scene, settings: Settings, *, search: bool = False) -> Scene:
-    """The scene with the settings in it, and without a search unless it is wanted."""
+    """The scene with the settings applied, and without a search unless requested."""
     assert scene.contact is not None and scene.time is not None
     around, along = settings.mesh
     return replace(
@@ -159,7 +165,7 @@ def applied(scene: Scene, settings: Settings, *, search: bool = False) -> Scene:
             order=settings.order,
             shape=scene.tire.shape.elements_along(along),
         ),
-        # The companion of the mesh tells it, and for the forces that are asked for.
+        # The mesh companion estimates that error, and for the forces of interest.
         static=replace(scene.static, error_estimate=False),
         modal=replace(scene.modal, up_to=settings.up_to),
         greens=replace(scene.greens, residual=settings.residual, dynamic=None, band=None),

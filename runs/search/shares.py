@@ -1,4 +1,4 @@
-"""The error of a run beside the one asked for, by cause and figure."""
+"""The estimated error of a run relative to its target, by cause and figure."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ VERTICAL = 2
 
 @dataclass(frozen=True)
 class Found:
-    """Estimated errors by cause of a run, vertical: of the `history` and the `mean`, relative; of each third octave
-    at `centre` Hz whose centre is below the highest frequency asked for, `level` dB. NaN where unknown."""
+    """Estimated errors of a run's vertical force by cause; NaN where unknown.
+
+    `history` and `mean`: relative; `level` dB of each third octave at `centre` Hz, up to the
+    highest frequency of interest.
+    """
 
     history: Mapping[str, float]
     mean: Mapping[str, float]
@@ -26,7 +29,7 @@ class Found:
 
     @classmethod
     def of(cls, product: Accuracy, wanted: Wanted) -> Found:
-        """Of the force that is asked for."""
+        """Errors of the force that the target applies to."""
         bars = product.by_cause.get(wanted.of, {})
         below = np.flatnonzero(product.centre <= product.up_to)
         unknown = (float("nan"),) * len(below)
@@ -42,27 +45,27 @@ class Found:
         )
 
     def over(self, wanted: Wanted) -> np.ndarray:
-        """Errors (causes, figures) over those asked for; infinite where unknown."""
+        """Errors (causes, figures) over their targets; infinite where unknown."""
         columns = []
         if wanted.target is not None:
             for values in (self.history, self.mean):
                 columns.append([values.get(cause, np.nan) / wanted.target for cause in CAUSES])
         if wanted.target_db is not None:
             levels = np.array([self.level[cause] for cause in CAUSES]).reshape(len(CAUSES), -1)
-            # Without a single band below the frequency nothing is known.
+            # Without a band below that frequency, nothing is known.
             columns += list((levels / wanted.target_db).T) or [[np.nan] * len(CAUSES)]
         return np.nan_to_num(np.array(columns, float).T, nan=np.inf)
 
 
 def worst(over: np.ndarray) -> tuple[float, int]:
-    """The largest error of all causes together over the one asked for, and its figure: 1 or less meets it."""
+    """The largest total error over its target, and the index of that figure; 1 or less meets it."""
     totals = np.sqrt((over**2).sum(axis=0))
     figure = int(totals.argmax())
     return float(totals[figure]), figure
 
 
 def shown(over: np.ndarray, wanted: Wanted) -> str:
-    """The error and its shares in words, of the figure that is furthest off."""
+    """The error and its shares in words, for the figure that is furthest from its target."""
     total, figure = worst(over)
     relative = 2 if wanted.target is not None else 0
     unit, scale = (

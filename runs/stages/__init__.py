@@ -1,1 +1,1 @@
-"""One module a stage: `inputs` (what it depends on), `compute`, and `reuse` of its file."""
+"""One module per stage: `inputs` (what it depends on), `compute`, writing and reading its file."""

@@ -1,4 +1,4 @@
-"""accuracy: how far the forces of a run may be off, by cheap companions of known order."""
+"""Stage accuracy: error estimates of a run's forces from cheap companion runs of known orders."""
 
 from __future__ import annotations
 
@@ -27,19 +27,22 @@ from tireroad.runs.stages.companions import Given, companions
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
-SHARE = 0.33  # of the run's own cost, that all companions together take
-_FEWEST = 64  # steps that a companion repeats at the least
-_LOOPS = 3.5  # time loops that five companions take for each step they repeat
-_COARSE = 0.14  # of the cost before the loop, on elements of twice the size
+SHARE = 0.33  # of the run's own cost: budget of all companion runs together
+_FEWEST = 64  # least number of steps that a companion run repeats
+_LOOPS = 3.5  # cost of five companion runs, in time loops per repeated step
+_COARSE = 0.14  # cost on elements of twice the size, as a share of the run's cost before the loop
 FORCES = ("contact_force", "axle_force")
 _UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Accuracy:
-    """Estimated errors of each force by cause (`by_cause[force][cause]`) at the bands `centre` (b,) Hz, found on
-    the first `window` s of the run, those of a history up to `up_to` Hz; the `mean` (3,) N of each force there; why
-    a cause is `absent`."""
+    """Error estimates of each force by cause, `by_cause[force][cause]`.
+
+    `centre` (b,) Hz: the third octaves; `window` s: the part of the run they were estimated on,
+    from its start; `up_to` Hz: upper frequency of the histories compared; `mean` (3,) N of each
+    force over the window; `absent`: why a cause has no estimate.
+    """
 
     centre: np.ndarray
     window: float
@@ -49,12 +52,12 @@ class Accuracy:
     absent: Mapping[str, str] = field(default_factory=dict)
 
     def total(self, force: str) -> Bars | None:
-        """Of all causes that are known; None where none is."""
+        """Combined error of all causes with an estimate; None if there is none."""
         found = self.by_cause.get(force, {})
         return total(found) if found else None
 
     def levels(self, force: str, centre: np.ndarray) -> np.ndarray | None:
-        """Errors (b, 3) dB at other bands; NaN where they are unknown."""
+        """Error estimates (b, 3) dB at other bands; NaN where unknown."""
         found = self.total(force)
         if found is None:
             return None
@@ -77,16 +80,16 @@ class AccuracyStage(Computed[Accuracy]):
     contact: Done[ContactHistory]
 
     def inputs(self) -> dict:
-        """The contact forces, and all they came from."""
+        """The key of the contact forces, and the upper frequency."""
         return {"contact": self.contact.key, "up_to": self.job.scene.accuracy.up_to}
 
     def compute(self, record: Record) -> Accuracy:
-        """Companions one by one; a cause whose companion fails is reported, and the run goes on. Collective."""
+        """Run the companions one by one; a failed one is reported, its cause absent. Collective."""
         history, setup = self.contact.product, self.setup.product
         if self._at_rest:
             return self._none("nothing excites the tire: its forces vary by rounding only")
         start = first_step(setup, self.job.scene.road, history.time)
-        start += start % 2  # where a step of the companion of twice the step begins
+        start += start % 2  # even: where a step of the companion with twice the step begins
         steps = self._window(start, len(history.time))
         if steps - start < 2:
             return self._none("the run is too short for a companion run with twice the step")
@@ -122,7 +125,7 @@ class AccuracyStage(Computed[Accuracy]):
         return product
 
     def produce(self, key: str, record: Record) -> Accuracy:
-        """As any stage; what a companion left for a run that goes on after a stop is of no use then. Collective."""
+        """As any stage; also removes the coarser companion's folder, kept to resume. Collective."""
         product = super().produce(key, record)
         folder = self.job.directory / COARSER
         on_root(self.job.comm, lambda: shutil.rmtree(folder, ignore_errors=True))
@@ -142,7 +145,7 @@ class AccuracyStage(Computed[Accuracy]):
         )
 
     def _window(self, start: int, steps: int) -> int:
-        """Up to which step companions go on, for `SHARE` of the run's estimated cost."""
+        """Last step of the companion runs, for `SHARE` of the run's estimated cost."""
         work = estimate(self.job.scene).work
         loop = work["contact loop"]
         before = sum(work.values()) - loop
@@ -164,7 +167,7 @@ class AccuracyStage(Computed[Accuracy]):
         )
 
     def write(self, file, product: Accuracy) -> None:
-        """By force and cause, and the total."""
+        """Bars by force and cause; totals are formed on reading."""
         put(file, "centre", product.centre, "Hz")
         file.attrs["window"], file.attrs["up_to"] = product.window, product.up_to
         for force, mean in product.mean.items():
@@ -177,7 +180,7 @@ class AccuracyStage(Computed[Accuracy]):
                     put(file, f"{force}/{cause}/{name}", getattr(bar, name), unit)
 
     def read(self, file) -> Accuracy:
-        """The same."""
+        """The same, read back."""
         by_cause = {
             force: {
                 cause: Bars(*(held[name][:] for name in _UNITS))
@@ -204,7 +207,7 @@ class AccuracyStage(Computed[Accuracy]):
 def _describe(
     record: Record, product: Accuracy, exact: Mapping[str, Measured], limit: float
 ) -> None:
-    """Of the vertical force: the error of mean and deviation (up to `limit` Hz), the largest of the bands."""
+    """Record the vertical force's errors: mean, deviation (up to `limit` Hz), worst band."""
     record.indicators["deviations are taken up to"] = (limit, "Hz")
     for name, figures in exact.items():
         bar, what = product.total(name), name.replace("_", " ")

@@ -1,4 +1,4 @@
-"""The same scene on half the elements, up to its Green's functions."""
+"""The same scene on elements of twice the size, up to its Green's functions."""
 
 from __future__ import annotations
 
@@ -31,25 +31,28 @@ STATIC_TO_GREENS: tuple[type[Part], ...] = (
     RotatingStage,
     GreensStage,
 )
-COARSER = "coarser"  # the folder in the run's own where its coarser companion's stages are, until they are of no use
-LEAST = (8, 4)  # elements around and along that a companion has
+COARSER = "coarser"  # folder, in the run's own, of the coarser companion's stages
+LEAST = (8, 4)  # fewest elements around and along of a companion's mesh
 
 
 @dataclass(frozen=True, kw_only=True)
 class CoarserStatic(StaticStage):
-    """The coarser mesh's static state by a few steps from that of the `run`; from the beginning at a deflection,
-    which counts from its own first touch, and where those steps find no balance."""
+    """The static state on the coarser mesh, reached in a few steps from that of the `run`.
 
-    forgets: ClassVar[bool] = False  # the run's own matrices serve the next member
+    It is computed from the undeformed tire if the scene prescribes a deflection, which counts from
+    this mesh's own first contact, or if those steps do not converge.
+    """
+
+    forgets: ClassVar[bool] = False  # the run's own matrices are kept for the next member
     run: Job
     near: Done[StaticState]
 
     def inputs(self) -> dict:
-        """Of any static state, and where it starts."""
+        """Those of any static state, and the state it starts from."""
         return super().inputs() | {"near": self.near.key}
 
     def compute(self, record: Record) -> StaticState:
-        """Collective."""
+        """The static state. Collective."""
         wanted = self.job.scene.static
         if wanted.deflection is None:
             given = self.near.product, self.run.tire, self.job.tire, wanted.load
@@ -59,10 +62,10 @@ class CoarserStatic(StaticStage):
 
 
 def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
-    """The job of a run with elements of twice the size, and what is done of it, from the static state on. Collective."""
+    """The coarser job, and its parts from the static state to the Green's functions. Collective."""
     job, done = coarser_job(run), dict[str, Done]()
     if (contact := job.scene.contact) is not None:
-        # Points of the run, not such as its own footprint asks for.
+        # Contact points as in the run, not those its own footprint would ask for.
         contact = replace(contact, points=points_of(run, static.product))
         job = replace(job, scene=replace(job.scene, contact=contact))
     on_root(job.comm, lambda: make_folder(job.directory))
@@ -79,10 +82,10 @@ def coarser(run: Job, static: Done[StaticState]) -> tuple[Job, dict[str, Done]]:
 
 
 def coarser_job(job: Job) -> Job:
-    """The same scene on half the elements around, and bead to bead where the scene says how many; its stages are
-    shared as those of any run, in a folder beside the run's own.
+    """The same scene with half the elements around and, where given, from bead to bead.
 
-    InputError where the mesh is too coarse to be halved.
+    Its stages are cached like those of any run, in a subfolder of the run's. Raises InputError if
+    the mesh is too coarse to be halved.
     """
     tire, static = job.scene.tire, job.scene.static
     coarse, segments = tire, tire.segments // 2
@@ -94,7 +97,7 @@ def coarser_job(job: Job) -> Job:
             f"the mesh is too coarse to be halved: that needs {around} elements around and {along} along"
         )
     rotation = job.scene.rotation
-    if rotation is not None:  # as fast as the run's own wheel, whatever the travel speed
+    if rotation is not None:  # the speed of the run's own wheel, whatever the travel speed
         rotation = replace(rotation, speed=job.speed, travel_speed=None)
     scene = replace(
         job.scene,
@@ -106,7 +109,7 @@ def coarser_job(job: Job) -> Job:
 
 
 def _made(job: Job, kind: type[Part], part: Part | None, done: dict[str, Done]) -> Done | None:
-    """What a part of the chain adds to what is done; None where it adds nothing. Collective."""
+    """The result of one part of the chain; None if it has none. Collective."""
     if kind is RotatingStage and not job.speed:
         return RotatingStage.instead(job, done)
     if isinstance(part, Stage):

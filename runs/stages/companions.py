@@ -1,4 +1,4 @@
-"""Cheap companions of a run: what its time step, points, modes and mesh are worth."""
+"""Companion runs: error estimates for a run's time step, contact points, modes and mesh."""
 
 from __future__ import annotations
 
@@ -34,14 +34,17 @@ from tireroad.runs.stages.build.setup import tread_surface
 from tireroad.runs.stages.build.wall import Normal, backed
 from tireroad.runs.stages.coarser import coarser
 
-FEWER = 1 / np.sqrt(2)  # of the highest mode: up to where the companion keeps states
+FEWER = 1 / np.sqrt(2)  # share of the highest mode up to which the companion keeps states
 
 
 @dataclass(frozen=True, kw_only=True)
 class Given:
-    """A run: its `job`, its static state, patch and road (not settled), response
-    and rolling modes, and the first `steps` of `step` s of its loop, by a `scheme`, that companions repeat; `free_slip`: what the
-    setup has of it, and another setup of the scene needs."""
+    """The run that companions repeat in part.
+
+    Its `job`, static state, patch and road (`setup`, not settled), response and rolling modes; the
+    first `steps` of `step` s of its loop, integrated by `scheme`. `free_slip`: the slip of free
+    rolling, already in `setup`; another setup of the scene needs it too.
+    """
 
     job: Job
     static: Done[StaticState]
@@ -55,19 +58,22 @@ class Given:
 
     @cached_property
     def settled(self) -> ContactSetup:
-        """The patch in its static state."""
+        """The setup with its patch in the static state."""
         return settled(self.job, self.setup, self.response, self.static.product.normal_force)
 
     @cached_property
     def longer(self) -> Forces:
-        """The run with twice its step. Collective."""
+        """The run repeated with twice its time step. Collective."""
         return self.repeated(self.settled, self.response, coarser=2)
 
     @cached_property
     def base(self) -> Forces | None:
-        """The run with twice the step where companions of points, modes and mesh, with that step too, are compared
-        with it, at half the cost; None where its steps leave out a state or do not resolve the contact's
-        oscillation, and those of the run do. Collective."""
+        """Reference for the companions of points, modes and mesh: the run with twice the step.
+
+        It halves their cost. None if the longer step drops a state or does not resolve the
+        contact's oscillation although the run's own step does; the run itself is then the
+        reference. Collective.
+        """
         step, spec = 2 * self.step, self.job.scene.contact
         kept = self.response.resolved(step)
         if len(kept.every) < len(self.response.resolved(self.step).every):
@@ -82,7 +88,7 @@ class Given:
             return None
 
     def of(self, job: Job) -> Given:
-        """The same with another job; its base stays that of the run."""
+        """The same with another job; `base` stays that of the run."""
         other = replace(self, job=job)
         other.__dict__["base"] = self.base
         return other
@@ -94,15 +100,17 @@ class Given:
         coarser: int | None = None,
         contact: Normal | None = None,
     ) -> Forces:
-        """The loop by another setup (settled), response, `contact` or a step `coarser` times as long, by default that
-        of `base`. Collective."""
+        """Repeat the loop with another setup (settled), response or `contact`.
+
+        `coarser`: factor on the time step, by default that of `base`. Collective.
+        """
         times = coarser or (1 if self.base is None else 2)
         step, steps = times * self.step, self.steps // times
         return forces(self.job, setup, response, step, steps, self.scheme, contact)
 
 
 def settled(job: Job, setup: ContactSetup, response: Response, force: np.ndarray) -> ContactSetup:
-    """The patch in its static state under the nodal forces (s,) N."""
+    """The setup with its patch in the static state under the nodal forces (s,) N."""
     return setup.settled(response, force, job.scene.contact)[0]
 
 
@@ -112,7 +120,7 @@ def longer_step(given: Given) -> Forces:
 
 
 def other_points(given: Given) -> Forces:
-    """Every other point of the grid both ways, or, of a footprint that holds few, twice as many. Collective."""
+    """Every other point of the grid both ways or, if these are few, twice as many. Collective."""
     job, patch = given.job, given.setup.patch
     if patch.places is None:
         raise InputError(
@@ -120,7 +128,7 @@ def other_points(given: Given) -> Forces:
         )
     coarser = ratio(given.settled.patch) > 1
     brush = job.scene.contact.brush_stiffness
-    if brush is not None:  # of a point that stands for four, or for a quarter
+    if brush is not None:  # stiffness of a point that stands for four, or for a quarter
         contact = replace(job.scene.contact, brush_stiffness=brush * (4 if coarser else 0.25))
         job = replace(job, scene=replace(job.scene, contact=contact))
     if coarser:
@@ -137,8 +145,11 @@ def other_points(given: Given) -> Forces:
 
 
 def fewer_modes(given: Given) -> Forces:
-    """States up to `FEWER` of the highest mode, those from there to the highest following statically: what lies beyond are the
-    shapes that joined the modes, without which the band below would move. Collective."""
+    """States up to `FEWER` of the highest mode; those from there to the highest are static.
+
+    States above the highest mode are kept: they belong to the shapes that joined the modes, without
+    which the band below would shift. Collective.
+    """
     highest = given.rolling.highest
     joined = given.rolling.basis.projection.shapes > 0
     limits = FEWER * highest, highest if joined else np.inf
@@ -160,8 +171,11 @@ def coarser_mesh(given: Given) -> Forces:
 
 
 def finer_wall(given: Given) -> Forces:
-    """With what the wall gives way to between the nodes under the points, which no coarser mesh tells: half the elements
-    change what is far from a point eight times and more, what is near it twice. Collective."""
+    """With the local flexibility of the wall between nodes below the contact points added.
+
+    A coarser mesh does not show this part: halving the elements changes the far field of a point
+    eight times and more, but its near field only twice. Collective.
+    """
     force = given.static.product.normal_force
     made = backed(given.job, given.static.product, given.setup, given.response)
     setup = made.setup.settled(made.response, force, made.contact)[0]
@@ -174,12 +188,14 @@ COMPANIONS: dict[str, Callable[[Given], Forces]] = {
     "modes": fewer_modes,
     "mesh": coarser_mesh,
 }
-"""By the cause of the error that each is for (contact.results.error_bars.CAUSES)."""
+"""By the cause of the error that each estimates (contact.results.error_bars.CAUSES)."""
 
 
 class Companion(NamedTuple):
-    """The `forces` of a companion, those they are compared with (None: the run's own), and the share of their difference
-    that is the error."""
+    """The `forces` of a companion run and their reference `beside` (None: the run itself).
+
+    `share`: the fraction of their difference that is the error.
+    """
 
     forces: Forces
     beside: Forces | None
@@ -188,7 +204,7 @@ class Companion(NamedTuple):
     def bars(
         self, run: Mapping[str, Measured], since: float, limit: float, up_to: float
     ) -> dict[str, Bars]:
-        """What it tells of the forces of a `run` after `since` s, as of contact.results.error_bars.measured."""
+        """Error bars of a `run` after `since` s; see contact.results.error_bars.measured."""
         off = _figures(self.forces, since, limit, up_to)
         other = _figures(self.beside, since, limit, up_to) if self.beside else run
         return {name: bars(other[name], off[name], self.share) for name in run}
@@ -203,9 +219,9 @@ def _figures(forces: Forces, since: float, limit: float, up_to: float) -> dict[s
 
 
 def companions(cause: str, given: Given) -> list[Companion]:
-    """Of a cause, without a word; the errors they tell add up as squares.
+    """Companion runs for one cause, without terminal output; their errors add as squares.
 
-    Collective; InputError or ConvergenceError where there is none.
+    Raises InputError or ConvergenceError if the cause has none. Collective.
     """
     with observe.quiet():
         beside = None if cause == "step" else given.base

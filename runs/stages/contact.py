@@ -1,4 +1,4 @@
-"""contact: the tire rolls over the road."""
+"""Stage contact: the tire rolls over the road."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ LINEAR = (
 
 @dataclass(frozen=True, kw_only=True)
 class ContactStage(Stage[ContactHistory]):
-    """The time loop. Its file is written as the loop goes, from the last checkpoint where there is one."""
+    """The time loop. Its file is written as it proceeds, from the last checkpoint if any."""
 
     name: ClassVar[str] = "contact"
     static: Done[StaticState]
@@ -58,7 +58,7 @@ class ContactStage(Stage[ContactHistory]):
     setup: Done[ContactSetup]
 
     def inputs(self) -> dict:
-        """The Green's functions, the contact, the road (its file by content) and the time."""
+        """The Green's functions, the contact, the road (a file by its content) and the time."""
         scene = self.job.scene
         return {
             "greens": self.greens.key,
@@ -75,13 +75,14 @@ class ContactStage(Stage[ContactHistory]):
         }
 
     def produce(self, key: str, record: Record) -> ContactHistory:
-        """Roll, and read the history back. Collective."""
+        """Run the time loop and read the history back. Collective."""
         self._roll(key, record)
         return self.stored()
 
     def _roll(self, key: str, record: Record) -> None:
-        """The time loop by the scheme that the contact asks for; by the other one where it chatters all the
-        same. Collective.
+        """Run the time loop with the scheme that suits the contact; the other one if it chatters.
+
+        Collective.
         """
         response, setup = self.greens.product.contact, self.setup.product
         plan = planned(self.job, record, response, self._shortest_period())
@@ -109,7 +110,7 @@ class ContactStage(Stage[ContactHistory]):
                 forget_checkpoint(self.job)
 
     def _rolling_freely(self, record: Record, setup: ContactSetup, plan: Planned, scheme: str):
-        """(setup, slip) of free rolling, where the scene wants that. Collective."""
+        """(setup, slip) of free rolling if the scene asks for it, else slip 0. Collective."""
         rotation, response = self.job.scene.rotation, self.greens.product.contact
         if rotation is None or not rotation.free_rolling:
             return setup, 0.0
@@ -126,7 +127,7 @@ class ContactStage(Stage[ContactHistory]):
         plan: Planned,
         scheme: Chosen,
     ) -> None:
-        """The time loop, block by block into the file; Chatter beyond the scheme's limit ends it. Collective."""
+        """Run the loop, writing by blocks; raises Chatter beyond the scheme's limit. Collective."""
         response, chosen = self.greens.product.contact, integration(self.job, plan, scheme.scheme)
         with record.timing("tread and solver"):
             driven = driven_tire(self.job, chosen.tire, chosen.step, chosen.steps)
@@ -147,7 +148,8 @@ class ContactStage(Stage[ContactHistory]):
                 observe.say(f"  goes on from the checkpoint at t = {reached:.6g} s")
             done, began = totals.figures.steps, time.thread_time()
             self._steps(setup, loop, driven, file, totals, losses, chosen)
-            # Of this process's own thread: what a step takes where nobody else wants the cores.
+            # CPU time of this process's own thread: the cost of a step when no other process needs
+            # the cores.
             busy = (time.thread_time() - began) / max(chosen.steps - done, 1)
             record.indicators["processor time a step"] = (1e6 * busy, "us")
             file.finish()
@@ -163,13 +165,13 @@ class ContactStage(Stage[ContactHistory]):
             describe_energy(record, *given, losses, chosen.step)
 
     def _shortest_period(self) -> float:
-        """Of all that excites the tire, s."""
+        """Shortest period of all excitation, s."""
         scene, setup = self.job.scene, self.setup.product
         passing = passing_period(scene.road, setup.shortest, setup.rolled.speed)
         return min(passing, shortest_period(scene.force))
 
     def _loop(self, record: Record, setup: ContactSetup, tire, step: float) -> Loop:
-        """The tire as seen at the patch's points, normal solver, friction; the choice is shown."""
+        """The loop of tire, normal solver and friction at the patch's points; recorded."""
         spec = self.job.scene.contact
         loop = make_loop(spec, setup, tire, step)
         if loop.friction is not None:
@@ -181,7 +183,7 @@ class ContactStage(Stage[ContactHistory]):
         return loop
 
     def _steps(self, setup, loop: Loop, driven, file: ContactFile, totals, losses, chosen) -> None:
-        """Take the steps that are left; stop between two of them when asked to. Collective."""
+        """Take the remaining steps; stops between two of them when requested. Collective."""
         done, steps = totals.figures.steps, chosen.steps
         given = setup.patch, setup.drive, chosen.step, steps
         instants = roll(loop.tire, loop.solver, *given, loop.friction, done, loop.memory)
@@ -189,8 +191,8 @@ class ContactStage(Stage[ContactHistory]):
         with (
             Deferred() as deferred,
             observe.Progress("contact", steps, begun=done) as bar,
-            # A step's matrices, a megabyte, are read as fast by one core as by two; threads that wait
-            # for each other in every product took ten times as long where cores are shared.
+            # One core reads a step's matrices, a megabyte, as fast as two; threads that wait for
+            # each other in every product took ten times as long where cores are shared.
             threadpool_limits(1, "blas"),
         ):
             for instant in instants:
@@ -209,12 +211,12 @@ class ContactStage(Stage[ContactHistory]):
             losses.flush()
 
     def read(self, file) -> ContactHistory:
-        """The totals over time, without the points."""
+        """The totals over time, without the single points."""
         return ContactHistory.of(file)
 
 
 def beyond_unique(friction: float | None, limit: float) -> list[str]:
-    """A warning where points that slip may leave a step with more than one answer."""
+    """A warning if slipping points may leave a step with more than one solution."""
     if friction is None or friction <= limit:
         return []
     return [

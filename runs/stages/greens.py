@@ -1,4 +1,4 @@
-"""greens: responses between the driven points, and between the points of the contact patch."""
+"""Stage greens: Green's functions between driven points, and between those of the patch."""
 
 from __future__ import annotations
 
@@ -26,21 +26,24 @@ from tireroad.runs.stages.stored.responses import fill_response, read_responses
 
 @dataclass(frozen=True)
 class Responses:
-    """The responses of a scene: between the points of the `contact` (prescribed forces among its inputs),
-    and of the prescribed `force`s; None where the scene has none."""
+    """The responses of a scene, each None if the scene has none.
+
+    `contact`: between the points of the patch, with the prescribed forces among its inputs;
+    `force`: between the points of the prescribed forces.
+    """
 
     contact: Response | None = None
     force: Response | None = None
 
     @property
     def named(self) -> dict[str, Response]:
-        """Those there are."""
+        """The responses that exist, by name."""
         return {name: made for name, made in vars(self).items() if made is not None}
 
 
 @dataclass(frozen=True, kw_only=True)
 class GreensStage(Computed[Responses]):
-    """The Green's functions with their residual, and the choice of dynamic states."""
+    """The Green's functions with their residual flexibility, and the choice of dynamic states."""
 
     name: ClassVar[str] = "greens"
     static: Done[StaticState]
@@ -50,7 +53,7 @@ class GreensStage(Computed[Responses]):
     setup: Done[ContactSetup | None]
 
     def inputs(self) -> dict:
-        """The state modes and what is driven; the road only through the reach of the patch."""
+        """The states and what is driven; the road enters only through the reach of the patch."""
         scene, setup = self.job.scene, self.setup.product
         return {
             "modes": self.rotating.key,
@@ -66,12 +69,12 @@ class GreensStage(Computed[Responses]):
 
     @property
     def _stands_with_air(self) -> bool:
-        """Whether the states are first reported here: those of a standing tire alone are its modes'."""
+        """Whether states are first reported here: at rest, those without air are the modes' own."""
         return self.job.speed == 0 and has_air(self.job.scene)
 
     @property
     def _contact_forces(self) -> int:
-        """Components of the forces on the nodes of the patch."""
+        """Number of force components on the nodes of the patch."""
         return len(components(self.job)) * len(self.setup.product.patch.index)
 
     @property
@@ -82,7 +85,7 @@ class GreensStage(Computed[Responses]):
         )
 
     def compute(self, record: Record) -> Responses:
-        """All that is between the probes. Collective."""
+        """The responses between all probes. Collective."""
         rolling, wanted = self.rotating.product, self._wanted
         if self._stands_with_air:
             cavity.describe(record, rolling)
@@ -99,7 +102,7 @@ class GreensStage(Computed[Responses]):
         return responses
 
     def _whole(self, record: Record, rolling: RollingModes, points, residual: str) -> Response:
-        """The response with all its states. Collective."""
+        """The response with all states. Collective."""
         if residual == "attachment":
             with record.timing("modes once more"):
                 _ = self.fields.product
@@ -117,7 +120,7 @@ class GreensStage(Computed[Responses]):
         return made.response
 
     def _apart(self, name: str, whole: Response) -> dict[str, Response]:
-        """The contact's response, the prescribed forces among its inputs (contact.driven), and theirs."""
+        """The contact's response, with prescribed forces as inputs (contact.driven), and theirs."""
         forces, more = len(self.job.scene.force), corner.readings(self.job)
         if name == "force" or not (forces or more):
             return {name: whole}
@@ -166,10 +169,10 @@ class GreensStage(Computed[Responses]):
 
 
 def _share_of_residual(record, where: str, response: Response) -> None:
-    """How much of the static flexibility the modes lack: the truncation, were it not for the residual."""
+    """Record the largest share of the static flexibility that the modes lack (truncation error)."""
     diagonal = np.diag(response.residual)
     total = diagonal + np.diag(response.static())
-    # A point of a coarse mesh may lie on the rim, which nothing moves.
+    # A point of a coarse mesh may lie on the rim, where its flexibility is zero.
     part = np.divide(diagonal, total, out=np.zeros_like(total), where=total != 0)
     name = f"share of the residual in the static flexibility of the {where}"
     record.indicators[name] = (float(part.max()), "-")

@@ -1,4 +1,4 @@
-"""modes: the lowest modes at the static state, and the rotation matrices on them."""
+"""Stage modes: the lowest modes about the static state, and rotation matrices projected on them."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from tireroad.runs.stages.build.turning import damping_of, shapes_of
 from tireroad.runs.stages.stored import fields_file, modes_file
 from tireroad.runs.stages.stored.checkpoint import checkpointed, forget
 
-_NAMED = 8  # modes of a round tire shown by name
+_NAMED = 8  # modes of an axisymmetric tire shown by name
 
 
 @dataclass(frozen=True, kw_only=True)
 class Motions(Shared[SmallMotions]):
-    """The finite elements at the static state, for whoever needs their matrices."""
+    """The finite-element matrices about the static state, shared by all stages that need them."""
 
     name: ClassVar[str] = "motions"
     static: Done[StaticState]
 
     def make(self) -> SmallMotions:
-        """Nothing yet: matrices are made when they are asked for."""
+        """No matrices yet: each is assembled when first used."""
         tire, static, modal = self.job.tire, self.static.product, self.job.scene.modal
         rim, road = modal.rim, modal.road
         key = self.static.key, rim, road
@@ -48,14 +48,14 @@ class Motions(Shared[SmallMotions]):
 
 @dataclass(frozen=True, kw_only=True)
 class ModesStage(Computed[ModalBasis]):
-    """The standing modes."""
+    """The modes of the non-rotating tire."""
 
     name: ClassVar[str] = "modes"
     static: Done[StaticState]
     motions: Done[SmallMotions]
 
     def inputs(self) -> dict:
-        """The static state and the modal table; rotation matrices only when the wheel turns."""
+        """The static state and the modal table; rotation matrices only if the wheel turns."""
         return {
             "static": self.static.key,
             "modal": asdict(self.job.scene.modal),
@@ -66,7 +66,7 @@ class ModesStage(Computed[ModalBasis]):
 
     @property
     def _shapes(self) -> tuple[float, str] | None:
-        """The speed (rad/s) up to which shapes of turning join the modes, and by which inertia."""
+        """The speed (rad/s) up to which rotation shapes join the modes, and their inertia."""
         turning = shapes_of(self.job)
         return (up_to(turning.speed), turning.inertia) if turning else None
 
@@ -100,7 +100,7 @@ class ModesStage(Computed[ModalBasis]):
         return replace(basis, labels=labels)
 
     def produce(self, key: str, record: Record) -> ModalBasis:
-        """As any stage; fields that other members of a family will need are kept for them. Collective."""
+        """As any stage; also caches the fields for other members of a family. Collective."""
         basis = super().produce(key, record)
         if self.job.scene.greens.residual == "attachment" and basis.modes is not None:
             fields_file.keep(self.job, key, self.motions.product.operators, basis.modes)
@@ -108,7 +108,7 @@ class ModesStage(Computed[ModalBasis]):
         return basis
 
     def _teams(self, record: Record) -> int:
-        """As many teams of processes as the memory that is free holds factors. Collective."""
+        """Number of process teams: as many as free memory holds factors. Collective."""
         comm = self.job.comm
         if comm.size == 1:
             return 1
@@ -124,7 +124,7 @@ class ModesStage(Computed[ModalBasis]):
         return teams
 
     def write(self, file, product: ModalBasis) -> None:
-        """Frequencies, traces, the small matrices; not the fields on all unknowns."""
+        """Frequencies, traces and the small matrices; not the fields on all unknowns."""
         modes_file.fill(file, product, self.static.product.points)
 
     def read(self, file) -> ModalBasis:
@@ -134,7 +134,7 @@ class ModesStage(Computed[ModalBasis]):
 
 @dataclass(frozen=True, kw_only=True)
 class Fields(Shared[ModalBasis]):
-    """The modes with their fields on all unknowns: as this run solved them, of the shared cache, or once more."""
+    """The modes with fields on all unknowns: of this run, of the shared cache, or solved again."""
 
     name: ClassVar[str] = "fields"
     modes: Done[ModalBasis]
@@ -142,7 +142,7 @@ class Fields(Shared[ModalBasis]):
     air: Done[Column | None]
 
     def make(self) -> ModalBasis:
-        """Collective."""
+        """The basis with fields. Collective."""
         wanted, basis = self.job.scene.modal, self.modes.product
         if basis.modes is not None:
             return basis
@@ -186,7 +186,7 @@ def _describe(record: Record, modes: Modes) -> None:
 
 
 def _damping(given: Damping, projection: Projection) -> str:
-    """Which damping acts, in words."""
+    """The damping in use, in words."""
     if not isinstance(given, StrainEnergy):
         unused = "" if projection.loss_factor is None else "; the loss factors are not used"
         mass, stiffness = given
@@ -196,7 +196,7 @@ def _damping(given: Damping, projection: Projection) -> str:
 
 
 def _say_names(frequency: np.ndarray, labels) -> None:
-    """The lowest modes of a round tire by name, each of a pair once."""
+    """Show the lowest modes of an axisymmetric tire by name, each pair once."""
     named = zip(labels.wave, labels.section, frequency, strict=True)
     first = {(n, k): f for n, k, f in reversed(list(named)) if n >= 0}
     lowest = sorted(first.items(), key=lambda item: item[1])[:_NAMED]
@@ -205,7 +205,7 @@ def _say_names(frequency: np.ndarray, labels) -> None:
 
 
 def _labels(motions: SmallMotions, vectors: np.ndarray) -> Labels | None:
-    """Wave and section numbers of the modes without a road; None with one. Collective."""
+    """Wave and section numbers of the modes if there is no road, else None. Collective."""
     if motions.static.road_height is not None:
         return None
     body = motions.body

@@ -1,4 +1,4 @@
-"""motion: the outer face in time, at the end of a run, for films."""
+"""Stage motion: displacement of the outer face over time at the end of a run, for films."""
 
 from __future__ import annotations
 
@@ -16,14 +16,16 @@ from tireroad.runs.files.store import put
 from tireroad.runs.stages.build.forces import Forces
 from tireroad.runs.stages.build.whole_tire import WholeTire
 
-_INSTANTS = 400  # at most, the last of the run
-_PER_PERIOD = 8  # of the end of the band
+_INSTANTS = 400  # at most; the last ones of the run
+_PER_PERIOD = 8  # of the band's upper frequency
 
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """At the instants `time` (g,) s the `displacement` (g, s, 3) m of the outer face beyond its static state,
-    whose nodes are at `points` (s, 3) m. Seen by the modes: the residual flexibility at the points is not in it.
+    """Motion of the outer face at the instants `time` (g,) s.
+
+    `displacement` (g, s, 3) m from the static state, of the nodes at `points` (s, 3) m. From the
+    modes only: the residual flexibility is not included.
     """
 
     time: np.ndarray
@@ -40,12 +42,12 @@ _UNITS = {
 
 @dataclass(frozen=True, kw_only=True)
 class MotionStage(WholeTire[Motion]):
-    """The states of the modes once more under the forces of the run, which are known by now."""
+    """Integrates the states once more under the forces of the run, which are known by now."""
 
     name: ClassVar[str] = "motion"
 
     def seen(self, basis: Basis, forces: Forces) -> tuple[Motion, dict[str, tuple[float, str]]]:
-        """The outer face at the instants kept. Root process only."""
+        """The outer face at the stored instants. Root process only."""
         points = self.static.product.points
         time, q = _replayed(basis, forces, self.band)
         shape = basis.shape[: 3 * len(points)]
@@ -57,17 +59,17 @@ class MotionStage(WholeTire[Motion]):
         }
 
     def write(self, file: h5py.File, product: Motion) -> None:
-        """All there is."""
+        """All fields of the product."""
         for name, (stored, unit) in _UNITS.items():
             put(file, stored, getattr(product, name), unit)
 
     def read(self, file: h5py.File) -> Motion:
-        """The same."""
+        """The same, read back."""
         return Motion(**{name: file[stored][:] for name, (stored, _) in _UNITS.items()})
 
 
 def _replayed(basis: Basis, forces: Forces, top: float) -> tuple[np.ndarray, np.ndarray]:
-    """Instants (g,) s, and the coordinates (g, m) at them."""
+    """Instants (g,) s, and the modal coordinates (g, m) at them."""
     unit = np.eye(basis.coordinates)
     response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
     tire = Recursion(response=response, step=forces.step, scheme="linear", comm=MPI.COMM_SELF)

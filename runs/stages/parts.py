@@ -23,4 +23,4 @@ PARTS: tuple[type[Part], ...] = (
     MotionStage,
 )
 
-"""Each takes, by name, what stands before it."""
+"""Each takes its inputs by name from the parts before it."""

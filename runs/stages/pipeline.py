@@ -1,4 +1,4 @@
-"""The stages in order: what is reused, what is computed, what is skipped, and what each cost."""
+"""Runs the stages in order: each is reused, computed or skipped, and its cost is recorded."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from tireroad.runs.stages.stored.obtained import obtained
 
 @dataclass(frozen=True)
 class Finished:
-    """What a run leaves in memory: its `job`, and what is `done` by the names of the parts."""
+    """What a run leaves in memory: its `job`, and the parts that are `done`, by name."""
 
     job: Job
     done: Mapping[str, Done]
@@ -51,12 +51,12 @@ class Finished:
 
     @property
     def motions(self) -> SmallMotions:
-        """The matrices at the static state."""
+        """The matrices about the static state."""
         return self.done["motions"].product
 
     @property
     def wheel(self) -> Wheel:
-        """The full matrices as the wheel turns."""
+        """The full matrices of the rotating wheel."""
         return self.done["wheel"].product
 
     @property
@@ -66,17 +66,17 @@ class Finished:
 
     @property
     def fields(self) -> ModalBasis:
-        """The standing modes, on all unknowns too."""
+        """The standing modes with their fields on all unknowns."""
         return self.done["fields"].product
 
     @property
     def rolling(self) -> RollingModes:
-        """The states of the tire as it turns."""
+        """The states of the rotating tire."""
         return self.done["rotating"].product
 
     @property
     def greens(self) -> Responses:
-        """Its responses between the points of the scene."""
+        """The responses between the points of the scene."""
         return self.done["greens"].product
 
 
@@ -90,19 +90,19 @@ def run_scene(
     petsc_options: list[str],
     cache: Cache = NO_CACHE,
 ) -> Finished:
-    """Run the stages a scene needs into the directory; what they left in memory. Collective.
+    """Run the stages of a scene into `directory`; returns their products. Collective.
 
     `cache`: finished stages shared with other runs, by default none.
     """
-    forget_peak()  # of a member of a sweep before, in the same process
+    forget_peak()  # of an earlier member of a sweep in the same process
     job = Job(scene, directory, comm, fresh, cache)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
     if scene.road is not None:
-        # A road file that cannot be used should be reported before hours of solving, not after.
+        # Report an unusable road file before hours of solving, not after.
         share(scene.road.surface, comm)
         on_root(comm, lambda: check_road(scene))
-    wanted = on_root(comm, lambda: estimate(scene, until))  # it may read the road's file
+    wanted = on_root(comm, lambda: estimate(scene, until))  # may read the road's file
     on_disk = on_root(comm, lambda: out_of_core(wanted, comm.size))
     each = 1e-9 * sum(memory_of(wanted, comm.size, on_disk).values()) / comm.size
     _say_demand(wanted, each, directory, comm)
@@ -121,7 +121,7 @@ def run_scene(
 
 
 def _parts(job: Job, reasons: Mapping[str, str], summary: Summary) -> dict[str, Done]:
-    """What each part of the pipeline leaves, by its name. Collective."""
+    """The product of each part of the pipeline, by name. Collective."""
     done: dict[str, Done] = {}
     for kind in PARTS:
         if (found := _done(job, kind, done, reasons, summary)) is not None:
@@ -132,7 +132,7 @@ def _parts(job: Job, reasons: Mapping[str, str], summary: Summary) -> dict[str, 
 
 @contextmanager
 def _factors(on_disk: bool, directory: Path, comm: MPI.Comm) -> Iterator[None]:
-    """While inside, factors are `on_disk`. Collective."""
+    """Within the context, factors are kept on disk if `on_disk`. Collective."""
     if not on_disk:
         yield
         return
@@ -143,7 +143,10 @@ def _factors(on_disk: bool, directory: Path, comm: MPI.Comm) -> Iterator[None]:
 
 
 def _say_demand(wanted: Estimate, each: float, directory: Path, comm: MPI.Comm) -> None:
-    """What the run will take, `each` process so many GB; InputError where the machine has too little by far. Collective."""
+    """Announce the estimated demand, `each` process in GB.
+
+    Raises InputError if the machine has far too little. Collective.
+    """
     for text in on_root(comm, lambda: check_demand(wanted, directory, comm.size)):
         observe.warn(text)
     observe.say(
@@ -154,7 +157,7 @@ def _say_demand(wanted: Estimate, each: float, directory: Path, comm: MPI.Comm) 
 
 
 def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done | None:
-    """What a part of the pipeline adds to what is done; None where it adds nothing. Collective."""
+    """The result of one part of the pipeline; None if it has none. Collective."""
     if issubclass(kind, Stage) and kind.name in reasons:
         reason = reasons[kind.name]
         observe.say(f"{kind.name:9s} skipped: {reason}")
@@ -167,7 +170,7 @@ def _done(job: Job, kind: type[Part], done, reasons, summary: Summary) -> Done |
 
 
 def _run(stage: Stage, summary: Summary) -> Done:
-    """The stage's product, with a word on where it comes from and what it cost. Collective."""
+    """The stage's product; reports where it comes from and what it cost. Collective."""
     job, name = stage.job, stage.name
     began = time.perf_counter()
     found = obtained(stage)
@@ -188,12 +191,12 @@ def _run(stage: Stage, summary: Summary) -> Done:
 
 
 def _peak(comm: MPI.Comm) -> float:
-    """Largest resident memory of any process since it began, GB. Collective."""
+    """Largest resident memory of any process since its start (forget_peak), GB. Collective."""
     return 1e-9 * comm.allreduce(peak_memory(), MPI.MAX)
 
 
 def _report(directory: Path, summary: Summary) -> None:
-    """Root process only. The entry comes first: the page shows itself too."""
+    """Write the report; its summary entry comes first, as the page lists it. Root process only."""
     from tireroad.runs.report.page import remarks, write_report
 
     began = time.perf_counter()
@@ -207,14 +210,14 @@ def _report(directory: Path, summary: Summary) -> None:
 
 
 def _check_options(petsc_options: list[str]) -> None:
-    """An option that nothing read is most likely misspelt: say so."""
+    """Warn of options that PETSc never read: most likely they are misspelt."""
     unused = [o for o in petsc_options if o.startswith("-") and not _was_read(o.lstrip("-"))]
     if unused:
         observe.warn(f"PETSc options that nothing read: {' '.join(unused)}")
 
 
 def _was_read(name: str) -> bool:
-    """Whether PETSc has looked for an option; petsc4py tells it from 3.19 on."""
+    """Whether PETSc has read an option; petsc4py offers this from 3.19 on."""
     import ctypes
 
     from petsc4py import PETSc

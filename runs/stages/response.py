@@ -1,4 +1,4 @@
-"""response: prescribed point forces on the tire, in time and in frequency, and the scene's own outputs."""
+"""Stage response: prescribed point forces in time and frequency, and the scene's outputs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class PointResponse:
 
 @dataclass(frozen=True, kw_only=True)
 class ResponseStage(Computed[PointResponse]):
-    """What the prescribed forces do, alone or in contact."""
+    """The response to the prescribed forces, alone or together with contact."""
 
     name: ClassVar[str] = "response"
     static: Done[StaticState]
@@ -41,7 +41,7 @@ class ResponseStage(Computed[PointResponse]):
     contact: Done[ContactHistory] | None = None
 
     def inputs(self) -> dict:
-        """The Green's functions, the forces, the time and what is read in frequency."""
+        """The Green's functions, the forces, the time and the frequency outputs."""
         scene, output = self.job.scene, self.job.scene.output
         return {
             "greens": self.greens.key,
@@ -53,7 +53,7 @@ class ResponseStage(Computed[PointResponse]):
         }
 
     def compute(self, record: Record) -> PointResponse:
-        """Integrate, then what the scene's outputs make of it. Collective."""
+        """Integrate in time, then add the scene's outputs. Collective."""
         seen = Driven(
             job=self.job,
             static=self.static.product,
@@ -75,17 +75,17 @@ class ResponseStage(Computed[PointResponse]):
         return PointResponse(curves)
 
     def write(self, file, product: PointResponse) -> None:
-        """Curve by curve."""
+        """One dataset per curve."""
         for name, (values, unit) in product.curves.items():
             put(file, name, values, unit)
 
     def read(self, file) -> PointResponse:
-        """The same, without those in groups of their own."""
+        """The same, without curves in subgroups."""
         datasets = {name: d for name, d in file.items() if hasattr(d, "shape")}
         return PointResponse({name: (d[:], d.attrs["unit"]) for name, d in datasets.items()})
 
     def _in_contact(self, record: Record, history: ContactHistory) -> Curves:
-        """What the contact loop found at the driven points, contact included."""
+        """The contact loop's results at the driven points."""
         if history.driven is None:
             return {"time": (history.time, "s")}
         largest = float(np.abs(history.driven).max())
@@ -100,15 +100,16 @@ class ResponseStage(Computed[PointResponse]):
         return curves
 
     def _integration(self, record: Record, seen: Driven) -> Integration:
-        """Step and scheme of given forces. Collective."""
+        """Step and scheme for prescribed forces. Collective."""
         scene = self.job.scene
         plan = planned(self.job, record, seen.whole, shortest_period(scene.force))
-        # Given forces have no contact to chatter: linear over the step is of the higher order.
+        # Prescribed forces have no contact that could chatter: linear over the step has the higher
+        # order.
         scheme = "linear" if scene.time.scheme == "auto" else scene.time.scheme
         return integration(self.job, plan, scheme)
 
     def _in_time(self, record: Record, seen: Driven) -> Curves:
-        """Displacements and axle force of the prescribed forces. Collective."""
+        """Displacements and axle force under the prescribed forces. Collective."""
         scene, chosen, force = self.job.scene, seen.integration, seen.force()
         displacement, axle, moment = self._marched(record, seen, force)
         record.headline |= {
@@ -121,13 +122,16 @@ class ResponseStage(Computed[PointResponse]):
             "force": (force, "N"),
             "displacement": (displacement.reshape(len(force), -1, 3), "m"),
         }
-        if scene.output.axle_force and scene.modal.rim != "free":  # else nothing holds the axle
+        if scene.output.axle_force and scene.modal.rim != "free":  # a free axle carries no force
             curves["axle_force"] = axle, "N"
             curves |= {"hub_moment": (moment, "N m")} if moment.size else {}
         return curves
 
     def _marched(self, record: Record, seen: Driven, force: np.ndarray) -> tuple:
-        """Displacement (nt, 3 k), axle force (nt, 3) and moments on the hub (nt, 3 or 0) under forces (nt, k). Collective."""
+        """Time integration under forces (nt, k).
+
+        Returns displacement (nt, 3 k), axle force (nt, 3) and hub moments (nt, 3 or 0). Collective.
+        """
         tire, direction = seen.integration.tire, directions(self.job.scene.force)
         displacement, axle = np.zeros((len(force), len(tire.same_step))), np.zeros((len(force), 3))
         tire.start(force[0])

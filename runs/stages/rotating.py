@@ -1,4 +1,4 @@
-"""rotating: the second eigenproblem, on the modal basis or on the finite elements."""
+"""Stage rotating: eigenproblem of the rotating tire, on the modal basis or the finite elements."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tireroad.runs.stages.stored import states_file
 
 @dataclass(frozen=True, kw_only=True)
 class FullMatrices(Shared[Wheel]):
-    """The full matrices of the tire as the wheel turns."""
+    """The full matrices of the rotating wheel."""
 
     name: ClassVar[str] = "wheel"
     motions: Done[SmallMotions]
@@ -38,7 +38,7 @@ class FullMatrices(Shared[Wheel]):
     air: Done[Column | None]
 
     def make(self) -> Wheel:
-        """Collective."""
+        """Assemble them. Collective."""
         turning, projection = turning_of(self.job), None
         if isinstance(turning.damping, StrainEnergy):
             projection = self.modes.product.projection
@@ -48,7 +48,7 @@ class FullMatrices(Shared[Wheel]):
 
 @dataclass(frozen=True, kw_only=True)
 class RotatingStage(Computed[RollingModes]):
-    """The states of the rolling tire; of a wheel that stands they are the modes' own."""
+    """The states of the rolling tire; for a wheel at rest, those of the modes."""
 
     name: ClassVar[str] = "rotating"
     modes: Done[ModalBasis]
@@ -56,14 +56,14 @@ class RotatingStage(Computed[RollingModes]):
 
     @classmethod
     def instead(cls, job: Job, done: Mapping[str, Done]) -> Done[RollingModes] | None:
-        """The wheel stands: the states follow from the modes by a closed formula."""
+        """For a wheel at rest, the states follow from the modes in closed form."""
         if "modes" not in done or job.speed:
             return None
         modes = done["modes"]
         return Done(modes.key, lambda: rolling_modes(modes.product, turning_of(job), job.comm))
 
     def inputs(self) -> dict:
-        """The modes, the damping, the speed and the inertia; how many states only where it counts."""
+        """The modes, damping, speed and inertia; the number of states only for the full method."""
         wanted, turning = self.job.scene.rotation, turning_of(self.job)
         return {
             "modes": self.modes.key,
@@ -76,7 +76,7 @@ class RotatingStage(Computed[RollingModes]):
         }
 
     def compute(self, record: Record) -> RollingModes:
-        """Solve on the root process, share, check. Collective."""
+        """Solve on the root process, share with all, check. Collective."""
         job, basis = self.job, self.modes.product
         with record.timing("eigensolver"):
             rolling = rolling_modes(basis, turning_of(job), job.comm)
@@ -97,7 +97,7 @@ class RotatingStage(Computed[RollingModes]):
         return replace(rolling, campbell=self._campbell(record))
 
     def _full(self, record: Record, projected: RollingModes) -> RollingModes:
-        """The states of the finite elements, in the place of the projected ones. Collective."""
+        """The states of the finite elements, which replace the projected ones. Collective."""
         wheel, wanted = self.wheel.product, self.job.scene.rotation
         with record.timing("full eigensolver"):
             matrices = wheel.rotating_damping, wheel.rotating_stiffness
@@ -109,7 +109,7 @@ class RotatingStage(Computed[RollingModes]):
         return found
 
     def _campbell(self, record: Record) -> Campbell | None:
-        """Branches of eigenvalues over speed, where the scene asks for them. Collective."""
+        """Eigenvalue branches over speed, if the scene asks for them. Collective."""
         wanted, turning = self.job.scene.rotation.campbell, turning_of(self.job)
         if wanted is None:
             return None
@@ -128,11 +128,11 @@ class RotatingStage(Computed[RollingModes]):
         return lines
 
     def write(self, file, product: RollingModes) -> None:
-        """The states, the fields of full ones, the branches over speed."""
+        """The states, the fields of full states, the branches over speed."""
         _fill(file, product)
 
     def read(self, file) -> tuple[StateModes, dict]:
-        """The states, and fields of their own, shape and momentum, where they have them."""
+        """The states and, for full states, their own fields: shape and momentum."""
         states = states_file.read(file)
         if "basis" not in file:
             return states, {}
@@ -152,7 +152,7 @@ class RotatingStage(Computed[RollingModes]):
 
 
 def _beyond(speed: float, critical: float) -> str:
-    """What to say of a speed beyond the critical one (rad/s)."""
+    """Warning of a speed beyond the critical speed (rad/s)."""
     return (
         f"rotation.speed = {speed:g} rad/s lies beyond the tire's critical speed of {critical:.4g} "
         "rad/s, at which a wave is stationary on the road and grows without bound: the results have "
@@ -184,13 +184,13 @@ def _describe(record: Record, rolling: RollingModes, critical: float) -> None:
 
 
 def _growth(job: Job, rolling: RollingModes, basis: ModalBasis) -> str:
-    """What to say of a tire whose motion grows. Collective."""
+    """Warning of an unstable tire. Collective."""
     states, turning = rolling.states, rolling.turning
     given = turning.damping, turning.inertia
 
     def first() -> float:
         if not growth(basis.projection, turning.speed, *given):
-            return turning.speed  # only the full problem has it
+            return turning.speed  # only the full problem is unstable
         return onset(basis.projection, *given, turning.speed)
 
     return (

@@ -1,4 +1,4 @@
-"""spectra: contact and axle force in frequency."""
+"""Stage spectra: contact and axle force over frequency."""
 
 from __future__ import annotations
 
@@ -22,20 +22,21 @@ from tireroad.runs.stages.build.rolling.run_in import first_step, run_in
 from tireroad.runs.stages.stored import levels
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
-_FEWEST = 32  # steps of which a spectrum says anything
+_FEWEST = 32  # fewest steps for a meaningful spectrum
 
-ROUNDING = 1e-12  # of the largest line: what is below is none
+ROUNDING = 1e-12  # relative to the largest line: anything below is rounding
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spectra:
-    """Complex amplitudes over `frequency` (f,) Hz of the `contact_force` and, where it is kept, of the
-    `axle_force`, (f, 3) N; third octaves: band `centre` (b,) Hz, `level` of the axle force and
-    `contact_level` (b, 3) dB re 1 N, with their estimated errors `level_error` and `contact_level_error` dB,
-    NaN where unknown, None where they were not wanted. The first `left_out` s of the run, its run-in, are not in them, nor
-    is anything beyond the `limit` of the model. `wheel`: the moments on the hub and the motions
-    of a wheel that moves, (f, 3) or (f, 1), by the names of runs.stages.build.corner. `levels`: third octaves of all that the run tells, and
-    densities, by the names of runs.stages.stored.levels.
+    """Spectra of a run after its run-in, up to the model's frequency limit.
+
+    `frequency` (f,) Hz; `contact_force` and, if stored, `axle_force` (f, 3) N: complex amplitudes;
+    `left_out` s: the run-in; `limit`: where the model ends; `levels`: third octaves and densities
+    by the names of runs.stages.stored.levels; `level_error` and `contact_level_error` (b, 3) dB:
+    estimated errors of the third octaves of axle and contact force, NaN where unknown, None if not
+    requested; `wheel`: hub moments and motions of a moving wheel, (f, 3) or (f, 1), by the names of
+    runs.stages.build.corner.
     """
 
     frequency: np.ndarray
@@ -60,7 +61,7 @@ _UNITS = {
 
 @dataclass(frozen=True, kw_only=True)
 class SpectraStage(Computed[Spectra]):
-    """From the history of the contact, after the run-in."""
+    """Spectra of the contact history after the run-in."""
 
     name: ClassVar[str] = "spectra"
     contact: Done[ContactHistory]
@@ -69,11 +70,11 @@ class SpectraStage(Computed[Spectra]):
     accuracy: Done[Accuracy] | None = None
 
     def inputs(self) -> dict:
-        """The contact forces: the length of road that is left out as run-in is in them, and the modes."""
+        """The contact forces, whose key covers modes and run-in length, and the error bars."""
         return {"contact": self.contact.key, "bars": self.accuracy.key if self.accuracy else None}
 
     def compute(self, record: Record) -> Spectra:
-        """Not collective."""
+        """The spectra. Not collective."""
         history = self.contact.product
         start, step = self._after_run_in(record, history.time), history.step
         total = history.total_force[start:]
@@ -114,7 +115,7 @@ class SpectraStage(Computed[Spectra]):
         )
 
     def _limit(self, record: Record, step: float) -> Limit:
-        """Where the model ends, with what sets it."""
+        """The lowest frequency limit of the model, with its cause."""
         found = all_limits(self.setup.product, self.rotating.product, step)
         limit = lowest(found)
         record.headline["an answer up to"] = (limit.frequency, "Hz")
@@ -130,7 +131,8 @@ class SpectraStage(Computed[Spectra]):
     def _after_run_in(self, record: Record, time: np.ndarray) -> int:
         """First step with the whole patch beyond the run-in.
 
-        0, and a warning, when that takes half the run or more: what is left would resolve too little.
+        0, with a warning, if that would drop half the run or more: too little would be left to
+        resolve.
         """
         setup, road = self.setup.product, self.job.scene.road
         start, needed = first_step(setup, road, time), run_in(setup, road)
@@ -144,7 +146,7 @@ class SpectraStage(Computed[Spectra]):
         return 0
 
     def write(self, file, product: Spectra) -> None:
-        """All there is."""
+        """All fields of the product."""
         for name, (stored, unit) in _UNITS.items():
             if getattr(product, name) is not None:
                 put(file, stored, getattr(product, name), unit)
@@ -161,7 +163,7 @@ class SpectraStage(Computed[Spectra]):
         file.attrs["limit_cause"] = product.limit.cause
 
     def read(self, file) -> Spectra:
-        """The same."""
+        """The same, read back."""
         kept = {name: file[stored][:] for name, (stored, _) in _UNITS.items() if stored in file}
         limit = Limit(float(file.attrs["limit"]), str(file.attrs["limit_cause"]))
         wheel = {name: file[name][:] for name in corner.UNITS if name in file}
@@ -172,7 +174,7 @@ class SpectraStage(Computed[Spectra]):
 
 
 def _largest(record: Record, frequency: np.ndarray, axle: np.ndarray) -> None:
-    """The largest line of the vertical axle force, away from the mean; none of a tire that stands still."""
+    """Record the largest line of the vertical axle force away from the mean, if there is any."""
     band = np.arange(min(3, len(frequency)), len(frequency))
     if np.abs(axle[band, 2]).max(initial=0.0) > ROUNDING * np.abs(axle[:, 2]).max(initial=0.0):
         peak = band[np.abs(axle[band, 2]).argmax()]

@@ -1,4 +1,4 @@
-"""static: inflate the tire, press it on the road."""
+"""Stage static: inflates the tire and presses it on the road."""
 
 from __future__ import annotations
 
@@ -29,14 +29,13 @@ from tireroad.runs.stages.build.turning import friction_of, rolling_shape, turni
 from tireroad.runs.stages.stored import cords_file, friction_file, static_file
 from tireroad.runs.stages.stored.checkpoint import checkpointed, forget
 
-_SPEEDS, _SAME_SPEED = 6, 1e-6  # solutions at a travel speed at most, and when they agree
+_SPEEDS, _SAME_SPEED = 6, 1e-6  # most solutions at a travel speed, and when two speeds agree
 _EXTENT = "length", "width", "area"
-COARSE = 0.02  # estimated error of the load above which the user is warned
+COARSE = 0.02  # estimated relative error of the load above which the user is warned
 
 
 def steady_rolling(job: Job, speed: float | None = None) -> Rolling:
-    """The steady rolling that the static state is computed for, at `speed` (rad/s) or the job's; at rest where
-    the scene wants that."""
+    """Steady rolling in statics, at `speed` (rad/s) or the job's; at rest if the scene says so."""
     scene = job.scene
     speed = job.speed if speed is None else speed
     if not scene.static.steady_rolling or speed == 0:
@@ -46,14 +45,14 @@ def steady_rolling(job: Job, speed: float | None = None) -> Rolling:
 
 @dataclass(frozen=True, kw_only=True)
 class StaticStage(Computed[StaticState]):
-    """The tire inflated, and pressed on the road where the scene has one."""
+    """The tire inflated and, if the scene has a road, pressed on it."""
 
     name: ClassVar[str] = "static"
     forgets: ClassVar[bool] = True
-    """Whether what an earlier run of the family left makes room: it belongs to another state."""
+    """Whether matrices kept from a family's earlier run are discarded: they are another state's."""
 
     def inputs(self) -> dict:
-        """The tire without its air, the static loads, and the rolling terms where they take part."""
+        """The tire without its air, the static loads, and the rolling terms if they act."""
         scene, rotation = self.job.scene, self.job.scene.rotation
         return {
             "tire": {k: v for k, v in asdict(scene.tire).items() if k != "cavity"},
@@ -66,7 +65,10 @@ class StaticStage(Computed[StaticState]):
         }
 
     def compute(self, record: Record) -> StaticState:
-        """The scene's state, at a travel speed again until the wheel's speed is that of its radius. Collective."""
+        """The scene's static state. Collective.
+
+        At a travel speed it is solved again until the wheel's speed matches its rolling radius.
+        """
         with checkpointed(self, "solution(s)") as journal:
             journal.agreed(self.job.comm)
             return self._concluded(record, *self._at_speed(record, History(journal)))
@@ -85,7 +87,7 @@ class StaticStage(Computed[StaticState]):
         return state, loader
 
     def _concluded(self, record: Record, state: StaticState, loader: Loader) -> StaticState:
-        """The state with its footprint as finer elements tell it; figures, and the error of its load. Collective."""
+        """Add error estimate and the finer elements' footprint; record the figures. Collective."""
         if self.job.scene.static.error_estimate and state.load:
             with record.timing("error estimate"):
                 state = _estimate(record, state, loader)
@@ -96,7 +98,7 @@ class StaticStage(Computed[StaticState]):
         return state
 
     def _solved(self, record: Record, speed: float, history: History) -> tuple[StaticState, Loader]:
-        """Load steps up to the state at `speed` rad/s. Collective."""
+        """Solve in load steps up to the state at `speed` rad/s. Collective."""
         rolling = steady_rolling(self.job, speed)
         with record.timing("mesh and forms"):
             equilibrium = Equilibrium(self.job.tire.body, rolling, road_shape(self.job.scene))
@@ -117,14 +119,14 @@ class StaticStage(Computed[StaticState]):
         return static_state(pressed.equilibrium, loader.touch), loader
 
     def _press(self, loader: Loader, rolling: Rolling) -> Loader:
-        """Inflate the tire and press it on the road; the loader of the state found. Collective."""
+        """Inflate the tire and press it on the road; returns the final loader. Collective."""
         wanted = self.job.scene.static
         loader.inflate(wanted.inflation)
         placed = wanted.load, wanted.deflection, wanted.road_height
         return place(loader, *placed, friction_of(self.job.scene, rolling))
 
     def _keep_last(self, loader: Loader) -> str:
-        """Write the last state that converged, if any did; a sentence that says where. Collective."""
+        """Write the last converged state, if any; returns a sentence saying where. Collective."""
         if not self.job.comm.allreduce(float(np.abs(loader.body.u.x.array).sum())):
             return ""
         job, last = self.job, self.job.path("static_last")
@@ -142,7 +144,7 @@ class StaticStage(Computed[StaticState]):
             )
 
     def produce(self, key: str, record: Record) -> StaticState:
-        """As any stage; the last state of a run that failed is of no use then. Collective."""
+        """As any stage; also removes the last state of an earlier, failed run. Collective."""
         if self.forgets:
             kept.forget()
         product = super().produce(key, record)
@@ -151,7 +153,7 @@ class StaticStage(Computed[StaticState]):
         return product
 
     def write(self, file, product: StaticState) -> None:
-        """Mesh, displacement, the outer face, the footprint."""
+        """Mesh, displacement, outer face and footprint."""
         static_file.fill(file, product, self.job.tire)
 
     def read(self, file) -> StaticState:
@@ -183,8 +185,8 @@ def _extent(attributes) -> Footprint:
 
 
 def _estimate(record: Record, state: StaticState, loader: Loader) -> StaticState:
-    """Print and keep how far the load is from that of finer elements; the state with their footprint. Collective."""
-    if state.pull is not None:  # of the state without friction: its load errs as that with it does
+    """Report the load error from finer elements; returns the state, their footprint. Collective."""
+    if state.pull is not None:  # estimated without friction: the load's error is the same with it
         loader.equilibrium.solve(loader.equilibrium.road_height)
     found = load_error(loader, state.rolling)
     if isinstance(found, str):

@@ -1,4 +1,4 @@
-"""stiffness: load over deflection with the footprint at each, and the stiffness of the standing tire."""
+"""Stage stiffness: load and footprint over deflection, stiffness of the non-rolling tire."""
 
 from __future__ import annotations
 
@@ -47,8 +47,10 @@ _FIGURES = {
 
 @dataclass(frozen=True)
 class Stiffness:
-    """`curve`: arrays (k,) over the deflections by the names of the file; `figures` of one state by name;
-    `matrix` (6, 6) of the stuck footprint, None where it was not asked for; `slides` with friction, by axis.
+    """Stiffness of the tire.
+
+    `curve`: arrays (k,) over the deflections, named as in the file; `figures` of one state by name;
+    `matrix` (6, 6) of the stuck footprint, None if not requested; `slides` with friction, by axis.
     """
 
     curve: dict[str, np.ndarray]
@@ -59,17 +61,17 @@ class Stiffness:
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessStage(Computed[Stiffness]):
-    """From the undeformed tire up the curve, and about the scene's own state."""
+    """The load curve from the undeformed tire, and the stiffness about the scene's own state."""
 
     name: ClassVar[str] = "stiffness"
     static: Done[StaticState]
 
     def inputs(self) -> dict:
-        """The static state, which knows the wheel's slip, and the table."""
+        """The static state, which includes the wheel's slip, and the table [stiffness]."""
         return {"static": self.static.key, "stiffness": asdict(self.job.scene.stiffness)}
 
     def compute(self, record: Record) -> Stiffness:
-        """The body is put back to the static state. Collective."""
+        """Compute; the body is put back to the static state afterwards. Collective."""
         state, wanted = self.static.product, self.job.scene.stiffness
         body = self.job.tire.body
         body.set_displacement(state.displacement)
@@ -94,21 +96,21 @@ class StiffnessStage(Computed[Stiffness]):
         return found
 
     def _stuck(self, record: Record, nodes: np.ndarray, centre: np.ndarray) -> RoadStiffness:
-        """Stiffness of the present footprint, of this process's `nodes`. Collective."""
+        """Stiffness of the present footprint; `nodes` are this process's own. Collective."""
         inflation = self.job.scene.static.inflation
         with record.timing("stuck footprint"):
             rolling = steady_rolling(self.job)
             return road_stiffness(self.job.tire.body, inflation, nodes, centre, rolling)
 
     def _slides(self, record: Record, stuck: RoadStiffness | None) -> Mapping[str, sliding.Curve]:
-        """Force over the way of the road with friction, of a scene that has some. Collective."""
+        """Force over road displacement with friction, if the scene has friction. Collective."""
         if stuck is None:
             return {}
         with record.timing("sliding"):
             return sliding.slides(self.job, self.static.product, stuck)
 
     def _curve(self, record: Record) -> tuple[list[CurvePoint], np.ndarray]:
-        """The points of the curve, and the last forces on own nodes, N. Collective."""
+        """The points of the curve, and the last contact forces on own nodes, N. Collective."""
         body, state = self.job.tire.body, self.static.product
         body.u.x.array[:] = 0.0
         with record.timing("mesh and forms"):
@@ -132,7 +134,7 @@ class StiffnessStage(Computed[Stiffness]):
         return points, equilibrium.contact_force()
 
     def write(self, file, product: Stiffness) -> None:
-        """The curve by columns, the figures, the matrix."""
+        """The curve column by column, the figures, the matrix."""
         for name, unit in _CURVE.items():
             put(file, f"curve/{name}", product.curve[name], unit)
         for name, value in product.figures.items():
@@ -142,7 +144,7 @@ class StiffnessStage(Computed[Stiffness]):
         sliding.fill(file, product.slides, self.static.product.travel is not None)
 
     def read(self, file) -> Stiffness:
-        """The same back."""
+        """The same, read back."""
         return Stiffness(
             {name: file[f"curve/{name}"][:] for name in _CURVE},
             {name: float(file[name][()]) for name in _FIGURES if name in file},
@@ -152,7 +154,7 @@ class StiffnessStage(Computed[Stiffness]):
 
 
 def _own(state: StaticState) -> float | None:
-    """Deflection of the scene's own state, m."""
+    """Deflection of the scene's own state, m; None without a road."""
     return state.deflection
 
 
@@ -174,11 +176,11 @@ def _result(points: list[CurvePoint], state: StaticState, stuck: RoadStiffness |
 
 
 def _vertical(curve: dict[str, np.ndarray], state: StaticState) -> tuple[float, float]:
-    """(load, slope) at the scene's own state, a point of the curve too, or at the curve's last."""
+    """(load, slope) at the scene's own state, added to the curve, or at the curve's last point."""
     own = _own(state)
     if own is None:
         return float(curve["load"][-1]), float(curve["stiffness"][-1])
-    # Points closer than the curve's own steps would make waves of rounding.
+    # Points much closer than the curve's own steps would turn rounding into waves.
     apart = np.abs(curve["deflection"] - own) > 0.05 * own
     deflection = np.append(curve["deflection"][apart], own)
     load = np.append(curve["load"][apart], state.load)

@@ -1,4 +1,4 @@
-"""vibration: the whole tire in frequency, under the forces of the run."""
+"""Stage vibration: the whole tire over frequency, under the forces of the run."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from tireroad.runs.stages.build.forces import Forces
 from tireroad.runs.stages.build.whole_tire import WholeTire
 from tireroad.runs.stages.spectra import Spectra
 
-VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: references of the levels, ISO 1683
-_LARGEST = 2e8  # bytes of displacement fields kept
-HANN = 1.5  # lines of its window that share what one sine holds: mean of w^2 over the square of its mean
+VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: reference values of the levels, ISO 1683
+_LARGEST = 2e8  # bytes: largest size of the stored displacement fields
+HANN = 1.5  # noise bandwidth of the window in lines: mean of w^2 over the square of its mean
 
 
 @dataclass(frozen=True, kw_only=True)
 class Vibration:
-    """On the outer face, up to the band of the Green's functions.
+    """Vibration of the outer face, up to the model's frequency limit.
 
-    `frequency` (f,) Hz; `velocity` (f,) m2/s2, mean square normal to the surface, of each line; `centre` (b,) Hz
-    with the third-octave `velocity_level` dB re 1 nm/s and `power_level` dB re 1 pW, and both A-weighted,
-    `velocity_weighted` and `weighted` (b,).
-    `shapes_at` (g,) Hz: the lines whose `displacement` (g, s, 3) m, complex amplitudes at the `points` (s, 3) m,
-    is kept: all, or the strongest that fit in 200 MB.
+    `frequency` (f,) Hz; `velocity` (f,) m2/s2: mean square normal velocity per line; `centre` (b,)
+    Hz with the third-octave `velocity_level` dB re 1 nm/s and `power_level` dB re 1 pW, and both
+    A-weighted, `velocity_weighted` and `weighted` (b,). `shapes_at` (g,) Hz: the lines whose
+    `displacement` (g, s, 3) m, complex amplitudes at the `points` (s, 3) m, is stored: all lines,
+    or the strongest that fit in 200 MB.
     """
 
     frequency: np.ndarray
@@ -63,17 +63,17 @@ _UNITS = {
 
 @dataclass(frozen=True, kw_only=True)
 class VibrationStage(WholeTire[Vibration]):
-    """By the states of the modes, after the run-in."""
+    """From the states of the modes, after the run-in."""
 
     name: ClassVar[str] = "vibration"
     spectra: Done[Spectra] | None = None
 
     def inputs(self) -> dict:
-        """The spectra's too: the run-in and the end of the model are theirs."""
+        """Also the spectra, which set the run-in and the model's frequency limit."""
         return super().inputs() | {"spectra": self.spectra.key if self.spectra else None}
 
     def seen(self, basis: Basis, forces: Forces) -> tuple[Vibration, dict[str, tuple[float, str]]]:
-        """The outer face line by line. Root process only."""
+        """The vibration of the outer face, line by line. Root process only."""
         state = self.static.product
         left_out = self.spectra.product.left_out if self.spectra else 0.0
         frequency, a = self._coordinates(basis, forces, left_out)
@@ -84,7 +84,7 @@ class VibrationStage(WholeTire[Vibration]):
     def _coordinates(
         self, basis: Basis, forces: Forces, left_out: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Lines (f,) Hz up to the end of the model, and a (f, m) at them. Root process only."""
+        """Lines (f,) Hz to the model's limit, and coordinates a (f, m) there. Root process only."""
         start = round(left_out / forces.step)
         pushed = np.concatenate(list(forces.pushes(start)))
         frequency, amplitude = amplitudes(pushed, forces.step)
@@ -93,22 +93,22 @@ class VibrationStage(WholeTire[Vibration]):
         return frequency[below], coordinates(basis.states, amplitude[below], frequency[below])
 
     def write(self, file: h5py.File, product: Vibration) -> None:
-        """All there is."""
+        """All fields of the product."""
         for name, (stored, unit) in _UNITS.items():
             put(file, stored, getattr(product, name), unit)
 
     def read(self, file: h5py.File) -> Vibration:
-        """The same."""
+        """The same, read back."""
         return Vibration(**{name: file[stored][:] for name, (stored, _) in _UNITS.items()})
 
 
 def _seen(
     shape: np.ndarray, surface: Surface, state: StaticState, frequency: np.ndarray, a: np.ndarray
 ) -> Vibration:
-    """What the coordinates `a` (f, m) mean on the outer face, whose shapes are (3 s, m)."""
+    """The vibration of the outer face for coordinates `a` (f, m) on the shapes (3 s, m)."""
     own = a[:, : shape.shape[1]]
     velocity = mean_square_velocity(own, surface.gram(shape), surface.area, frequency)
-    # Amplitudes are scaled to show a sine whole: of a band of lines each holds as much too much.
+    # Amplitudes are scaled to show a sine in full; summed over a band, each line counts HANN times.
     lines = velocity / HANN
     centre, square = band_sums(frequency, lines)
     _, weighted = band_sums(frequency, lines * 10 ** (a_weighting(frequency) / 10))
@@ -130,12 +130,12 @@ def _seen(
 
 
 def _level(square: np.ndarray, reference: float) -> np.ndarray:
-    """dB."""
+    """Level in dB."""
     return 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference)
 
 
 def _headline(found: Vibration, surface: Surface) -> dict[str, tuple[float, str]]:
-    """The sums over all bands."""
+    """Totals over all bands."""
 
     def total(level: np.ndarray) -> float:
         return float(10 * np.log10((10 ** (level / 10)).sum())) if len(level) else -np.inf

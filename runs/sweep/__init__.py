@@ -1,1 +1,1 @@
-"""`sweep`: a family of runs that shares what it can, locally or through a batch system."""
+"""`sweep`: a family of runs with shared stages, run locally or through a batch system."""

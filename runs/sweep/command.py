@@ -1,4 +1,4 @@
-"""The command `sweep`: all members, here or by a batch system, then one table and one page."""
+"""The command `sweep`: runs all members, here or in a batch system; writes a table and a page."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from tireroad.runs.sweep.page import write_page
 
 
 def sweep(path: Path, out: Path | None, *, at_once: int, batch: bool, only_gather: bool) -> None:
-    """Run the sweep of a file. Not collective: members are processes of their own.
+    """Run the sweep defined in a file. Not collective: members are separate processes.
 
-    ConvergenceError, after all is gathered, when a member did not end well: the same command runs those
-    again, and what is finished is reused.
+    Raises ConvergenceError, after everything is gathered, if a member failed: the same command runs
+    that member again and reuses what is finished.
     """
     family = read(path)
     folder = out or Path("results") / family.name
@@ -33,7 +33,7 @@ def sweep(path: Path, out: Path | None, *, at_once: int, batch: bool, only_gathe
 
 
 def _run(family: Sweep, folder: Path, at_once: int, only_gather: bool) -> None:
-    """All members here, or none, then the table and the page."""
+    """Run all members locally, unless only gathering, then write the table and the page."""
     failed: list[str] = []
     if not only_gather:
         number, limit = local.at_once(family, at_once)
@@ -50,7 +50,7 @@ def _run(family: Sweep, folder: Path, at_once: int, only_gather: bool) -> None:
 
 
 def _gather(family: Sweep, folder: Path, failed: Sequence[str]) -> None:
-    """The table and the page of what there is."""
+    """Write the table and the page of the available results."""
     table = gather(family, folder)
     write(table, folder)
     page = write_page(table, folder, family.name, failed)
@@ -60,7 +60,7 @@ def _gather(family: Sweep, folder: Path, failed: Sequence[str]) -> None:
 
 
 def _queue(family: Sweep, folder: Path, source: Path) -> None:
-    """Scripts on disk, and in the queue."""
+    """Write the job scripts and submit them."""
     first, rest = shared_first(family)
     scripts = queue.write_scripts(family, folder, first, rest, source)
     for script in scripts.values():
@@ -70,7 +70,7 @@ def _queue(family: Sweep, folder: Path, source: Path) -> None:
 
 
 def shared_first(family: Sweep) -> tuple[list[Member], list[Member]]:
-    """(one member of each group that shares its static state and modes, all others)."""
+    """(one member per group that shares its static state and modes, all others)."""
     seen: set[str] = set()
     first: list[Member] = []
     rest: list[Member] = []
@@ -82,7 +82,7 @@ def shared_first(family: Sweep) -> tuple[list[Member], list[Member]]:
 
 
 def _group(scene: Scene) -> str:
-    """What the static state and the modes depend on, as one key."""
+    """One key for everything that the static state and the modes depend on."""
     from mpi4py import MPI
 
     from tireroad.runs.stages.base.job import Job

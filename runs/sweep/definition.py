@@ -1,20 +1,21 @@
-"""What a sweep file says: a base scene, axes, and how their values make members.
+"""Definition of a sweep file: a base scene, axes, and how their values form members.
 
-    name = "speeds"
-    scene = "passenger.toml"          # relative to the sweep file
-    plan = "grid"                     # grid | list | latin-hypercube
+  name = "speeds"
+  scene = "passenger.toml"          # relative to the sweep file
+  plan = "grid"                     # grid | list | latin-hypercube
 
-    [[axis]]
-    key = "rotation.speed"
-    values = [20.0, 40.0, 60.0]       # grid: every combination of all axes
-    # range = [20.0, 60.0]            # latin-hypercube, or grid with count = 5
+  [[axis]]
+  key = "rotation.speed"
+  values = [20.0, 40.0, 60.0]       # grid: every combination of all axes
+  # range = [20.0, 60.0]            # latin-hypercube, or grid with count = 5
 
-    [[member]]                        # plan = "list": the members one by one
-    name = "soft"
-    set = { "tire.material.youngs_modulus" = 30e6 }
+  [[member]]                        # plan = "list": the members one by one
+  name = "soft"
+  set = { "tire.material.youngs_modulus" = 30e6 }
 
-`samples` and `seed` belong to the latin hypercube. [slurm] holds options of sbatch (account, partition,
-time); [queue] names the template and the commands of another batch system (runs.sweep.queue).
+`samples` and `seed` belong to the latin hypercube. [slurm] holds options of sbatch (account,
+partition, time); [queue] names the template and the commands of another batch system
+(runs.sweep.queue).
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from tireroad.runs.scene.tables.scene import Scene
 
 PLANS = ("grid", "list", "latin-hypercube")
 MOST = 10_000
-FILES = ("road.file", "tire.file")  # keys that name files, relative to the sweep file
+FILES = ("road.file", "tire.file")  # keys of file names, relative to the sweep file
 _KEYS = {
     "name",
     "scene",
@@ -55,20 +56,20 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,79}")
 
 @dataclass(frozen=True)
 class Member:
-    """One run: its folder's name, and what it sets over the base scene, key by key."""
+    """One run: the name of its folder, and its settings on top of the base scene, key by key."""
 
     name: str
     settings: Mapping[str, Any]
 
     def overrides(self) -> list[str]:
-        """As arguments of --set; the scene takes the member's name."""
+        """The settings as arguments of --set; the scene takes the member's name."""
         given = [f"{key}={literal(value)}" for key, value in self.settings.items()]
         return [*given, f"name={literal(self.name)}"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """A sweep as read: `axes` are the keys that vary, in the order of the file; `folder` is the file's."""
+    """A sweep as read: `axes` are the keys that vary, in file order; `folder` is the file's."""
 
     name: str
     scene: Path
@@ -80,7 +81,7 @@ class Sweep:
     folder: Path = Path(".")
 
     def load(self, member: Member) -> Scene:
-        """The member's scene, checked. InputError names the member."""
+        """The member's scene, checked. An InputError names the member."""
         try:
             return load(self.scene, member.overrides())
         except InputError as error:
@@ -88,7 +89,7 @@ class Sweep:
 
 
 def read(path: Path) -> Sweep:
-    """The sweep of a file. InputError for all that is wrong with it, scenes of members included."""
+    """Read and check a sweep file. Raises InputError for any problem, including members' scenes."""
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -170,7 +171,7 @@ def _listed(
 
 
 def _values(path: Path, axis: Mapping[str, Any]) -> list[Any]:
-    """The values of an axis of a grid: a list, or `count` of them over a `range`."""
+    """The values of an axis of a grid: a list, or `count` values over a `range`."""
     if "values" in axis:
         values = axis["values"]
         if not isinstance(values, list) or not values:
@@ -215,7 +216,7 @@ def _whole(
 
 
 def _named(keys: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> list[Member]:
-    """Members numbered and named by what they set: 03-speed=40."""
+    """Members numbered and named by their settings: 03_speed-40."""
     digits = len(str(len(rows)))
     members = []
     for number, row in enumerate(rows, start=1):
@@ -237,7 +238,7 @@ def _short(value: Any) -> str:
 
 
 def _absolute(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """File names made absolute, from the sweep file's folder."""
+    """Make file names absolute, relative to the sweep file's folder."""
     return {
         key: str((folder / value).resolve()) if key in FILES and isinstance(value, str) else value
         for key, value in settings.items()

@@ -1,4 +1,4 @@
-"""One table of all members of a sweep: what was set, what came out. Reads result folders only."""
+"""Gathers settings and results of all members of a sweep from their folders into one table."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Column:
-    """A quantity of every member: numbers, NaN where a member has none."""
+    """A quantity of every member; NaN if a member has none."""
 
     name: str
     unit: str
@@ -32,7 +32,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Gathered:
-    """The table: `settings` of each axis by member, `columns` of results, members without results."""
+    """The table: `settings` per axis and member, `columns` of results, members without results."""
 
     names: tuple[str, ...]
     settings: Mapping[str, tuple[Any, ...]]
@@ -41,7 +41,7 @@ class Gathered:
 
 
 def gather(sweep: Sweep, folder: Path) -> Gathered:
-    """What the members left in folder/members."""
+    """Gather the members' results in folder/members."""
     rows: list[dict[tuple[str, str], float]] = []
     missing = []
     for member in sweep.members:
@@ -86,7 +86,7 @@ def _figures(run: RunResults) -> dict[tuple[str, str], float]:
 
 
 def write(table: Gathered, folder: Path) -> None:
-    """folder/sweep.csv and folder/sweep.h5."""
+    """Write folder/sweep.csv and folder/sweep.h5."""
     with (
         replacing(folder / "sweep.csv") as part,
         part.open("w", newline="", encoding="utf-8") as file,

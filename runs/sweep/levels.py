@@ -1,9 +1,10 @@
-"""Third octaves of a sweep's members in dB of the first, with how sure the differences are.
+"""Third octaves of a sweep's members in dB relative to the first, with their uncertainty.
 
-Members that differ in a seed only are samples of one road: their powers are averaged, and the mean power is within
-t s / sqrt(n) of that of all roads, in 95 of 100 cases (Student's t of n - 1 degrees of freedom, s the standard
-deviation over the n seeds). Beside it stands what the error bars of the runs tell (contact.results.error_bars). Both are
-independent of each other and of those of the other member.
+Members that differ only in a seed are samples of one road: their powers are averaged, and the mean
+power lies within t s / sqrt(n) of that of all roads in 95 of 100 cases (Student's t with n - 1
+degrees of freedom, s the standard deviation over the n seeds). The error bars of the runs
+(contact.results.error_bars) are added as squares; both are independent of each other and of those
+of other members.
 """
 
 from __future__ import annotations
@@ -23,8 +24,11 @@ _SURE = 0.95
 
 @dataclass(frozen=True)
 class Levels:
-    """Of each group of members that differ in seeds only (`names`, how many `seeds`): `level` (g, b) dB re 1 N and
-    its `error` (g, b) dB, NaN where nothing is known of it, at the `bands`."""
+    """Levels of groups of members that differ in seeds only.
+
+    `names`; number of `seeds`; `level` (g, b) dB re 1 N and its `error` (g, b) dB at the `bands`,
+    NaN where nothing is known.
+    """
 
     names: tuple[str, ...]
     seeds: tuple[int, ...]
@@ -33,13 +37,13 @@ class Levels:
     error: Array
 
     def differences(self) -> tuple[Array, Array]:
-        """(g - 1, b) dB of the first group's, and the errors of these differences."""
+        """Differences (g - 1, b) dB from the first group, and their errors."""
         both = np.sqrt(self.error[1:] ** 2 + self.error[0] ** 2)
         return self.level[1:] - self.level[0], both
 
 
 def levels(table: Gathered) -> Levels | None:
-    """Of the vertical axle force; None where no member has bands."""
+    """Levels of the vertical axle force; None if no member has bands."""
     columns = {column.name: column.values for column in table.columns}
     bands = tuple(
         name.removeprefix(LEVEL) for name in columns if name.startswith(LEVEL) and "Hz" in name
@@ -61,7 +65,7 @@ def levels(table: Gathered) -> Levels | None:
 
 
 def _alike(table: Gathered) -> dict[str, list[int]]:
-    """Members by what they differ in beside seeds; by their own names where no axis is a seed."""
+    """Members grouped by their settings other than seeds; one group each if no axis is a seed."""
     seeds = [key for key in table.settings if key.rpartition(".")[2] == "seed"]
     if not seeds:
         return {name: [k] for k, name in enumerate(table.names)}

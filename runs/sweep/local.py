@@ -1,4 +1,4 @@
-"""Members of a sweep on this machine: so many at a time as cores and memory allow."""
+"""Runs the members of a sweep on this machine, as many at a time as cores and memory allow."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from tireroad.runs.process.memory import available_memory
 from tireroad.runs.scene.extent.estimate import memory
 from tireroad.runs.sweep.definition import Member, Sweep
 
-_LOOK = 0.5  # s between two looks at the running members
+_LOOK = 0.5  # s between two checks of the running members
 _OUTCOME = {0: "done", 2: "its input is wrong", 3: "a solver gave up", 4: "stopped"}
 
 
 @dataclass
 class Ended:
-    """How a member ended: exit status, seconds, and the last line that it said."""
+    """The outcome of a member: exit status, seconds, and its last line of output."""
 
     member: Member
     status: int
@@ -32,14 +32,14 @@ class Ended:
 
     @property
     def line(self) -> str:
-        """One line for the user."""
+        """The outcome in one line."""
         outcome = _OUTCOME.get(self.status, f"crashed (status {self.status}): a bug")
         more = f": {self.said}" if self.status else ""
         return f"{self.member.name}: {outcome} after {observe.seconds(self.seconds)}{more}"
 
 
 def at_once(sweep: Sweep, wanted: int) -> tuple[int, str]:
-    """How many members run at a time, and what limits it when it is fewer than wanted."""
+    """How many members run at a time, and what limits it if fewer than wanted."""
     cores = os.cpu_count() or 1
     largest = max(sum(memory(sweep.load(member)).values()) for member in sweep.members)
     room = int(available_memory() // (largest * sweep.processes))
@@ -51,11 +51,11 @@ def at_once(sweep: Sweep, wanted: int) -> tuple[int, str]:
 
 
 def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
-    """Run every member into folder/members/<name>; how each ended, in the order of the sweep.
+    """Run every member into folder/members/<name>; returns the outcomes in the sweep's order.
 
-    So many workers (runs.sweep.worker) take one member after the other. They share a cache of finished stages, so
-    that what has the same inputs is computed once: a member waits while another computes what it needs. A worker that
-    has crashed is replaced; a stop signal ends all of them.
+    Each of the workers (runs.sweep.worker) takes one member after the other. They share a cache of
+    finished stages, so that equal inputs are computed once: a member waits while another computes
+    what it needs. A worker that crashes is replaced; a stop signal ends all of them.
     """
     waiting = list(sweep.members)
     workers: list[_Worker] = []
@@ -88,7 +88,7 @@ def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
 
 
 class _Worker:
-    """A process, or an mpirun of several, that computes one `member` after the other; None between them."""
+    """A process, or mpirun with several, that computes one `member` at a time; None when idle."""
 
     def __init__(self, sweep: Sweep, folder: Path, threads: int, number: int) -> None:
         self.member: Member | None = None
@@ -99,7 +99,7 @@ class _Worker:
             "OPENBLAS_NUM_THREADS": str(threads),
             "OMP_NUM_THREADS": str(threads),
         }
-        self._own = self._logs / f"worker-{number}.txt"  # what no member says
+        self._own = self._logs / f"worker-{number}.txt"  # output outside members
         with self._own.open("wb") as own:
             self.process = subprocess.Popen(
                 _program(sweep, "work"),
@@ -110,7 +110,7 @@ class _Worker:
             )
 
     def take(self, member: Member) -> None:
-        """Begin a member."""
+        """Start a member."""
         self.member, self._began = member, time.monotonic()
         self._log, self._status = (self._logs / f"{member.name}.{end}" for end in ("txt", "status"))
         self._log.write_bytes(b"")
@@ -118,12 +118,12 @@ class _Worker:
         files = {"log": str(self._log.resolve()), "status": str(self._status.resolve())}
         line = json.dumps({"run": _arguments(self._sweep, member, self._folder), **files})
         assert self.process.stdin is not None
-        with suppress(BrokenPipeError):  # it has crashed, and is found so
+        with suppress(BrokenPipeError):  # it has crashed, which `ended` detects
             self.process.stdin.write(f"{line}\n".encode())
             self.process.stdin.flush()
 
     def ended(self) -> Ended | None:
-        """How the member ended, once it has; None before, and between members."""
+        """The outcome of the current member once it has ended, else None."""
         if self.member is None:
             return None
         crashed = self.process.poll()
@@ -139,11 +139,11 @@ class _Worker:
 
     @property
     def crashed(self) -> bool:
-        """Whether it has ended, and how its member ended is known."""
+        """Whether it has exited and the outcome of its last member is known."""
         return self.member is None and self.process.poll() is not None
 
     def end(self) -> None:
-        """No more members; the one it computes is stopped."""
+        """Take no more members; the current one is stopped."""
         if self.member is not None:
             self.process.terminate()
         assert self.process.stdin is not None
@@ -151,7 +151,7 @@ class _Worker:
             self.process.stdin.close()
 
     def close(self) -> None:
-        """Wait for its end."""
+        """Wait for the process to exit."""
         self.end()
         self.process.wait()
 
@@ -163,18 +163,18 @@ def _last(log: Path) -> str:
 
 
 def command(sweep: Sweep, member: Member, folder: Path) -> list[str]:
-    """The command line of one member's run by itself."""
+    """The command line that runs one member on its own."""
     return _program(sweep, *_arguments(sweep, member, folder))
 
 
 def _program(sweep: Sweep, *arguments: str) -> list[str]:
-    """The program on the processes of one run."""
+    """The program's command line on the processes of one run."""
     line = [sys.executable, "-P", "-m", "tireroad.runs", *arguments]
     return ["mpirun", "-n", str(sweep.processes), *line] if sweep.processes > 1 else line
 
 
 def _arguments(sweep: Sweep, member: Member, folder: Path) -> list[str]:
-    """What the program is told of one member's run."""
+    """The program's arguments for one member's run."""
     settings: Sequence[str] = [part for one in member.overrides() for part in ("--set", one)]
     out = str(folder / "members" / member.name)
     return ["run", str(sweep.scene.resolve()), "--out", out, *settings]

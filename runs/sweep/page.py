@@ -25,11 +25,11 @@ SHOWN = (
     "rotating: lowest",
     "modes: lowest",
 )
-CURVES = 12  # third-octave spectra that can be told apart in one picture
+CURVES = 12  # third-octave spectra that can be distinguished in one figure
 
 
 def write_page(table: Gathered, folder: Path, title: str, failed: Sequence[str]) -> Path:
-    """Write folder/sweep.html; its path."""
+    """Write folder/sweep.html; returns its path."""
     loader = FileSystemLoader(Path(__file__).parent)
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     pages.filters["quantity"] = quantity
@@ -70,7 +70,7 @@ def _figures(table: Gathered) -> list[tuple[str, str]]:
 
 
 def _with_level(table: Gathered, bands: Sequence[Column]) -> list[Column]:
-    """The columns that are drawn; first the overall level of the vertical axle force."""
+    """The columns to be drawn; first the overall level of the vertical axle force."""
     columns = [
         c for c in table.columns if c.name in SHOWN and np.ptp(c.values[np.isfinite(c.values)])
     ]
@@ -96,7 +96,7 @@ def _spectra(bands: Sequence[Column], names: Sequence[str]) -> str:
 
 @styled
 def _differences(compared: Levels) -> str:
-    """In dB of the first, with error bars."""
+    """Differences in dB from the first, with error bars."""
     figure, axes = canvas(9.5, 3.2)
     level, error = compared.differences()
     place = np.arange(len(compared.bands))
@@ -121,7 +121,7 @@ def _differences(compared: Levels) -> str:
 
 
 def _about(compared: Levels) -> str:
-    """What the picture of differences shows."""
+    """Caption of the figure of differences."""
     text = (
         "Vertical axle force, difference from the first in dB, with what the runs' error bars tell of it; "
         "where there is no bar nothing is known."
@@ -136,7 +136,7 @@ def _about(compared: Levels) -> str:
 
 @styled
 def _against(key: str, values: Array, columns: Sequence[Column]) -> str:
-    """Every chosen result over one axis, a panel each."""
+    """Every chosen result over one axis, in separate panels."""
     count = max(min(len(columns), 4), 1)
     figure, axes = canvas(9.5, 2.0 * count + 0.4, count, sharex=True)
     order = np.argsort(values, kind="stable")
@@ -149,7 +149,7 @@ def _against(key: str, values: Array, columns: Sequence[Column]) -> str:
 
 @styled
 def _map(first: str, a: Array, second: str, b: Array, column: Column) -> str:
-    """A result over two axes: coloured where the grid has it."""
+    """A result over two axes, coloured at the grid's points."""
     figure, axes = canvas(6.5, 4.2)
     drawn = axes[0, 0].scatter(a, b, c=column.values, s=320, marker="s", cmap="cividis")
     axes[0, 0].set(xlabel=first, ylabel=second)

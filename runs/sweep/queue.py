@@ -1,7 +1,7 @@
-"""A sweep through Slurm, or through another queue by a template: scripts on disk, then submitted.
+"""Submits a sweep to Slurm, or through a template to another batch system, as job scripts.
 
-Members share stages through the cache in the sweep's folder. A first job computes one member of each
-group that shares a static state and modes; an array job runs the rest when it has ended, and a last
+Members share stages through the cache in the sweep's folder. The first job computes one member of
+each group that shares a static state and modes; after it, an array job runs the rest, and a last
 job gathers.
 """
 
@@ -53,12 +53,13 @@ _MORE = {"number", "join"}
 
 @dataclass(frozen=True, kw_only=True)
 class Queue:
-    """How a batch system is spoken to. By default Slurm.
+    """Interface to a batch system, by default Slurm.
 
-    `template`: text of a job script with $name, $logs, $processes, $cache, $directives, $warning and
-    $body, which starts the run in the background and sets `child`. `task`: the environment variable of
-    the task's number in an array. `submit`: the command; the group of the pattern `number` finds the job's
-    number in what it prints. `array` with {count}, `after` with {jobs}: its options, the jobs joined by `join`.
+    `template`: text of a job script with $name, $logs, $processes, $cache, $directives, $warning
+    and $body, which starts the run in the background and sets `child`. `task`: environment variable
+    with the task number in an array. `submit`: the command; the group of the pattern `number` finds
+    the job number in its output. `array` with {count}, `after` with {jobs}: its options; `join`
+    separates the jobs.
     """
 
     template: str = SLURM
@@ -72,7 +73,7 @@ class Queue:
 
     @classmethod
     def of(cls, sweep: Sweep) -> Queue:
-        """The queue of the sweep's [queue] table, or Slurm with the lines of its [slurm] table."""
+        """The batch system of the sweep's [queue] table, or Slurm with its [slurm] options."""
         given = dict(sweep.queue)
         if not given:
             return cls(directives=sweep.slurm)
@@ -96,7 +97,7 @@ class Queue:
         return cls(**words | {"template": text})
 
     def submission(self, script: Path, count: int | None, before: Sequence[str]) -> list[str]:
-        """The command line that submits a script as an array of `count`, after the jobs `before`."""
+        """The command line that submits a script as an array of `count` after jobs `before`."""
         line = shlex.split(self.submit)
         if count is not None:
             line += shlex.split(self.array.format(count=count))
@@ -105,7 +106,7 @@ class Queue:
         return [*line, str(script)]
 
     def numbered(self, said: str) -> str:
-        """The job's number in what `submit` printed. ConvergenceError where there is none."""
+        """The job number in the output of `submit`. Raises ConvergenceError if there is none."""
         found = re.search(self.number, said)
         if found is None:
             raise ConvergenceError(
@@ -124,7 +125,7 @@ def _has_group(pattern: str) -> bool:
 def write_scripts(
     sweep: Sweep, folder: Path, first: Sequence[Member], rest: Sequence[Member], source: Path
 ) -> dict[str, Path]:
-    """The scripts of the jobs, by name: `first`, `rest` (where there are any) and `gather`."""
+    """Write the job scripts; by name: `first`, `rest` (if there are any) and `gather`."""
     queue, scripts = Queue.of(sweep), {}
     for name, members in (("first", first), ("rest", rest)):
         if members:
@@ -137,7 +138,7 @@ def write_scripts(
 
 
 def submit(sweep: Sweep, scripts: Mapping[str, Path], counts: Mapping[str, int]) -> dict[str, str]:
-    """Hand the scripts to the queue, each after the ones before; the job numbers by name."""
+    """Submit the scripts, each after the ones before; returns the job numbers by name."""
     queue = Queue.of(sweep)
     jobs: dict[str, str] = {}
     for name, script in scripts.items():
@@ -157,7 +158,7 @@ def submit(sweep: Sweep, scripts: Mapping[str, Path], counts: Mapping[str, int])
 def _script(
     sweep: Sweep, folder: Path, name: str, body: str, queue: Queue, processes: int | None = None
 ) -> Path:
-    """Write one job script; its path."""
+    """Write one job script; returns its path."""
     jobs = folder / "jobs"
     jobs.mkdir(parents=True, exist_ok=True)
     try:
@@ -192,7 +193,7 @@ def _directives(given: Mapping[str, Any]) -> str:
 
 
 def _members(sweep: Sweep, folder: Path, members: Sequence[Member], task: str) -> str:
-    """The shell's choice of a member by the number of its task in the array."""
+    """Shell code that selects a member by its task number in the array."""
     lines = [f'case "${{{task}:-1}}" in']
     for number, member in enumerate(members, start=1):
         lines.append(f"{number}) {shlex.join(command(sweep, member, folder.resolve()))} & ;;")

@@ -1,8 +1,8 @@
-"""A process that computes members of a sweep one after the other: Python and its libraries are loaded once.
+"""A worker that computes members of a sweep one after the other, loading the libraries once.
 
-It is told of a member by a line of its standard input, {"run": arguments, "log": file, "status": file}, writes what
-the run says to the log, and its exit status to the other file when it has ended. Standard input ends it. Under
-mpirun the root process hears and writes; a run is collective.
+A line on standard input describes a member: {"run": arguments, "log": file, "status": file}. The
+run's output goes to the log, its exit status to the other file when it has ended. The worker ends
+with its standard input. Under mpirun the root process reads and writes; a run is collective.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tireroad.runs.process.statuses import DONE, STOPPED, rank_before_mpi
 
 
 def work() -> int:
-    """Compute what standard input names; the worker's own exit status. Collective over all processes."""
+    """Compute the members from standard input; returns the exit status. Collective."""
     from mpi4py import MPI
 
     from tireroad.runs.cli import main
@@ -36,15 +36,17 @@ def work() -> int:
 
 
 def _set_aside() -> None:
-    """What is there between two members, libraries above all, the collector of garbage need not look through while the next
-    one is computed, nine times and more."""
+    """Exempt the objects that persist between members, mainly libraries, from garbage collection.
+
+    Otherwise the collector would scan them during the next member, nine times and more.
+    """
     gc.unfreeze()
     gc.collect()
     gc.freeze()
 
 
 def _told() -> dict | None:
-    """The next member, of the root process; None where there is no more, and elsewhere."""
+    """The next member, on the root process; None if there is none, and on other processes."""
     if rank_before_mpi() != 0:
         return None
     line = sys.stdin.readline()
@@ -52,7 +54,7 @@ def _told() -> dict | None:
 
 
 def _say_to(log: str) -> None:
-    """What this process and its libraries print goes to the end of a file; the root process's alone."""
+    """Append the output of this process and its libraries to a file; on the root process only."""
     if rank_before_mpi() != 0:
         return
     sys.stdout.flush()
@@ -63,7 +65,7 @@ def _say_to(log: str) -> None:
 
 
 def _write(path: str, status: int) -> None:
-    """The status, whole or not at all."""
+    """Write the status atomically."""
     sys.stdout.flush()
     with open(f"{path}.part", "w", encoding="ascii") as file:
         file.write(str(status))

@@ -1,1 +1,1 @@
-"""The thesis's figures and tables, computed anew and compared with it (command `reproduce`)."""
+"""The figures and tables of the thesis, recomputed and compared with it (command `reproduce`)."""

@@ -1,4 +1,4 @@
-"""What the thesis says in a number, what this program finds, and whether the two agree."""
+"""A numerical claim of the thesis, the program's value, and whether they agree."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ UNEXPLAINED = "the cause is not known"
 class Claim:
     """One figure of the thesis against one of this program.
 
-    `thesis` is the thesis's value and `source` where it stands; `relation` how `found` must lie to it:
-    "equal" within `tolerance` (a share of the thesis's value; absolute where that is 0), "below" or "above" by
-    more than that. `because` is the reason to give where they differ. `right`: what is right by another
-    method, named in `by`, where the thesis is wrong or has no number; `found` is held to it within the same
-    tolerance. ValueError for values that no comparison can be made of.
+    `thesis`: the thesis's value; `source`: where it stands. `relation` of `found` to it: "equal"
+    within `tolerance` (a share of the thesis's value; absolute if that is 0), "below" or "above" by
+    more than that. `because`: the reason if they differ. `right`: the value by another method,
+    named in `by`, if the thesis is wrong or has no number; `found` is compared with it at the same
+    tolerance. Raises ValueError for values that cannot be compared.
     """
 
     what: str
@@ -41,7 +41,7 @@ class Claim:
 
     @property
     def agrees(self) -> bool:
-        """Whether this program finds what the thesis says. A figure that is no number never does."""
+        """Whether this program's value agrees with the thesis; a non-finite value never does."""
         margin = _margin(self.thesis, self.tolerance)
         if not math.isfinite(self.found):
             return False
@@ -53,7 +53,7 @@ class Claim:
 
     @property
     def is_right(self) -> bool | None:
-        """Whether this program finds what another method does; None where there is no other."""
+        """Whether this program's value agrees with another method; None if there is none."""
         if self.right is None:
             return None
         return bool(abs(self.found - self.right) <= _margin(self.right, self.tolerance))
@@ -69,6 +69,6 @@ def _margin(value: float, tolerance: float) -> float:
 
 
 def verdict(claims: tuple[Claim, ...]) -> str:
-    """Of a whole figure: "agrees" where all its claims do, else how many differ."""
+    """Verdict on a whole figure: "agrees" if all its claims do, else how many differ."""
     off = sum(not claim.agrees for claim in claims)
     return "agrees" if not off else f"differs in {off} of {len(claims)}"

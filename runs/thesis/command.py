@@ -1,4 +1,4 @@
-"""The command `reproduce`: the thesis's figures and tables, with what agrees and what does not."""
+"""The command `reproduce`: the figures and tables of the thesis, and which of them agree."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tireroad.runs.thesis.runner import Scenes
 
 
 def known() -> dict[str, Figure]:
-    """All figures by name, figures before tables, in the thesis's order."""
+    """All figures and tables by name, figures first, in the order of the thesis."""
     for found in pkgutil.iter_modules(figures.__path__):
         importlib.import_module(f"{figures.__name__}.{found.name}")
     return {name: FIGURES[name] for name in sorted(FIGURES, key=_place)}
@@ -35,8 +35,8 @@ def _place(name: str) -> tuple[str, str, int]:
 def reproduce(names: Sequence[str], directory: Path, comm: MPI.Comm) -> None:
     """Compute the named figures (all by default) into the directory. Collective.
 
-    InputError for an unknown name or a folder that cannot be made; ConvergenceError, after all the others, when
-    a figure could not be computed.
+    Raises InputError for an unknown name or a folder that cannot be created; ConvergenceError,
+    after all others are done, if a figure could not be computed.
     """
     wanted = chosen(names, known())
     on_root(comm, lambda: _made(directory))
@@ -69,7 +69,7 @@ def _made(directory: Path) -> None:
 
 
 def _entry(one: Figure, scenes: Scenes) -> output.Entry:
-    """A figure computed and drawn, or how it failed. Collective."""
+    """Compute and draw a figure, or record its failure. Collective."""
     began = time.perf_counter()
     try:
         found = one.compute(scenes)

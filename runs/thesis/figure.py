@@ -1,4 +1,4 @@
-"""A figure or table of the thesis: its name, what it shows, and the function that computes it anew."""
+"""A figure or table of the thesis: name, content, and the function that recomputes it."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from tireroad.runs.thesis.runner import Scenes
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduced:
-    """What this program shows: a line, the `claims`, a `picture` (draws a data URI; root process) and its
-    caption."""
+    """The program's result: a line, `claims`, a `picture` (data URI; root process), its caption."""
 
     shows: str
     claims: tuple[Claim, ...]
@@ -23,13 +22,13 @@ class Reproduced:
 
     @property
     def verdict(self) -> str:
-        """Of all claims together."""
+        """Verdict on all claims together."""
         return verdict(self.claims)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """`name` on the command line, `title`, what the `thesis` shows in a line, and `compute` (collective)."""
+    """`name` on the command line, `title`, a line on the `thesis`, and `compute` (collective)."""
 
     name: str
     title: str
@@ -41,7 +40,7 @@ FIGURES: dict[str, Figure] = {}
 
 
 def figure(name: str, title: str, thesis: str) -> Callable:
-    """Decorator: a function of the scenes that computes the named figure; collective."""
+    """Decorate a collective function of the scenes that computes the named figure."""
 
     def add(compute: Callable[[Scenes], Reproduced]) -> Callable[[Scenes], Reproduced]:
         FIGURES[name] = Figure(name=name, title=title, thesis=thesis, compute=compute)
@@ -51,9 +50,9 @@ def figure(name: str, title: str, thesis: str) -> Callable:
 
 
 def chosen(names: Sequence[str], known: dict[str, Figure]) -> list[Figure]:
-    """The figures of these names, each once, in the thesis's order; all of them without names.
+    """The figures with these names, each once, in the order of the thesis; all without names.
 
-    InputError for a name that is not known, with the nearest one.
+    Raises InputError for an unknown name, suggesting the nearest one.
     """
     for name in names:
         if name not in known:

@@ -1,4 +1,4 @@
-"""reproduce.html, reproduce.json and reproduce.csv: what was reproduced, for people and for programs."""
+"""Writes reproduce.html, reproduce.json and reproduce.csv, for people and for programs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure, what it took in s, and what was `found`, drawn; or how it `failed`."""
+    """A figure, its seconds, and what was `found`, with its picture; or how it `failed`."""
 
     figure: Figure
     seconds: float
@@ -37,7 +37,7 @@ class Entry:
 
     @property
     def verdict(self) -> str:
-        """Of the figure."""
+        """Verdict on the figure."""
         return self.found.verdict if self.found else "not computed"
 
 
@@ -77,7 +77,7 @@ def _of_claim(claim: Claim) -> dict[str, Any]:
 
 
 def _table(entries: Sequence[Entry]) -> str:
-    """A row a claim."""
+    """The CSV, one row per claim."""
     stream = io.StringIO()
     writer = csv.DictWriter(stream, _COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -102,7 +102,7 @@ def _page(entries: Sequence[Entry], head: dict[str, Any]) -> str:
 
 
 def asked(claim: Claim) -> str:
-    """The thesis's value with what is allowed beside it."""
+    """The thesis's value with its tolerance."""
     value = quantity(claim.thesis, claim.unit)
     if claim.relation != "equal":
         return f"{claim.relation} {value}"

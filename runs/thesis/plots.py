@@ -15,7 +15,7 @@ Array = NDArray[np.floating]
 
 @dataclass(frozen=True)
 class Curve:
-    """y over x; `dashes` and `marker` of matplotlib, `colour` a number in the cycle."""
+    """y over x; `dashes` and `marker` as in matplotlib, `colour` an index into the colour cycle."""
 
     x: Array
     y: Array
@@ -26,7 +26,7 @@ class Curve:
 
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """Curves by the names in the legend; a name that begins with "_" has none. `scales` of x and y."""
+    """Curves by name in the legend, which omits names beginning with "_". `scales` of x and y."""
 
     title: str = ""
     x: str

@@ -1,4 +1,4 @@
-"""The scenes of the thesis, run into one folder: stages of the same inputs are computed once."""
+"""Runs the scenes of the thesis in one folder; stages with the same inputs are computed once."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Scenes:
-    """Runs scenes of `runs/thesis/scenes` into `directory`/runs on the processes of `comm`, stages shared through
-    a `cache`."""
+    """Runs scenes of `runs/thesis/scenes` in `directory`/runs on the processes of `comm`.
+
+    Stages are shared through a `cache`.
+    """
 
     directory: Path
     comm: MPI.Comm
@@ -33,11 +35,11 @@ class Scenes:
     _found: dict[str, Any] = field(default_factory=dict)
 
     def load(self, name: str, *settings: str) -> Scene:
-        """The scene of a name with settings ("a.b=value") laid over it. Not collective."""
+        """The named scene with settings ("a.b=value") applied. Not collective."""
         return load(FOLDER / f"{name}.toml", settings)
 
     def run(self, name: str, *settings: str, until: str) -> Finished:
-        """Its stages up to `until`; what they left in memory. Collective."""
+        """Run its stages up to `until`; returns the products in memory. Collective."""
         scene = self.load(name, *settings)
         folder = (
             self.directory / "runs" / re.sub(r"[^A-Za-z0-9._-]+", "-", "_".join([name, *settings]))
@@ -58,12 +60,12 @@ class Scenes:
             )
 
     def once(self, name: str, make: Callable[[], T]) -> T:
-        """What figures share beside stages: made at the first time, kept in memory by name. Collective."""
+        """An object that figures share: made on first use, kept in memory by name. Collective."""
         if name not in self._found:
             self._found[name] = make()
         return self._found[name]
 
 
 def kept(run: Finished, stage: str, pick: Callable[[Any], T]) -> T:
-    """What `pick(file)` returns of a stage's file, on every process. Collective."""
+    """The value of `pick(file)` for a stage's file, on every process. Collective."""
     return run.job.read(run.job.path(stage), pick)

@@ -1,1 +1,1 @@
-"""This program against full finite elements, closed forms and stress: one module a validation."""
+"""Validation against full finite elements and closed forms, and stress tests: one module each."""

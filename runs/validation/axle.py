@@ -1,4 +1,4 @@
-"""Axle force by momentum and by the free rim (thesis (7.4)), each checking the other; both against full FE."""
+"""Axle force by momentum and by the free rim (thesis (7.4)), and by full finite elements."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ count = 300
 duration = 0.1
 """
 
-# Angle around the axle and arc along the section, degrees; direction. Around where the road would be: on
-# a road a free rim topples.
+# Angle around the axle and arc along the section, degrees; direction. Near the place of a road, but
+# without one: on a road a free rim topples.
 FORCES = (
     (0.0, 0.0, (0.0, 0.0, 1.0)),
     (6.0, 4.0, (0.0, 0.0, 1.0)),
@@ -55,7 +55,7 @@ FORCES = (
 
 @dataclass(frozen=True)
 class Found:
-    """Axle force, -, and moment, m, per force (f, 3, k) by one way, and the seconds it took."""
+    """Axle force, -, and moment, m, per force (f, 3, k) by one method; its run time in seconds."""
 
     form: str
     modes: int | str
@@ -65,7 +65,7 @@ class Found:
 
 
 def run() -> list[Table]:
-    """Standing and rolling."""
+    """The tire at rest and rolling."""
     columns = [
         ("speed", "rad/s"),
         ("form", ""),
@@ -116,7 +116,7 @@ def _rows(speed: float) -> Iterator[list]:
 
 
 def _off(found: np.ndarray, exact: np.ndarray) -> tuple[float, float]:
-    """Relative L2 and worst, %."""
+    """Relative L2 error and largest error, %."""
     far = found - exact
     mean = np.linalg.norm(far) / np.linalg.norm(exact)
     return 100 * float(mean), 100 * float(np.abs(far).max() / np.abs(exact).max())
@@ -128,7 +128,8 @@ def _total(loads: sparse.csr_matrix) -> np.ndarray:
 
 
 def _full(tires: Tires) -> Found:
-    """All unknowns; the moment by the rows that modes are given, which tests hold against the forces on the rim's nodes."""
+    """All unknowns; the moment from the rows that modes use, which tests compare with the forces on
+    the rim's nodes."""
     loads = tires.probes.on_face.loads
     began = time.perf_counter()
     wheel, none = tires.wheel, sparse.csr_matrix((0, loads.shape[1]))
@@ -145,7 +146,7 @@ def _full(tires: Tires) -> Found:
 
 
 def _momentum(tires: Tires, count: int) -> Found:
-    """The program's own way: its response, with the momentum of each state for an output."""
+    """The program's own method: its response, with the momentum of each state as an output."""
     loads = tires.probes.on_face.loads
     began = time.perf_counter()
     response = tires.response(count, "attachment", counted=False)
@@ -155,7 +156,7 @@ def _momentum(tires: Tires, count: int) -> Found:
 
 
 def _free_rim(tires: Tires) -> Iterator[Found]:
-    """Modes of the same static state with its rim let go."""
+    """Modes of the same static state with its rim released."""
     loads, motions = tires.probes.on_face.loads, tires.motions
     free = SmallMotions(motions.tire, motions.static, rim="free")
     wheel, modes = wheel_of(free, tires.wheel.turning), solved(free.operators, count=max(COUNTS))

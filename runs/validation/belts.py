@@ -1,4 +1,4 @@
-"""Modes against full finite elements in time: a tire with cords and lossy compounds, rolling over rough roads."""
+"""Modes against full finite elements in time: a tire with cords and lossy compounds, rough road."""
 
 from __future__ import annotations
 
@@ -83,12 +83,12 @@ LARGE = {"segments": 50, "elements_arc": 16}
 
 
 def run() -> list[Table]:
-    """A table a road, and whether the target is reached."""
+    """One table per road, and whether the target is reached."""
     return _run(MESH)
 
 
 def run_large() -> list[Table]:
-    """The same on the mesh of the defaults along the arc."""
+    """The same with as many elements along the arc as by default."""
     return _run(LARGE)
 
 

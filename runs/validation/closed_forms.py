@@ -17,7 +17,7 @@ ABOUT = "tube, rings, oscillator, Hertz, punch, friction, creep of rolling, stat
 
 
 def run() -> list[Table]:
-    """One table."""
+    """One table of all cases."""
     rows = [
         [case, found, exact, unit, 100 * abs(found / exact - 1)]
         for package in (

@@ -1,4 +1,4 @@
-"""Modal runs beside full finite elements at several steps: errors, run times, targets reached or not."""
+"""Modal runs against full finite elements at several time steps: errors, run times, targets."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.validation.histories import History, follow
 from tireroad.runs.validation.tires import Choice, Tires
 
-TIMES = 3  # a modal loop lasts a tenth of a second: its processor time scatters threefold
+TIMES = 3  # repetitions: a modal loop takes 0.1 s, and its CPU time scatters threefold
 
 NOTES = [
     f"Errors: relative L2 of what varies in 0 to {BAND:g} Hz (Hann window); worst: largest difference "
@@ -24,8 +24,10 @@ NOTES = [
 
 @dataclass(frozen=True)
 class Run:
-    """A history, its errors by quantity, and `error`, the largest of those that count; `choice` None
-    for full finite elements."""
+    """A history, its errors by quantity, and `error`, the largest one among the counted quantities.
+
+    `choice` is None for full finite elements.
+    """
 
     choice: Choice | None
     history: History
@@ -34,9 +36,9 @@ class Run:
 
 
 class Comparison:
-    """Full finite elements at falling steps (two or more), and modal runs judged by the last.
+    """Full finite elements at falling steps (two or more); modal runs compared with the last.
 
-    `counts`: the quantities whose error a run is chosen by.
+    `counts`: the quantities whose error a run is selected by.
     """
 
     def __init__(self, full: list[History], counts: tuple[str, ...]):
@@ -47,7 +49,7 @@ class Comparison:
         self.modal: list[Run] = []
 
     def add(self, choice: Choice, history: History) -> None:
-        """A modal run."""
+        """Add a modal run."""
         self.modal.append(self._run(choice, history, self._between(history)))
 
     def _run(self, choice: Choice | None, history: History, errors: dict[str, Distance]) -> Run:
@@ -61,11 +63,11 @@ class Comparison:
         }
 
     def full_within(self, error: float) -> Run:
-        """The full run of the largest step whose error is not above the given one, else the finest."""
+        """The full run with the largest step whose error is within the given one, or the finest."""
         return next((run for run in self.full if run.error <= error), self.full[-1])
 
     def table(self, title: str) -> Table:
-        """All runs."""
+        """The table of all runs."""
         names = list(self._reference.values)
         columns = [("modes", "-"), ("residual", ""), ("step", "s")]
         columns += [(part, "%") for name in names for part in (name, f"worst {name}")]
@@ -88,8 +90,11 @@ class Comparison:
         return [*head, history.step, *errors, *times, *([] if same else [""])]
 
     def verdict(self, case: str, error: float, asked: float, modes_seconds: float) -> list:
-        """A row of `verdicts`: the fastest modal run within `error`, `asked` times as fast as full
-        finite elements that are no more accurate than that either."""
+        """A row of `verdicts`: the fastest modal run within `error`, or the most accurate one.
+
+        The target is reached if it is within `error` and `asked` times as fast as full finite
+        elements of that accuracy.
+        """
         within = [run for run in self.modal if run.error <= error]
         if within:
             best = min(within, key=lambda run: run.history.seconds)
@@ -102,7 +107,7 @@ class Comparison:
         named = f"{best.choice.modes} {best.choice.residual}, {ours.step:g} s"
         full = f"{theirs.step:g} s, {percent(reference.error):g} %"
         before = modes_seconds + ours.setup - theirs.setup
-        # Simulated time from which the modes, too, are paid for.
+        # Simulated time after which the modes have paid off, too.
         pays = self._duration * before / (theirs.seconds - ours.seconds)
         figures = [percent(best.error), full, digits(gain), digits(max(pays, 0.0))]
         return [case, 100 * error, asked, named, *figures, reached]
@@ -117,7 +122,7 @@ class Comparison:
 def compare(
     tires: Tires, steps: Sequence[float], choices: Sequence[Choice], counts: tuple[str, ...]
 ) -> Comparison:
-    """Full finite elements at the steps (s), and the choices, over the road the tires have at present."""
+    """Full finite elements at the steps (s), and the choices, on the tires' present road."""
     trial = tires.trial
     found = Comparison([follow(trial, *tires.full(step)) for step in steps], counts)
     for choice in choices:
@@ -153,5 +158,5 @@ def percent(part: float) -> float:
 
 
 def digits(value: float) -> float:
-    """Three of them: more is noise, of errors as of times."""
+    """Round to three digits: more would be noise, in errors and in times."""
     return float(f"{value:.3g}")

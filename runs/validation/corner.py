@@ -1,4 +1,4 @@
-"""Modes against full finite elements in time with the wheel as a rigid body on a corner, standing and rolling."""
+"""Modes against full finite elements in time: the wheel as a rigid body on a corner."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ WITHIN = 0.01
 
 
 def run() -> list[Table]:
-    """A table a case, and which choices are within 1 %."""
+    """One table per case, and which choices are within 1 %."""
     tables, rows = [], []
     modes, made = max(choice.modes for choice in CHOICES), {}
     with tempfile.TemporaryDirectory() as folder:

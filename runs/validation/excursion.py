@@ -1,4 +1,4 @@
-"""What a tire that is linear about its static state leaves out: rolling finite elements with large motions beside it."""
+"""The error of linearising about the static state, against rolling FE with large motions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ STEP, DURATION = 1e-4, 0.04  # s
 
 
 def run() -> list[Table]:
-    """One table."""
+    """One table of all roads."""
     with tempfile.TemporaryDirectory() as folder:
         tires, rows = None, []
         for name, road, height in ROADS:
@@ -54,7 +54,7 @@ def scene_of(road: str, mesh: dict[str, int] | None = None, duration: float = DU
 
 
 def beside(tires: Tires) -> tuple[float, float, float, float, float]:
-    """Error %, largest forces N, iterations a step, ratio of run times. Collective."""
+    """Error %, largest forces N, iterations per step, ratio of run times. Collective."""
     linear = follow(tires.trial, *tires.full(STEP))
     tire, *given = tires.nonlinear(STEP)
     found = follow(tires.trial, tire, *given)

@@ -1,4 +1,4 @@
-"""What a tire does over time, whatever it is made of: the same road, points, tread and solver."""
+"""Time histories of any tire model with the same road, points, tread and solver."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ from tireroad.contact.setup import ContactSetup
 
 @dataclass(frozen=True)
 class History:
-    """Quantities (n, k) by name at the end of each of n steps of `step` s; `seconds` of the loop, of one
-    thread's processor time, which a busy machine changes little; `setup` of what it needs.
+    """Quantities (n, k) by name at the end of each of n steps of `step` s.
+
+    `seconds` of the loop: CPU time of one thread, which a busy machine changes little; `setup`:
+    seconds of its set-up.
     """
 
     step: float
@@ -28,7 +30,7 @@ class History:
 
 @dataclass(frozen=True)
 class Trial:
-    """What any tire is taken over: the table [contact], patch and road, for `duration` s."""
+    """The conditions of any tire model's run: table [contact], patch and road, `duration` s."""
 
     spec: Spec
     setup: ContactSetup
@@ -36,7 +38,7 @@ class Trial:
 
 
 def follow(trial: Trial, tire, step: float, setup: float) -> History:
-    """Take the tire over the trial's road: same points, tread, solver and road for any tire.
+    """Run the tire over the trial's road, with the same points, tread and solver for any tire.
 
     Contact and axle force (n, 3) N, displacement of the contact points (n, c) m.
     """

@@ -1,4 +1,4 @@
-"""Modes against full finite elements in time: a standing tire on a flat road that moves (figures 6.4, 6.5)."""
+"""Modes against full finite elements: a tire at rest on a moving flat road (figures 6.4, 6.5)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ duration = {duration}
 step = 1e-4
 """
 )
-AMPLITUDES = (1e-4, 2e-3)  # m: the thesis's, and one at which the contact changes
+AMPLITUDES = (1e-4, 2e-3)  # m: that of the thesis, and one at which the contact changes
 CHOICES = (
     Choice(50, "none", 1e-4),
     Choice(50, "static", 1e-4),
@@ -42,9 +42,9 @@ CHOICES = (
     Choice(150, "attachment", 1e-4),
     Choice(400, "static", 1e-4),
 )
-STEPS = (2e-4, 1e-4)  # s, of the full finite elements
+STEPS = (2e-4, 1e-4)  # s: steps of the full finite elements
 MESH = {"segments": 24, "elements_arc": 10, "duration": 0.1}
-# Large motions assemble the finite elements several times a step.
+# With large motions the finite elements are assembled several times per step.
 SMALL = {"segments": 16, "elements_arc": 6, "duration": 0.04}
 MOVED = (1e-4, 1e-3, 2e-3, 4e-3)  # m
 LINEARISED = Choice(150, "attachment", 2e-4)
@@ -52,7 +52,7 @@ QUANTITIES = ("contact force", "axle force", "displacement")
 
 
 def run() -> list[Table]:
-    """Contact force, axle force, displacement of the contact points; run times."""
+    """Errors of contact force, axle force and displacement of the contact points; run times."""
     tables, rows = [], []
     modes = max(choice.modes for choice in CHOICES)
     with tempfile.TemporaryDirectory() as folder:
@@ -68,7 +68,7 @@ def run() -> list[Table]:
 
 
 def _linearised() -> Table:
-    """Motions about the static state, small against large ones of the same elements."""
+    """Motions about the static state: small against large ones on the same elements."""
     modes, rows = LINEARISED.modes, []
     with tempfile.TemporaryDirectory() as folder:
         scenes = [SCENE.format(amplitude=a, modes=modes, **SMALL) for a in MOVED]

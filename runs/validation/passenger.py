@@ -1,4 +1,4 @@
-"""The built-in passenger tire on a rough road: third octaves of modes against full finite elements, air and cords included."""
+"""Passenger tire with air and cords, rough road: third octaves of modes against full FE."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ duration = {duration}
 step = 1e-4
 """
 MESH = {"segments": 16, "elements_arc": 14, "duration": 0.2}
-STEPS = (1.6e-4, 8e-5)  # s, of the full finite elements, the first of the modes too
-HIGHEST = (400.0, 560.0)  # Hz, of the modes kept
-BAND = (100.0, 530.0)  # Hz: third octaves of 125 to 500 Hz, of three lines at least
+STEPS = (1.6e-4, 8e-5)  # s: steps of the full finite elements; the modes use the first
+HIGHEST = (400.0, 560.0)  # Hz: upper frequency of the modes kept
+BAND = (100.0, 530.0)  # Hz: third octaves of 125 to 500 Hz, with at least three lines each
 ASKED = 1.0  # dB
 
 
 def run() -> list[Table]:
-    """Differences of every third octave, the worst of them, and what a simulated second takes."""
+    """Differences in every third octave, the largest of them, and seconds per simulated second."""
     with tempfile.TemporaryDirectory() as folder:
         tires = Tires(SCENE.format(highest=max(HIGHEST), **MESH), Path(folder))
         full = [follow(tires.trial, *tires.full(step)) for step in STEPS]
@@ -64,7 +64,7 @@ def run() -> list[Table]:
 
 
 def compared_table(title: str, compared: dict[str, History], exact: History) -> Table:
-    """Third octaves of the vertical forces less the `exact` ones, dB: a row a band, a column a history."""
+    """Third octaves of vertical forces minus `exact`, dB: a row per band, a column per history."""
     rows: list[list] = []
     for name in ("contact", "axle"):
         centre, right = _levels(exact, name)

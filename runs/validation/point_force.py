@@ -49,8 +49,8 @@ CHOICES = [
         (300, "static", 1e-4),
     )
 ]
-STEPS = (2e-4, 1e-4)  # s, of the full finite elements
-RADIUS = 1.0  # without contact nothing chatters: average acceleration, the least error of all
+STEPS = (2e-4, 1e-4)  # s: steps of the full finite elements
+RADIUS = 1.0  # nothing chatters without contact: average acceleration, the smallest error of all
 MESH = {"segments": 24, "elements_arc": 10}
 
 

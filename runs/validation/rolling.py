@@ -1,4 +1,4 @@
-"""Modes against full finite elements in time: rolling at 100 rad/s over sine, cleat and rough roads."""
+"""Modes against full finite elements in time: 100 rad/s over sine, cleat and rough roads."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ MORE_ROADS = {
     "cobblestones, joints of 6 mm": 'kind = "cobblestones"',
     "texture, 0.2 mm rms": 'kind = "texture"',
 }
-STEPS = (1e-4, 5e-5, 2.5e-5)  # s, of the full finite elements
+STEPS = (1e-4, 5e-5, 2.5e-5)  # s: steps of the full finite elements
 CHOICES = (
     Choice(100, "none", 1e-4),
     Choice(100, "static", 1e-4),
@@ -71,12 +71,12 @@ LARGE = {"segments": 70, "elements_arc": 20}
 
 
 def run() -> list[Table]:
-    """A table a road, and which targets are reached."""
+    """One table per road, and which targets are reached."""
     return _run(MESH, STEPS, ROADS)
 
 
 def run_large() -> list[Table]:
-    """Four times the unknowns, the full finite elements at half the steps, rougher roads."""
+    """Four times the unknowns, full finite elements at half the steps, rougher roads."""
     return _run(LARGE, [step / 2 for step in STEPS], ROADS | MORE_ROADS)
 
 
@@ -99,7 +99,7 @@ def _run(mesh: dict[str, int], steps: Sequence[float], roads: dict[str, str]) ->
 
 
 def _beyond(found: Comparison) -> str:
-    """What the road excites above the band, and the nonlinear contact takes down into it."""
+    """Force above the band, which the nonlinear contact partly transfers into it."""
     force = found.full[-1].history.values["contact force"][:, 2]
     power = np.abs(np.fft.rfft(force - force.mean())) ** 2
     frequency = np.fft.rfftfreq(len(force), found.full[-1].history.step)

@@ -1,4 +1,4 @@
-"""The course of contact forces within a step: what is chosen on soft and stiff treads, against finer steps."""
+"""Choice of the integration scheme on soft and stiff treads, against finer time steps."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ ROAD = "cobblestones, joints of 0.5 mm"
 
 
 def run() -> list[Table]:
-    """All treads, residuals and steps in one table."""
+    """One table of all treads, residuals and steps."""
     return tables(MESH, RESIDUALS, STEPS, FINEST)
 
 
 def tables(mesh: dict[str, int], residuals, steps, finest: float) -> list[Table]:
-    """`finest`: the step (s) of the reference, with forces linear over it."""
+    """`finest`: time step (s) of the reference, whose forces are linear over the step."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         tires = None
@@ -60,7 +60,7 @@ def tables(mesh: dict[str, int], residuals, steps, finest: float) -> list[Table]
 
 
 def _follow(tires: Tires, response: Response, step: float, scheme: str) -> History | None:
-    """None where the motion grew without bound."""
+    """The history; None if the motion grew without bound."""
     tire = Recursion(
         response=response.resolved(step), step=step, scheme=scheme, comm=tires.job.comm
     )

@@ -1,4 +1,4 @@
-"""Every package where it could blow up: each case comes to its end, or is refused with the reason."""
+"""Stress test of every package: each case must finish, or be refused with a reason."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The two tires of a validation: modes, as many and with the residual wanted, and full finite elements."""
+"""The two tire models of a validation: modes with any residual, and full finite elements."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ from tireroad.runs.stages.build.turning import turning_of
 from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.runs.validation.histories import Trial
 
-# Of the full finite elements' scheme. Axle force on a cleat at steps of 1e-4 s with 0, 0.5 and 0.8: 5.4, 2.8
-# and 2.1 % off; contact force on cobblestones at 2.5e-5 s: 0 and 0.5 are 0.08 % apart, 0.8 is 0.2 % off.
+# Spectral radius of the full finite elements' scheme. Axle force on a cleat at steps of 1e-4 s with
+# 0, 0.5 and 0.8: 5.4, 2.8 and 2.1 % off; contact force on cobblestones at 2.5e-5 s: 0 and 0.5 are
+# 0.08 % apart, 0.8 is 0.2 % off.
 RADIUS = 0.5
 LOADED = """
 name = "validate"
@@ -40,12 +41,12 @@ youngs_modulus = 48e6
 [static]
 load = 500.0
 """
-"""A scene's beginning: the soft torus that carries 500 N, of elements still to be named."""
+"""Beginning of a scene: the soft torus under 500 N, with the elements left open."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What a run of the modal tire may spend: modes, residual option, time step in s."""
+    """Settings of a modal run: modes, residual option, time step in s."""
 
     modes: int
     residual: str
@@ -53,9 +54,9 @@ class Choice:
 
 
 class Tires:
-    """A scene run up to its modes; its road, and the modes kept, can then be changed at little cost.
+    """A scene run up to its modes; its road, and the modes kept, can then be changed at low cost.
 
-    `static_seconds`, `modes_seconds`: what those stages took. Files go to `folder`.
+    `static_seconds`, `modes_seconds`: duration of those stages. Files go to `folder`.
     """
 
     def __init__(self, scene: str, folder: Path):
@@ -85,7 +86,7 @@ class Tires:
 
     @property
     def setting(self) -> str:
-        """Size, and what was spent before any road, for a title."""
+        """Size, and cost before any road, for a title."""
         top = self.modes.frequency[-1]
         return (
             f"{self.unknowns} unknowns; static state {self.static_seconds:.1f} s, "
@@ -93,7 +94,7 @@ class Tires:
         )
 
     def change(self, scene: str) -> None:
-        """Take a scene that differs after its modes only: road, forces, contact, time."""
+        """Switch to a scene that differs only after its modes: road, forces, contact, time."""
         self._file.write_text(scene)
         self.job = replace(self.run.job, scene=load(self._file))
         self._responses: dict[tuple[int, str], tuple[Response, float]] = {}
@@ -105,11 +106,11 @@ class Tires:
 
     @property
     def wheel(self) -> Wheel:
-        """The full matrices as the wheel turns."""
+        """The full matrices of the rotating wheel."""
         return self.run.wheel
 
     def modal(self, choice: Choice) -> tuple[Recursion, float, float]:
-        """The lowest modes with their residual between the points of the scene; step; set-up in s."""
+        """The lowest modes with their residual between the scene's points; step; set-up in s."""
         key = choice.modes, choice.residual
         if key not in self._responses:
             began = time.perf_counter()
@@ -121,7 +122,7 @@ class Tires:
         return tire, choice.step, seconds + time.perf_counter() - began
 
     def response(self, count: int, residual: str, counted: bool = True) -> Response:
-        """The response of the lowest modes, as the program's own stages make it; what is `counted` of it, or all."""
+        """The response of the lowest modes as the stages make it; the `counted` part, or all."""
         if count not in self._rolling:
             turning = turning_of(self.job)
             few = fewer(self.modes, self.motions, count, turning, self.job.axle)
@@ -154,7 +155,7 @@ class Tires:
         return tire, step, time.perf_counter() - began
 
     def _damping(self) -> tuple[tuple[float, float], ModalDamping | None]:
-        """What damps the full matrices uniformly, and mode by mode beside it. Collective."""
+        """Uniform damping of the full matrices, and additional modal damping. Collective."""
         wheel, modes = self.wheel, self.modes
         if not isinstance(wheel.damping, StrainEnergy):
             return wheel.damping, None

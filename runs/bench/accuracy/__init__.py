@@ -1,1 +1,1 @@
-"""Benchmarks of run time against error, and of what error bars and searches are worth."""
+"""Benchmarks of run time against error, and of the quality of error bars and searches."""

@@ -1,4 +1,4 @@
-"""Accuracy on demand: is the target met, and at what cost beside the best settings that there are."""
+"""Accuracy on demand: is the target met, and at what cost compared with the best settings?"""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ TARGET, UP_TO = 0.15, 100.0  # -, Hz
 WANTED = (f"accuracy.target={TARGET}", f"accuracy.up_to={UP_TO}")
 # Rungs of the exhaustive search, none finer than the reference.
 GRID = {"mesh": (0, 1, 2), "modes": (0, 2), "points": (0, 1, 2), "step": (0, 1, 2)}
-# On what a stage's cost depends: what differs in none of it is computed once in a search.
+# Causes that a stage's cost depends on: a stage equal in all of them is computed once in a search.
 DEPENDS = {
     "static": ("mesh",),
     "modes": ("mesh", "modes"),
@@ -55,9 +55,9 @@ ASKED = {"met": 90.0, "cost": 2.0, "search": 3.0}  # % of the cases; times the l
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of a case: whether the search ended within its target by its own `estimated` error, the `true` one of
-    what it chose; seconds of a run with that, of the `best` of the exhaustive search (None: nothing met the
-    target) and of the whole `search`."""
+    """Result of a case: whether the search ended within its target by its own `estimated` error;
+    the `true` error of the chosen settings; seconds of a run with these, of the `best` one of
+    the exhaustive search (None: none met the target), and of the whole `search`."""
 
     case: str
     ended: bool
@@ -69,18 +69,18 @@ class Outcome:
 
     @property
     def met(self) -> bool:
-        """Whether the true error is as asked for."""
+        """Whether the true error meets the target."""
         return self.ended and self.true <= TARGET
 
 
 def run(kept: Path | None = None) -> list[Table]:
-    """All cases; what the folder `kept` holds of them is not computed again. On one process."""
+    """Run all cases, except those whose results are in the folder `kept`. On one process."""
     with tempfile.TemporaryDirectory() as folder:
         return tables(Path(folder), CASES, GRID, kept or Path(folder) / "kept")
 
 
 def tables(folder: Path, cases: Iterable[Case], grid: Mapping, kept: Path) -> list[Table]:
-    """Of the cases, with the rungs of the exhaustive search. On one process."""
+    """Tables of the cases; `grid`: rungs of the exhaustive search. On one process."""
 
     def settings(_: Case) -> tuple:
         return TARGET, UP_TO, DURATION, FINE, dict(grid)
@@ -91,14 +91,14 @@ def tables(folder: Path, cases: Iterable[Case], grid: Mapping, kept: Path) -> li
 
 
 def judged(case: Case, folder: Path, kept: Path, *settings) -> Records:
-    """The outcome of a case, of the settings that this module has. On one process."""
+    """The outcome of one case with the settings of this module. On one process."""
     *_, grid = settings
     with by_processor():
         return [asdict(_outcome(folder, case, grid, kept / "forces"))]
 
 
 def _outcome(folder: Path, case: Case, grid: Mapping, forces: Path) -> Outcome:
-    """Reference, search and exhaustive search of a case. On one process."""
+    """Reference, search and exhaustive search of one case. On one process."""
     fine = case.scene(folder, DURATION, *sets(**{**FINE, **TIRES[case.tire].fine}))
     exact = recorded(fine, folder / "reference", forces, _cache(folder))
     scene = case.scene(folder, DURATION, *WANTED)
@@ -113,8 +113,8 @@ def _outcome(folder: Path, case: Case, grid: Mapping, forces: Path) -> Outcome:
 
 
 def _cheapest(folder: Path, ladders: Ladders, grid: Mapping, truth: _Truth) -> float | None:
-    """Seconds of the cheapest of all settings of the grid that meet the target; those whose stages before the loop
-    alone are known to cost more are not run."""
+    """Seconds of the cheapest settings in the grid that meet the target, or None; those whose
+    stages before the loop are known to cost more are not run."""
     best: float | None = None
     known: dict[tuple, float] = {}
     for rungs in product(*grid.values()):
@@ -131,7 +131,7 @@ def _cheapest(folder: Path, ladders: Ladders, grid: Mapping, truth: _Truth) -> f
 
 
 def _searched(folder: Path, scene) -> tuple[bool, list[Trial]]:
-    """Whether a search met its target, and its trials that came to an end. Collective."""
+    """Whether a search met its target, and its successful trials. Collective."""
     folder.mkdir(parents=True, exist_ok=True)
     ended = True
     try:
@@ -143,14 +143,14 @@ def _searched(folder: Path, scene) -> tuple[bool, list[Trial]]:
 
 
 def _driven(folder: Path, ladders: Ladders, settings: Settings | None) -> Driven:
-    """A run with settings, from stages that those of the same wheel share. Collective."""
-    assert settings is not None  # the grid's rungs are all there
+    """A run with these settings; stages are shared with runs of the same wheel. Collective."""
+    assert settings is not None  # all rungs of the grid exist
     scene = applied(ladders.scene, settings)
     return driven(scene, folder / "grid", "contact", _cache(folder))
 
 
 def _cache(folder: Path) -> Cache:
-    """Of all that a wheel's roads share, in the wheel's folder."""
+    """The cache shared by all roads of a wheel, in the wheel's folder."""
     return Cache(folder / "cache")
 
 
@@ -160,7 +160,7 @@ def _cost(spent: Mapping[str, float]) -> float:
 
 
 def _spent(trials: list[Trial]) -> float:
-    """Seconds of all trials, their error bars too, each stage once where its inputs are the same."""
+    """Seconds of all trials with error bars, counting each stage once per set of inputs."""
     once = {}
     for trial in trials:
         for stage, value in trial.seconds.items():
@@ -171,13 +171,13 @@ def _spent(trials: list[Trial]) -> float:
 
 @dataclass(frozen=True)
 class _Truth:
-    """An `exact` run, and from when on (s) it is compared: what a run's own error bars leave out is left out."""
+    """An `exact` run, and the time (s) from which runs are compared, as for error bars."""
 
     exact: Recorded
     since: float
 
     def error(self, run: Recorded) -> float:
-        """The error that is asked for: of the history and of the mean of the axle force, relative, the larger one."""
+        """The error that the target limits: the larger one of the axle force's history and mean."""
         one, other = self._measured(self.exact), self._measured(run)
         far = bars(one, other, 1.0)
         return float(max(far.history[2], far.mean[2] / abs(one.mean[2])))

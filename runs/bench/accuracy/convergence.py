@@ -1,5 +1,7 @@
-"""What makes the forces of a rolling tire converge: mesh, points, modes, step and residual, one by one; and how far off
-the default settings are."""
+"""Convergence of a rolling tire's forces, and the error of the default settings.
+
+Mesh, points, modes, step and residual are varied one at a time.
+"""
 
 from __future__ import annotations
 
@@ -28,17 +30,20 @@ ROADS = {
 }
 SPEED, DURATION = 50.0, 0.16  # rad/s, s
 BANDS = (20.0, 1000.0)  # Hz
-# dB below the strongest band: a sine has all its force in one, and what is left of 50 dB less in another no user reads.
+# dB below the strongest band: a sine has all its force in one band, and residues 50 dB below it in
+# another are irrelevant.
 WEAK = 30.0
-# Elements as small at the footprint as far from it: 36 x 14 with 0.1 there have modes 1 % higher than the default mesh.
+# Elements far from the footprint must be fine too: modes of 36 x 14 elements with a footprint size
+# of 0.1 are 1 % higher than those of the default mesh.
 FINEST = {"segments": 34, "arc": 18, "order": 3, "footprint": 0.15}
 BASE = {"modes": 500, "residual": "static", "pitch": 0.003, "step": 5e-5}
-"""The converged run, from which one thing at a time is made coarser, or finer where that shows that it is one."""
+"""The converged run; single settings are made coarser, or finer to confirm convergence."""
 DEFAULT = "default settings"
 CHANGES: dict[str, tuple[dict, ...]] = {
     DEFAULT: ({},),
     "mesh": ({"segments": 22, "arc": 12}, {"segments": 42, "arc": 22}),
-    # No divisor of the cleat's length: with one both its edges fall between points at the same time, and errors add.
+    # No divisor of the cleat's length: otherwise both its edges fall between points at the same
+    # time, and errors add.
     "points": ({"pitch": 0.004}, {"pitch": 0.0021}),
     "modes": ({"modes": 250}, {"modes": 700}),
     "step": ({"step": 1e-4}, {"step": 2.5e-5}),
@@ -48,9 +53,12 @@ CHANGES: dict[str, tuple[dict, ...]] = {
 
 @dataclass(frozen=True)
 class Apart:
-    """How far a run is from the converged one: relative L2 of what varies in the `history` up to the band's end, of `mean` and
-    `deviation`, %; the largest difference of a third octave, dB, and where, Hz: of bands within `WEAK` of the strongest, and
-    of `every` one."""
+    """Distance of a run from the converged one.
+
+    Relative L2 error of the varying part of the `history` up to the band's end, errors of `mean`
+    and `deviation`, %; the largest difference of a third octave within `WEAK` of the strongest
+    (`level`, dB, at `at`, Hz), and of `every` one, dB.
+    """
 
     history: float
     mean: float
@@ -61,7 +69,7 @@ class Apart:
 
 
 def apart(exact: Rolled, found: Rolled, force: str, duration: float) -> Apart:
-    """The vertical part of a force in two runs over the same road; bands up to half the lower highest mode."""
+    """Distance of a vertical force in two runs over one road, up to half the lower highest mode."""
     steps = [run.figure("contact", "step") for run in (exact, found)]
     top = 0.5 * min(run.figure("modes", "highest") for run in (exact, found))
     values = [run.forces[force][:, 2:] for run in (exact, found)]
@@ -76,8 +84,11 @@ def apart(exact: Rolled, found: Rolled, force: str, duration: float) -> Apart:
 
 
 def levels(exact: tuple, found: tuple) -> tuple[float, float, float]:
-    """The largest difference (dB) of bands of both, as (centres Hz, levels dB), within BANDS: of those within `WEAK` of the
-    strongest, where (Hz), and of all; NaN where they have none in common."""
+    """Largest difference (dB) of common bands within BANDS; each run as (centres Hz, levels dB).
+
+    Of those within `WEAK` of the strongest, with its frequency (Hz), and of all; NaN without common
+    bands.
+    """
     centre, level = (np.asarray(part) for part in exact)
     other = dict(zip(np.round(found[0], 6), found[1], strict=True))
     off = np.array([other.get(at, np.nan) for at in np.round(centre, 6)]) - level
@@ -91,8 +102,10 @@ def levels(exact: tuple, found: tuple) -> tuple[float, float, float]:
 
 
 def run(kept: Path | None = None) -> list[Table]:
-    """A table a road: what one step coarser costs in accuracy, and one step finer changes. Roads that the folder `kept`
-    holds are not computed again. On one process."""
+    """One table per road: errors one step coarser, and changes one step finer.
+
+    Roads whose results are in the folder `kept` are not computed again. On one process.
+    """
     with tempfile.TemporaryDirectory() as folder:
         return [_kept(Path(folder), road, kept or Path(folder) / "kept") for road in ROADS]
 
@@ -108,7 +121,7 @@ def _kept(folder: Path, road: str, kept: Path) -> Table:
 
 
 def table(folder: Path, road: str, finest: dict, base: dict, changes: dict) -> Table:
-    """Of one road; `finest` mesh and `base` keys of the converged run, `changes` by what they are made to."""
+    """The table of one road: `finest` mesh and `base` keys of the converged run, and `changes`."""
     observe.say(f"  {road}: the converged run ...")
     exact = _rolled(folder, road, finest, base, {})
     rows: list[list] = [["converged", "", "", *[""] * 6, exact.cost]]
@@ -159,7 +172,7 @@ def _named(keys: dict) -> str:
 
 
 def _rolled(folder: Path, road: str, finest: dict, base: dict, changed: dict) -> Rolled:
-    """A run with keys changed; stages that runs have in common are shared. Collective."""
+    """A run with changed keys; common stages are shared between runs. Collective."""
     mesh = finest | {key: value for key, value in changed.items() if key in finest}
     keys = base | {key: value for key, value in changed.items() if key in base}
     name = "-".join(str(value) for value in (*mesh.values(), keys["modes"]))

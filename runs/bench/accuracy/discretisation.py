@@ -1,4 +1,4 @@
-"""Which elements: run time against error over order, mesh and grading; locking; the diagonal mass."""
+"""Choice of elements: run time against error over order, mesh, grading; locking; diagonal mass."""
 
 from __future__ import annotations
 
@@ -48,9 +48,8 @@ LOADED = (
 
 @dataclass(frozen=True)
 class Answer:
-    """The lowest frequencies `values` (COUNT,) Hz of one mesh of `unknowns`, in `seconds` of one core;
-    `consistent`: the first and the last by the consistent mass, Hz.
-    """
+    """The lowest frequencies `values` (COUNT,) Hz of a mesh with `unknowns`, in `seconds` of one
+    core; `consistent`: the first and the last with the consistent mass, Hz."""
 
     unknowns: int
     seconds: float
@@ -59,8 +58,8 @@ class Answer:
 
 
 def run() -> list[Table]:
-    """Frequencies and loads of meshes, treatments of the dilatation, both masses. Collective."""
-    for order in (2, 3):  # compile outside the clock
+    """Frequencies and loads by mesh, integration of the dilatation, and both masses. Collective."""
+    for order in (2, 3):  # compile outside the timing
         _answer(_section(order, 12, 4, 1, "bead", 0.5))
     exact = _fourier()
     answers = {}
@@ -75,7 +74,7 @@ def run() -> list[Table]:
 
 
 def _fourier() -> np.ndarray:
-    """The lowest frequencies (Hz) without loads by Fourier series around the axle, a fine section."""
+    """The lowest frequencies (Hz) without loads, by Fourier series around, on a fine section."""
     section = _section(3, 8, 28, 2, "bead", 1.0).section()
     return lowest(section, {"wall": Rubber(YOUNGS_MODULUS, 0.45, 1200.0)}, COUNT)
 
@@ -189,7 +188,7 @@ def _meshes(answers: dict, exact: np.ndarray) -> Table:
 
 
 def _locking() -> Table:
-    """First frequency without loads, the dilatation by full and by reduced integration."""
+    """First frequency without loads, with full and with reduced integration of the dilatation."""
     meshes = [(2, 20, 8), (2, 40, 16), (3, 16, 8)]
     rows = []
     for ratio in RATIOS:

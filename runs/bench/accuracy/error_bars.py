@@ -1,4 +1,4 @@
-"""Estimated over true error of the figures of rolling: what the error bars of a run are worth."""
+"""Estimated over true error of rolling figures: the quality of a run's error bars."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ RUN = {"segments": 18, "arc": 8, "order": 3, "modes": 100, "pitch": 0.008, "step
 
 
 def run(kept: Path | None = None) -> list[Table]:
-    """All cases; what the folder `kept` holds of them is not computed again. On one process."""
+    """Run all cases, except those whose results are in the folder `kept`. On one process."""
     with tempfile.TemporaryDirectory() as folder:
         where = Path(folder)
         return tables(where, CASES, RUN, FINE, DURATION, kept or where / "kept")
@@ -51,7 +51,7 @@ def run(kept: Path | None = None) -> list[Table]:
 def tables(
     folder: Path, cases: Iterable[Case], coarse: dict, fine: dict, duration: float, kept: Path
 ) -> list[Table]:
-    """Of the `cases`; settings of the run and of the far finer one. On one process."""
+    """Tables of the `cases`, with settings of the run and of the much finer one. On one process."""
 
     def settings(case: Case) -> tuple:
         tire = TIRES[case.tire]
@@ -66,20 +66,20 @@ def tables(
 def judged(
     case: Case, folder: Path, kept: Path, coarse: dict, fine: dict, duration: float
 ) -> Records:
-    """The figures of a case (Effectivity) with its error bars and against its finer runs. On one process."""
+    """The figures of a case (Effectivity), estimated and against finer runs. On one process."""
     where = _Where(folder, kept, case, duration, coarse, fine)
     return [asdict(one) for one in _judged(where)]
 
 
 def _told(records: Records) -> str:
-    """What is said of a case that is done."""
+    """The message about a completed case."""
     good = [one.good for one in (Effectivity(**record) for record in records) if one.cause == ALL]
     return f"{sum(good)} of {len(good)} figures good"
 
 
 @dataclass(frozen=True)
 class _Where:
-    """A case, its settings, and where its runs and their forces go."""
+    """A case, its settings, and the folders of its runs and their forces."""
 
     folder: Path
     kept: Path
@@ -94,7 +94,7 @@ class _Where:
         return driven(scene, self.folder / "run", "spectra", self._cache)
 
     def finer(self, *names: str) -> Recorded:
-        """With some of its settings as fine as the reference's."""
+        """The run with some settings as fine as the reference's."""
         keys = self.coarse | {name: self.fine[name] for name in names if name in self.fine}
         scene = self.case.scene(self.folder, self.duration, *sets(**keys))
         folder = self.folder / "-".join(("fine", *names))
@@ -102,7 +102,7 @@ class _Where:
 
     @property
     def _cache(self) -> Cache:
-        """Of the stages that the roads and the settings share."""
+        """The cache of stages shared by roads and settings."""
         return Cache(self.folder / "cache")
 
 
@@ -110,7 +110,7 @@ _MESH = ("segments", "arc", "order", "footprint", "modes")
 
 
 def _judged(where: _Where) -> Iterator[Effectivity]:
-    """Of all causes, and of each, from pairs of runs that differ in it alone."""
+    """Effectivities of all causes together, and of each from two runs that differ only in it."""
     own = where.own()
     more = where.finer("modes")
     pairs: dict[str, tuple[Recorded, Recorded]] = {

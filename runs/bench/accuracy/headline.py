@@ -1,4 +1,4 @@
-"""The headline: wall time of one simulated second of rolling on a rough road, within 1 %."""
+"""The headline: wall-clock time of one simulated second on a rough road, at 1 % error."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from tireroad.runs.process import observe
 ABOUT = "one simulated second of rolling on a rough road: wall time at 1 % error"
 
 MESH = Mesh(32, 12, 0.3)
-MODES = 600  # differ from 900 by 0.05 % in the contact and 0.09 % in the axle force, same error
+MODES = 600  # 900 differ by 0.05 % in the contact and 0.09 % in the axle force, same error
 RESIDUAL = "attachment"
 FINEST = 2.5e-5  # s, step of the reference
 DURATION = 1.0  # s
-TARGET = 1.0  # % of error, and s of wall time
-# Dynamic states (None: all that the step resolves) and steps a second, the cheapest first.
+TARGET = 1.0  # % of error, and s of wall-clock time
+# Dynamic states (None: all that the step resolves) and steps per second, the cheapest first.
 CHOICES = ((None, 4000), (450, 5000), (None, 5000), (None, 8000))
 
 
 def run() -> list[Table]:
-    """The table of the choices; the first within the error is the headline."""
+    """The table of the choices; the cheapest within the error is the headline."""
     with tempfile.TemporaryDirectory() as folder:
         return [table(Path(folder), MESH, MODES, DURATION, CHOICES)]
 
 
 def table(folder: Path, mesh: Mesh, modes: int, duration: float, choices) -> Table:
-    """The whole contact stage as a user runs it, files and checks included, choice by choice."""
+    """The whole contact stage of a user's run, including files and checks, choice by choice."""
     observe.say("  modes of the tire and the reference ...")
     keys: dict[str, Any] = {"modes": modes, "residual": RESIDUAL, "duration": duration}
     exact = rolled(folder, mesh, step=FINEST, **keys)
@@ -51,7 +51,7 @@ def table(folder: Path, mesh: Mesh, modes: int, duration: float, choices) -> Tab
 
 
 def _error(exact: Rolled, found: Rolled, name: str, duration: float) -> float:
-    """In percent; of the contact force its vertical part, the only one without friction."""
+    """Error, %; of the contact force only the vertical part, the only one without friction."""
     part = slice(2, 3) if name == "total_force" else slice(None)
     given = exact.forces[name][:, part], found.forces[name][:, part]
     return 100 * distance(*given, duration, BAND).mean

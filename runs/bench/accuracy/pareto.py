@@ -1,6 +1,6 @@
-"""Run time against error of a tire that rolls on a rough road: modes x residual x step x mesh.
+"""Run time against error of a tire rolling on a rough road: modes x residual x step x mesh.
 
-The error is against a run whose mesh is converged too: what a mesh leaves wrong, no modes and no steps mend.
+The reference has a converged mesh too: neither modes nor steps can remove the error of a mesh.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from tireroad.runs.validation.histories import History, follow
 ABOUT = "modes x residual x step x mesh against a run converged in all of them: the Pareto front of rolling"
 
 COARSE, FINE = Mesh(24, 10, 0.35), Mesh(32, 12, 0.3)
-CONVERGED, ORDER = Mesh(36, 14, 0.2), 3  # of the reference, its elements of that order
-MOST = 600  # modes of the reference, attachment modes besides
-FINEST = 2.5e-5  # s, its step
+CONVERGED, ORDER = Mesh(36, 14, 0.2), 3  # mesh of the reference, and its element order
+MOST = 600  # modes of the reference, plus attachment modes
+FINEST = 2.5e-5  # s: its step
 DURATION = 0.2  # s
 COUNTS = (50, 100, 200, 400)
 RESIDUALS = ("none", "static", "second-order", "attachment")
@@ -43,7 +43,7 @@ FULL = "full finite elements"
 
 @dataclass(frozen=True)
 class Choice:
-    """A configuration, what it costs (s a simulated second) and how far it is off (%)."""
+    """A configuration, its cost (s per simulated second) and its errors (%)."""
 
     mesh: str
     modes: int
@@ -60,14 +60,14 @@ class Choice:
 
     @property
     def name(self) -> str:
-        """What a reader would ask for."""
+        """A short description."""
         if self.residual == FULL:
             return f"{self.residual}, {self.step:g} s"
         return f"{self.modes} modes, {self.residual}, {self.step:g} s"
 
 
 def run() -> list[Table]:
-    """The front on one mesh, what two meshes differ by, and full finite elements beside them."""
+    """The front on one mesh, the fronts of two meshes, and full finite elements for comparison."""
     with tempfile.TemporaryDirectory() as folder:
         return tables(Path(folder), (COARSE, FINE), COUNTS, MOST, FULL_STEPS, CONVERGED)
 
@@ -75,7 +75,7 @@ def run() -> list[Table]:
 def tables(
     folder: Path, meshes: tuple[Mesh, Mesh], counts, most, full_steps, converged: Mesh
 ) -> list[Table]:
-    """`meshes`: coarse and fine; `counts` of modes, and `most`, the reference's, on the mesh `converged`."""
+    """`meshes`: coarse, fine; `counts` of modes; `most` of the reference, on mesh `converged`."""
     reference, exact = _reference(folder, converged, most, f"tire.order={ORDER}")
     given, own = _reference(folder, meshes[0], most)
     found = _choices(given, exact, str(meshes[0]), counts, RESIDUALS, STEPS)
@@ -116,7 +116,7 @@ def _choices(given: Prepared, exact: History, mesh: str, counts, residuals, step
 
 
 def _full(given: Prepared, exact: History, mesh: str, step: float) -> Choice:
-    """Every degree of freedom of the same mesh in time."""
+    """All degrees of freedom of the same mesh, integrated in time."""
     from tireroad.fem.matrices.probe import nodes
     from tireroad.fem.transient.linear import FullTire
     from tireroad.modal.damping import StrainEnergy
@@ -139,7 +139,7 @@ def _full(given: Prepared, exact: History, mesh: str, step: float) -> Choice:
 
 
 def front(choices: list[Choice]) -> list[Choice]:
-    """Those that no other beats in both cost and error, the cheapest first."""
+    """The choices that no other beats in both cost and error, the cheapest first."""
     best: list[Choice] = []
     for choice in sorted(choices, key=lambda c: (c.cost, c.worst)):
         if not best or choice.worst < best[-1].worst:
@@ -222,7 +222,7 @@ def _named(target: float, best: list[Choice], full: list[Choice]) -> str:
 
 
 def _meshes(found, on_fine, apart, coarse: Prepared, fine: Prepared) -> Table:
-    """Fronts of the two meshes, each against its own reference, and how far those are apart."""
+    """The fronts of two meshes, and the error of each mesh itself."""
     rows = [_row(choice) for part in (found, on_fine) for choice in front(part)]
     sizes = [
         f"{s.run.job.scene.tire.segments} x {s.run.job.scene.tire.proportions().along}"

@@ -1,4 +1,4 @@
-"""The problem that the benchmarks of rolling share: a tire on a rough road, and how errors are told."""
+"""The problem shared by the rolling benchmarks: a tire on a rough road, and its error measures."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tireroad.runs.process import observe
 from tireroad.runs.stages.pipeline import Finished, run_scene
 from tireroad.runs.validation.histories import History, Trial, follow
 
-BAND = 500.0  # Hz, up to which errors are told
+BAND = 500.0  # Hz: upper frequency of the errors
 SPEED = 100.0  # rad/s
 
 TEXTURE = 'kind = "texture"\nrms = 2e-4\nroll_off = 0.2\ncut_off = 0.03'
@@ -60,7 +60,7 @@ step = {step}
 
 @dataclass(frozen=True)
 class Mesh:
-    """Elements around and from bead to bead, and their size where the road touches; None: by default."""
+    """Elements around and bead to bead, and their relative size at the footprint; None: default."""
 
     segments: int | None
     arc: int | None
@@ -71,8 +71,10 @@ class Mesh:
 
 
 def write_scene(file: Path, mesh: Mesh, **keys: object) -> Path:
-    """The scene with some of its keys changed: speed, modes, residual, pitch, duration, step; one that is None has no
-    line in it, and so the program's default. `road`: the lines of its table."""
+    """Write the scene with some keys changed: speed, modes, residual, pitch, duration, step, road.
+
+    `road`: the lines of its table. A key that is None is left out of the scene.
+    """
     values: dict[str, object] = {"speed": SPEED, "modes": 100, "residual": "static"}
     values |= {"pitch": 0.008, "duration": 0.2, "step": 1e-4, "road": TEXTURE}
     values |= vars(mesh) | keys
@@ -83,20 +85,20 @@ def write_scene(file: Path, mesh: Mesh, **keys: object) -> Path:
 
 
 def _named(line: str) -> Iterator[str]:
-    """The fields of a line to be formatted."""
+    """The format fields of a line."""
     return (name for _, name, _, _ in Formatter().parse(line) if name)
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A `run` up to its Green's functions, and the `trial` of its road, its points settled."""
+    """A `run` up to its Green's functions, and the `trial` with its road and settled points."""
 
     run: Finished
     trial: Trial
 
 
 def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Prepared:
-    """A run up to its Green's functions, its points settled; `sets` as of --set. Collective."""
+    """A run up to its Green's functions, with settled points; `sets` as for --set. Collective."""
     from tireroad.runs.scene.load import load
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -111,7 +113,7 @@ def prepared(folder: Path, mesh: Mesh, *sets: str, **keys: object) -> Prepared:
 
 @dataclass(frozen=True)
 class Rolled:
-    """A run as a user starts it: its stages' entries of summary.json, and forces (n, 3) N by name."""
+    """A run as a user starts it: its stages in summary.json, and forces (n, 3) N by name."""
 
     stages: dict[str, dict]
     forces: dict[str, np.ndarray]
@@ -123,18 +125,20 @@ class Rolled:
 
     @property
     def cost(self) -> float:
-        """Seconds of all stages; of those that were reused, what they took when they were computed. Of the processor, if
-        it all ran inside of fem.timing.by_processor."""
+        """Seconds of all stages; of reused ones, the seconds of their computation.
+
+        CPU time, if everything ran within fem.timing.by_processor.
+        """
         return sum(sum(entry["cost"].values()) for entry in self.stages.values())
 
     @property
     def loop(self) -> float:
-        """Wall time (s) of the time loop, files and checks included."""
+        """Wall-clock time (s) of the time loop, including files and checks."""
         return self.stages["contact"]["cost"]["time loop"]
 
 
 def rolled(folder: Path, mesh: Mesh, *sets: str, cache: Cache = NO_CACHE, **keys: object) -> Rolled:
-    """A run up to its contact forces; stages that the folder or the cache holds are reused. Collective."""
+    """A run up to its contact forces; stages in the folder or the cache are reused. Collective."""
     from tireroad.runs.scene.load import load
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -156,7 +160,7 @@ def rolled(folder: Path, mesh: Mesh, *sets: str, cache: Cache = NO_CACHE, **keys
 
 
 def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
-    """The response that the run would have with its first modes and another residual. Collective."""
+    """The response of the run with its first `count` modes and another residual. Collective."""
     run, job = given.run, given.run.job
     few = fewer(run.fields, run.motions, count, run.wheel.turning, job.axle)
     rolling = rolling_modes(few, run.wheel.turning, job.comm)
@@ -166,7 +170,7 @@ def fewer_modes(given: Prepared, count: int, residual: str) -> Response:
 
 
 def modal(given: Prepared, response: Response, step: float) -> History:
-    """The loop on the states that the step resolves; what a run's response reads of its wheel is left out."""
+    """The loop on the states that the step resolves, without readings of the wheel."""
     alone = response.between(slice(response.residual.shape[1]), slice(None)).resolved(step)
     tire = Recursion(response=alone, step=step, scheme="linear", comm=MPI.COMM_SELF)
     with threadpool_limits(1, "blas"):
@@ -174,7 +178,7 @@ def modal(given: Prepared, response: Response, step: float) -> History:
 
 
 def errors(reference: History, found: History, duration: float) -> tuple[float, float]:
-    """Relative L2 up to BAND of what varies in the contact force and in the axle force, %."""
+    """Relative L2 error up to BAND of the varying contact force and axle force, %."""
     contact, axle = (
         100 * distance(reference.values[name], found.values[name], duration, BAND).mean
         for name in ("contact force", "axle force")

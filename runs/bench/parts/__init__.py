@@ -1,1 +1,1 @@
-"""What benchmarks are made of that are too long for one module."""
+"""Parts of benchmarks that are too long for one module."""

@@ -1,4 +1,4 @@
-"""Work in a process of its own, whose memory goes back as a whole, and whose failure ends nothing else."""
+"""Runs a task in a separate process, which releases its memory and isolates its failures."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ from tireroad.runs.process.statuses import BUG, DONE
 
 
 def apart(task: Callable[..., Any], *given: Any) -> Any:
-    """task(*given) of another process, whose results are pickled. ConvergenceError with its reason where it fails, in whatever
-    way. On one process."""
+    """task(*given) in another process; its result is pickled. On one process.
+
+    Raises ConvergenceError with the reason if it fails in any way.
+    """
     with tempfile.TemporaryDirectory() as folder:
         asked, answer = Path(folder) / "asked", Path(folder) / "answer"
         asked.write_bytes(pickle.dumps((task, given)))
         done = subprocess.run(
             [sys.executable, "-P", "-m", __name__, str(asked), str(answer)],
-            env=dict(os.environ),  # without what MPI has set in this process
+            env=dict(os.environ),  # without MPI's settings of this process
             stderr=subprocess.PIPE,
             text=True,
             errors="replace",
@@ -47,7 +49,7 @@ def _reason(status: int, said: str) -> str:
 
 
 def _answered(asked: Path, answer: Path) -> None:
-    """Work, in the other process."""
+    """Do the task, in the other process."""
     mpi.start_petsc([])
     task, given = pickle.loads(asked.read_bytes())
     answer.write_bytes(pickle.dumps(task(*given)))

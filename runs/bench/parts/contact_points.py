@@ -23,12 +23,12 @@ ELASTIC = 5e6, 0.45
 
 
 def median(function: Callable[[], object], repeats: int) -> float:
-    """Median of several runs, s: the loops it is compared with are medians too."""
+    """Median of several runs, s; the loops it is compared with are medians too."""
     return float(np.median(durations(function, repeats)))
 
 
 def _grid_case(n: int):
-    """A sphere-like gap on n x n points of 0.1 m, a soft tire under it."""
+    """A sphere-like gap on n x n points over 0.1 m, below a soft tire."""
     pitch = 0.1 / n
     x, y = (a.ravel() for a in np.meshgrid(*2 * [(np.arange(n) - (n - 1) / 2) * pitch]))
     places = GridPlaces((n, n), (pitch, pitch), np.arange(n * n))
@@ -39,7 +39,7 @@ def _grid_case(n: int):
 
 
 def large() -> Table:
-    """Both solvers on a textured road that moves; the last row is 100 x 100 points by projected CG."""
+    """Both solvers on a moving textured road; the last row is 100 x 100 points by projected CG."""
     rows = []
     for n in (32, 64, 100):
         x, y, kernel = _grid_case(n)
@@ -73,7 +73,7 @@ def large() -> Table:
 
 
 def rough() -> Table:
-    """128 x 128 points from nothing; tamaas, where it is installed, in the last row."""
+    """128 x 128 points without a starting guess; the last row is tamaas, if installed."""
     n = 128
     x, y, kernel = _grid_case(n)
     road = Texture(seed=2).make()
@@ -98,9 +98,9 @@ def rough() -> Table:
 
 
 def _tamaas(surface: np.ndarray, force: np.ndarray) -> list:
-    """Polonsky and Keer's solver of tamaas (Frerot et al., JOSS 2020) under the same load, in free space.
+    """Polonsky and Keer's solver in tamaas (Frerot et al., JOSS 2020), same load, free space.
 
-    Its tolerance, 1e-9 of its own measure, gives forces that agree with ours to some 1e-9.
+    Its tolerance, 1e-9 in its own measure, gives forces that agree with ours to about 1e-9.
     """
     import tamaas
 
@@ -124,5 +124,5 @@ def _tamaas(surface: np.ndarray, force: np.ndarray) -> list:
 
 
 def _none(count: int):
-    """A tire that does not give way."""
+    """A rigid tire."""
     return sparse.csr_matrix((count, 1)), np.zeros((1, 1))

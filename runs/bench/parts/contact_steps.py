@@ -1,4 +1,4 @@
-"""Part of `bench contact`: the recursion against direct convolution, and orders in the time step."""
+"""Part of `bench contact`: recursion against direct convolution, and orders in the time step."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DURATION = 0.01  # s
 
 
 def orders() -> Table:
-    """Forces of a shaken, rolling strip with residual flexibility at falling steps, both schemes."""
+    """Forces of a shaken, rolling strip with residual flexibility by step size, both schemes."""
     response = Strip(speed=20.0).response(PATCH.points, 5, 2, residual=6)
     exact = _forces(response, "linear", 6400)
     rows, before = [], None
@@ -44,7 +44,7 @@ def orders() -> Table:
 
 
 def _forces(response, scheme: str, steps: int) -> np.ndarray:
-    """Changes of the forces (25, c) N at common instants; the road shakes by 0.8 mm at 60 Hz."""
+    """Changes of the forces (25, c) N at common instants; the road moves by 0.8 mm at 60 Hz."""
     step = DURATION / steps
     tire = Recursion(response=response, step=step, scheme=scheme, comm=MPI.COMM_SELF)
     tread = half_space_compliance(PATCH.points[:, :2], PATCH.half_sizes, 5e6, 0.45)
@@ -55,8 +55,10 @@ def _forces(response, scheme: str, steps: int) -> np.ndarray:
 
 
 def convolution() -> Table:
-    """Prescribed forces, the same in both; the convolution is timed at the end of 200 steps and at
-    4,000 by its cost, which grows with their number.
+    """Recursion and convolution under the same prescribed forces.
+
+    The convolution is timed in full up to 1,600 steps; at 4,000 steps its time is extrapolated from
+    its cost per lag, which grows with the number of steps.
     """
     patch = oval_patch((10, 6), (0.015, 0.02), 500.0)
     response = Strip(speed=20.0).response(patch.points, 12, 5)
@@ -64,7 +66,8 @@ def convolution() -> Table:
     before: list[float] = []
     for steps in (200, 400, 800, 1600):
         times, off, size = _both(response, patch.force, 0.02, steps, 200)
-        # Romberg's table: both err by even powers of the step, for the force begins smoothly.
+        # Romberg's table: the errors of both are in even powers of the step, because the force
+        # begins smoothly.
         limits = [off]
         for order, coarse in enumerate(before, 1):
             limits.append(limits[-1] + (limits[-1] - coarse) / (4**order - 1))
@@ -89,8 +92,11 @@ def convolution() -> Table:
 
 
 def _both(response, shape: np.ndarray, duration: float, steps: int, shown: int):
-    """Seconds of recursion and convolution, the difference of their displacements at `shown` common
-    times (shown, r) m, and the largest displacement, m."""
+    """Recursion and convolution under the same forces.
+
+    Returns their seconds, the difference of their displacements at `shown` common times (shown, r)
+    m, and the largest displacement, m.
+    """
     h = duration / steps
     tires: tuple[Tire, ...] = (
         Recursion(response=response, step=h, scheme="linear", comm=MPI.COMM_SELF),
@@ -112,7 +118,7 @@ def _both(response, shape: np.ndarray, duration: float, steps: int, shown: int):
 
 
 def _many_steps(steps: int) -> list:
-    """500 points and 500 states: the recursion's steps, and steps/2 lags of the convolution each."""
+    """500 points and 500 states: the recursion's steps; steps/2 lags of the convolution each."""
     points, lags = 500, 20
     patch = oval_patch((25, 20), (0.006, 0.006), 500.0)
     tire = Recursion(

@@ -1,4 +1,4 @@
-"""Part of `bench discretisation`: load and footprint at given heights of the road against a sequence that converges."""
+"""Part of `bench discretisation`: load and footprint at given road heights, against their limit."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from tireroad.runs.process import observe
 if TYPE_CHECKING:
     from tireroad.fem.static.load_error import LoadError
 
-HEIGHTS = (0.002, 0.005, 0.010, 0.015, 0.020)  # m above the first touch of the finest
-# Times that elements at the footprint are cut in two. The edge of a footprint falls anywhere in an element: the width of a
-# soft torus 2 mm down went 11.18, 10.69, 10.40, 10.55 mm, which two cuts took for a sequence that ends at 9.96.
+HEIGHTS = (0.002, 0.005, 0.010, 0.015, 0.020)  # m above first contact on the finest mesh
+# Number of bisections of the elements at the footprint. The edge of a footprint falls anywhere
+# within an element: the width of a soft torus at 2 mm deflection went 11.18, 10.69, 10.40, 10.55
+# mm, which two bisections took for a sequence that ends at 9.96.
 CUTS = 3
 QUANTITIES = ("load", "length", "width")
 
@@ -31,7 +32,7 @@ class Pressed:
 
     @classmethod
     def of(cls, balance) -> Pressed:
-        """Of a tire in balance (fem.static.companion)."""
+        """Figures of a tire in equilibrium (fem.static.companion)."""
         extent = balance.extent
         return cls(balance.load, extent.length, extent.width)
 
@@ -43,8 +44,8 @@ class Pressed:
 
 @dataclass(frozen=True)
 class Known:
-    """A tire at one height of the road: its `own` state, its `estimate` (fem.static.load_error), and what it
-    converges to, if that was looked for."""
+    """A tire at one road height: its `own` state, its `estimate` (fem.static.load_error), and its
+    limit, if computed."""
 
     own: Pressed
     estimate: LoadError
@@ -53,15 +54,17 @@ class Known:
 
 @dataclass(frozen=True)
 class Converged:
-    """What ever smaller elements come to, as `values` of Pressed, and how sure that is, `error` (3,) relative."""
+    """The limit for ever smaller elements: `values` of Pressed, and relative `error` (3,)."""
 
     values: np.ndarray
     error: np.ndarray
 
 
 def converged(sequence: list[Pressed]) -> Converged:
-    """The limit of a sequence of halved sizes, by Aitken where all of it closes in, else its last; the error is what
-    the last step changed."""
+    """The limit of a sequence of halved sizes; its error is the change of the last step.
+
+    By Aitken's extrapolation if the whole sequence converges, else its last value.
+    """
     values = np.array([one.values for one in sequence])
     steps = np.diff(values, axis=0)
     ratios = np.divide(steps[1:], steps[:-1], out=np.ones_like(steps[1:]), where=steps[:-1] != 0)
@@ -72,8 +75,11 @@ def converged(sequence: list[Pressed]) -> Converged:
 
 
 def at_heights(loader, heights, cuts: int = 0) -> list[Known]:
-    """An inflated tire at each height (m, of the road), with its estimate; and what it converges to with its
-    elements at the footprint cut in two, `cuts` times over. Collective."""
+    """An inflated tire at each road height (m), with its error estimate.
+
+    With `cuts` >= 2 also its limit, from that many bisections of the elements at the footprint.
+    Collective.
+    """
     from tireroad.fem.static.companion import Balance
     from tireroad.fem.static.load_error import at_finer_footprint, load_error
 
@@ -92,8 +98,10 @@ def at_heights(loader, heights, cuts: int = 0) -> list[Known]:
 
 
 def table(meshes: dict[str, object], reference: str, make) -> Table:
-    """Of `meshes`, sections by name; `make(section)` gives an inflated loader; `reference` names the one whose
-    footprint is cut. Collective."""
+    """Table of `meshes`, sections by name; `reference` names the one with bisected footprint.
+
+    `make(section)` gives an inflated loader. Collective.
+    """
     exact = make(meshes[reference])
     heights = [exact.touch + height for height in HEIGHTS]
     observe.say("  loads: the sequence that converges ...")

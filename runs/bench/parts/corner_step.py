@@ -1,4 +1,4 @@
-"""Part of `bench contact`: what a step costs when the wheel moves, against one whose axle is held."""
+"""Part of `bench contact`: cost of a step with a moving wheel, against one with a held axle."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TURNS = 5
 
 
 def corner() -> Table:
-    """Whole contact stages of two durations, in turns: the difference is that of the steps between."""
+    """Contact stages of two durations, alternately: their difference is that of the extra steps."""
     costs: dict[str, list[float]] = {name: [] for name in AXLES}
     with tempfile.TemporaryDirectory() as folder, observe.quiet():
         points = {name: _run(Path(folder) / name, name, SHORT)[1] for name in AXLES}
@@ -58,7 +58,7 @@ def _more(cost: np.ndarray, held: np.ndarray) -> float:
 
 
 def _run(folder: Path, name: str, duration: float) -> tuple[float, int]:
-    """Processor seconds of a run, of whose stages only the contact is not there yet; its points."""
+    """CPU seconds of a run of which all stages but the contact exist, and its number of points."""
     folder.mkdir(parents=True, exist_ok=True)
     scene = load(
         write_scene(folder / "given.toml", MESH, duration=duration, step=STEP), AXLES[name]

@@ -1,4 +1,4 @@
-"""Figures of rolling with their true and their estimated errors, and tables of how good the estimates are."""
+"""True and estimated errors of rolling figures, and tables of the estimates' quality."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 
 from tireroad.runs.measure.tabulate import Table
 
-RANGE, ASKED = (0.5, 2.0), 80.0  # effectivity; % of the cases in it
+RANGE, ASKED = (0.5, 2.0), 80.0  # effectivity; % of the cases within it
 SMALL = {
     "mean": 1e-4,
     "deviation": 1e-3,
     "history": 0.1,
     "level": 0.02,
-}  # of the load, of the deviation, %, dB: below, no error
-ALL = "all"  # causes together
+}  # of the load, of the deviation, %, dB: smaller errors count as none
+ALL = "all"  # all causes together
 FORCES = {"contact_force": "total_force", "axle_force": "axle_force"}
 
 
 @dataclass(frozen=True)
 class Effectivity:
-    """A figure of a case with its true and its estimated error (N, % or dB), by one `cause` or all."""
+    """A figure of a case with true and estimated error (N, % or dB), by one `cause` or all."""
 
     case: str
     force: str
@@ -34,19 +34,19 @@ class Effectivity:
 
     @property
     def kind(self) -> str:
-        """Third octaves are one kind."""
+        """Kind of figure; all third octaves are one kind."""
         return self.figure if self.figure in SMALL else "third octaves"
 
     @property
     def good(self) -> bool:
-        """Within `RANGE`, or both too small to matter."""
+        """Whether the estimate is within `RANGE`, or both errors are negligible."""
         if max(self.true, self.estimated) <= self.small:
             return True
         return RANGE[0] * self.true <= self.estimated <= RANGE[1] * self.true
 
 
 def _judgement(some: list[Effectivity]) -> list[float]:
-    """Number, share that is good (%), median and tenths of estimated over true where there is an error."""
+    """Number, share of good ones (%), median and 10 % quantiles of estimated over true error."""
     ratio = [one.estimated / one.true for one in some if one.true > one.small] or [float("nan")]
     good = 100 * float(np.mean([float(one.good) for one in some] or [np.nan]))
     return [len(some), good, *map(float, np.quantile(ratio, [0.5, 0.1, 0.9]))]
@@ -62,7 +62,7 @@ _JUDGED = [
 
 
 def shares(found: list[Effectivity], note: str, failed: Sequence[str] = ()) -> Table:
-    """All causes together; `note` says what of and against what, `failed` which cases are not among them, and why."""
+    """All causes together; `note`: what was compared, `failed`: cases left out, with the reason."""
     some = [one for one in found if one.cause == ALL]
     kinds = ("mean", "deviation", "history", "third octaves")
     parts = {kind: [one for one in some if one.kind == kind] for kind in kinds}
@@ -80,7 +80,7 @@ def shares(found: list[Effectivity], note: str, failed: Sequence[str] = ()) -> T
 
 
 def by_cause(found: list[Effectivity]) -> Table:
-    """Each cause by itself."""
+    """Each cause separately."""
     rows = []
     for cause in dict.fromkeys(one.cause for one in found if one.cause != ALL):
         for force in FORCES:
@@ -101,7 +101,7 @@ _PAIRS = (
 
 
 def every(found: list[Effectivity]) -> Table:
-    """Each figure of all causes together, and the history by each."""
+    """Each figure of all causes together, and the history by cause."""
     columns = [
         ("case", ""),
         ("force", ""),

@@ -1,4 +1,4 @@
-"""What a machine can do at best: the rates that measured stages are held against."""
+"""Peak rates of the machine: lower bounds for the measured stages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 
 def durations(work: Callable[[], object], repeats: int) -> list[float]:
-    """What each of several runs takes, s."""
+    """Durations of several runs, s."""
     times = []
     for _ in range(repeats):
         began = time.perf_counter()
@@ -19,12 +19,12 @@ def durations(work: Callable[[], object], repeats: int) -> list[float]:
 
 
 def fastest(work: Callable[[], object], repeats: int) -> float:
-    """Shortest of several runs, s: what a floor is."""
+    """Shortest of several runs, s, used as a lower bound."""
     return min(durations(work, repeats))
 
 
 def bandwidth() -> float:
-    """Bytes a second that a + s b -> c moves through memory, on one core."""
+    """Memory bandwidth of a + s b -> c, bytes per second, on one core."""
     a, b, c = np.ones((3, 8_000_000))
 
     def triad() -> None:
@@ -35,7 +35,7 @@ def bandwidth() -> float:
 
 
 def flop_rate() -> float:
-    """Floating-point operations a second of a dense product."""
+    """Floating-point operations per second of a dense product."""
     n = 1000
     a = np.ones((n, n))
     return 2 * n**3 / fastest(lambda: a @ a, 5)

@@ -1,5 +1,4 @@
-"""Results of a bench that goes on where it was stopped: a JSON file a case, with what they are of; each case is computed in a
-process of its own."""
+"""Results of a resumable benchmark: a JSON file per case; each case runs in its own process."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from tireroad.runs.process import observe
 
 Records = list[dict[str, Any]]
 Task = Callable[..., Records]
-"""task(case, folder, kept, *settings): a function of a module."""
+"""task(case, folder, kept, *settings): a module-level function."""
 
 
 def every_case(
@@ -28,8 +27,10 @@ def every_case(
     settings: Callable[[Case], tuple],
     told: Callable[[Records], str],
 ) -> tuple[dict[Case, Records], list[str]]:
-    """What the task gives of each case, or what is kept of the same program and settings (text and numbers); and a line on
-    each case that failed. Cases work in a folder by wheel; `told` of what was found is shown. On one process.
+    """The task's results for each case, from `kept` if stored by the same program and settings.
+
+    Also one line per failed case. Cases work in a folder per wheel; `told` makes the message about
+    a result. `settings` are text and numbers. On one process.
     """
     found, failed = dict[Case, Records](), list[str]()
     for case in cases:
@@ -52,7 +53,7 @@ def every_case(
 
 
 def read_kept(file: Path, of: list[Any]) -> Records | None:
-    """Records that an earlier bench kept of the same program and settings; None where there are none."""
+    """Records stored by an earlier benchmark with the same program and settings, or None."""
     if not file.exists():
         return None
     data = json.loads(file.read_text(encoding="utf-8"))
@@ -60,11 +61,11 @@ def read_kept(file: Path, of: list[Any]) -> Records | None:
 
 
 def write_kept(file: Path, of: list[Any], found: Records) -> None:
-    """Keep records, and the program and settings they are `of`."""
+    """Store records, with the program and settings they are `of`."""
     file.parent.mkdir(parents=True, exist_ok=True)
     write_text(file, json.dumps({"of": of, "found": found}, indent=1) + "\n")
 
 
 def _plain(of: list[Any]) -> Any:
-    """As it comes back from a file: tuples are lists there."""
+    """The value as read back from JSON: tuples become lists."""
     return json.loads(json.dumps(of))

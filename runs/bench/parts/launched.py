@@ -1,4 +1,4 @@
-"""Runs of the program by its launcher, as a user starts them."""
+"""Runs the program through its launcher, as a user does."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 def launched(scene: Path, out: Path, until: str, processes: int, *more: str) -> dict:
-    """The stages in the summary of a run up to a stage, one BLAS thread a process."""
+    """The summary's stages of a run up to a stage, with one BLAS thread per process."""
     command = [str(ROOT / "tireroad"), "run", str(scene), "--until", until]
     command += ["--out", str(out), "-n", str(processes), *more]
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    environment["TIREROAD_CACHE"] = "off"  # what is timed is computed
+    environment["TIREROAD_CACHE"] = "off"  # what is timed must be computed
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     if done.returncode:
         raise ConvergenceError(f"bench: {' '.join(command)} failed:\n{done.stderr[-2000:]}")

@@ -1,5 +1,5 @@
-"""The cases on which estimated errors and searches are judged: 3 tires, 4 roads, 2 speeds; and far finer runs of them,
-whose forces are kept, so that a bench goes on where it was stopped and another one shares them."""
+"""The cases for estimated errors and searches: 3 tires, 4 roads, 2 speeds, and their reference
+runs, whose forces are stored so that a benchmark can resume and others share them."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ from tireroad.runs.stages.pipeline import Finished, run_scene
 
 @dataclass(frozen=True, kw_only=True)
 class Tire:
-    """What a tire's scene has in `text`. Of settings as of `sets`, `run` are those in which its runs, and `fine` those in
-    which its reference differ: rolling belts take attachment modes, as searches do."""
+    """A tire: its part of a scene (`text`) and the settings (as for `sets`) in which its runs
+    (`run`) and its reference (`fine`) differ from the common ones. Rolling belts use attachment
+    modes, as searches do."""
 
     text: str
     run: Mapping[str, Any] = field(default_factory=dict)
@@ -66,15 +67,16 @@ _ATTACHED = {"residual": "attachment"}
 TIRES = {
     "soft": Tire(text=_SOFT),
     "belted": Tire(text=_SOFT + _BELT, run=_ATTACHED, fine=_ATTACHED),
-    # 205/60 R15 under its rated load: of order 2, several elements through its wall, its footprint ten times as wide.
+    # 205/60 R15 under rated load: order 2, several elements through the wall, a footprint ten times
+    # as wide.
     "radial": Tire(
         text=_RADIAL,
         run={"segments": 16, "arc": 14, "order": 2} | _ATTACHED,
         fine={"segments": 26, "arc": 24, "order": 2, "footprint": 0.1, "pitch": 0.004} | _ATTACHED,
     ),
 }
-# The cleat lies where the patch comes after its run-in, which no figure has in it. At both speeds a wave of the sine passes in more
-# than the 10 ms of the highest frequency that searches are asked for.
+# The cleat is reached after the run-in, which no figure includes. At both speeds a wave of the sine
+# takes longer than 10 ms, the period of the highest frequency of interest in searches.
 ROADS = {
     "sine": 'kind = "sine"\namplitude = 2e-4\nwavelength = 0.25',
     "cleat": 'kind = "cleat"\nheight = 0.003\nlength = 0.02\nposition = 0.5',
@@ -83,9 +85,9 @@ ROADS = {
 }
 SPEEDS = (30.0, 60.0)  # rad/s
 DURATION = 0.16  # s
-# Finer than any setting that is judged, and than its companions. What a point's force does near by falls as the size
-# of the elements at the footprint: nodes there are 2.7 mm apart, a fifth of those of 18 x 8 elements. Points are nearer
-# to each other than half of 8 mm.
+# Finer than any settings tested and their companions. The near field of a point force scales with
+# the size of the elements at the footprint: nodes there are 2.7 mm apart, a fifth of those of 18 x
+# 8 elements. Points are closer than half of 8 mm.
 FINE: dict[str, Any] = {
     "segments": 40,
     "arc": 14,
@@ -95,7 +97,7 @@ FINE: dict[str, Any] = {
     "pitch": 0.003,
     "step": 1e-4,
 }
-# m, of the patch: the same on every road, so that what comes before the loop is shared
+# m, of the patch: the same on every road, so that stages before the loop are shared
 REACH = 0.012
 SCENE = """
 name = "case"
@@ -125,7 +127,7 @@ class Case:
 
     @property
     def wheel(self) -> str:
-        """What all roads share."""
+        """Name of what all roads share: tire and speed."""
         return f"{self.tire}-{self.speed:g}"
 
     @property
@@ -134,7 +136,7 @@ class Case:
         return TIRES[self.tire].text, ROADS[self.road]
 
     def scene(self, folder: Path, duration: float, *sets: str) -> Scene:
-        """The scene, with keys of --set laid over it; its file goes to the folder."""
+        """The scene with keys as for --set; its file is written to the folder."""
         from tireroad.runs.scene.load import load
 
         folder.mkdir(parents=True, exist_ok=True)
@@ -149,7 +151,7 @@ CASES = tuple(Case(*one) for one in product(TIRES, ROADS, SPEEDS))
 
 
 def by_wheel(cases: Iterable[Case]) -> list[Case]:
-    """Cases of one wheel, which share their stages, after each other."""
+    """Cases sorted by wheel, since cases of one wheel share stages."""
     return sorted(cases, key=lambda case: (list(TIRES).index(case.tire), case.speed))
 
 
@@ -164,7 +166,7 @@ def sets(
     footprint: float = 0.25,
     residual: str = "static",
 ) -> tuple[str, ...]:
-    """Settings of mesh, modes, points, step and residual as of --set."""
+    """Settings of mesh, modes, points, step and residual as for --set."""
     return (
         f"tire.segments={segments}",
         f"tire.elements_arc={arc}",
@@ -178,7 +180,7 @@ def sets(
 
 
 def told_settings(keys: Mapping[str, Any], part: Literal["run", "fine"]) -> str:
-    """Settings as of `sets` in words, and those of the tires that differ in this `part` of theirs."""
+    """Settings in words, including the tires whose settings differ in this `part`."""
     own = {name: getattr(tire, part) for name, tire in TIRES.items()}
     others = [f"of the {name} tire {_told({**keys, **one})}" for name, one in own.items() if one]
     return "; ".join([_told(keys), *others])
@@ -205,13 +207,13 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Driven(Recorded):
-    """What a run left: its products and forces."""
+    """The products and forces of a run."""
 
     done: Finished
 
 
 def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> Driven:
-    """Run a scene, without a word; stages are shared through a `cache`. Collective."""
+    """Run a scene without terminal output; stages are shared through a `cache`. Collective."""
     folder.mkdir(parents=True, exist_ok=True)
     with observe.quiet():
         done = run_scene(
@@ -229,18 +231,18 @@ def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> D
 
 
 def recorded(scene: Scene, folder: Path, kept: Path, cache: Cache = NO_CACHE) -> Recorded:
-    """The forces of a run in the folder, from the folder `kept` where a bench left those of the same scene: by
-    whatever state of the program, until they are removed there. In a process of its own."""
+    """The forces of a run in a separate process, or those of the same scene that a benchmark stored
+    in the folder `kept` (used whatever program version computed them, until deleted)."""
     bare = replace(scene, accuracy=Accuracy(estimate=False))
     file = kept / f"{hashlib.sha256(dumps(bare).encode()).hexdigest()[:16]}.npz"
     if not file.exists():
-        apart(_record, bare, folder, file, cache)  # of a fine run's gigabytes not all come back
+        apart(_record, bare, folder, file, cache)  # frees the memory of a fine run
     with np.load(file) as found:
         return Recorded(dict(zip(NAMES, found["forces"], strict=True)), float(found["step"]))
 
 
 def _record(scene: Scene, folder: Path, file: Path, cache: Cache) -> None:
-    """The forces of a run into a file. On one process."""
+    """Write the forces of a run to a file. On one process."""
     run = driven(scene, folder, "contact", cache)
     file.parent.mkdir(parents=True, exist_ok=True)
     with replacing(file) as part, part.open("wb") as opened:

@@ -1,4 +1,4 @@
-"""Part of `bench contact`: a step on a grid with friction, and what it costs that the tread gives way to it sideways."""
+"""Part of `bench contact`: a step on a grid with friction, and the cost of a tread that shears."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from tireroad.runs.measure.tabulate import Table
 STEP = 1e-4
 ELASTIC = 5e6, 0.45
 NODES, STATES, FINER = (12, 9), 200, 4
-BRUSH = 3e4  # N/m of each point
+BRUSH = 3e4  # N/m per point
 BLOCKS, STEPS = 7, 20
 
 
 def parts_of(shape: tuple[int, int], modes: int, horizontal: bool = False):
-    """Patch, tire with `modes` complex states, tread; 500 N on an oval of a tenth of a metre."""
+    """Patch, tire with `modes` complex states, tread; 500 N on an oval of about 0.1 m."""
     patch = oval_patch(shape, (0.15 / shape[0], 0.12 / shape[1]), 500.0)
     around = max(modes // 20, 2)
     strip = Strip(speed=20.0)
@@ -46,7 +46,7 @@ def parts_of(shape: tuple[int, int], modes: int, horizontal: bool = False):
 
 
 def _local(points: np.ndarray) -> np.ndarray:
-    """What the modes left out give way to, m/N in z, x, y: smooth over 2 cm, as a wall's is."""
+    """Local flexibility of truncated modes, m/N in z, x, y: smooth over 2 cm, like a wall's."""
     away = ((points[:, None] - points[None]) ** 2).sum(axis=-1)
     return np.kron([[1.0, 0.1, 0.0], [0.1, 0.5, 0.0], [0.0, 0.0, 0.5]], 1e-6 * np.exp(-away / 4e-4))
 
@@ -56,8 +56,11 @@ def wavy(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def on_a_grid(brush: float | None, sheared: bool = False):
-    """The loop on a grid `FINER` times as fine as the nodes that carry it, and its friction: bristles of `brush` N/m, inf
-    for none that give way; None: frictionless. `sheared`: the tread gives way too."""
+    """The loop on a grid `FINER` times finer than the nodes that carry it, and its friction.
+
+    `brush`: bristle stiffness N/m, inf if rigid, None: frictionless. `sheared`: the tread shears
+    too.
+    """
     patch, tire, _, _ = parts_of(NODES, STATES, True)
     count = len(patch.points)
     counts = (NODES[0] - 1) * FINER + 1, (NODES[1] - 1) * FINER + 1
@@ -96,7 +99,7 @@ def on_a_grid(brush: float | None, sheared: bool = False):
 
 
 def shearing() -> Table:
-    """Blocks of steps in turns, in processor seconds, so that what disturbs one disturbs all."""
+    """Blocks of steps alternately, in CPU seconds, so that disturbances affect all equally."""
     cases = {
         ("gives way", "bristles"): (BRUSH, True),
         ("gives way", "none"): (np.inf, True),

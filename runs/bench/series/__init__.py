@@ -1,1 +1,1 @@
-"""Fourier series around the axle, finite elements in the section: another method, without dolfinx."""
+"""An independent method: Fourier series around, finite elements in the section, no dolfinx."""

@@ -1,9 +1,10 @@
-"""Another method for small motions of an unloaded ring: Fourier series around, finite elements in the section.
+"""Small motions of an unloaded ring: Fourier series around, finite elements in the section.
 
-    u(r, y, theta) = Re[v(r, y) e^{i n theta}],   K_n v = omega^2 M v   for each wave number n,
+  u(r, y, theta) = Re[v(r, y) e^{i n theta}],   K_n v = omega^2 M v   for each wave number n,
 
-linear elasticity in cylindrical coordinates, exact around the axle, with lines of cords as membranes: what the
-program's three-dimensional meshes are compared to. No dolfinx, no code shared with the program's forms.
+linear elasticity in cylindrical coordinates, exact around the axle, with lines of cords as
+membranes: a reference for the program's three-dimensional meshes. Uses no dolfinx and shares no
+code with the program's forms.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Rubber:
 
 @dataclass(frozen=True)
 class Membrane:
-    """Cords on a ply of the section: E A / s in N/m, rho A / s in kg/m2, angle in rad from the circumference."""
+    """Cords on a ply: E A / s in N/m, rho A / s in kg/m2, angle in rad to the circumference."""
 
     stiffness: float
     angle: float
@@ -44,7 +45,7 @@ def frequencies(
     count: int,
     cords: Mapping[str, Membrane] | None = None,
 ) -> np.ndarray:
-    """The lowest `count` frequencies (Hz) of a wave number, the rim held; each stands for a pair if n > 0."""
+    """The `count` lowest frequencies (Hz) of a wave number, rim held; one per pair if n > 0."""
     stiffness, mass = _solid(section, rubbers, wave)
     for name, membrane in (cords or {}).items():
         more, heavier = _cords(section, section.plies[name], membrane, wave)
@@ -58,7 +59,7 @@ def frequencies(
 
 
 def lowest(section, rubbers, count: int, waves: int = 16, cords=None) -> np.ndarray:
-    """The lowest `count` frequencies (Hz) of the whole ring, pairs twice."""
+    """The lowest `count` frequencies (Hz) of the whole ring, with pairs counted twice."""
     found = [
         np.repeat(frequencies(section, rubbers, n, 8, cords), 1 if n == 0 else 2)
         for n in range(waves)
@@ -96,7 +97,7 @@ def _solid(section: SectionMesh, rubbers: Mapping[str, Rubber], n: int):
 
 
 def _strains(N: np.ndarray, gradient: np.ndarray, r: np.ndarray, n: int) -> np.ndarray:
-    """B (cells, points, 6, dofs) of (e_rr, e_tt, e_yy, g_rt, g_ty, g_ry), dofs (r, t, y) of each node."""
+    """B (cells, points, 6, dofs) of (e_rr, e_tt, e_yy, g_rt, g_ty, g_ry), nodal dofs (r, t, y)."""
     dr, dy = gradient[..., 0], gradient[..., 1]
     over = N / r[..., None]
     B = np.zeros((*r.shape, 6, N.shape[1], 3), complex)
@@ -117,7 +118,7 @@ def _hooke(rubber: Rubber) -> np.ndarray:
 
 
 def _cords(section: SectionMesh, edges: np.ndarray, cords: Membrane, n: int):
-    """K_n and M of cords on a ply, over one radian: strain along the cord from the ply's own strains."""
+    """K_n and M of cords on a ply, over one radian; strain along the cord from the ply's own."""
     chain = section.chain(edges)
     order = section.order
     line = chain[order * np.arange(len(edges))[:, None] + np.arange(order + 1)]

@@ -1,10 +1,12 @@
-"""An inflated tire and its small motions, by Fourier series around and finite elements in the section.
+"""An inflated tire and its small motions: Fourier series around, finite elements in the section.
 
-    F = I + grad u,   int P(F) : grad v + cords + p int (x_theta x x_s) . v = 0   (axisymmetric, three components),
+  F = I + grad u,   int P(F) : grad v + cords + p int (x_theta x x_s) . v = 0
 
-then for each wave number n the tangent on fields Re[v(r, y) e^{i n theta}], with stresses, pressure and cords of
-that state and the rubber's own part at its dynamic modulus. The same selective rules as the program (full for the
-distortion, one point a direction less for dilatation and cords), all else written anew: numpy, no dolfinx.
+(axisymmetric, three components); then for each wave number n the tangent on fields
+Re[v(r, y) e^{i n theta}], with stresses, pressure and cords of that state and the rubber's own part
+at its dynamic modulus. The integration is selective as in the program (full for the distortion, one
+point per direction less for dilatation and cords); everything else is independent: numpy, no
+dolfinx.
 """
 
 from __future__ import annotations
@@ -20,13 +22,16 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.sections.construction import Construction
 from tireroad.runs.bench.series.pieces import Face, Line, Rule, dofs
 
-STEPS = (0.02, 0.1, 0.3, 0.6, 1.0)  # of the inflation
-_SMALL = 1e-10  # m, the last Newton step
+STEPS = (0.02, 0.1, 0.3, 0.6, 1.0)  # shares of the inflation pressure
+_SMALL = 1e-10  # m: size of the last Newton step
 _UNIT = np.eye(3)
 
 
 class InflatedRing:
-    """A construction of `elements` bead to bead, inflated to a pressure (Pa). Fields (r, theta, y) a node."""
+    """A construction with `elements` from bead to bead, inflated to a pressure (Pa).
+
+    Fields have components (r, theta, y) per node.
+    """
 
     def __init__(self, tire: Construction, elements: int, order: int, pressure: float):
         self.section = mesh = tire.section(elements, order)
@@ -62,7 +67,7 @@ class InflatedRing:
                 raise ConvergenceError(f"inflation stops at {share:g} of {self.pressure:g} Pa")
 
     def frequencies(self, wave: int, count: int) -> np.ndarray:
-        """The lowest `count` (Hz) of a wave number, rim held, dynamic moduli; pairs once."""
+        """The `count` lowest frequencies (Hz) of a wave, rim held, dynamic moduli; pairs once."""
         stiffness = self._inside(self._tangent(wave, self.pressure, dynamic=True))
         stiffness = (stiffness + stiffness.getH()) / 2
         given = {"M": self._inside(self.mass), "sigma": 0.0, "which": "LM"}
@@ -71,13 +76,13 @@ class InflatedRing:
 
     @property
     def weight(self) -> float:
-        """kg, of wall and cords."""
+        """Mass of wall and cords, kg."""
         along = np.tile([0.0, 0.0, 1.0], len(self.section.nodes))
         return float(2 * np.pi * along @ (self.mass @ along))
 
     @cached_property
     def mass(self) -> sparse.csr_matrix:
-        """Over one radian."""
+        """Mass matrix over one radian."""
         rule = self._parts[0][0]
         blocks = np.einsum("qa,qb,cq,c->cab", rule.N, rule.N, rule.volume, self._density)
         out = self._assembled(self.section.cells, _each_component(blocks))
@@ -170,5 +175,5 @@ def _moduli(stress, F: np.ndarray) -> np.ndarray:
 
 
 def lowest(tire: InflatedRing, waves: Sequence[int] = (0, 1)) -> np.ndarray:
-    """The two lowest frequencies (Hz) of each wave number: lateral, wind-up; yaw and camber, vertical."""
+    """The two lowest frequencies (Hz) by wave number: lateral, wind-up; yaw/camber, vertical."""
     return np.concatenate([tire.frequencies(wave, 2) for wave in waves])

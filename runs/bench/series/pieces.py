@@ -1,4 +1,4 @@
-"""What a section adds to a wave number's problem: its cells, its lines of cords, its inner face."""
+"""Contributions of a section to the problem of a wave number: cells, lines of cords, inner face."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _UNIT = np.eye(3)
 
 
 class Rule:
-    """Gauss points of the section's cells: shapes N (q, a), their slopes, radius and volume (c, q) a radian."""
+    """Gauss points of the cells: shapes N (q, a), slopes, radius, volume (c, q) per radian."""
 
     def __init__(self, section: SectionMesh, points: int):
         edge, (t, w) = reference.equispaced(section.order), _gauss(points)
@@ -29,7 +29,7 @@ class Rule:
         self._slopes = np.einsum("dqa,cqdx->cqax", dN, np.linalg.inv(J))
 
     def gradient(self, wave: int) -> np.ndarray:
-        """(c, q, 9, 3 a): grad u (component, direction) of the nodal values at a wave number."""
+        """(c, q, 9, 3 a): grad u (component, direction) from the nodal values at a wave number."""
         over = self.N[None] / self.radius[..., None]
         out = np.zeros((*self.radius.shape, 3, 3, self.N.shape[1], 3), complex if wave else float)
         for k in range(3):
@@ -42,7 +42,7 @@ class Rule:
 
 
 class Line:
-    """Cords on a chain of edges: F a of each Gauss point, a the cord's direction."""
+    """Cords on a chain of edges: F a at each Gauss point, with the cord's direction a."""
 
     def __init__(self, section: SectionMesh, edges: np.ndarray, cords: CordLine, points: int):
         order, chain = section.order, section.chain(edges)
@@ -72,7 +72,7 @@ class Line:
         return out.reshape(*self._radius.shape, 3, -1)
 
     def state(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """F a over its length, tension (N/m), and the derivative of the tension by F a."""
+        """Unit vector of F a, tension (N/m), and the derivative of the cord force by F a."""
         u = displacement.ravel()[dofs(self.nodes)]
         moved = self._direction + np.einsum("cqkd,cd->cqk", self.stretch(0), u)
         stretch = np.linalg.norm(moved, axis=-1)[..., None]
@@ -86,7 +86,7 @@ class Line:
 
 
 class Face:
-    """The inner face as it is: x_s, x_theta, and what a unit pressure does there."""
+    """The deformed inner face: x_s, x_theta, and the force of a unit pressure."""
 
     def __init__(self, section: SectionMesh, displacement: np.ndarray):
         self.nodes = section.side(section.inner)
@@ -102,12 +102,12 @@ class Face:
         self._sign = -np.sign(out)[:, None, None]
 
     def force(self) -> np.ndarray:
-        """(c, 3 a): of the air on the wall, to the side of the residual."""
+        """(c, 3 a): force of the air on the wall, with the sign it has in the residual."""
         pushed = self._sign * np.cross(self._x_t, self._x_s)
         return np.einsum("qa,cqk,q->cak", self._N, pushed, self._w).reshape(len(self.nodes), -1)
 
     def tangent(self, wave: int) -> np.ndarray:
-        """(c, 3 a, 3 a): its derivative at a wave number."""
+        """(c, 3 a, 3 a): derivative of that force at a wave number."""
         q, a = self._N.shape
         W, along, around = (np.zeros((q, a, 3, 3), complex if wave else float) for _ in range(3))
         for k in range(3):
@@ -127,5 +127,5 @@ def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def dofs(nodes: np.ndarray) -> np.ndarray:
-    """(c, 3 a) of nodes (c, a)."""
+    """Degrees of freedom (c, 3 a) of nodes (c, a)."""
     return (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)

@@ -1,7 +1,8 @@
-"""What a page with script draws in place of a still picture: charts to zoom, shapes to turn.
+"""Interactive charts and shapes in place of still figures, if scripts are enabled.
 
-The scripts are charts.js and shapes.js beside this file, and uPlot 1.6.32 (uplot/, MIT), all written into the page: it
-asks for nothing from anywhere. Without script, and on paper, the still picture is shown.
+The scripts are charts.js and shapes.js beside this file, and uPlot 1.6.32 (uplot/, MIT), all
+embedded in the page, which loads nothing from outside. Without scripts, and in print, the still
+figure is shown.
 """
 
 from __future__ import annotations
@@ -15,31 +16,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 _HERE = Path(__file__).parent
-MOST = (
-    10_000  # values of a curve; longer ones keep the least and the greatest of each run of values
-)
-_STEPS = 127  # of a coordinate, signed bytes
+MOST = 10_000  # values of a curve; longer ones keep minimum and maximum of each block of values
+_STEPS = 127  # full scale of a coordinate as a signed byte
 
 
 def script() -> str:
-    """All scripts, as text."""
+    """All scripts as text."""
     names = "uplot/uPlot.iife.min.js", "charts.js", "shapes.js"
     return "\n".join((_HERE / name).read_text(encoding="utf-8") for name in names)
 
 
 def style() -> str:
-    """uPlot's style sheet, as text."""
+    """uPlot's style sheet as text."""
     return (_HERE / "uplot/uPlot.min.css").read_text(encoding="utf-8")
 
 
 def packed(values: Any, kind: str) -> dict[str, str]:
-    """An array for the scripts: little-endian numbers of a `kind` of numpy's, in base 64."""
+    """An array for the scripts: little-endian numbers of numpy type `kind`, in base 64."""
     flat = np.ascontiguousarray(values, dtype=np.dtype(kind).newbyteorder("<"))
     return {"kind": kind, "data": b64encode(flat.tobytes()).decode()}
 
 
 def thinned(x: NDArray, columns: NDArray) -> tuple[NDArray, NDArray]:
-    """x (n,) and columns (n, k) with at most MOST rows: of each run of rows the least, then the greatest, of each column."""
+    """x (n,) and columns (n, k) in at most MOST rows: minimum, then maximum, of each block."""
     width = -(-len(x) // (MOST // 2))
     if len(x) <= MOST:
         return x, columns
@@ -62,8 +61,11 @@ def chart(
     legend: bool = True,
     height: int = 240,
 ) -> dict[str, Any]:
-    """Curves (n,) by name over x (n,), for charts.js; `labels` of both axes with units. Without `legend` the curve
-    under the pointer is named: for many. A value that is not finite is a gap."""
+    """Curves (n,) by name over x (n,), for charts.js; `labels` of both axes with units.
+
+    Without `legend`, for many curves, the one under the pointer is named. Non-finite values are
+    gaps.
+    """
     place, values = thinned(np.asarray(x, float), np.column_stack(list(curves.values())))
     series = [
         {
@@ -85,7 +87,7 @@ def chart(
 
 
 def charts(*one: dict[str, Any]) -> dict[str, Any]:
-    """Charts one below the other; their pointers move together."""
+    """Charts one below the other, with a common pointer."""
     return {"kind": "charts", "charts": list(one)}
 
 
@@ -100,8 +102,11 @@ def bars(
     least: int,
     height: int = 300,
 ) -> dict[str, Any]:
-    """Bars by name, each (values (n,), errors (n,) or None), side by side over named places (n,), from ends[0]
-    to at least ends[1]; room for at `least` so many; pale where `few` (n,). A value that is not finite has no bar."""
+    """Bars by name, each (values (n,), errors (n,) or None), side by side over named places (n,).
+
+    From ends[0] to at least ends[1], with space for at least `least` places; pale where `few` (n,).
+    Non-finite values have no bar.
+    """
     drawn = [
         {
             "name": name,
@@ -127,10 +132,10 @@ def bars(
 def shapes(
     points: NDArray, quads: NDArray, normal: NDArray, moved: NDArray, titles: Sequence[str]
 ) -> dict[str, Any]:
-    """Surface shapes (m, s, 3) on points (s, 3) with quads (q, 4) and unit normals (s, 3), to turn and, as they
-    swing, to watch.
+    """Shapes (m, s, 3) on points (s, 3) with quads (q, 4) and unit normals (s, 3), for 3D view.
 
-    Coordinates in 127ths of the greatest; each shape's greatest displacement is one.
+    Coordinates as 16-bit shares of the largest one; displacements as signed bytes, each shape's
+    largest being full scale.
     """
     reach = np.abs(points).max()
     greatest = np.maximum(np.linalg.norm(moved, axis=2).max(axis=1), 1e-300)
@@ -149,7 +154,7 @@ def shapes(
 def footprint(
     points: NDArray, half: NDArray, time: NDArray, values: NDArray, label: str
 ) -> dict[str, Any]:
-    """Values (n, c) at points (c, 3) m, squares of half sizes (2,) m, at the instants time (n,) s, to watch."""
+    """Animation of values (n, c) at points (c, 3) m, squares of half sizes (2,) m, over time, s."""
     top = float(np.nan_to_num(values).max(initial=0.0)) or 1.0
     touched = (values > 0).any(axis=0)
     near = touched if touched.any() else np.ones(len(points), bool)

@@ -1,1 +1,1 @@
-"""What the report says of each result file: facts, tables and pictures."""
+"""Report sections, by result file: facts, tables and figures."""

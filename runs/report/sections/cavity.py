@@ -1,4 +1,4 @@
-"""What the report says of the air inside the tire."""
+"""Report section parts about the air inside the tire."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ _LISTED = 6
 
 
 def duct(results: Results, section: Section) -> None:
-    """Adds the modes of the air between rigid walls, where the tire has air (modes.h5)."""
+    """Add the modes of the air between rigid walls, if the tire has air (modes.h5)."""
     frequency = results.optional("modes.h5", "cavity/frequency")
     if frequency is None:
         return
@@ -24,7 +24,7 @@ def duct(results: Results, section: Section) -> None:
 def resonances(
     results: Results, section: Section, file: str, name: str, eigenvalue: NDArray
 ) -> None:
-    """Adds the states in which the air moves most, where the tire has air."""
+    """Add the states dominated by the air, if the tire has air."""
     share = results.optional(file, name)
     if share is None:
         return

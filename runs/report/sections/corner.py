@@ -1,4 +1,4 @@
-"""What the report says of the wheel: moments on its hub, and how it moves where it does."""
+"""Report section part about the wheel: hub moments, and its motion if it moves."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ _AXES = "xyz"
 
 
 def wheel(results: Results, section: Section, time: NDArray) -> None:
-    """Adds the moments on the hub, and the motion of wheel and body where the wheel moves (contact.h5)."""
+    """Add the hub moments, and the motion of wheel and body if the wheel moves (contact.h5)."""
     moved = results.optional("contact.h5", "wheel/translation")
     moment = results.optional("contact.h5", "hub_moment")
     if moment is not None:

@@ -1,4 +1,4 @@
-"""What the report says of forces: rolling contact and point forces."""
+"""Report sections about forces: rolling contact and point forces."""
 
 from collections.abc import Mapping
 
@@ -12,14 +12,14 @@ from tireroad.runs.report.quantities import quantity
 from tireroad.runs.report.sections import corner, pattern, road, transmissibility
 from tireroad.runs.report.sections.tire import pressure
 
-SAMPLED = 400  # instants read of a (time, point) dataset: the file may be larger than memory
+SAMPLED = 400  # instants read of a (time, point) dataset: it may be larger than memory
 AT_ONCE = 2e8  # bytes
 PAIRED = 6  # receptances drawn
-PLAYED = 240  # instants of the footprint in motion
+PLAYED = 240  # instants of the animated footprint
 
 
 def contact(results: Results) -> Section:
-    """The tire rolling over the road (contact.h5)."""
+    """The section on rolling contact (contact.h5)."""
     name = "contact.h5"
     section = Section("Rolling contact", "Total forces of the road on the tire.")
     time, total = results.array(name, "time"), results.array(name, "total_force")
@@ -54,7 +54,7 @@ def contact(results: Results) -> Section:
 def sampled(dataset: h5py.Dataset, stride: int) -> NDArray:
     """Every `stride`-th row (n, c): of a small dataset at once, of a large one row by row.
 
-    One row costs the unpacking of its whole chunk, so that 400 rows cost more than 20 MB at once.
+    Reading one row decompresses its whole chunk, so 400 rows cost more than 20 MB read at once.
     """
     if dataset.nbytes <= AT_ONCE:
         return dataset[()][::stride]
@@ -62,7 +62,7 @@ def sampled(dataset: h5py.Dataset, stride: int) -> NDArray:
 
 
 def pressure_maps(results: Results, section: Section, time: NDArray, vertical: NDArray) -> None:
-    """Adds the contact pressure at the least, mean, greatest and last vertical force."""
+    """Add the contact pressure at the minimum, mean, maximum and last vertical force."""
     mean = int(np.abs(vertical - vertical.mean()).argmin())
     chosen = {"least": int(vertical.argmin()), "mean": mean, "greatest": int(vertical.argmax())}
     chosen["last"] = len(time) - 1
@@ -84,7 +84,7 @@ def pressure_maps(results: Results, section: Section, time: NDArray, vertical: N
 def rolling(
     points: NDArray, time: NDArray, normal: h5py.Dataset, area: NDArray | None
 ) -> dict | None:
-    """The footprint in motion; None of points whose area, and so whose pressure, is not known."""
+    """The animated footprint; None if the area of the points, and so their pressure, is unknown."""
     if area is None or area.shape != (len(points),) or len(time) < 2:
         return None
     stride = max(1, -(-len(time) // PLAYED))
@@ -96,7 +96,7 @@ def rolling(
 def histories(
     time: NDArray, forces: Mapping[str, NDArray | None], active: NDArray | None
 ) -> dict | None:
-    """Charts of named forces (nt, 3) N by component, and of the number of points in contact (nt,)."""
+    """Charts of named forces (nt, 3) N by component, and of the number of touching points (nt,)."""
     if len(time) < 2:
         return None
     there = {name: force for name, force in forces.items() if force is not None}
@@ -117,7 +117,7 @@ def histories(
 
 
 def response(results: Results) -> Section:
-    """The tire under point forces (response.h5)."""
+    """The section on point forces (response.h5)."""
     name = "response.h5"
     section = Section("Point forces", "Displacement at the driven points.")
     time, moved = results.optional(name, "time"), results.optional(name, "displacement")
@@ -154,7 +154,7 @@ def response(results: Results) -> Section:
 
 
 def point_names(scene: Mapping, count: int) -> list[str]:
-    """A name for every driven point, with its place where the scene tells."""
+    """A name for every driven point, with its location if the scene has it."""
     forces = scene.get("force", [])
     if len(forces) != count:
         return [f"point {n + 1}" for n in range(count)]

@@ -1,4 +1,4 @@
-"""What the report says of the tread's pattern."""
+"""Report section part about the tread pattern."""
 
 from numpy.typing import NDArray
 
@@ -6,11 +6,11 @@ from tireroad.runs.files.read import Results, Section
 from tireroad.runs.report import figures
 from tireroad.runs.report.quantities import quantity
 
-_SHOWN = 0.6  # m of the tread drawn
+_SHOWN = 0.6  # m of tread drawn
 
 
 def tread(results: Results, section: Section) -> None:
-    """Adds the pattern and the part of it that is under the footprint when the run begins (contact.h5)."""
+    """Add the pattern, and the part of it under the footprint at the beginning (contact.h5)."""
     depth = results.optional("contact.h5", "pattern/depth")
     if depth is None:
         return

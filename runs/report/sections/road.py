@@ -1,4 +1,4 @@
-"""What the report says of the road."""
+"""Report section part about the road."""
 
 from numpy.typing import NDArray
 
@@ -8,7 +8,7 @@ from tireroad.runs.report.quantities import quantity
 
 
 def texture(results: Results, section: Section) -> None:
-    """Adds mean profile depth and third octaves of the road that was driven over (contact.h5)."""
+    """Add mean profile depth and texture third octaves of the road (contact.h5)."""
     depth = results.attribute("contact.h5", "mean_profile_depth")
     if depth is not None:
         section.facts.append(("mean profile depth of the road", quantity(depth, "m")))

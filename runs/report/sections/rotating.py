@@ -1,4 +1,4 @@
-"""What the report says of the modes of the rolling tire."""
+"""Report section about the modes of the rolling tire."""
 
 from contextlib import suppress
 
@@ -14,11 +14,11 @@ from tireroad.runs.report.sections.tire import LISTED
 
 
 def rotating(results: Results) -> Section:
-    """Eigenvalues of the rolling tire (rotating.h5)."""
+    """The section on eigenvalues of the rolling tire (rotating.h5)."""
     name = "rotating.h5"
     section = Section("Modes of the rolling tire", "Eigenvalues s of the rotating, damped tire.")
     value = results.array(name, "eigenvalue")
-    # Those of the near-defective block too.
+    # Including those of the near-defective block.
     block = results.optional(name, "block")
     every = value if block is None else np.concatenate([value, np.linalg.eigvals(block)])
     beyond = every[growing(every)]
@@ -56,12 +56,12 @@ def rotating(results: Results) -> Section:
 
 
 def campbell(results: Results, section: Section) -> None:
-    """Adds the branches over speed, where the run has followed them: as they are damped, and undamped."""
+    """Add the branches over speed, damped and undamped, if the run has computed them."""
     speed = results.optional("rotating.h5", "campbell/speed")
     if speed is None:
         return
     radius: float | None = None
-    with suppress(Absent, InputError):  # that file's own section tells
+    with suppress(Absent, InputError):  # that file's own section reports the problem
         radius = float(results.attribute("static.h5", "rolling_radius") or 0.0)
     damped = results.array("rotating.h5", "campbell/frequency")
     undamped = results.optional("rotating.h5", "campbell/undamped")

@@ -1,4 +1,4 @@
-"""What the report says of a search for settings: the error of each trial against its cost."""
+"""Report section part about the search for settings: error against cost of each trial."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tireroad.runs.search.shares import CAUSES, worst
 
 
 def add(results: Results, section: Section) -> None:
-    """The trials of search.json, where the run began with a search that can be read."""
+    """Add the trials of search.json, if the run began with a search and the file is readable."""
     with suppress(OSError, ValueError, KeyError, TypeError):
         wanted = _wanted(results.scene)
         trials = [one for one in read_trials(results.directory / NAME) if one.found is not None]
@@ -53,13 +53,13 @@ def _errors(trial: Trial, wanted: Accuracy) -> NDArray:
 
 
 def _shares(over: NDArray) -> NDArray:
-    """By cause, of the figure that is furthest off."""
+    """Shares by cause, for the figure furthest from its target."""
     return over[:, worst(over)[1]]
 
 
 @figures.styled
 def trade(cost: NDArray, error: NDArray, parts: NDArray) -> str:
-    """Errors (n,) over the one asked for and their `parts` (n, causes) against the `cost` (n,) s of a run."""
+    """Errors (n,) over their target, and their `parts` (n, causes), over a run's `cost` (n,) s."""
     figure, axes = figures.line_canvas(6.0, 3.0)
     here = axes[0, 0]
     here.plot(cost, error, "-o", color="#52606d", ms=4, label="all")

@@ -1,4 +1,4 @@
-"""What the report says of spectra: lines, densities, and third octaves with their errors."""
+"""Report section about spectra: lines, densities, and third octaves with their errors."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tireroad.runs.report import figures, live
 from tireroad.runs.report.quantities import quantity
 
 _FILE = "spectra.h5"
-_MORE = (  # (third octaves, what they are of, reference)
+_MORE = (  # third octaves, their quantity, reference
     ("contact_level", "contact force", "dB re 1 N"),
     ("hub_moment_level", "moment on the hub", "dB re 1 N m"),
 )
 
 
 def spectra(results: Results) -> Section:
-    """Spectra of the variation of the axle force, or, where that is not kept, of the contact force."""
+    """Spectra of the varying axle force or, if it is not stored, of the varying contact force."""
     frequency, force = results.array(_FILE, "frequency"), results.optional(_FILE, "axle_force")
     of = "contact force" if force is None else "axle force"
     contact = results.array(_FILE, "contact_force")
@@ -39,7 +39,7 @@ def spectra(results: Results) -> Section:
         if value is not None:
             section.facts.append((name, quantity(value, unit)))
     octaves(results, section, of)
-    if (results.directory / "search.json").is_file():  # what reads it loads all stages
+    if (results.directory / "search.json").is_file():  # importing search loads all stages
         from tireroad.runs.report.sections import search
 
         search.add(results, section)
@@ -62,7 +62,7 @@ def _lines(frequency: NDArray, force: NDArray, of: str) -> dict:
 
 
 def octaves(results: Results, section: Section, of: str) -> None:
-    """Adds third octaves: of the axle force with their table, of all else there is as pictures."""
+    """Add third octaves: with a table for the axle force, as figures for the other quantities."""
     centre = results.optional(_FILE, "third_octave/centre")
     level = results.optional(_FILE, "third_octave/level")
     name, level = ("level", level) if level is not None else ("contact_level", None)
@@ -101,7 +101,7 @@ def _show_bands(
     reference: str,
     few: NDArray,
 ) -> None:
-    """Adds levels (b, 3) dB over band centres (b,) Hz, with their errors (b, 3) dB."""
+    """Add levels (b, 3) dB over band centres (b,) Hz, with their errors (b, 3) dB."""
     label = f"{of}, rms, in {reference}"
     heard = np.where(level > figures.SILENT, level, np.nan)
     series = {
@@ -122,7 +122,7 @@ def _show_bands(
 
 
 def few_lines(results: Results, count: int) -> NDArray:
-    """(b,): whether a band holds fewer lines than a level wants."""
+    """Mask (b,) of bands with too few lines for a reliable level."""
     held = results.optional(_FILE, "third_octave/lines")
     return np.zeros(count, bool) if held is None else held < FEW
 
@@ -145,7 +145,7 @@ def _table(
     weighted: NDArray | None,
     error: NDArray | None,
 ) -> Table:
-    """The vertical levels, their errors and how sure they are."""
+    """The vertical levels, their errors and confidence intervals."""
     sure = results.optional(_FILE, "third_octave/confidence")
     head = ["band, Hz", "z, dB re 1 N"]
     columns = [[f"{c:g}" for c in nominal(centre)], _texts(level[:, 2])]
@@ -166,7 +166,7 @@ def _texts(level: NDArray) -> list[str]:
 
 
 def densities(results: Results, section: Section) -> None:
-    """Adds the power spectral densities of the vertical forces."""
+    """Add the power spectral densities of the vertical forces."""
     frequency = results.optional(_FILE, "density/frequency")
     if frequency is None or len(frequency) < 3:
         return

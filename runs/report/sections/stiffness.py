@@ -1,4 +1,4 @@
-"""What the report says of load over deflection and of the stiffness of the standing tire (stiffness.h5)."""
+"""Report section about load, deflection and stiffness of the non-rolling tire (stiffness.h5)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _COLUMNS = (
 
 
 def section(results: Results) -> Section:
-    """Curve, table and stiffnesses."""
+    """The section: curve, table and stiffnesses."""
     made = Section(
         "Load, deflection and stiffness",
         "The standing tire pressed on a flat road, its rim held. Horizontally and about the vertical: "
@@ -53,7 +53,7 @@ def section(results: Results) -> Section:
 
 
 def _slides(results: Results, made: Section) -> None:
-    """Adds force over the way of the road, of a tire with friction."""
+    """Add force over road displacement or slip, for a tire with friction."""
     rolls = results.attribute("static.h5", "travel") is not None
     curves = {}
     for name in ("longitudinal", "lateral"):
@@ -80,7 +80,7 @@ def _slides(results: Results, made: Section) -> None:
 
 @styled
 def slid(curves: Mapping[str, tuple[NDArray, NDArray]], label: str) -> str:
-    """Force (n) N over way or slip (n) by name, as a picture."""
+    """Figure of force (n) N over displacement or slip (n), by name."""
     figure, axes = canvas(6.2, 3.0)
     here, start = axes[0, 0], np.zeros(1)
     for colour, (name, (moved, force)) in zip(COLOURS, curves.items(), strict=False):
@@ -94,7 +94,7 @@ def slid(curves: Mapping[str, tuple[NDArray, NDArray]], label: str) -> str:
 
 @styled
 def curve(deflection: NDArray, load: NDArray, area: NDArray, own: float) -> str:
-    """Load (n) N and area (n) cm2 over deflection (n) mm, as a picture."""
+    """Figure of load (n) N and contact area (n) cm2 over deflection (n) mm."""
     figure, axes = canvas(6.2, 3.0)
     here, other = axes[0, 0], axes[0, 0].twinx()
     start = np.zeros(1)

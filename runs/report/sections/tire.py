@@ -1,4 +1,4 @@
-"""What the report says of the loaded tire and its modes: facts, tables and pictures."""
+"""Report sections about the loaded tire and its modes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,12 +8,12 @@ from tireroad.runs.report import live, surface_figures
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.report.sections import cavity
 
-LISTED = 16  # rows of a table of modes; the files hold them all
+LISTED = 16  # rows of a table of modes; the files hold all modes
 PICTURED = 6
 
 
 def static(results: Results) -> Section:
-    """The tire at rest on the road (static.h5)."""
+    """The section on the static state (static.h5)."""
     section = Section("Loaded tire and footprint", "The static state everything later starts from.")
     name = "static.h5"
     section.facts = attributes(
@@ -54,7 +54,7 @@ def static(results: Results) -> Section:
 
 
 def friction(results: Results) -> list[tuple[str, str]]:
-    """Resultants of a static state with friction; nothing of one without."""
+    """Resultants of a static state with friction; empty without friction."""
     force, moment = (
         results.attribute("static.h5", name) for name in ("horizontal_force", "moment")
     )
@@ -72,7 +72,7 @@ def friction(results: Results) -> list[tuple[str, str]]:
 
 
 def cords(results: Results, section: Section) -> None:
-    """Adds a table of the cords' forces, where the tire has any."""
+    """Add a table of the cord forces, if the tire has cords."""
     rows = []
     for ply in results.scene.get("tire", {}).get("cords", ()):
         force, area = (
@@ -92,7 +92,7 @@ def cords(results: Results, section: Section) -> None:
 
 
 def footprint(results: Results, section: Section) -> None:
-    """Adds the map of the static contact pressure, where the tire stands on a road."""
+    """Add the map of the static contact pressure, if there is a road."""
     force, points = (results.optional("static.h5", f"contact/{n}") for n in ("force", "points"))
     if force is None or points is None or not (force[:, 2] > 0).any():
         section.notes.append("No road: there is no footprint.")
@@ -114,7 +114,7 @@ def footprint(results: Results, section: Section) -> None:
 
 
 def pressure(force: NDArray, area: NDArray | None) -> tuple[NDArray, str]:
-    """Pressure (c) kPa where the area of every point is known, else the force (c) N."""
+    """Pressure (c) kPa if the area of every point is known, else the force (c) N."""
     if area is None or area.shape != force.shape[-1:]:
         return force, "force in N"
     return np.divide(
@@ -123,7 +123,7 @@ def pressure(force: NDArray, area: NDArray | None) -> tuple[NDArray, str]:
 
 
 def modes(results: Results) -> Section:
-    """Modes of the loaded, standing tire (modes.h5)."""
+    """The section on the modes of the loaded, non-rotating tire (modes.h5)."""
     name = "modes.h5"
     section = Section("Modes of the loaded tire", "Undamped, not rotating, about the static state.")
     frequency, residual = results.array(name, "frequency"), results.optional(name, "residual")
@@ -161,5 +161,5 @@ def modes(results: Results) -> Section:
 
 
 def _named(wave: int, number: int) -> str:
-    """A mode of a round tire by its wave number and its number in the section; -: of none."""
+    """A mode of an axisymmetric tire by wave number and section mode; "-" without a wave number."""
     return f"{wave}, {number}" if wave >= 0 else "-"

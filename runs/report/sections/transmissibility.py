@@ -1,4 +1,4 @@
-"""The axle's share of the report on point forces: force on the held axle per force on the tread."""
+"""Report section part about the axle: force on the held axle per force on the tread."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from tireroad.runs.files.read import Results, Section
 from tireroad.runs.report.figures import COLOURS, COMPONENTS, WIDE, canvas, encode, styled
 from tireroad.runs.report.quantities import quantity
 
-POINTS = 3  # drawn at most
-LEAST = 1e-4  # of the largest: what is smaller is rounding by symmetry
+POINTS = 3  # at most, drawn
+LEAST = 1e-4  # of the largest; below, rounding at what is zero by symmetry
 
 
 def add(results: Results, section: Section, names: list[str]) -> None:
-    """The curves of response.h5, where it has them, by momentum and by the free rim."""
+    """Add the curves of response.h5, by momentum and by the free rim, if it has them."""
     name = "response.h5"
     frequency, found = (
         results.optional(name, f"transmissibility/{part}") for part in ("frequency", "momentum")
@@ -49,7 +49,7 @@ def transmissibilities(
     names: list[str],
     reference: str = "dB re 1 N/N",
 ) -> str:
-    """Magnitudes of (f, 3, k) in dB of the `reference`, a row a point."""
+    """Magnitudes of (f, 3, k) in dB re `reference`, one row per point."""
     rows = min(found.shape[2], POINTS)
     figure, axes = canvas(WIDE, 2.4 * rows + 0.4, rows, sharex=True)
     floor = LEAST * np.abs(found).max()

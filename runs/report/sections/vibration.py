@@ -1,4 +1,4 @@
-"""What the report says of the vibration of the tire."""
+"""Report section about the vibration of the tire."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from tireroad.runs.report.figures import COLOURS, RANGE_DB, WIDE, encode, line_c
 
 
 def vibration(results: Results) -> Section:
-    """How the outer face vibrates, and what power it would radiate at most (vibration.h5)."""
+    """The section on vibration and equivalent radiated power of the outer face (vibration.h5)."""
     name = "vibration.h5"
     section = Section(
         "Vibration of the outer face",
@@ -50,7 +50,7 @@ def level_lines(frequency: NDArray, level: NDArray, unit: str) -> str:
 
 @styled
 def radiated_power(centre: NDArray, plain: NDArray, weighted: NDArray) -> str:
-    """Levels (b,) dB re 1 pW, as they are and A-weighted, over band centres (b,) Hz."""
+    """Levels (b,) dB re 1 pW, unweighted and A-weighted, over band centres (b,) Hz."""
     figure, ((axes,),) = line_canvas(WIDE, 3.0, below=0.62)
     place, top = np.arange(len(centre)), float(plain.max())
     floor = 10.0 * np.floor((top - RANGE_DB) / 10.0)

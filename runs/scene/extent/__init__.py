@@ -1,1 +1,1 @@
-"""How large a scene is: its section and elements, unknowns, memory, disk and time, before anything is computed."""
+"""The extent of a scene, estimated in advance: elements, unknowns, memory, disk and time."""

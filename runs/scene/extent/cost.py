@@ -1,15 +1,16 @@
-"""What the stages of a scene cost: operations, and seconds of one core."""
+"""Cost of a scene's stages: operations, and seconds on one core."""
 
 from tireroad.runs.scene.extent.sizes import Sizes
 from tireroad.runs.scene.tables.scene import Scene
 
 
 def seconds(work: dict[str, float], size: Sizes, column: int) -> dict[str, float]:
-    """Processor time (s) of `operations` by stage, `column` unknowns in a column of nodes through the wall.
+    """CPU time (s) of `operations` by stage; `column`: unknowns in a column through the wall.
 
-    Of a core of a shared server (Intel Xeon), one BLAS thread, on 2026-11-23; from 7,020 to 98,100 unknowns (the static
-    state: 224,100) within a factor of 1.6 (tests/runs/scenes/test_estimated_time.py). What goes through the wall is done
-    in blocks, the faster the thicker it is; so are modes, in larger ones on larger meshes.
+    On a core of a shared server (Intel Xeon), one BLAS thread, 2026-11-23; from 7,020 to 98,100
+    unknowns (static state: 224,100) within a factor of 1.6
+    (tests/runs/scenes/test_estimated_time.py). Operations through the wall are done in blocks,
+    which are faster the thicker the wall; those on modes too, in larger blocks on larger meshes.
     """
     thicker, larger = column / 9, size.free / 27_900
     share = {
@@ -23,9 +24,11 @@ def seconds(work: dict[str, float], size: Sizes, column: int) -> dict[str, float
 def operations(
     scene: Scene, size: Sizes, left_out: dict[str, str], column: int, dense: bool
 ) -> dict[str, float]:
-    """By stage, in seconds of one core of 2020, of the quickstart (27,900 unknowns, 9 a column of nodes, 200 modes, 277
-    nodes), scaled by the operations that grow fastest: an unknown meets all those of the columns beside it. `dense`: the
-    contact points have a matrix.
+    """Operations by stage, in seconds on one core of 2020.
+
+    Those of the quickstart (27,900 unknowns, 9 per column of nodes, 200 modes, 277 nodes), scaled
+    by the fastest-growing operations: each unknown is coupled to all those of the neighbouring
+    columns. `dense`: the contact points have a full matrix.
     """
     count, pairs = size.modes / 200, size.coordinates / 200
     mesh = (size.free / 27_900) ** 1.2 * column / 9

@@ -1,4 +1,4 @@
-"""What a scene takes beside what the machine has: refused or warned of before it is taken."""
+"""Compares a scene's demand with the machine's resources, to refuse or warn before the run."""
 
 import shutil
 from pathlib import Path
@@ -7,19 +7,22 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.process.memory import available_memory
 from tireroad.runs.scene.extent.estimate import FACTOR, FOOTPRINT, KEYS, LOAD_ERROR, Estimate
 
-# The estimate may be off by 1.5: beyond that a run cannot succeed, below it it may not.
+# The estimate is within a factor of 1.5: above CERTAIN a run cannot succeed, above DOUBTFUL it may
+# not.
 CERTAIN, DOUBTFUL = 1.5, 0.8
-# What the processes of a run share out by rows where memory is short; of all else each has its own.
+# Parts that the processes of a run share by rows; of everything else each process has its own.
 SPREAD = ("matrices", FACTOR, FOOTPRINT, LOAD_ERROR, "modes", "flexibility of the patch")
-# Of a factor, what MUMPS keeps on disk out of core: of 54,000 and 108,000 unknowns it took 26 and 22 % of the memory.
+# Share of a factor that MUMPS keeps on disk out of core: with 54,000 and 108,000 unknowns, 26 and
+# 22 % of the memory were still taken.
 ON_DISK = 0.7
-LONG = 3600.0  # s: of a run that takes longer the user is warned
+LONG = 3600.0  # s: runs estimated to take longer cause a warning
 
 
 def check_demand(wanted: Estimate, directory: Path, processes: int = 1) -> list[str]:
-    """Warnings about memory, disk and time. InputError where they cannot suffice.
+    """Warnings about memory, disk and time. Raises InputError if they cannot suffice.
 
-    `directory`: where results go (it may not exist yet). Where memory is short, factors are kept on disk.
+    `directory`: result folder, which need not exist yet. If memory is short, factors are kept on
+    disk.
     """
     on_disk = out_of_core(wanted, processes)
     taken = memory_of(wanted, processes, on_disk)
@@ -53,7 +56,7 @@ def check_demand(wanted: Estimate, directory: Path, processes: int = 1) -> list[
 
 
 def memory_of(wanted: Estimate, processes: int, on_disk: bool = False) -> dict[str, float]:
-    """Bytes by part, of all processes of a run together, with factors in memory or `on_disk`."""
+    """Bytes by part, all processes of a run together, with factors in memory or `on_disk`."""
     parts = {
         name: size if name in SPREAD else processes * size for name, size in wanted.memory.items()
     }
@@ -61,12 +64,12 @@ def memory_of(wanted: Estimate, processes: int, on_disk: bool = False) -> dict[s
 
 
 def out_of_core(wanted: Estimate, processes: int) -> bool:
-    """Whether factors have to be kept on disk: this machine has too little memory for them beside all else."""
+    """Whether factors must be kept on disk because this machine's memory is too small for them."""
     return sum(memory_of(wanted, processes).values()) > DOUBTFUL * available_memory()
 
 
 def _largest(parts: dict[str, float]) -> str:
-    """The largest part and the keys that make it so."""
+    """The largest part, with the keys that determine its size."""
     name = max(parts, key=parts.__getitem__)
     return f"{name} ({KEYS[name]})" if name in KEYS else name
 
@@ -77,7 +80,7 @@ def _existing(directory: Path) -> Path:
 
 
 def duration(seconds: float) -> str:
-    """A rough time in words: it is within a factor of three."""
+    """A rough time in words, accurate within a factor of three."""
     for unit, size in (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 1.5 * size:
             return (

@@ -1,4 +1,4 @@
-"""How much memory, disk and time a scene will take, before anything is computed."""
+"""Estimates of a scene's memory, disk and time before anything is computed."""
 
 import math
 from dataclasses import dataclass
@@ -13,37 +13,44 @@ from tireroad.runs.scene.tables.scene import Scene
 PROGRAM = 2.1e8
 """Bytes of one process with all libraries loaded and the mesh made (measured)."""
 MATRICES = 6
-"""Sparse matrices held at the highest: K, its scaled copy and parts, those of rotation (measured: with the rest 0.92 GB
-for the quickstart, 2.3 to 2.8 GB for a passenger tire of 102,060 unknowns on one process, 1.6 GB on each of two)."""
+"""Sparse matrices held at peak: K, its scaled copy and parts, those of rotation (measured,
+including the rest: 0.92 GB for the quickstart, 2.3 to 2.8 GB for a passenger tire of 102,060
+unknowns on one process, 1.6 GB on each of two)."""
 TANGENTS = 4
-"""Of them in the static state: the whole ring's tangent, half of it with its fold, and where its entries go."""
+"""Matrices held in the static state: the whole ring's tangent, half of it folded, index maps."""
 COLUMNS = 250
-"""Columns of a tangent's inverse by which its set of contact settles (fem.static.linear_contact has 400 at most), twice: a torus
-of 220,500 unknowns took 2.3 GB on each of two processes; 1.8 come out, 1.4 without them. Gone before the modes."""
+"""Columns of a tangent's inverse that solving the contact set takes, held twice.
+
+At most 400 (fem.static.linear_contact). A torus of 220,500 unknowns took 2.3 GB on each of two
+processes; the estimate is 1.8, 1.4 without them. Released before the modes.
+"""
 BASES = 3
-"""Copies of all modes held at the highest: slices, the sorted vectors, their products."""
+"""Copies of all modes held at peak: slices, the sorted vectors, their products."""
 ANSWERS = 6 * 64
-"""Columns that solving for the flexibility of the patch takes (fem.matrices.direct.solve_parts): loads, answers, their copies."""
+"""Columns held while solving for the flexibility of the patch (fem.matrices.direct.solve_parts):
+loads, solutions, copies."""
 SHAPES = {"attachment": 3, "second-order": 5}
-"""By residual, columns a force on the patch, of fields held at the highest; of the others the answers at the patch are all."""
+"""By residual: full-length columns per force on the patch held at peak; other residuals hold only
+values at the patch."""
 DENSE = 1000
-"""Contact points up to which a tread's matrix is kept (contact.model.DENSE_POINTS)."""
+"""Number of contact points up to which a tread's matrix is stored (contact.model.DENSE_POINTS)."""
 BLOCK = 512
 """Steps of contact results held between two writes (stages.stored.contact_file)."""
 MOST = 1000
 """Touching points up to which "auto" takes the active set (contact.model.MOST_TOUCHING)."""
 PIVOT = 5
-"""Copies of the matrix of the points that touch, while it is pivoted (contact.solver.pivot)."""
+"""Copies of the matrix of the touching points during pivoting (contact.solver.pivot)."""
 PACKED = 0.3
-"""Size of contact.h5 over its numbers: most forces are 0 (measured: 0.24 on stones, 0.29 on texture)."""
+"""Size of contact.h5 relative to its raw numbers: most forces are 0 (measured: 0.24 on stones, 0.29
+on texture)."""
 
 FOOTPRINT = "columns of the footprint"
 FACTOR = "factor of the stiffness"
 LOAD_ERROR = "estimate of the load's error"
 HIGHEST = 3
-"""Order of elements, as fem.static.load_error has it, which is not loaded to estimate."""
+"""Highest element order, as in fem.static.load_error, which is not imported just to estimate."""
 
-# Keys that make a part large.
+# Keys that determine the size of each part.
 KEYS = {
     "matrices": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     FACTOR: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
@@ -63,9 +70,12 @@ KEYS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """`memory` of one process at the highest, `disk` of the result folder at the highest (bytes),
-    `seconds` of one core, each by part, and the `sizes` they follow from. `work`: operations, of which the seconds are a
-    measured share; what is chosen by cost goes by these, and stays when seconds are measured anew."""
+    """Estimated demand of a scene, by part, and the `sizes` it follows from.
+
+    `memory` (bytes): peak of one process; `disk` (bytes): peak of the result folder; `seconds` on
+    one core. `work`: operations, to which the seconds are a measured factor; choices by cost use
+    `work`, so that they do not change when the seconds are recalibrated.
+    """
 
     sizes: Sizes
     memory: dict[str, float]
@@ -75,7 +85,7 @@ class Estimate:
 
 
 def estimate(scene: Scene, until: str | None = None) -> Estimate:
-    """What the stages up to `until` take. Memory within a factor of 1.5 where measured, the rest rougher."""
+    """Demand of the stages up to `until`; memory within 1.5 where measured, the rest rougher."""
     size, left_out = sizes(scene), skipped(scene, until)
     column = _unknowns_through(scene.tire.proportions().through, scene.tire.order)
     dense = "contact" not in left_out and bool(_matrices_of_points(scene, size))
@@ -90,7 +100,7 @@ def estimate(scene: Scene, until: str | None = None) -> Estimate:
 
 
 def memory(scene: Scene) -> dict[str, float]:
-    """Bytes by part, for one process at the highest."""
+    """Peak bytes by part, for one process."""
     return estimate(scene).memory
 
 
@@ -100,10 +110,12 @@ def turning(scene: Scene) -> bool:
 
 
 def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
-    """The factor of the stiffness is that of nested dissection on a surface: 31/4 N log2 N entries for
-    N columns of nodes (George 1973, doi 10.1137/0710032), each a dense block as large as the
-    unknowns of one column, kept in one triangle. MUMPS took 84 MB for 27,225 and 194 MB for 59,697
-    unknowns of second order, this gives 88 MB and 211 MB. What it is for a turning tire's responses has both triangles.
+    """Peak bytes by part.
+
+    The factor of the stiffness is that of nested dissection on a surface: 31/4 N log2 N entries for
+    N columns of nodes (George 1973, doi 10.1137/0710032), each a dense block of the unknowns of one
+    column, one triangle stored. For 27,225 and 59,697 unknowns of second order MUMPS took 84 and
+    194 MB; this gives 88 and 211 MB. The factor for a rotating tire's responses has both triangles.
     """
     tire, free, count = scene.tire, size.free, size.coordinates
     through = tire.proportions().through
@@ -121,7 +133,7 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
     else:
         parts["modes"] = 8.0 * BASES * free * count
     if scene.static.on_road and scene.static.error_estimate:
-        # Gone before the modes are looked for, whose matrices and vectors may take as much.
+        # Released before the modes, whose matrices and vectors may take as much.
         later = parts["matrices"] - tangents + parts.get("modes", 0.0)
         parts[LOAD_ERROR] = max(_companions(free, through, tire.order) - later, 0.0)
     if "rotating" not in left_out:
@@ -137,7 +149,7 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
 
 
 def _factor(free: float, through: int, order: int) -> float:
-    """One triangle of a factor of so many unknowns, elements through the wall, and order."""
+    """Bytes of one triangle of a factor; `free` unknowns, `through` elements through the wall."""
     block = _unknowns_through(through, order)
     columns = max(free / block, 2.0)
     return 4.0 * 7.75 * columns * math.log2(columns) * block**2
@@ -149,8 +161,10 @@ def _matrices(count: int, free: float, through: int, order: int) -> float:
 
 
 def _companions(free: float, through: int, order: int) -> float:
-    """The two of the load's error (fem.static.load_error), by half of the ring: elements cut in two at the footprint,
-    which doubles them, and another order everywhere, a higher one on half as many elements around.
+    """Bytes of the two companions of the load's error (fem.static.load_error), on half of the ring.
+
+    One has elements halved at the footprint, which doubles their number; the other has another
+    order everywhere, a higher one on half as many elements around.
     """
     other = order + 1 if order < HIGHEST else order - 1
     layers = _unknowns_through(through, other) / _unknowns_through(through, order)
@@ -163,7 +177,7 @@ def _companions(free: float, through: int, order: int) -> float:
 
 
 def _each_step(scene: Scene, points: int) -> int:
-    """Numbers that the outputs at the driven points add to each time step."""
+    """Values per time step that the outputs at the driven points add."""
     return sum(kind.numbers(points) for _, kind in scene.output.kinds)
 
 
@@ -185,7 +199,7 @@ def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
 
 
 def _matrices_of_points(scene: Scene, size: Sizes) -> int:
-    """How many matrices of the contact points there are at once."""
+    """Number of matrices of the contact points held at once."""
     if scene.contact.on_nodes or size.points <= DENSE:
         return 3
     by_product = scene.contact.solver == "projected-cg"
@@ -195,7 +209,7 @@ def _matrices_of_points(scene: Scene, size: Sizes) -> int:
 
 
 def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
-    """Bytes of files; a checkpoint is a copy of contact.h5 so far."""
+    """Bytes of the files; a checkpoint is a copy of contact.h5 so far."""
     through = scene.tire.proportions().through
     face = size.free / (3 * (through * scene.tire.order + 1)) * 3
     parts = {"static.h5": 40.0 * size.free}
@@ -218,13 +232,13 @@ def _unknowns_through(through: int, order: int) -> int:
 
 
 def _columns_coupled(order: int) -> float:
-    """Columns of nodes that share an element with one, on average over an element's own."""
+    """Columns of nodes sharing an element with a given one, averaged over an element's columns."""
     own = np.full(order, order + 1.0)  # inside an element
-    own[0] = 2 * order + 1  # between two
+    own[0] = 2 * order + 1  # between two elements
     return float(np.outer(own, own).mean())
 
 
 def _layers_coupled(through: int, order: int) -> float:
-    """Nodes of one column that share an element with one of them, on average."""
+    """Nodes of one column that share an element with a given one, on average."""
     inside = through * (order - 1) * (order + 1)
     return (inside + 2 * (order + 1) + (through - 1) * (2 * order + 1)) / (through * order + 1)

@@ -1,7 +1,7 @@
-"""How large the parts of a scene will become, reckoned before anything is computed.
+"""Sizes of the parts of a scene, estimated before anything is computed.
 
-Modes by their density in a plate under tension, contact points by the footprint, steps by what the
-automatic step resolves. Each is an estimate within a factor of two or so of what a run finds.
+Modes from their density in a plate under tension, contact points from the footprint, steps from the
+automatic step. Each is within a factor of about two of what a run finds.
 """
 
 import math
@@ -16,15 +16,19 @@ from tireroad.runs.scene.rules.road import least_travel, made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.scene import Scene
 
-TURN = 0.3  # radians of the fastest mode in an automatic step, 200 steps at least (stages.build.stepping)
-SHAPES = 0.7, 0.1  # shapes of turning a mode: with cords, and without (modal.turning_shapes)
-MARGIN = 5e-3  # m: the reach of the patch beyond the road's height (stages.greens)
+TURN = 0.3  # radians of the fastest mode per automatic step (stages.build.rolling.stepping)
+SHAPES = 0.7, 0.1  # rotation shapes per mode: with cords, and without (modal.turning_shapes)
+MARGIN = 5e-3  # m: reach of the patch beyond the road's height (stages.greens)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sizes:
-    """`free` unknowns, `modes`, `coordinates` with the shapes that join them, `points` of contact on `nodes`, time `steps`, `frequencies` of
-    receptances, `speeds` of a Campbell diagram, `driven` points."""
+    """Sizes of a scene.
+
+    `free` unknowns; `modes`; `coordinates`: modes plus the rotation shapes that join them; contact
+    `points` on `nodes`; time `steps`; `frequencies` of receptances; `speeds` of a Campbell diagram;
+    `driven` points.
+    """
 
     free: int
     modes: int
@@ -61,9 +65,9 @@ def sizes(scene: Scene) -> Sizes:
 class _Wall:
     """The wall as a flat plate under tension: N = A/4π (k² + s² ω²) modes up to ω.
 
-    k is that of bending waves, ρh ω² = B k⁴ + T k², and s² the sum of the squared slownesses of the two
-    waves in the plane, which cords make too fast to count. `area` A m², `mass` ρh kg/m², `bending` B N m,
-    `tension` T N/m, `slowness2` s² (s/m)².
+    k is the wave number of bending waves, ρh ω² = B k⁴ + T k², and s² the sum of the squared
+    slownesses of the two in-plane waves, which cords make too fast to count. `area` A m², `mass` ρh
+    kg/m², `bending` B N m, `tension` T N/m, `slowness2` s² (s/m)².
     """
 
     area: float
@@ -81,7 +85,7 @@ class _Wall:
         return self.area * (k2 + self.slowness2 * omega2) / (4 * math.pi)
 
     def frequency_of(self, modes: float) -> float:
-        """Frequency (Hz) below which there are so many modes, by bisection in its logarithm."""
+        """Frequency (Hz) below which there are that many modes, by bisection in its logarithm."""
         low, high = 1e-3, 1e9
         while high > 1.001 * low:
             middle = math.sqrt(low * high)
@@ -90,7 +94,7 @@ class _Wall:
 
 
 def _wall(scene: Scene) -> _Wall:
-    """Of the section's height and thickness; the pressure's tension is that across a circle so high."""
+    """The wall, from the section's height and thickness; tension as in a circle of that radius."""
     tire, shape = scene.tire.proportions(), scene.tire.shape
     youngs, poisson, density = shape.rubber(scene.tire)
     plane = density * (1 - poisson**2 + 2 * (1 + poisson)) / youngs
@@ -112,19 +116,19 @@ def _modes(scene: Scene, free: int) -> int:
 
 
 def _shapes(scene: Scene, modes: int) -> int:
-    """Number of shapes of turning that join the modes."""
+    """Number of rotation shapes that join the modes."""
     if not scene.joins_shapes or not scene.rotation.speed:
         return 0
     return int(SHAPES[not scene.tire.shape.angles(scene.tire)] * modes)
 
 
 def highest_frequency(scene: Scene, modes: int) -> float:
-    """Frequency (Hz) of the highest mode, by the same density."""
+    """Frequency (Hz) of the highest mode, from the same mode density."""
     return scene.modal.up_to or _wall(scene).frequency_of(modes)
 
 
 def road_height(scene: Scene) -> float:
-    """Height (m) of the road over its datum in the first metres, and of its motion."""
+    """Height (m) of the road above its datum in the first metres, plus its motion's amplitude."""
     motion = scene.road.motion
     lift = abs(motion.amplitude) if motion.kind != "none" else 0.0
     surface, start = scene.road.surface, scene.road.start
@@ -140,7 +144,7 @@ def road_height(scene: Scene) -> float:
 
 
 def road_memory(scene: Scene) -> dict[str, float]:
-    """Bytes that are taken to make the road, where they count."""
+    """Bytes taken while the road is made, if significant."""
     try:
         taken = getattr(made(scene.road.surface), "making", 0.0)
     except InputError:
@@ -149,7 +153,7 @@ def road_memory(scene: Scene) -> dict[str, float]:
 
 
 def _points(scene: Scene, free: int) -> tuple[int, int]:
-    """Nodes and points of the patch: where the tire is within reach of the road."""
+    """Nodes and points of the patch, where the tire is within reach of the road."""
     if scene.contact is None:
         return 0, 0
     static, contact, mesh = scene.static, scene.contact, scene.tire
@@ -158,10 +162,10 @@ def _points(scene: Scene, free: int) -> tuple[int, int]:
     reach = contact.reach or 1.5 * road_height(scene) + MARGIN
     deflection = static.deflection or 0.01
     if static.load is not None and static.inflation > 0:
-        # A membrane carries its load by the pressure on the area that is pressed flat.
+        # A membrane carries its load by the pressure on the flattened area.
         deflection = min(static.load / (2 * math.pi * static.inflation * round_), tire.height)
     area = _area_within(mesh.ring().section, reach + deflection)
-    graded = math.sqrt(mesh.footprint_size)  # the patch reaches beyond the finest elements
+    graded = math.sqrt(mesh.footprint_size)  # the patch extends beyond the finest elements
     around = 2 * math.pi * tire.outer_radius / (mesh.segments * mesh.order) * graded
     along = 2 * math.radians(tire.half_angle) * tire.height
     along *= graded / (tire.along * mesh.order)
@@ -173,9 +177,10 @@ def _points(scene: Scene, free: int) -> tuple[int, int]:
 
 
 def _area_within(section: SectionMesh, depth: float) -> float:
-    """Area (m²) of the undeformed outer face that a plane cuts off at a depth (m) below its lowest point.
+    """Area (m²) of the undeformed outer face cut off by a plane `depth` (m) above its lowest point.
 
-    2 sqrt(2 r (depth - fall)) of the length at each place across; 2 pi depth sqrt(R r) of a torus.
+    Integrates the chord 2 sqrt(2 r (depth - fall)) over the section; for a torus 2 pi depth sqrt(R
+    r).
     """
     r, y = section.nodes[section.chain(section.outer)].T
     chord = 2 * np.sqrt(2 * r * np.clip(depth - (r.max() - r), 0.0, None))
@@ -183,7 +188,7 @@ def _area_within(section: SectionMesh, depth: float) -> float:
 
 
 def _steps(scene: Scene, modes: int) -> int:
-    """Number of time steps, those of an automatic step as the run will choose it."""
+    """Number of time steps; for an automatic step, as the run will choose it."""
     time = scene.time
     if time is None:
         return 0

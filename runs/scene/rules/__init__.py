@@ -1,1 +1,1 @@
-"""What no single key can say: contradictions between tables, roads that cannot be driven on, cords and compounds."""
+"""Rules beyond single keys: consistency between tables, usable roads, cords and compounds."""

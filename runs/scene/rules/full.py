@@ -1,4 +1,4 @@
-"""What is solved on the full matrices needs a damping that they have."""
+"""Solutions on the full matrices need a damping that has a full matrix."""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +10,7 @@ Where = Callable[[tuple[str, ...], str], InputError]
 
 
 def full_matrices(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """What is solved on the full matrices needs a damping that they have."""
+    """Raise an error for a solution on the full matrices without [damping]."""
     if scene.damping is not None:
         return
     advice = "needs a full damping matrix, which loss factors do not give: add [damping]"

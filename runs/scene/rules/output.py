@@ -1,4 +1,4 @@
-"""What the outputs of a scene need, and how much of them is too much."""
+"""Requirements and limits of a scene's outputs."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +13,7 @@ MOST_SPEEDS = 10_000
 
 
 def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """What each kind of output at the driven points needs."""
+    """Check each kind of output at the driven points against the scene."""
     for name, kind in scene.output.kinds:
         path = "output", name
         if scene.contact is not None and not kind.in_contact:
@@ -29,7 +29,7 @@ def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 
 def check_campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Speeds that make neither none nor too many."""
+    """Check that the Campbell diagram has at least one speed and not too many."""
     campbell = scene.rotation.campbell if scene.rotation else None
     if campbell is not None:
         path = "rotation", "campbell", "step"
@@ -37,7 +37,7 @@ def check_campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 
 def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """What the motion of the whole tire needs, in frequency and in time."""
+    """Check what the motion of the whole tire needs, in frequency and in time."""
     output = scene.output
     for key in ("vibration", "fields"):
         if not getattr(output, key):

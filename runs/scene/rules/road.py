@@ -1,4 +1,4 @@
-"""Whether the road of a scene can be driven on, before anything is solved: its file, its length."""
+"""Checks before solving that the road of a scene can be driven on: its file and its length."""
 
 import math
 from collections.abc import Callable
@@ -9,19 +9,19 @@ from tireroad.contact.roads.under_tire import Road
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables.scene import Scene
 
-# The effective rolling radius of a pressed tire over its outer radius, at the least; and how far the
-# patch may reach ahead of the axle, m: what is refused here the run would refuse for certain.
+# Least ratio of a pressed tire's effective rolling radius to its outer radius, and farthest reach
+# of the patch ahead of the axle, m: only what a run would certainly refuse is refused here.
 LEAST_RADIUS = 0.85
 AHEAD = 0.5
 Where = Callable[[tuple[str, ...], str], InputError]
 
 
-# A wall inside a drum that is this many times as large has room to be pressed on it.
+# Least ratio of an inside drum's radius to the tire's outer radius that leaves room to press it.
 _ROOM = 1.15
 
 
 def check_shape(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """InputError for a drum without room for the tire, and for modes on a road that is no level plane."""
+    """Raise an error for a drum too small for the tire, or held modes without a level plane."""
     road, camber = scene.road, scene.static.camber
     drum = road.drum_radius if road else None
     outer = scene.tire.proportions().outer_radius
@@ -39,9 +39,9 @@ def check_shape(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 
 def check_road(scene: Scene) -> None:
-    """InputError where the road's file cannot be used, or is too short for certain. Not collective.
+    """Raise InputError if the road's file is unusable or certainly too short. Not collective.
 
-    A road in a text file is read as a whole.
+    A road in a text file is read completely.
     """
     if scene.road is None:
         return
@@ -50,24 +50,24 @@ def check_road(scene: Scene) -> None:
         _check_extent(scene, road)
 
 
-_MADE: dict[tuple, Road] = {}  # the last road alone
+_MADE: dict[tuple, Road] = {}  # only the last road
 
 
 def made(surface: RoadKind) -> Road:
-    """The road of a scene; the last one is kept, as reading a file may take seconds."""
+    """The road of a scene; the last one is kept, since reading a file may take seconds."""
     found = _MADE.get(_which(surface))
     return found or keep(surface, surface.make())
 
 
 def keep(surface: RoadKind, road: Road) -> Road:
-    """Have the road in the place of the last one."""
+    """Keep a road, in place of the last one; returns it."""
     _MADE.clear()
     _MADE[_which(surface)] = road
     return road
 
 
 def _which(surface: RoadKind) -> tuple:
-    """The road and the state of its file, which may have been written anew."""
+    """The road and the state of its file, which may have been rewritten."""
     if surface.reads is None or not surface.reads.is_file():
         return (surface,)
     state = surface.reads.stat()
@@ -93,7 +93,7 @@ def _check_extent(scene: Scene, road: Road) -> None:
 
 
 def least_travel(scene: Scene) -> float:
-    """Way (m) that the tire rolls in the run, rather too little: the static state is not known yet."""
+    """Distance (m) rolled in the run, estimated low because the static state is not known yet."""
     rotation, time = scene.rotation, scene.time
     if rotation is None or time is None:
         return 0.0

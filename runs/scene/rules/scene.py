@@ -1,4 +1,4 @@
-"""What no single key can tell: contradictions between tables, and what this version leaves out."""
+"""Rules beyond single keys: contradictions between tables, and combinations not supported."""
 
 from collections.abc import Callable
 from dataclasses import fields
@@ -25,10 +25,9 @@ Where = Callable[[tuple[str, ...], str], InputError]
 
 
 def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
-    """Note every contradiction between keys or tables, one of each rule.
+    """Note contradictions between keys or tables, at most one per rule.
 
-    A rule is left out where something is wrong within a table that it reads: what it would say
-    could be a consequence.
+    A rule is skipped if a table that it reads has a problem: what it found might be a consequence.
     """
     broken = source.broken()
     for tables, rule in RULES:

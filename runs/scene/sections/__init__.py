@@ -1,1 +1,1 @@
-"""The sections a tire of a scene can have; a new one is a file in `kinds`."""
+"""The kinds of section that a scene's tire can have; a new kind is a file in `kinds`."""

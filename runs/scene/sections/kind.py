@@ -1,7 +1,7 @@
-"""What a kind of section is: its own keys, and the ring of elements, compounds and cords that follow.
+"""Base of the kinds of section: own keys, and the resulting ring of elements, compounds and cords.
 
-A new kind is one file in runs.scene.sections.kinds, or a class in a user's own script. The scene's keys,
-`check`, the key reference and the range tests follow from it.
+A new kind is one file in runs.scene.sections.kinds, or a class in a user's script. The scene's
+keys, `check`, the key reference and the range tests derive from it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.tables.tire import Tire
 
-# Elements around of the meshes that a search may take, where a kind does not say.
+# Elements around in the meshes of a search, unless a kind has its own.
 AROUND = (16, 20, 24, 30, 36, 44, 52, 64, 78, 96, 120)
 
 
@@ -27,9 +27,9 @@ AROUND = (16, 20, 24, 30, 36, 44, 52, 64, 78, 96, 120)
 class Proportions:
     """Sizes of a section, for estimates and for checks against other keys.
 
-    `outer_radius` m at the crown, `height` m from the crown to the beads' side of the section (of a torus
-    the radius of its section), `thickness` m of the wall at the crown, `half_angle` deg from the crown to
-    a bead; elements `along` the section from bead to bead and `through` the wall.
+    `outer_radius` m at the crown; `height` m: half of the section's height (for a torus, the radius
+    of its section circle); `thickness` m of the wall at the crown; `half_angle` deg from the crown
+    to a bead; number of elements `along` the section from bead to bead and `through` the wall.
     """
 
     outer_radius: float
@@ -41,11 +41,11 @@ class Proportions:
 
 
 class SectionKind(Parameters):
-    """Base of the kinds of section. Methods take the scene's [tire], of which the kind is a part.
+    """Base class of the kinds of section. Methods take the scene's [tire], which has the kind.
 
-    `order` and `segments`: polynomial order and elements around where the scene leaves them open. `air`:
-    whether the tire holds air that takes part, unless [tire.cavity] says otherwise; `tread_law`: what `contact.tread` is where
-    it is left open, a layer for treads on belts, which hardly give way.
+    `order` and `segments`: defaults of element order and elements around. `air`: whether air is
+    included unless [tire.cavity] says otherwise. `tread_law`: default of `contact.tread`; a layer
+    for treads on belts, which hardly deform.
     """
 
     owner = "section"
@@ -55,26 +55,26 @@ class SectionKind(Parameters):
     tread_law: ClassVar[str] = "layer"
 
     def elements(self, tire: Tire) -> tuple[Self, int, int]:
-        """The kind with its number of elements chosen, and order and segments of the scene or by default."""
+        """The kind with its number of elements set; order and segments, given or by default."""
         return self, tire.order or self.order, tire.segments or self.segments
 
     def check(self, tire: Tire, source: Source) -> None:
-        """Note in `source` what in [tire] cannot be."""
+        """Note problems of [tire] in `source`."""
 
     def proportions(self, tire: Tire) -> Proportions:
         """Sizes of the section."""
         raise NotImplementedError
 
     def ring(self, tire: Tire) -> Ring:
-        """The section's elements, revolved."""
+        """The ring of elements from the revolved section."""
         raise NotImplementedError
 
     def rubbers(self, tire: Tire) -> dict[str, Material]:
-        """The compound of each region of the ring's section, by name."""
+        """The compound of each region of the section, by name."""
         raise NotImplementedError
 
     def cords(self, tire: Tire) -> list[Cords]:
-        """The cords on the plies of the ring's section."""
+        """The cords on the plies of the section."""
         raise NotImplementedError
 
     def angles(self, tire: Tire) -> dict[str, float]:
@@ -82,12 +82,12 @@ class SectionKind(Parameters):
         return {line.name: line.angle for line in tire.cords}
 
     def rubber(self, tire: Tire) -> tuple[float, float, float]:
-        """Dynamic Young's modulus (Pa), Poisson's ratio and density (kg/m³) of the wall, for estimates."""
+        """Dynamic modulus (Pa), Poisson's ratio and density (kg/m³) of the wall, for estimates."""
         law = tire.material.law
         return tire.dynamic * law.youngs, law.poisson, tire.material.density
 
     def free_unknowns(self, tire: Tire) -> int:
-        """Displacement unknowns of the mesh without those held by the rim."""
+        """Displacement unknowns of the mesh, without those held by the rim."""
         import numpy as np
 
         section = self.ring(tire).section
@@ -95,33 +95,35 @@ class SectionKind(Parameters):
         return 3 * tire.segments * tire.order * (len(section.nodes) - held)
 
     def coarser(self, tire: Tire) -> Self:
-        """The kind with half the elements along the section, however few."""
+        """The kind with half the elements along the section, however few that leaves."""
         raise NotImplementedError
 
     def meshes(self, tire: Tire) -> tuple[tuple[int, int], ...]:
-        """(elements around, along the section) from coarse to fine, each some 1.2 times as fine as the one before,
-        that a search for settings may take; the coarsest can be halved."""
+        """(elements around, along the section) for a search of settings, from coarse to fine.
+
+        Each is about 1.2 times finer than the one before; the coarsest can be halved.
+        """
         along = self.proportions(tire).along
         return tuple((around, along) for around in AROUND)
 
     def search_order(self, tire: Tire) -> int:
-        """Order of the elements that a search takes."""
+        """Element order used by a search."""
         return tire.order
 
     def elements_along(self, along: int) -> Self:
-        """The kind with as many elements along its section, where that can be chosen."""
+        """The kind with that many elements along its section, if the number can be chosen."""
         return self
 
     def has_losses(self, tire: Tire) -> bool:
-        """Whether a compound has a loss factor."""
+        """Whether any compound has a loss factor."""
         return any((tire.loss_factor, *(part.loss_factor for part in tire.region)))
 
     def fingerprint(self, tire: Tire) -> str | None:
-        """A hash of what a run takes from files that the section is read from; None without one."""
+        """Hash of what a run takes from the section's files; None without files."""
         return None
 
     def described(self, tire: Tire) -> list[str]:
-        """Lines for `check`: what of a file is used and what is not."""
+        """Lines for `check`: which parts of a file are used and which are not."""
         return []
 
 

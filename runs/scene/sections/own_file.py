@@ -1,4 +1,4 @@
-"""A tire's section from a file: read once, its regions and cords matched with the scene's."""
+"""A tire's section from a file: read once; its regions and cords are matched with the scene's."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ def _keys(tire: Tire) -> FileSection:
 
 
 def own_section(tire: Tire) -> OwnSection:
-    """The section of the tire's file. InputError, with file and line, for what is wrong in it."""
+    """The section in the tire's file. Raises InputError, with file and line, for errors in it."""
     return _read(*_source(tire))
 
 
 def own_ring(tire: Tire) -> Ring:
-    """It in the scene's order and elements around, the same object for the same scene and file."""
+    """The ring of that section in the scene's order and segments; cached per scene and file."""
     return _ring(*_source(tire), tire.order, tire.segments, tire.footprint_size)
 
 
 def _source(tire: Tire) -> tuple[Path, int, Wishes]:
-    """The file, when it was changed, and what is asked of it."""
+    """The file, its modification time, and what is requested from it."""
     from tireroad.fem.decks.own import Wishes
 
     keys = _keys(tire)
@@ -74,7 +74,7 @@ def _ring(
 
 
 def _revolved(mesh: SectionMesh, segments: int, footprint_size: float) -> Ring:
-    """The section as a ring; half as many elements around make its coarser companion."""
+    """The section as a ring; its coarser companion has half as many elements around."""
     from tireroad.fem.sections.ring import revolved
     from tireroad.fem.sections.torus import LEAST
 
@@ -86,7 +86,7 @@ def _revolved(mesh: SectionMesh, segments: int, footprint_size: float) -> Ring:
 
 
 def fingerprint(tire: Tire) -> str:
-    """A hash of all that the run takes from the tire's file."""
+    """Hash of everything that the run takes from the tire's file."""
     own = own_section(tire)
     mesh = own.mesh
     faces = (mesh.outer, mesh.tread, mesh.inner, mesh.rim, *mesh.plies.values())
@@ -99,7 +99,7 @@ def fingerprint(tire: Tire) -> str:
 
 
 def check_regions(tire: Tire, own: OwnSection) -> None:
-    """That every [[tire.region]] names one of the file."""
+    """Check that every [[tire.region]] names a region of the file."""
     known = {name.upper() for name in own.mesh.regions}
     for number, region in enumerate(tire.region):
         if region.name is None or region.name.upper() not in known:
@@ -110,7 +110,7 @@ def check_regions(tire: Tire, own: OwnSection) -> None:
 
 
 def check_cords(tire: Tire, own: OwnSection) -> None:
-    """That every [[tire.cords]] names a line of the file, and every line without data has cords."""
+    """Check that every [[tire.cords]] names a line of the file."""
     for number, cords in enumerate(spelt(tire.cords, own.mesh.plies)):
         if cords.name not in own.mesh.plies:
             known = ", ".join(own.mesh.plies) or "none"
@@ -120,7 +120,7 @@ def check_cords(tire: Tire, own: OwnSection) -> None:
 
 
 def own_materials(tire: Tire) -> dict[str, Material]:
-    """The compound of each region by name: of [[tire.region]], else of the file, else [tire.material]."""
+    """Compound of each region by name: of [[tire.region]], else the file, else [tire.material]."""
     own = own_section(tire)
     return {
         name: _material(tire, name, rubber)
@@ -131,8 +131,8 @@ def own_materials(tire: Tire) -> dict[str, Material]:
 def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
     """The material of one region.
 
-    Its dynamic modulus and loss factor are those of the [[tire.region]] where they are not 1 and 0, else likewise those
-    of the file's compound, else [tire]'s.
+    Dynamic modulus and loss factor are those of the [[tire.region]] if not 1 and 0, else likewise
+    those of the file's compound, else those of [tire].
     """
     from tireroad.fem.tire.material import Material, compound
 
@@ -148,12 +148,12 @@ def _material(tire: Tire, name: str, rubber: Rubber | None) -> Material:
 
 
 def given_cords(tire: Tire) -> list[Line]:
-    """The scene's [[tire.cords]] by the names of the file's lines."""
+    """The scene's [[tire.cords]], with names spelt as in the file."""
     return spelt(tire.cords, own_section(tire).mesh.plies)
 
 
 def own_cords(tire: Tire) -> list[Cords]:
-    """The cords on the lines of the file: of [[tire.cords]] by name, else of the file."""
+    """The cords on the lines of the file: from [[tire.cords]] of that name, else from the file."""
     from tireroad.fem.tire.cords import Cords
 
     given = {cords.name: cords_of(cords) for cords in given_cords(tire)}
@@ -166,7 +166,7 @@ def own_cords(tire: Tire) -> list[Cords]:
 
 
 def described(tire: Tire) -> list[str]:
-    """What of the tire's file is used and what is not, for `check`."""
+    """Which parts of the tire's file are used and which are not, for `check`."""
     own = own_section(tire)
     mesh = own.mesh
     lines = [f"tire from {_keys(tire).name.name}", *(f"  {line}" for line in own.used)]

@@ -1,4 +1,4 @@
-"""What kinds of section share: cords and compounds of a scene's tables, sizes of a ring."""
+"""Shared by the kinds of section: cords and compounds of a scene's tables, sizes of a ring."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def cords_of(line: Line) -> Cords:
-    """The cords of a [[tire.cords]], wherever they lie."""
+    """The cords of a [[tire.cords]], without their place in the section."""
     from tireroad.fem.tire.cords import Cords
 
     values = {k: v for k, v in vars(line).items() if k not in ("depth", "arc", "angle")}
@@ -28,25 +28,25 @@ def cords_of(line: Line) -> Cords:
 
 
 def spelt(lines: Sequence[Line], names: Iterable[str]) -> list[Line]:
-    """The lines of a [[tire.cords]] with the names of the section's plies as the section spells them."""
+    """The [[tire.cords]] with names spelt as the section's plies are."""
     own = {name.upper(): name for name in names}
     return [replace(line, name=own.get(line.name.upper(), line.name)) for line in lines]
 
 
 def region_of(tire: Tire, name: str) -> Region | None:
-    """The scene's [[tire.region]] of that name."""
+    """The scene's [[tire.region]] of that name, or None."""
     return next((r for r in tire.region if r.name and r.name.upper() == name.upper()), None)
 
 
 def losses_of(part: Region | Rubber | None) -> dict[str, float]:
-    """Dynamic modulus and loss factor that a [[tire.region]] or a file's compound gives, where they are not 1 and 0."""
+    """Dynamic modulus and loss factor of a region or a file's compound, if not 1 and 0."""
     given = {} if part is None else {"dynamic": part.dynamic, "loss_factor": part.loss_factor}
     neutral = {"dynamic": 1.0, "loss_factor": 0.0}
     return {key: value for key, value in given.items() if value != neutral[key]}
 
 
 def proportions_of(ring: Ring, drawn: SectionMesh) -> Proportions:
-    """Sizes of a ring whose section was drawn so, of whatever order."""
+    """Sizes of a ring from its section as drawn, of any element order."""
     return Proportions(
         outer_radius=float(drawn.nodes[:, 0].max()),
         height=ring.height / 2,

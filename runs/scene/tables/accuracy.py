@@ -1,4 +1,4 @@
-"""The table [accuracy]: how sure the answer is, and how sure it shall be."""
+"""The table [accuracy]: error estimates, and the target of a search for settings."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Accuracy:
 
     @property
     def aimed(self) -> bool:
-        """Whether an error is asked for."""
+        """Whether a target error is given."""
         return self.target is not None or self.target_db is not None
 
     @property
@@ -73,7 +73,7 @@ class Accuracy:
 
 
 def check_accuracy(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """What a target needs of the other tables."""
+    """Check what a target requires of the other tables."""
     wanted = scene.accuracy
     if not wanted.aimed:
         return

@@ -1,4 +1,4 @@
-"""The table of the axle: what holds the wheel, and what it does not go with."""
+"""The table [axle]: support of the wheel, and incompatible settings."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _entry(value: Any) -> float:
 
 
 def _springs(default: Springs, doc: str) -> Any:
-    """Six numbers of a diagonal, or a whole 6 x 6 matrix."""
+    """A key of six diagonal entries, or a whole 6 x 6 matrix."""
 
     def read(value: Any) -> Springs:
         whole = isinstance(value, list | tuple) and len(value) == 6
@@ -105,7 +105,7 @@ class AxleTable:
 
 
 def axle_of(scene: Scene) -> Axle | None:
-    """The wheel that moves; None where it is held. InputError where it is no mechanical system."""
+    """The moving wheel; None if held. Raises InputError if it is no valid mechanical system."""
     given = scene.axle
     if given.kind == "fixed" or len(given.locked) == len(DIRECTIONS):
         return None
@@ -122,7 +122,7 @@ def axle_of(scene: Scene) -> Axle | None:
 
 
 def check_axle(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Raise InputError for a corner that cannot stand, and for what does not go with one that moves."""
+    """Raise an error for an unstable corner, and for settings incompatible with a moving wheel."""
     given = scene.axle
     if given.kind == "fixed":
         return
@@ -156,7 +156,7 @@ def _check_springs(axle: Axle, error: Where) -> None:
 
 
 def _check_company(scene: Scene, axle: Axle, error: Where) -> None:
-    """What is computed for a held wheel only."""
+    """Refuse what is available for a held wheel only."""
     turns = scene.rotation is not None and scene.rotation.speed > 0
     if scene.modal.rim == "free":
         raise error(("modal", "rim"), '= "free" is a wheel without mass: [axle] needs "fixed"')

@@ -1,4 +1,4 @@
-"""The table of the air inside the tire: its keys, when it is there unasked, what it does not go with."""
+"""The table [tire.cavity]: keys, when air is included by default, and incompatible settings."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Cavity:
 
 
 def filled(scene: Scene) -> Scene:
-    """The scene with the air that every tire has but the thesis's torus, unless its table says so."""
+    """The scene with air included by default, for every section but the torus of the thesis."""
     tire = scene.tire
     if not tire.shape.air or tire.cavity is not None:
         return scene
@@ -48,12 +48,12 @@ def filled(scene: Scene) -> Scene:
 
 
 def has_air(scene: Scene) -> bool:
-    """Whether the air in the tire takes part."""
+    """Whether the air in the tire is modelled."""
     return scene.tire.cavity is not None and scene.tire.cavity.gas != "none"
 
 
 def check_cavity(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Raise InputError for what is not computed with air."""
+    """Raise an error for what is not available with air."""
     if not has_air(scene):
         return
     rotation, residual = scene.rotation, scene.greens.residual

@@ -1,4 +1,4 @@
-"""The tables of the contact and of the run in time, with units, ranges and defaults."""
+"""The tables [contact] and [time], with units, ranges and defaults."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -79,26 +79,26 @@ class Contact(Variants):
 
     @property
     def on_nodes(self) -> bool:
-        """Whether the points are nodes whatever the footprint."""
+        """Whether the points are nodes for any footprint."""
         counted = self.brush_stiffness is not None or not self.law.compliant
         return self.points == "nodes" or (self.points == "auto" and counted)
 
     @property
     def rubs(self) -> bool:
-        """Whether the road pulls on the tire horizontally."""
+        """Whether the road exerts horizontal forces on the tire."""
         bristles = (self.brush_stiffness, self.brush_stiffness_per_area) != (None, None)
         return bristles or self.sheared
 
     @property
     def sheared(self) -> bool:
-        """Whether the tread gives way to horizontal forces."""
+        """Whether the tread deforms under horizontal forces."""
         return (
             self.shear and self.friction is not None and self.brush == "rolling" and self.law.shears
         )
 
 
 def check_tread(contact: Contact, standing: bool, error: Where, rubs: bool) -> None:
-    """Raise InputError for treads and brushes that cannot be; `rubs`: the static state has friction."""
+    """Raise an error for invalid treads and brushes; `rubs`: the static state has friction."""
     if contact.law.creep is not None and contact.on_nodes:
         raise error(
             ("contact", "tread"),

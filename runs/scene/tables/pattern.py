@@ -1,4 +1,4 @@
-"""The table of the tread's pattern, and what it does not go with."""
+"""The table [pattern] of the tread, and incompatible settings."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class PatternTable:
 
 
 def check_pattern(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Raise InputError for a pattern that cannot be, or without the points that see it."""
+    """Raise an error for an invalid pattern, or for one without a grid that resolves it."""
     wanted = scene.pattern
     if wanted is None:
         return

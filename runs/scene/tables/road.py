@@ -1,4 +1,4 @@
-"""The table of the road: where it lies, its kind with that kind's keys, and its motion."""
+"""The table [road]: placement, kind with the kind's keys, and motion."""
 
 from dataclasses import dataclass
 
@@ -18,5 +18,5 @@ class Road(Variants, Placement):
 
     @property
     def file(self) -> str | None:
-        """The file of a measured road."""
+        """The file of a measured road, or None."""
         return getattr(self.surface, "file", None)

@@ -220,7 +220,7 @@ class Scene:
 
     @property
     def joins_shapes(self) -> bool:
-        """Whether shapes of turning join the modes of a wheel that turns (modal.turning_shapes)."""
+        """Whether rotation shapes join the modes of a rotating wheel (modal.turning_shapes)."""
         rotation = self.rotation
         if rotation is None or self.modal.rim == "free":
             return False

@@ -1,4 +1,4 @@
-"""The table of the static state: inflation, and the road by load, deflection or height."""
+"""The table [static]: inflation, and the road by load, deflection or height."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The table of load-deflection and stiffness, and what it needs."""
+"""The table [stiffness]: load-deflection curve and stiffness, and what they need."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Stiffness:
 
 
 def deflections(wanted: Stiffness, own: float | None) -> list[float]:
-    """The deflections (m) to visit; `own` is that of the scene's static state."""
+    """The deflections (m) to compute; `own` is that of the scene's static state."""
     if wanted.deflections:
         return list(wanted.deflections)
     last = wanted.up_to or _BEYOND * own
@@ -87,7 +87,7 @@ def deflections(wanted: Stiffness, own: float | None) -> list[float]:
 
 
 def check_stiffness(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Raise InputError where there is nothing to take the deflections from."""
+    """Raise an error if there is nothing to derive the deflections from."""
     wanted, static = scene.stiffness, scene.static
     if wanted is None or wanted.deflections or wanted.up_to:
         return

@@ -151,7 +151,7 @@ class Tire(Variants):
     )
 
     def with_elements(self, on_road: bool) -> Tire:
-        """With its elements chosen where the scene leaves them open; smaller at the footprint on a road."""
+        """The tire with open mesh keys set; on a road, elements are smaller at the footprint."""
         shape, order, segments = self.shape.elements(self)
         near = self.footprint_size or (NEAR_ROAD if on_road else 1.0)
         return replace(self, shape=shape, order=order, segments=segments, footprint_size=near)
@@ -161,9 +161,9 @@ class Tire(Variants):
         return self.shape.proportions(self)
 
     def ring(self) -> Ring:
-        """The section's elements, revolved."""
+        """The ring of elements from the revolved section."""
         return self.shape.ring(self)
 
     def free_unknowns(self) -> int:
-        """Displacement unknowns of the mesh without those held by the rim."""
+        """Displacement unknowns of the mesh, without those held by the rim."""
         return self.shape.free_unknowns(self)

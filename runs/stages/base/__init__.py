@@ -1,1 +1,1 @@
-"""What a stage is, the run that it belongs to, and what it records."""
+"""Base classes of stages, the job they belong to, and their records."""

@@ -1,4 +1,4 @@
-"""One run of one scene: what all its stages share, and none of them changes."""
+"""A job: one run of one scene, shared unchanged by all its stages."""
 
 from __future__ import annotations
 
@@ -26,8 +26,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Job:
-    """The scene, where its results go, and the processes that compute them; `fresh`: reuse nothing; `cache`:
-    finished stages shared with other runs, by default none."""
+    """The scene, its result folder, and the processes that compute it.
+
+    `fresh`: reuse nothing; `cache`: finished stages shared with other runs, by default none.
+    """
 
     scene: Scene
     directory: Path
@@ -38,22 +40,27 @@ class Job:
 
     @property
     def speed(self) -> float:
-        """Speed of rotation, rad/s; 0 when the wheel stands. Of a scene with a travel speed a first guess, until
-        the static state gives its rolling radius."""
+        """Speed of rotation, rad/s; 0 for a wheel at rest.
+
+        For a scene with a travel speed it is a first guess until the static state gives the rolling
+        radius.
+        """
         if "speed" in self.found:
             return self.found["speed"]
         return self.scene.rotation.speed if self.scene.rotation else 0.0
 
     def free_speed(self, state: StaticState) -> float:
-        """Speed (rad/s) at which a wheel with this rolling radius rolls freely at the scene's travel speed;
-        the scene's own where it has none."""
+        """Speed (rad/s) of a wheel with this rolling radius, rolling freely at the travel speed.
+
+        The job's own speed if the scene has no travel speed.
+        """
         rotation = self.scene.rotation
         if rotation is None or rotation.travel_speed is None:
             return self.speed
         return rotation.travel_speed / (rotation.rolling_radius or state.rolling_radius())
 
     def settle(self, done: Mapping[str, Any]) -> None:
-        """At a travel speed, take the wheel's for which the static state was found, once it is `done`. Collective."""
+        """At a travel speed, adopt the static state's wheel speed once it is `done`. Collective."""
         rotation = self.scene.rotation
         if rotation is None or not rotation.travel_speed or self.found or "static" not in done:
             return
@@ -62,12 +69,12 @@ class Job:
 
     @cached_property
     def axle(self) -> Axle | None:
-        """The wheel that moves; None where it is held."""
+        """The moving wheel; None if the axle is held."""
         return axle_of(self.scene)
 
     @cached_property
     def tire(self) -> TireModel:
-        """The scene's tire without loads."""
+        """The scene's tire, unloaded."""
         return make_tire(self.comm, self.scene.tire)
 
     def path(self, stage: str) -> Path:
@@ -75,11 +82,11 @@ class Job:
         return self.directory / f"{stage}.h5"
 
     def provenance(self, stage: str, key: str) -> store.Provenance:
-        """Where a stage's file comes from; `key` is the hash of its inputs."""
+        """Provenance of a stage's file; `key` is the hash of the stage's inputs."""
         return store.Provenance(self.scene.name, dumps(self.scene), stage, key, self.comm.size)
 
     def write(self, path: Path, provenance: store.Provenance, fill: Callable[[Any], None]) -> None:
-        """Write a file by `fill(file)` on the root process. Collective."""
+        """Write a file with `fill(file)` on the root process. Collective."""
 
         def write() -> None:
             with store.writing(path, provenance) as file:
@@ -88,7 +95,7 @@ class Job:
         on_root(self.comm, write)
 
     def read(self, path: Path, pick: Callable[[Any], T]) -> T:
-        """What `pick(file)` returns, on every process. Collective."""
+        """The value of `pick(file)`, on every process. Collective."""
 
         def opened() -> T:
             with store.opened(path) as file:

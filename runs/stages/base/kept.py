@@ -1,4 +1,4 @@
-"""What one run of a family leaves to the next in the same process, while the static state is the same: matrices above all."""
+"""Objects, mainly matrices, kept in memory for a family's next run with the same static state."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
-MOST = 2  # of a kind: those of a run and of its coarser companion
+MOST = 2  # per kind: those of a run and of its coarser companion
 _kept: dict[str, OrderedDict[Hashable, Any]] | None = None
 
 
 def begin() -> None:
-    """From now on keep them: this process computes one member of a family after the other."""
+    """Start keeping: this process computes the members of a family one after the other."""
     global _kept
     _kept = {}
 
 
 def once(kind: str, key: Hashable, make: Callable[[], T]) -> T:
-    """What `make` gives, of the same key that of the run before. Collective where `make` is."""
+    """The value of `make`, or that of an earlier run with the same key. Collective if `make` is."""
     if _kept is None:
         return make()
     known = _kept.setdefault(kind, OrderedDict())
     if key not in known:
-        while len(known) >= MOST:  # before the new ones take their memory
+        while len(known) >= MOST:  # freed before the new ones need the memory
             known.popitem(last=False)
         known[key] = make()
     known.move_to_end(key)
@@ -32,6 +32,6 @@ def once(kind: str, key: Hashable, make: Callable[[], T]) -> T:
 
 
 def forget() -> None:
-    """Nothing is kept: a new static state is computed, of which there are no matrices yet."""
+    """Drop everything, before a new static state: matrices belong to one state."""
     if _kept is not None:
         _kept.clear()

@@ -1,4 +1,4 @@
-"""What a stage tells about itself: figures, warnings, and where its time went."""
+"""The record of a stage: figures, warnings, and time by part."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Figures = dict[str, tuple[Any, str]]
 
 @dataclass
 class Record:
-    """What a stage tells about itself: figures as name: (value, unit), seconds by part."""
+    """The record of a stage: figures as name: (value, unit), seconds by part."""
 
     headline: Figures = field(default_factory=dict)
     indicators: Figures = field(default_factory=dict)
@@ -27,7 +27,7 @@ class Record:
         )
 
     def timing(self, part: str) -> AbstractContextManager[None]:
-        """Add the seconds spent inside to a part of the stage's cost."""
+        """Add the seconds spent inside the context to a part of the stage's cost."""
         return self.cost(part)
 
     @property

@@ -1,4 +1,4 @@
-"""A stage: a function of typed inputs whose frozen product goes to a file and comes back from it."""
+"""A stage: a function of typed inputs whose frozen product is written to a file and read back."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ P = TypeVar("P")
 
 
 class Done(Generic[P]):
-    """A product, with the `key` (hash) of all that it was computed from; "" of what has no file.
+    """A product with the `key` (hash) of all its inputs; the key is "" if the product has no file.
 
-    It is made or read when it is first asked for: what nobody needs is never read. Collective then.
+    It is computed or read on first use, so that an unused product is never read. That use is
+    collective.
     """
 
     def __init__(self, key: str, make: Callable[[], P]) -> None:
@@ -31,14 +32,14 @@ class Done(Generic[P]):
 
 @dataclass(frozen=True, kw_only=True)
 class Part(ABC, Generic[P]):
-    """A link of the pipeline. Its fields beside `job` are the parts it takes, by their names."""
+    """A part of the pipeline. Apart from `job`, its fields are the parts it takes, by name."""
 
     name: ClassVar[str]
     job: Job
 
     @classmethod
     def taken(cls, job: Job, done: Mapping[str, Done]) -> Part | None:
-        """The part with what it takes of what is done; None where something it needs is not there."""
+        """The part with its inputs from `done`; None if a required input is missing."""
         given: dict[str, Any] = {}
         for item in fields(cls):
             if item.name == "job":
@@ -51,7 +52,7 @@ class Part(ABC, Generic[P]):
 
 
 class Shared(Part[P]):
-    """What several stages take, made when one asks for it, and kept in no file."""
+    """A part used by several stages, made on first use and not stored in a file."""
 
     @abstractmethod
     def make(self) -> P:
@@ -59,44 +60,44 @@ class Shared(Part[P]):
 
 
 class Stage(Part[P]):
-    """A part whose product is kept in the file `<name>.h5` and reused while its inputs stay the same."""
+    """A part whose product is stored in `<name>.h5` and reused while its inputs are unchanged."""
 
     @abstractmethod
     def inputs(self) -> Mapping[str, Any]:
-        """All the product depends on, the keys of other products among it. Collective."""
+        """Everything the product depends on, including the keys of other products. Collective."""
 
     @abstractmethod
     def produce(self, key: str, record: Record) -> P:
-        """The product, its file written; figures of the computation go to the record. Collective."""
+        """Make the product and write its file; figures go into the record. Collective."""
 
     @abstractmethod
     def read(self, file: Any) -> Any:
-        """What a file holds of the product. Root process only."""
+        """The content of the product's file. Root process only."""
 
     def restored(self, held: Any) -> P:
-        """The product from what its file holds; by default just that. On every process."""
+        """The product from its file's content, by default that content. On every process."""
         return held
 
     def stored(self) -> P:
-        """The product as its file has it. Collective."""
+        """The product as stored in its file. Collective."""
         return self.restored(self.job.read(self.job.path(self.name), self.read))
 
     @classmethod
     def instead(cls, job: Job, done: Mapping[str, Done]) -> Done[P] | None:
-        """What later parts take in the place of a stage that is skipped; None: they go without."""
+        """What later parts receive if this stage is skipped; None: nothing."""
         return None
 
 
 class Computed(Stage[P]):
-    """A stage that is computed first and written after."""
+    """A stage whose product is first computed, then written."""
 
     @abstractmethod
     def compute(self, record: Record) -> P:
-        """The product; figures of the computation go to the record. Collective."""
+        """Compute the product; figures go into the record. Collective."""
 
     @abstractmethod
     def write(self, file: Any, product: P) -> None:
-        """Fill an empty file. Root process only."""
+        """Write the product into an empty file. Root process only."""
 
     def produce(self, key: str, record: Record) -> P:
         """Compute the product and write its file. Collective."""

@@ -1,1 +1,1 @@
-"""What a stage computes with, made from the scene: the tire, its air, the turning, the contact, the steps."""
+"""Builds, from the scene, what a stage computes with: tire, air, rotation, contact, time steps."""

@@ -1,4 +1,4 @@
-"""The air in the tire of a run: made at the static state, stored beside the modes, summed up in figures."""
+"""The air in the tire: built on the static state, stored with the modes, reported in figures."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from tireroad.runs.stages.base.stage import Done, Shared
 if TYPE_CHECKING:
     from tireroad.fem.cavity.column import Column
 
-LIMIT = 1000.0  # Hz: beyond it the section is half a wavelength wide, and the duct no line
+LIMIT = 1000.0  # Hz: above it the section exceeds half a wavelength: no one-dimensional duct
 _SHOWN = 4
-_MOSTLY = 0.3  # of a state's energy: then it is one of the air's
+_MOSTLY = 0.3  # share of a state's energy above which it counts as an air resonance
 _UNITS = {
     "circular": "rad/s",
     "pressure": "m^1/2/kg^1/2 s",
@@ -46,12 +46,12 @@ _STATES = {
 
 
 def inputs(job: Job) -> dict | None:
-    """What the air depends on besides the static state; None without it."""
+    """What the air depends on besides the static state; None without air."""
     return asdict(job.scene.tire.cavity) if has_air(job.scene) else None
 
 
 def make_air(job: Job, motions: SmallMotions, highest: float) -> Column | None:
-    """The air at the wall of the static state, or None; `highest` (Hz) of the modes. Collective."""
+    """The air inside the deformed wall, or None; `highest` mode's frequency (Hz). Collective."""
     if not has_air(job.scene):
         return None
     from tireroad.fem.cavity.column import make_column
@@ -70,14 +70,14 @@ def make_air(job: Job, motions: SmallMotions, highest: float) -> Column | None:
 
 @dataclass(frozen=True, kw_only=True)
 class AirColumn(Shared["Column | None"]):
-    """The air at the wall, as the modes were made with it, or once more where they are reused."""
+    """The air at the wall, from the modes' computation, or rebuilt if they are reused."""
 
     name: ClassVar[str] = "air"
     modes: Done[ModalBasis]
     motions: Done[SmallMotions]
 
     def make(self) -> Column | None:
-        """Collective."""
+        """The air column. Collective."""
         basis = self.modes.product
         if basis.column is not None:
             return basis.column
@@ -85,7 +85,7 @@ class AirColumn(Shared["Column | None"]):
 
 
 def describe_air(record: Record, air: Air) -> None:
-    """The modes of the air that joins those of the tire."""
+    """Record the modes of the air that join those of the tire."""
     record.headline |= {
         "air, rigid walls": (_listed(air.duct.frequency[:_SHOWN]), "Hz"),
         "volume of air": (1e3 * air.duct.volume, "l"),
@@ -98,7 +98,7 @@ def _listed(values: np.ndarray) -> str:
 
 
 def fill(file: h5py.File, air: Air | None) -> None:
-    """Write the air beside the modes."""
+    """Write the air into the file of the modes."""
     if air is None:
         return
     put(file, "cavity/frequency", air.duct.frequency, "Hz")
@@ -110,7 +110,7 @@ def fill(file: h5py.File, air: Air | None) -> None:
 
 
 def read(file: h5py.File) -> Air | None:
-    """The air of a file of modes, None where it has none."""
+    """The air from a file of modes; None if it has none."""
     if "cavity" not in file:
         return None
     group = file["cavity"]
@@ -120,7 +120,7 @@ def read(file: h5py.File) -> Air | None:
 
 
 def fill_states(file: h5py.File, rolling: RollingModes) -> None:
-    """Write the states of a tire with air that stands, which no stage before had to find."""
+    """Write the states of a non-rotating tire with air, which no earlier stage has computed."""
     states = rolling.states
     for name, unit in _STATES.items():
         put(file, f"states/{name}", getattr(states, name), unit)
@@ -131,12 +131,12 @@ def fill_states(file: h5py.File, rolling: RollingModes) -> None:
 
 
 def share(rolling: RollingModes) -> np.ndarray:
-    """Part (q,) of each state's kinetic energy that is the air's."""
+    """Share (q,) of the air in each state's kinetic energy."""
     return rolling.basis.projection.air.share(rolling.states.right)
 
 
 def describe(record: Record, rolling: RollingModes) -> None:
-    """Tell the states that are the air's more than any others: the cavity's resonances."""
+    """Record the states with the largest share of air: the cavity resonances."""
     frequency, part = rolling.states.eigenvalue.imag, share(rolling)
     first = np.argsort(-part * (frequency > 0))[:_SHOWN]
     first = first[part[first] >= min(_MOSTLY, part[first[0]])]

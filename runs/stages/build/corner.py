@@ -1,4 +1,4 @@
-"""The wheel in a run: what the modes hold for it, and what is read of it as it moves or is held."""
+"""The wheel corner in a run: its part of the modes, and readings of a moving or held wheel."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from tireroad.runs.files.store import put
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 
-MOMENTS = 3  # on the hub: what is read of every wheel, after all else
-BESIDE = SEEN + MOMENTS  # columns of probes after the outer face
+MOMENTS = 3  # hub moments: the last readings of every wheel
+BESIDE = SEEN + MOMENTS  # columns of the probes after those of the outer face
 UNITS = {
     "wheel/translation": "m",
     "wheel/rotation": "rad",
@@ -35,14 +35,16 @@ _FREQUENCIES, _LOADS = 25, 20
 
 
 def inputs(job: Job) -> dict | None:
-    """What depends on the axle; None where the wheel is held."""
+    """The axle's inputs; None if the wheel is held."""
     return asdict(job.scene.axle) if job.axle else None
 
 
 def readings(job: Job) -> int:
-    """How many more outputs a response has: motions of wheel and body, and moments on the hub; of a wheel that is held the
-    moments alone, where the force on the axle is wanted. None of a free rim, and none where the road holds what touches it,
-    which then carries some of the moments.
+    """Number of additional outputs of a response.
+
+    Motions of wheel and body and hub moments for a moving wheel; for a held wheel the moments
+    alone, if the axle force is wanted. 0 for a free rim, and 0 if the road holds the footprint,
+    which then carries part of the moments.
     """
     if job.axle:
         return BESIDE
@@ -52,27 +54,29 @@ def readings(job: Job) -> int:
 
 
 def layout(job: Job) -> dict[str, tuple[tuple, str]]:
-    """Shape of a step and unit of what is read, by the names in contact.h5."""
+    """Shape per step and unit of each reading, by the names in contact.h5."""
     names = {0: (), MOMENTS: ("hub_moment",)}.get(readings(job), tuple(UNITS))
     return {name: ((3,) if name != "body/height" else (), UNITS[name]) for name in names}
 
 
 def fill(file: h5py.File, corner: Corner | None) -> None:
-    """Write what the rim's motions meet beside the modes; the axle itself is the scene's."""
+    """Write the matrices of the rim's motions with the modes; the axle belongs to the scene."""
     for name in ARRAYS if corner else ():
         put(file, f"corner/{name}", getattr(corner, name), "kg, m, N, rad")
 
 
 def read(file: h5py.File, axle: Axle | None) -> Corner | None:
-    """The corner of a file of modes, with the scene's axle, or held."""
+    """The corner from a file of modes, with the scene's axle or held; None if the file has none."""
     if "corner" not in file:
         return None
     return Corner(axle=axle or Axle.held(), **{name: file[f"corner/{name}"][:] for name in ARRAYS})
 
 
 def widened(probes: sparse.csr_matrix, count: int) -> sparse.csr_matrix:
-    """Probes (k, 3 s) of the outer face, with the last `count` of those of wheel, body and hub after them,
-    (k + count, 3 s + 10)."""
+    """Probes (k, 3 s) of the outer face, plus the last `count` readings of wheel, body, hub.
+
+    Returns (k + count, 3 s + 10).
+    """
     every = sparse.identity(BESIDE, format="csr")
     return sparse.block_diag([probes, every[BESIDE - count :]], format="csr")
 
@@ -89,7 +93,10 @@ def standing_moment(patch: Patch) -> np.ndarray:
 
 
 def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
-    """Datasets of contact.h5 (n, ...) from readings (n, 10), or (n, 3) of the moments; `static` N m as above."""
+    """Datasets of contact.h5 (n, ...) from readings (n, 10), or (n, 3) of moments alone.
+
+    `static` (3,) N m: the static moment, which is added.
+    """
     out = {"hub_moment": readings[:, -MOMENTS:] + static}
     if readings.shape[1] > MOMENTS:
         out |= {name: readings[:, place] for name, place in _PLACES.items()}
@@ -98,7 +105,7 @@ def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def check_blocked(record: Record, rolling: RollingModes, loads, highest: float) -> None:
-    """Put the force on the hub beside that by the blocked force (greens.blocked), up to `highest` Hz."""
+    """Record how far hub force and blocked force (greens.blocked) differ up to `highest` Hz."""
     basis, some = Basis.of(rolling), loads[:: -(-loads.shape[0] // _LOADS)]
     frequency = np.linspace(0, highest, _FREQUENCIES + 1)[1:]
     off = disagreement(basis, rolling.turning, some, frequency)
@@ -107,7 +114,7 @@ def check_blocked(record: Record, rolling: RollingModes, loads, highest: float) 
 
 
 def describe(record: Record, rolling: RollingModes) -> None:
-    """The axle in figures: the slowest motions of wheel and body."""
+    """Record the slowest motions of wheel and body."""
     values = rolling.states.eigenvalue
     slow = values[np.argsort(np.abs(values))][:3]
     record.headline["slowest motions of tire, wheel and body"] = (

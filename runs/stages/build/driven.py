@@ -1,4 +1,4 @@
-"""What a run shows to its outputs: responses and forces of the driven points, and the history of the contact."""
+"""What outputs can read of a run: responses and forces of the driven points, contact history."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ Array = np.ndarray
 
 @dataclass(frozen=True, kw_only=True)
 class Driven:
-    """The points of the scene's [[force]]s, k of them, and the contact, as every kind of output sees them.
+    """The k points of the scene's [[force]] tables, and the contact, as outputs see them.
 
-    `time` (nt,) s, None of a scene without [time]; `integration`: how given forces were integrated, None where
-    contact or nothing was; `history` of the contact, None of a scene without.
+    `time` (nt,) s, None without [time]; `integration`: how prescribed forces were integrated, None
+    with contact or without time integration; `history` of the contact, None without contact.
     """
 
     job: Job
@@ -47,30 +47,33 @@ class Driven:
 
     @property
     def response(self) -> Response:
-        """Displacement (3 k) per force (k) of the tire as it turns, without the road."""
+        """Displacement (3 k) per force (k) of the rotating tire, without the road."""
         return self.whole.between(slice(3 * len(self.job.scene.force)), slice(None))
 
     @property
     def whole(self) -> Response:
-        """The same, and where the axle is held and its force wanted, the moments (3) on it after the displacements."""
+        """`response`, then the moments (3) on the axle if it is held and its force wanted."""
         return self.greens.product.force
 
     def moments(self, frequency: Array) -> Array | None:
-        """Moment (f, 3, k) m on the held axle per given force, at `frequency` (f,) Hz; None where it is not known."""
+        """Moment (f, 3, k) m on the held axle per force at `frequency` (f,) Hz; None if unknown."""
         read = self.whole.between(slice(3 * len(self.job.scene.force), None), slice(None))
         return read.receptance(frequency) if len(read.residual) else None
 
     def of_contact(self, name: str) -> Array:
-        """An array of contact.h5 by its name, e.g. "normal_force" (nt, c) N, on every process. Collective."""
+        """An array of contact.h5, e.g. "normal_force" (nt, c) N, on every process. Collective."""
         return self.job.read(self.job.path("contact"), lambda file: file[name][:])
 
     def points(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """Loads (k, 3 s) of unit forces along the given ones, and readings (3 k, 3 s) of their points."""
+        """Loads (k, 3 s) of unit forces as directed, and readings (3 k, 3 s) of their points."""
         return driven_points(self.job)
 
     def by_free_rim(self, count: int, frequency: Array) -> tuple[Array, float]:
-        """Force and moment (f, 6, k) of the tire on the held axle per given force, by `count` modes of the same static
-        state with its rim let go; the highest of them, Hz. Collective."""
+        """Force and moment (f, 6, k) of the tire on the held axle per unit force, by the free rim.
+
+        From `count` modes of the same static state with its rim released; also returns the highest
+        of them, Hz. Collective.
+        """
         turning = turning_of(self.job)
         motions = SmallMotions(
             self.job.tire, self.static, rim="free", road=self.job.scene.modal.road
@@ -84,21 +87,21 @@ class Driven:
 
     @property
     def drifts(self) -> bool:
-        """Whether a constant force moves the tire ever further: it has no receptance at 0 Hz then."""
+        """Whether a constant force makes the tire drift: there is then no receptance at 0 Hz."""
         return self.job.scene.modal.rim == "free" or self.response.rigid > 0
 
     def force(self, order: int = 0) -> Array:
-        """The given forces (nt, k) N, or their derivative in time of that order."""
+        """The prescribed forces (nt, k) N, or their time derivative of that order."""
         return histories(self.job.scene.force, self.time, order)
 
     def along(self, full: Array) -> Array:
-        """Each point's motion along its own force, (n, k, k), from its components (n, 3 k, k)."""
+        """Motion of each point along its own force, (n, k, k), from its components (n, 3 k, k)."""
         forces = self.job.scene.force
         components = full.reshape(len(full), len(forces), 3, len(forces))
         return np.einsum("frdk,rd->frk", components, directions(forces))
 
     def march(self, response: Response) -> Array:
-        """Readings (nt, 3 k) of another response under the given forces, from rest. Collective."""
+        """Readings (nt, 3 k) of another response to prescribed forces, from rest. Collective."""
         taken = self.integration
         scheme = "linear" if taken.scheme == "convolution" else taken.scheme
         tire = Recursion(response=response, step=taken.step, scheme=scheme, comm=self.job.comm)

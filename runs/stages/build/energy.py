@@ -1,4 +1,4 @@
-"""The energy balance of the contact stage: what is counted as the loop goes, and what is said of it."""
+"""The energy balance of stage contact: accumulated during the loop, then reported."""
 
 from __future__ import annotations
 
@@ -15,17 +15,19 @@ from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process import observe
 from tireroad.runs.stages.base.record import Record
 
-# Of the energy that moved: beyond it the steps are too long, or something is wrong. Where forces were right to a
-# percent up to 300 Hz it was 0.012 at most, where they were off by 35 %, 0.024.
+# Share of the energy exchanged, beyond which the steps are too long or something is wrong.
+# Measured: 0.012 at most where forces were right to 1 % up to 300 Hz, 0.024 where they were off by
+# 35 %.
 _UNBALANCED = 0.02
-_TAKEN = 0.1  # of the energy that moved: what forces that are constant over a step may take
-_LEAST = 1e-9  # J: below, rounding
+_TAKEN = 0.1  # share of the energy exchanged that constant forces over a step may dissipate
+_LEAST = 1e-9  # J: below is rounding
 
 
 @dataclass(frozen=True)
 class Works:
-    """Work (J) of the contact's changes and of the prescribed forces, if any; `lead`: what more all of them do
-    where they are constant over the step, 0 where they are linear.
+    """Work (J) of the contact's force changes and of the prescribed forces, if any.
+
+    `lead`: additional work of all forces if they are constant over the step; 0 if they are linear.
     """
 
     contact: float
@@ -34,12 +36,12 @@ class Works:
 
     @property
     def total(self) -> float:
-        """Of all forces, as if they were linear over the step."""
+        """Work of all forces as if they were linear over the step."""
         return self.contact + (self.driven or 0.0)
 
 
 def works(scheme: str, contact: Work, driven: Driven | None) -> Works:
-    """The works of a loop that has ended."""
+    """The works of a completed loop."""
     lead = contact.lead + (driven.lead if driven else 0.0)
     return Works(
         contact.total, driven.work if driven else None, lead if scheme == "constant" else 0.0
@@ -47,7 +49,7 @@ def works(scheme: str, contact: Work, driven: Driven | None) -> Works:
 
 
 class Losses:
-    """The losses of a rolling tire, of its states at each step; nothing of one whose losses are not known."""
+    """Energy losses of a rolling tire from its states at each step; empty if not known."""
 
     def __init__(self, tire, response: Response, rolling: RollingModes, step: float) -> None:
         self._tire = tire
@@ -61,16 +63,18 @@ class Losses:
 
     @property
     def found(self) -> tuple[float, float, float, float] | None:
-        """Energy lost in the material, work of the drive, what the modes left out lost less what the drive
-        gave them, and what forces that jump do against these beyond what they store, J; None where they
-        are not known."""
+        """Losses of the run, J; None if they are not known.
+
+        Energy lost in the material; work of the drive; loss in the truncated modes less the drive's
+        work on them; work of jumping forces on those modes beyond what they store.
+        """
         if self._motion is None:
             return None
         losses, beyond = self._motion.losses, self._circulation
         return losses.lost, losses.drive, beyond.work, beyond.lead
 
     def flush(self) -> None:
-        """Count the steps since the last time. Collective."""
+        """Account for the steps since the last call. Collective."""
         if self._motion is None or not (samples := self._tire.samples()):
             return
         states, pushes, forces = zip(*samples, strict=True)
@@ -78,11 +82,11 @@ class Losses:
         self._circulation.add(np.array(forces))
 
     def state(self) -> dict[str, np.ndarray]:
-        """What a checkpoint keeps."""
+        """State for a checkpoint."""
         return self._motion.losses.state() | self._circulation.state() if self._motion else {}
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from `state`."""
+        """Continue from a `state`."""
         if self._motion is not None:
             self._motion.losses.set_state(kept)
             self._circulation.set_state(kept)
@@ -97,7 +101,7 @@ def describe_energy(
     losses: Losses,
     step: float,
 ) -> None:
-    """Work of the forces and of the drive, energy in the tire, energy lost, and what does not add up.
+    """Record work of forces and drive, energy in the tire, energy lost, and the imbalance.
 
     `kept`: the tire's snapshot.
     """
@@ -124,7 +128,7 @@ def describe_energy(
 
 
 def _standing(record: Record, rolling: RollingModes, work: float, left: float) -> None:
-    """What was lost is what is missing: it must not be negative when the wheel stands."""
+    """Energy lost, by difference; it must not be negative for a tire at rest."""
     turns = rolling.turning.speed > 0
     record.indicators["lost, less the work of the drive" if turns else "lost"] = (work - left, "J")
     observe.say(
@@ -147,7 +151,7 @@ def _rolling(
     beyond: float,
     taken: float,
 ) -> None:
-    """Every term is known: what does not add up is the error of the steps."""
+    """All terms are known: the imbalance is the error of the time steps."""
     off = work + drive - left - lost - beyond - taken
     moved = max(abs(work), abs(drive), abs(left), abs(lost))
     record.indicators |= {

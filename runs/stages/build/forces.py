@@ -1,4 +1,4 @@
-"""All forces on the tire of a finished run, as they push its coordinates."""
+"""All forces on the tire in a completed run, projected on its coordinates."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from tireroad.runs.stages.build.point_forces import histories
 from tireroad.runs.stages.build.setup import components, probes
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
-_ROWS = 4096  # steps read at once
+_ROWS = 4096  # steps read at a time
 
 
 def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sparse.csr_matrix:
-    """The driven points (k, 3 s): the patch's nodes in all components, then the prescribed forces."""
+    """The driven points (k, 3 s): the patch's nodes in all components, then prescribed forces."""
     loads = probes(job, state, setup).loads
     if setup is None:
         return loads
@@ -31,8 +31,10 @@ def driven_loads(job: Job, state: StaticState, setup: ContactSetup | None) -> sp
 
 @dataclass(frozen=True, kw_only=True)
 class Forces:
-    """Of the steps that end at `time` (n,) s, `step` s apart; `seen` (k, m) kg^-1/2 is what the driven points
-    see of the coordinates."""
+    """The forces of the steps ending at `time` (n,) s, `step` s apart.
+
+    `seen` (k, m) kg^-1/2: the coordinates' displacements at the driven points.
+    """
 
     job: Job
     setup: ContactSetup | None
@@ -44,7 +46,7 @@ class Forces:
     def of(
         job: Job, setup: ContactSetup | None, history: ContactHistory | None, seen: np.ndarray
     ) -> Forces:
-        """From the file of the contact, or of the prescribed forces. Root process only."""
+        """From the file of the contact, or of the response to given forces. Root process only."""
         if history is not None:
             time, step = history.time, history.step
         else:
@@ -54,13 +56,15 @@ class Forces:
         return Forces(job=job, setup=setup, time=time, step=step, seen=seen)
 
     def pushes(self, start: int = 0, still: bool = False) -> Iterator[np.ndarray]:
-        """Modal forces (n, m) N kg^-1/2 from step `start` on, block by block; with `still` those of the static
-        state are taken off. Root process only."""
+        """Modal forces (n, m) N kg^-1/2 from step `start` on, block by block.
+
+        With `still`, those of the static state are subtracted. Root process only.
+        """
         for first in range(start, len(self.time), _ROWS):
             yield self._force(slice(first, first + _ROWS), still) @ self.seen
 
     def _force(self, some: slice, still: bool) -> np.ndarray:
-        """(n, k) N in the order of the driven points."""
+        """Forces (n, k) N in the order of the driven points."""
         prescribed = histories(self.job.scene.force, self.time[some])
         if self.setup is None:
             return prescribed

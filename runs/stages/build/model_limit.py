@@ -1,4 +1,4 @@
-"""Where the answer of a run ends in frequency."""
+"""Upper frequency up to which the results of a run are valid."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tireroad.modal.rolling import RollingModes
 
 
 def all_limits(setup: ContactSetup, rolling: RollingModes, step: float) -> tuple[Limit, ...]:
-    """Of the modes, the points that pass, and the `step` (s)."""
+    """Limits by the modes, the spacing of the contact points and the `step` (s)."""
     return limits(
         step=step,
         highest=rolling.highest / (2 * np.pi),
@@ -20,5 +20,5 @@ def all_limits(setup: ContactSetup, rolling: RollingModes, step: float) -> tuple
 
 
 def model_limit(setup: ContactSetup, rolling: RollingModes, step: float) -> Limit:
-    """The one that counts."""
+    """The lowest of the limits."""
     return lowest(all_limits(setup, rolling, step))

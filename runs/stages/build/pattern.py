@@ -1,4 +1,4 @@
-"""The tread's pattern of a scene."""
+"""The tread pattern of a scene."""
 
 from __future__ import annotations
 
@@ -20,12 +20,15 @@ from tireroad.runs.scene.tables.pattern import PatternTable
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 
-MOST = 20_000_000  # depths of a file
-_SHOWN = 2e-3  # m between the depths that are kept for the report
+MOST = 20_000_000  # most depths in a file
+_SHOWN = 2e-3  # m: spacing of the depths stored for the report
 
 
 def make_pattern(wanted: PatternTable | None, rolling_radius: float) -> Pattern | None:
-    """The pattern on a tire of effective rolling radius (m); None for a slick. InputError for a bad file."""
+    """The pattern of a tire with this effective rolling radius (m); None for a slick.
+
+    Raises InputError for an unusable file.
+    """
     if wanted is None:
         return None
     around = 2 * math.pi * rolling_radius
@@ -36,7 +39,7 @@ def make_pattern(wanted: PatternTable | None, rolling_radius: float) -> Pattern 
 
 
 def inputs(job: Job) -> list | None:
-    """What depends on the pattern: its table, and its file by content; None for a slick."""
+    """The pattern's inputs: its table, and its file by content; None for a slick."""
     wanted = job.scene.pattern
     if wanted is None:
         return None
@@ -44,7 +47,7 @@ def inputs(job: Job) -> list | None:
 
 
 def describe(record: Record, setup: ContactSetup) -> None:
-    """How much of the tread is land under the footprint, and at which tone its pitches pass."""
+    """Record the land ratio of the pattern under the footprint, and the pitch-passing frequency."""
     pattern, patch = setup.pattern, setup.patch
     if pattern is None:
         return
@@ -56,7 +59,7 @@ def describe(record: Record, setup: ContactSetup) -> None:
 
 
 def fill(file: h5py.File, setup: ContactSetup) -> None:
-    """Write what of the pattern is under the patch at t = 0, and all around the tire across it."""
+    """Write the pattern under the patch at t = 0, and its depth all around the tire."""
     if setup.pattern is None:
         return
     put(file, "pattern/begun", setup.begun, "m")
@@ -88,7 +91,7 @@ def _heights(wanted: PatternTable) -> Heights:
 
 
 def _arrays(path: Path) -> Heights:
-    """From an archive of NumPy, read as data."""
+    """From an archive of NumPy, read as plain data (no pickles)."""
     try:
         with zipfile.ZipFile(path) as archive:
             return Heights(*(read_numbers(archive, name, MOST) for name in ("depth", "y")))
@@ -97,7 +100,7 @@ def _arrays(path: Path) -> Heights:
 
 
 def _image(path: Path, wanted: PatternTable) -> Heights:
-    """From an image: rows across the tire, from +y down, columns around it."""
+    """From an image: rows across the tire, from +y down; columns around it."""
     from matplotlib.image import imread
 
     try:

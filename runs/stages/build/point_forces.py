@@ -14,14 +14,16 @@ def directions(forces: Sequence[PointForce]) -> np.ndarray:
 
 
 def histories(forces: Sequence[PointForce], time: np.ndarray, order: int = 0) -> np.ndarray:
-    """amplitude sin(2 pi f t), or the constant amplitude from t = 0 on, N (nt, k); or the order-th
-    rate of it, N/s^order."""
+    """The forces (nt, k) N: amplitude sin(2 pi f t), or the constant amplitude if f = 0.
+
+    `order`: order of the time derivative, N/s^order.
+    """
     columns = [_history(force, time, order) for force in forces]
     return np.stack(columns, axis=-1) if columns else np.zeros((len(time), 0))
 
 
 def shortest_period(forces: Sequence[PointForce]) -> float:
-    """Period of the fastest force, s; infinite when all are constant."""
+    """Period of the fastest force, s; infinite if all are constant."""
     fastest = max((force.frequency for force in forces), default=0.0)
     return 1 / fastest if fastest else np.inf
 

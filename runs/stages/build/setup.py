@@ -1,4 +1,4 @@
-"""Where a scene's tire meets its road, and where its prescribed forces act: cheap, made in every run."""
+"""Where the tire meets the road and where prescribed forces act: cheap, so made in every run."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Setup(Shared[ContactSetup | None]):
-    """The patch and the road under it; None in a scene without contact."""
+    """The patch and the road under it; None for a scene without contact."""
 
     name: ClassVar[str] = "setup"
     static: Done[StaticState]
 
     def make(self) -> ContactSetup | None:
-        """From the static state and the scene's road."""
+        """The setup from the static state and the scene's road."""
         job = self.job
         if not job.scene.contact:
             return None
@@ -47,14 +47,14 @@ class Setup(Shared[ContactSetup | None]):
 
 
 def tread_surface(job: Job, state: StaticState, key: str) -> TreadSurface:
-    """The deformed tread of the static state of this key."""
-    from tireroad.fem.static.tread_surface import TreadSurface  # not needed by points at nodes
+    """The deformed tread of the static state with this key."""
+    from tireroad.fem.static.tread_surface import TreadSurface  # not needed for points at nodes
 
     return kept.once("surface", key, lambda: TreadSurface(job.tire.lattice, state.seen))
 
 
 def scene_setup(job: Job, state: StaticState, surface: TreadSurface | None = None) -> ContactSetup:
-    """The patch and the road of the job's scene; `surface`: the tread, where it is known."""
+    """The patch and the road of the job's scene; `surface`: the tread, if known."""
     scene, motion = job.scene, job.scene.road.motion
     points = points_of(job, state)
     setup = contact_setup(
@@ -76,13 +76,13 @@ def scene_setup(job: Job, state: StaticState, surface: TreadSurface | None = Non
 
 
 def points_of(job: Job, state: StaticState) -> str | Pitch:
-    """The scene's contact points, by this state where it leaves them to the program: "nodes", or the pitch of a grid."""
+    """The contact points, "nodes" or the pitch of a grid; for "auto" chosen from this state."""
     contact = job.scene.contact
     if contact.on_nodes:
         return "nodes"
     if contact.points != "auto":
         return contact.points
-    # The same with and without an estimate of the load.
+    # So that the choice is the same with and without an error estimate of the load.
     extent = replace(state, fine_extent=None).footprint()
     speed = rolling_speed(job, state)
     found = spacing(extent, nodes_within(state, 0.0), speed, job.scene.accuracy.up_to)
@@ -90,7 +90,7 @@ def points_of(job: Job, state: StaticState) -> str | Pitch:
 
 
 def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup:
-    """With the scene's slip and slip angle; of a wheel that is to roll freely with the slip of its static shape too."""
+    """The setup with slip and slip angle; at free rolling also the slip of the static shape."""
     rotation, slip = job.scene.rotation, wheel_slip(job.scene)
     if rotation is None or not rotation.free_rolling:
         return replace(setup, slip=slip)
@@ -99,25 +99,28 @@ def _slipping(job: Job, state: StaticState, setup: ContactSetup) -> ContactSetup
 
 
 def rolling_speed(job: Job, state: StaticState) -> float:
-    """Speed of the road under the tire, m/s: the wheel's by its effective rolling radius."""
+    """Speed of the road under the tire, m/s: wheel speed times effective rolling radius."""
     return job.speed * rolling_radius(job, state)
 
 
 def rolling_radius(job: Job, state: StaticState) -> float:
-    """Effective rolling radius, m: the scene's, or that of the static state."""
+    """Effective rolling radius, m: from the scene, or else from the static state."""
     given = job.scene.rotation.rolling_radius if job.scene.rotation else None
     return given or state.rolling_radius()
 
 
 def components(job: Job) -> tuple[int, ...]:
-    """Directions of the contact forces: normal to the road, and with a brush along and across it after that."""
+    """Directions of the contact forces: normal to the road; with a brush also along and across."""
     return (2, 0, 1) if job.scene.contact.rubs else (2,)
 
 
 @dataclass(frozen=True)
 class Probes:
-    """What is driven and read, on the outer face: `name` "contact" or "force", `outputs` (r, 3 s) and
-    `loads` (k, 3 s), or wider where the wheel is read too; `counted` of both are displacements at loads."""
+    """The driven and read points on the outer face.
+
+    `name` "contact" or "force"; `outputs` (r, 3 s) and `loads` (k, 3 s), wider if the wheel is read
+    too; `counted`: the part of both that is displacements at loads.
+    """
 
     name: str
     outputs: sparse.csr_matrix
@@ -126,18 +129,18 @@ class Probes:
 
     @property
     def on_face(self) -> Probes:
-        """What is counted, by the outer face alone."""
+        """The counted part, restricted to the outer face."""
         if self.counted == slice(None):
             return self
         face = slice(self.outputs.shape[1] - corner.BESIDE)
         outputs = self.outputs[self.counted][:, face].tocsr()
-        if self.loads is self.outputs:  # which is worth half of the solutions
+        if self.loads is self.outputs:  # saves half of the solutions
             return Probes(self.name, outputs, outputs)
         return Probes(self.name, outputs, self.loads[:, face].tocsr())
 
 
 def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
-    """Of the contact patch with what prescribed forces add to it, or of the prescribed forces alone."""
+    """Probes of the contact patch and prescribed forces, or of prescribed forces alone."""
     loads, readings = driven_points(job) if job.scene.force else (None, None)
     more = corner.readings(job)
     if setup is None:
@@ -160,7 +163,7 @@ def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
 
 
 def _driven_alone(loads: sparse.csr_matrix, readings: sparse.csr_matrix, more: int) -> Probes:
-    """Of prescribed forces, and `more` readings of the wheel."""
+    """Probes of prescribed forces, and `more` readings of the wheel."""
     if not more:
         return Probes("force", readings, loads)
     wide, last = corner.widened(readings, more), readings.shape[0]
@@ -171,7 +174,7 @@ def _driven_alone(loads: sparse.csr_matrix, readings: sparse.csr_matrix, more: i
 
 
 def driven_points(job: Job) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-    """The prescribed forces (k, 3 s), and the readings (3 k, 3 s) of x, y and z at their centres."""
+    """The prescribed forces (k, 3 s), and readings (3 k, 3 s) of x, y and z at their centres."""
     lattice, loads, readings = job.tire.lattice, [], []
     for force in job.scene.force:
         angle, arc = np.radians([force.angle, force.arc])

@@ -1,4 +1,4 @@
-"""The road of a file, read by one process of each machine: the others have what it found."""
+"""A road file, read by one process of each machine and shared with the others."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from tireroad.runs.scene.rules.road import keep, made
 
 
 def share(surface: RoadKind, comm: MPI.Comm) -> None:
-    """Have the road of a file on every process, where `made` finds it. Collective.
+    """Make the road of a file available on every process, where `made` finds it.
 
-    Heights in memory are sent as buffers; a file, the user's or a temporary one, is opened by each process, which reads
-    from it what it drives over. Where a process cannot open it, it reads the file by itself when it wants it. InputError on
-    all processes where one machine cannot use the file.
+    Heights in memory are sent as buffers; a file, the user's or a temporary one, is opened by each
+    process, which reads what it drives over. A process that cannot open it reads the road file
+    itself on first use. Raises InputError on all processes if one machine cannot use the file.
+    Collective.
     """
     if comm.size == 1 or surface.reads is None:
         return
@@ -36,9 +37,9 @@ def share(surface: RoadKind, comm: MPI.Comm) -> None:
 
 
 def _sent(road: Road | None, node: MPI.Comm) -> Road | None:
-    """What the first process of a machine has, where this one can open it. Collective.
+    """The road of the machine's first process if this one can open it, else None. Collective.
 
-    No process leaves before all have opened it: the first one may close its temporary file from then on.
+    No process leaves before all have opened it: the first one may then close its temporary file.
     """
     try:
         return broadcast(node, road)

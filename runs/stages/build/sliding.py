@@ -1,4 +1,4 @@
-"""[stiffness] with friction: force over the way of the road under a tire that stands, or over the slip of a wheel that rolls."""
+"""[stiffness] with friction: force over road displacement at rest, or over slip when rolling."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from tireroad.runs.stages.build.turning import wheel_slip
 
 AXES = ("longitudinal", "lateral")
 _COLUMNS = ("moved", "force", "tangent", "moment", "sticks")
-# Way at which all slides, times friction over the rate at first: 1.5 of two spheres (Cattaneo, Mindlin), 3 of a rolling brush.
+# Displacement at full sliding, times initial stiffness over friction force: 1.5 for two spheres
+# (Cattaneo, Mindlin), 3 for a rolling brush.
 _STANDING, _ROLLING = 2.0, 3.0
 _MOST = 0.5  # slip
 
@@ -26,11 +27,13 @@ Curve = Mapping[str, np.ndarray]
 
 
 def slides(job: Job, state: StaticState, stuck: RoadStiffness) -> dict[str, Curve]:
-    """The curves by the names of `AXES`, `start` the force's rate with all that sticks at first; none without friction.
-    The body is left in another state. Collective."""
+    """The curves by the names of `AXES`; none without friction.
+
+    `start`: initial slope, with all points sticking. Leaves the body in another state. Collective.
+    """
     wanted, friction = job.scene.stiffness, job.scene.static.friction
     if state.pull is None or not friction or not wanted.slide_steps:
-        return {}  # friction 0 holds nothing back: there is no way to slide by
+        return {}  # friction 0 resists nothing: no displacement to slide over
     found: dict[str, Curve] = {}
     for axis, name in enumerate(AXES):
         slide = Slide(job.tire.body, state, friction, axis)
@@ -62,7 +65,7 @@ def _told(point: Slid, rolls: bool) -> str:
 
 
 def units(rolls: bool) -> dict[str, str]:
-    """Of the columns; a wheel that rolls slips."""
+    """Units of the columns; a rolling wheel has slip instead of displacement."""
     rate = "N" if rolls else "N/m"
     return {
         "moved": "-" if rolls else "m",
@@ -82,13 +85,13 @@ def fill(file: h5py.File, found: Mapping[str, Curve], rolls: bool) -> None:
 
 
 def read(file: h5py.File) -> dict[str, Curve]:
-    """What `fill` wrote."""
+    """The curves that `fill` wrote."""
     group = file.get("slide", {})
     return {name: {key: curve[key][()] for key in curve} for name, curve in group.items()}
 
 
 def half_way(curve: Curve) -> float:
-    """Force over way at half of the largest force, N/m."""
+    """Secant stiffness at half of the largest force, N/m."""
     force, moved = (np.concatenate([[0.0], curve[key]]) for key in ("force", "moved"))
     half = 0.5 * force.max()
     last = int(np.argmax(force >= half))
@@ -96,7 +99,7 @@ def half_way(curve: Curve) -> float:
 
 
 def describe(record: Record, found: Mapping[str, Curve], rolls: bool) -> None:
-    """Headline figures."""
+    """Record the headline figures."""
     for name, curve in found.items():
         force = float(curve["force"].max())
         if rolls:

@@ -1,4 +1,4 @@
-"""How the tire of a scene becomes a section, a lattice of nodes and a finite-element body."""
+"""From the scene's tire to its section, lattice of nodes and finite-element body."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def make_tire(comm: MPI.Comm, tire: Tire):
-    """The tire without loads, its finite elements made when they are asked for."""
+    """The tire without loads; its finite elements are made on first use."""
     from tireroad.fem.model import TireModel
 
     section = tire.ring()
@@ -24,7 +24,7 @@ def make_tire(comm: MPI.Comm, tire: Tire):
 
 
 def road_shape(scene: Scene) -> RoadShape:
-    """The road's own shape under the tire: the wheel's camber, and the drum where there is one."""
+    """The road's shape under the tire: the wheel's camber, and the drum if there is one."""
     from tireroad.fem.static.curved.shape import RoadShape
 
     drum = scene.road.drum_radius if scene.road else None

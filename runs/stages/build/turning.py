@@ -1,4 +1,4 @@
-"""How the wheel of a scene turns, and what damps its tire."""
+"""Rotation of the scene's wheel, and damping of its tire."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from tireroad.runs.stages.base.job import Job
 
 
 def damping_of(job: Job) -> Damping:
-    """In proportion where the scene says so, else by the loss factors of the compounds."""
+    """Proportional damping if the scene has it, else modal strain energy (loss factors)."""
     given = job.scene.damping
     return StrainEnergy() if given is None else Proportional(given.mass, given.stiffness)
 
 
 def rolling_shape(turning: Turning) -> Rolling:
-    """The steady rolling of the static state of a wheel that turns so; at rest where it stands."""
+    """Steady rolling, for the static state, of a wheel that turns so; at rest for speed 0."""
     if turning.speed == 0:
         return AT_REST
-    # By strain energy there is no damping before there are modes: the shape has inertia alone.
+    # Strain-energy damping needs modes, which come later: the shape then has inertia forces alone.
     mass, stiffness = (0.0, 0.0) if isinstance(turning.damping, StrainEnergy) else turning.damping
     return Rolling(
         speed=turning.speed, damping=mass, stiffness_damping=stiffness, inertia=turning.inertia
@@ -30,14 +30,14 @@ def rolling_shape(turning: Turning) -> Rolling:
 
 
 def wheel_slip(scene: Scene) -> tuple[float, float]:
-    """The scene's slip of the wheel (s_x, s_y), its slip angle included."""
+    """The scene's slip of the wheel (s_x, s_y), including its slip angle."""
     along, across = scene.contact.slip if scene.contact else (0.0, 0.0)
     angle = scene.rotation.slip_angle if scene.rotation else 0.0
     return along, across + math.tan(math.radians(angle))
 
 
 def friction_of(scene: Scene, rolling: Rolling) -> Friction | None:
-    """Friction of the static state that rolls so; None of a scene without."""
+    """Friction of the static state that rolls so; None if the scene has none."""
     static, rotation = scene.static, scene.rotation
     if static.friction is None:
         return None
@@ -55,5 +55,5 @@ def turning_of(job: Job) -> Turning:
 
 
 def shapes_of(job: Job) -> Turning | None:
-    """How the wheel turns where shapes of turning join its modes (modal.turning_shapes), else None."""
+    """The wheel's rotation if rotation shapes join its modes (modal.turning_shapes), else None."""
     return turning_of(job) if job.speed and job.scene.joins_shapes else None

@@ -1,4 +1,4 @@
-"""The rubber that a scene's contact presses on: what it gives way to between the nodes of the mesh."""
+"""Local compliance, between the nodes of the mesh, of the rubber under a scene's contact."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tireroad.greens.response import Response
 from tireroad.runs.scene.tables.tire import Tire
 from tireroad.runs.stages.base.job import Job
 
-_WHOLE = 0.9  # of the wall: a compound as thick as that is all of it
+_WHOLE = 0.9  # share of the wall from which a compound counts as all of it
 
 
 @dataclass(frozen=True, kw_only=True)
 class Normal:
-    """What the loop asks of [contact] where all forces are normal to the road."""
+    """The attributes of [contact] that the loop needs if all forces are normal to the road."""
 
     law: TreadLaw
     solver: str
@@ -33,7 +33,7 @@ class Normal:
 
 
 class Backing(NamedTuple):
-    """What the loop takes in place of a run's own; the setup not settled."""
+    """Replacements for the run's own contact, setup (not settled) and response."""
 
     contact: Normal
     setup: ContactSetup
@@ -41,11 +41,11 @@ class Backing(NamedTuple):
 
 
 def backed(job: Job, static: StaticState, setup: ContactSetup, response: Response) -> Backing:
-    """Setup (not settled) and response with what the outer rubber gives way to between the nodes: the tread lies on all
-    of it, and the nodes give way by less what they have of it already.
+    """Contact, setup (not settled) and response with the outer rubber's local compliance.
 
-    InputError where that is not known: points that are nodes, a road that is no plane, horizontal forces, a tread that
-    creeps.
+    The tread is backed by all of that rubber; the nodes' residual loses the part that the mesh
+    already has. Raises InputError where this is not known: points at nodes, a road that is not a
+    plane, horizontal forces, a tread that creeps.
     """
     contact, patch = job.scene.contact, setup.patch
     if patch.weights is None or patch.frames is not None or contact.rubs or contact.law.creep:
@@ -63,7 +63,7 @@ def backed(job: Job, static: StaticState, setup: ContactSetup, response: Respons
 
 
 def _outer(tire: Tire, ring: Ring) -> Influence:
-    """Of the compound at the crown, for small motions: a half-space where the wall is of nothing else, else a layer."""
+    """Influence of the crown's compound: a half-space if it is the whole wall, else a layer."""
     section = ring.section
     cell = section.outer[len(section.outer) // 2, 0]
     material = tire.shape.rubbers(tire)[section.regions[section.region[cell]]]

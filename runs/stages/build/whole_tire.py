@@ -1,4 +1,4 @@
-"""What the stages have in common that show the whole tire under the forces of a finished run."""
+"""Common base of the stages that show the whole tire under the forces of a completed run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ P = TypeVar("P")
 
 @dataclass(frozen=True, kw_only=True)
 class WholeTire(Computed[P]):
-    """Computed on the root process from the forces in the file of the contact, and the prescribed ones."""
+    """Computed on the root process from contact and prescribed forces as stored in their files."""
 
     static: Done[StaticState]
     rotating: Done[RollingModes]
@@ -30,7 +30,7 @@ class WholeTire(Computed[P]):
     contact: Done[ContactHistory] | None = None
 
     def inputs(self) -> dict[str, Any]:
-        """The forces in time, the states, and the band."""
+        """The forces over time, the states, and the band."""
         scene = self.job.scene
         return {
             "modes": self.rotating.key,
@@ -58,9 +58,9 @@ class WholeTire(Computed[P]):
 
     @abstractmethod
     def seen(self, basis: Basis, forces: Forces) -> tuple[P, dict[str, tuple[float, str]]]:
-        """The product and its headline. Root process only."""
+        """The product and its headline figures. Root process only."""
 
     @property
     def band(self) -> float:
-        """Frequencies of interest, Hz."""
+        """Upper end of the frequency band of interest, Hz."""
         return band(self.rotating.product, Wanted(band=self.job.scene.greens.band))

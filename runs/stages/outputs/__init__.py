@@ -1,1 +1,1 @@
-"""One file for each kind of output at the driven points: its keys and its curves."""
+"""One module per kind of output at the driven points: its keys and its curves."""

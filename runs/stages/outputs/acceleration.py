@@ -16,11 +16,14 @@ class Acceleration(Output):
     in_contact: ClassVar[bool] = False
 
     def numbers(self, points: int) -> int:
-        """Three components of each point."""
+        """Three components per point."""
         return 3 * points
 
     def curves(self, seen: Driven, record: Record) -> Curves:
-        """a = C s^2 q + C s B f + R d2f/dt2, (nt, k, 3) m/s2: the middle term is the residual of the velocity."""
+        """a = C s^2 q + C s B f + C B df/dt + R d2f/dt2, (nt, k, 3) m/s2, of states q and forces f.
+
+        The middle terms are the residuals of the rates; C B is zero for a complete set of states.
+        """
         if seen.integration is None:
             return {}
         response = seen.response.resolved(seen.integration.step)

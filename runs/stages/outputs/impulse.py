@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 )
 class Impulse(Output):
     def numbers(self, points: int) -> int:
-        """One from each to each."""
+        """One per pair of points."""
         return points**2
 
     def curves(self, seen: Driven, record: Record) -> Curves:
-        """g (nt, k, k) along the forces, without the residual's delta at t = 0."""
+        """g (nt, k, k) along the forces, without the residual's delta function at t = 0."""
         if seen.time is None:
             return {}
         with record.timing("impulse responses"):

@@ -31,7 +31,7 @@ class Receptance(Output):
     )
 
     def check(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
-        """Points, steps, and full matrices where these are asked for."""
+        """Check the steps, and that the direct solution is possible where it is requested."""
         check_steps(
             (*path, "step"), "frequencies", self.to, self.step, "Hz", error, most=MOST_FREQUENCIES
         )
@@ -44,11 +44,11 @@ class Receptance(Output):
             raise error((*path, "direct"), "needs an [axle] that is fixed: take 0")
 
     def frequencies(self) -> int:
-        """From 0 to the highest."""
+        """Number of frequencies above 0."""
         return round(self.to / self.step)
 
     def curves(self, seen: Driven, record: Record) -> Curves:
-        """H (f, k, k) m/N, each point along its own force. Collective."""
+        """Receptances H (f, k, k) m/N, each point along its own force. Collective."""
         frequency = np.arange(0.0, self.to + self.step / 2, self.step)
         if seen.drifts:
             frequency = frequency[1:]
@@ -61,7 +61,7 @@ class Receptance(Output):
         return out | (self._by_full_matrices(seen, record) if self.direct else {})
 
     def _by_full_matrices(self, seen: Driven, record: Record) -> Curves:
-        """The same receptances without modes, at a few frequencies, and how far the modes are off."""
+        """The receptances from full matrices at a few frequencies; records the modal error."""
         frequency = self.to * np.arange(1, self.direct + 1) / self.direct
         loads, readings = seen.points()
         with record.timing("receptance of the full matrices"):

@@ -1,4 +1,4 @@
-"""Force and moment on the held axle per force at the driven points, over frequency: by momentum, and by a free rim."""
+"""Force and moment on the held axle per force at driven points, by momentum and by a free rim."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from tireroad.runs.stages.base.record import Record
     from tireroad.runs.stages.build.driven import Driven
 
-# Of the highest mode. Of a tire of 48 MPa with 60, 120, 250 modes (311, 448, 687 Hz) the two ways are 0.5, 0.25, 0.2 %
-# apart up to half of it, and 40, 3, 0.2 % up to 300 Hz.
+# Of the highest mode. For a tire of 48 MPa with 60, 120 and 250 modes (311, 448, 687 Hz) the two
+# methods differ by 0.5, 0.25 and 0.2 % up to half of it, and by 40, 3 and 0.2 % up to 300 Hz.
 LIMIT = 0.5
 FREQUENCY, MOMENTUM, FREE_RIM, MOMENT, FREE_RIM_MOMENT = (
     f"transmissibility/{name}"
@@ -46,7 +46,7 @@ class Transmissibility(Output):
     )
 
     def check(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
-        """Points, an axle that is held, steps."""
+        """Check that the axle is held, that a free rim has no air, and the steps."""
         if scene.modal.rim == "free" or scene.axle.kind != "fixed":
             raise error(
                 path, 'is the force on a held axle: take modal.rim = "fixed", axle.kind = "fixed"'
@@ -60,9 +60,11 @@ class Transmissibility(Output):
         )
 
     def curves(self, seen: Driven, record: Record) -> Curves:
-        """The curves (f, 3, k) of k driven points, from `step` to `to` Hz: force, -, of the tire on the axle per
-        force, and moment, m, about its centre. By the momentum of the response's states and, where the scene asks for
-        it, by modes of the tire with a free rim (greens.axle): each checks the other. Collective.
+        """Transmissibilities (f, 3, k) of k driven points, from `step` to `to` Hz.
+
+        Force of the tire on the axle per force, -, and moment about the axle's centre per force, m.
+        From the momentum of the response's states and, if the scene asks for it, from modes of the
+        tire with a free rim (greens.axle); each checks the other. Collective.
         """
         from tireroad.greens.axle import by_momentum
 
@@ -100,5 +102,5 @@ class Transmissibility(Output):
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> float:
-    """Distance of two transmissibilities over the other's size, both as root mean squares over all entries."""
+    """Relative distance of two transmissibilities, as root mean squares over all entries."""
     return float(np.linalg.norm(one - other) / np.linalg.norm(other))

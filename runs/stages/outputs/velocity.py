@@ -16,11 +16,14 @@ class Velocity(Output):
     in_contact: ClassVar[bool] = False
 
     def numbers(self, points: int) -> int:
-        """Three components of each point."""
+        """Three components per point."""
         return 3 * points
 
     def curves(self, seen: Driven, record: Record) -> Curves:
-        """v = C s q + R df/dt, (nt, k, 3) m/s, of states q, eigenvalues s, shapes C and residual R."""
+        """v = C s q + C B f + R df/dt, (nt, k, 3) m/s: states q, poles s, shapes C, residual R.
+
+        C B, with the inputs B, is zero for a complete set of states.
+        """
         if seen.integration is None:
             return {}
         response = seen.response.resolved(seen.integration.step)

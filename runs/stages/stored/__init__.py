@@ -1,1 +1,1 @@
-"""How the larger products of the stages are written to their files and read back."""
+"""Writing the larger products of the stages to their files and reading them back."""

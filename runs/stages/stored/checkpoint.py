@@ -1,8 +1,9 @@
-"""The checkpoint of a stage before its loop: what the static state and the modes have found when a run is stopped or killed.
+"""Checkpoints of the stages static and modes, for runs that are stopped or killed.
 
-Each process keeps its own results, part by part, in `<stage>_checkpoint/<rank>of<size>-<number>.h5`; a part begins
-with its result of that number. Parts carry a checksum and the key of the stage's inputs, and those from the first on
-that is absent, damaged or of other inputs are not taken.
+Each process stores its own results, part by part, in
+`<stage>_checkpoint/<rank>of<size>-<number>.h5`, where `number` is that of the part's first result.
+Parts carry a checksum and the key of the stage's inputs; reading ends at the first part that is
+absent, damaged or of other inputs.
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ from tireroad.runs.process.signals import Stopped
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.stage import Stage
 
-WORTH = 60.0  # times what writing results takes, computing them has taken before they are written
+WORTH = 60.0  # results are written once computing them has taken this many times the writing
 LEAST = 1.0  # s of computing
 _COLUMNS = "by_columns"
-_RATE = 2e8  # bytes a second, until a large part has been written
-_LARGE = 1e6  # bytes, of which the rate is taken: of less, the file as such is most of the time
+_RATE = 2e8  # bytes per second, until a large part has been written
+_LARGE = 1e6  # bytes from which the write rate is measured: below, opening the file dominates
 
 
 @contextmanager
 def checkpointed(stage: Stage, what: str) -> Iterator[Journal]:
-    """The journal of a stage; `what` its results are, for people. A stop keeps what was found. Collective."""
+    """The journal of a stage, of results named `what`; a stop writes them. Collective."""
     job = stage.job
     parts = _Parts(job, stage.name, store.wanted_hash(stage.name, stage.inputs()))
     found = parts.read()
@@ -48,7 +49,7 @@ def checkpointed(stage: Stage, what: str) -> Iterator[Journal]:
 
 
 def forget(job: Job, stage: str) -> None:
-    """Remove the checkpoint of a stage that has ended. Collective."""
+    """Remove the checkpoint of a finished stage. Collective."""
     job.comm.Barrier()
     on_root(job.comm, lambda: shutil.rmtree(_folder(job, stage), ignore_errors=True))
 
@@ -58,7 +59,7 @@ def _folder(job: Job, stage: str) -> Path:
 
 
 class _Parts:
-    """The files of this process."""
+    """The checkpoint files of this process."""
 
     def __init__(self, job: Job, stage: str, key: str) -> None:
         self._job, self._stage, self._key = job, stage, key
@@ -72,7 +73,7 @@ class _Parts:
         return self._folder / f"{comm.rank}of{comm.size}-{number:04d}.h5"
 
     def read(self) -> list[Entry]:
-        """What there is of these inputs, by as many processes; why not, where there is something else. Collective."""
+        """Results stored for the same inputs and process count; reports others. Collective."""
         found: list[Entry] = []
         reason = "" if self._job.fresh else self._read(found)
         reasons = [one for one in self._job.comm.allgather(reason) if one not in ("", "absent")]
@@ -81,7 +82,7 @@ class _Parts:
         return found
 
     def _read(self, found: list[Entry]) -> str:
-        """Add what is whole to `found`; why no more of it is."""
+        """Append the usable parts to `found`; returns why the next one is not."""
         wanted = self._job.provenance(self._stage, self._key).input_hash
         while not (reason := store.why_not(self._path(len(found)), wanted, self._stage)):
             with store.opened(self._path(len(found))) as file:
@@ -89,7 +90,7 @@ class _Parts:
         return reason
 
     def keep(self, number: int, entry: Entry) -> None:
-        """A result; written with those before, once that is worth its time."""
+        """Store a result; it is written with those before it once that pays off."""
         if not self._waiting:
             self._first = number
         self._waiting.append(entry)
@@ -101,11 +102,11 @@ class _Parts:
                 self._rate = size / max(time.monotonic() - began, 1e-3)
 
     def flush(self) -> None:
-        """Write what is waiting."""
+        """Write the results that are waiting."""
         if not self._waiting:
             return
         provenance = self._job.provenance(self._stage, self._key)
-        # That the result folder was removed is said by what writes the file.
+        # If the result folder was removed, writing the file reports it.
         with suppress(FileNotFoundError):
             self._folder.mkdir(exist_ok=True)
         with store.writing(self._path(self._first), provenance) as file:
@@ -119,8 +120,10 @@ class _Parts:
 
 
 def _entry(group) -> Entry:
-    """The arrays of a result, by their names with those of their groups; as they lay in memory, since sums of products go
-    by that."""
+    """The arrays of a result by name, including groups.
+
+    Their memory order is restored, because the rounding of sums of products depends on it.
+    """
     found: dict[str, np.ndarray] = {}
 
     def add(name: str, one) -> None:

@@ -1,4 +1,4 @@
-"""What a contact loop tells in figures and warnings."""
+"""Figures and warnings of a contact loop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from tireroad.fem.static.footprint import Footprint
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.build.rolling.stepping import Integration
 
-# Spacings of points that a footprint is wide: cobblestones vary 23 % too much at 1.8, 5 % too little at 2.5, 3 % at 3.6.
+# Fewest point spacings per footprint width. Measured on cobblestones: deviation 23 % too large at
+# 1.8, 5 % too small at 2.5, 3 % at 3.6.
 FEW = 2.2
 LINEAR = (
     1 / 3
@@ -19,7 +20,7 @@ LINEAR = (
 
 
 def describe(record: Record, counted: Totals, solver, chosen: Integration, taken: int) -> None:
-    """Loads, the step and its cost, how exactly it was solved; `taken`: the steps of this run, without those before its checkpoint."""
+    """Record loads, the step, its cost and accuracy; `taken`: steps since the checkpoint."""
     totals, chattering = counted.figures, counted.alternation.worst
     record.headline |= {
         "mean load": (float(totals.sum / totals.steps), "N"),
@@ -41,13 +42,13 @@ def describe(record: Record, counted: Totals, solver, chosen: Integration, taken
 
 
 def alternation(record: Record, worst: float, scheme: Chosen) -> None:
-    """A warning where points open and close from step to step, unless that was found to be the road."""
+    """Warn if points open and close from step to step, unless the road is the known cause."""
     if worst > LIMIT and scheme.reason != ROAD:
         record.warnings.append(warning(worst))
 
 
 def points(record: Record, patch: Patch, extent: Footprint, relief: float) -> None:
-    """The footprint at rest in spacings of its points, and a warning where it is few wide or long on a road with heights."""
+    """Record the static footprint's size in point spacings; warn if too few on a rough road."""
     spacing = patch.spacing
     if not spacing.all():
         return
@@ -63,7 +64,7 @@ def points(record: Record, patch: Patch, extent: Footprint, relief: float) -> No
 
 
 def excursion(record: Record, most: float, deflection: float | None) -> None:
-    """How far the contact moved beyond the state about which the tire is linear."""
+    """Record how far the contact moved from the state about which the tire is linearised."""
     record.indicators["largest motion of the contact beyond the static state"] = (most, "m")
     if not deflection:
         return

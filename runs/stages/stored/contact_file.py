@@ -1,4 +1,4 @@
-"""contact.h5 as the time loop goes, and the checkpoint from which a loop goes on."""
+"""contact.h5, written during the time loop, and the checkpoint from which a loop continues."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tireroad.runs.stages.stored import road_file
 
 BLOCK = 512  # steps kept in memory between two writes
 CHECKPOINT = "checkpoint.h5"
-STATE = "state"  # the group of a checkpoint that contact.h5 does not have
+STATE = "state"  # the group that a checkpoint has in addition to those of contact.h5
 
 _LAYOUT: dict[str, tuple[tuple, str]] = {
     "time": ((), "s"),
@@ -38,15 +38,15 @@ _LAYOUT: dict[str, tuple[tuple, str]] = {
     "active": ((), "-"),
     "residual": ((), "-"),
 }
-DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, where a scene has them
+DRIVEN = "driven_displacement"  # (nt, k, 3) m at the k prescribed forces, if the scene has them
 
 
 @dataclass(frozen=True, kw_only=True)
 class ContactHistory:
-    """What the road did to the tire, n steps of `step` s at the times `time` (n,): `total_force` (n, 3) N,
-    `axle_force` (n, 3) N where it is kept, displacement (n, k, 3) m at `driven` points, where there are any, and by the names of runs.stages.corner the
-    moments on the hub of the `wheel`, and its motions where it moves. `free_slip`: what slip was added so that the wheel rolls freely.
-    """
+    """The contact over n steps of `step` s ending at `time` (n,) s: `total_force` (n, 3) N;
+    `axle_force` (n, 3) N if stored; `driven` (n, k, 3) m: displacement at driven points, if any;
+    `wheel`: hub moments, and motions of a moving wheel, by the names of
+    runs.stages.build.corner; `free_slip`: slip added so that the wheel rolls freely."""
 
     step: float
     scheme: str
@@ -59,7 +59,7 @@ class ContactHistory:
 
     @staticmethod
     def of(file: h5py.File) -> ContactHistory:
-        """The history in contact.h5; not its points, which may be many."""
+        """The history in contact.h5, without the single points, which may be many."""
         kept = {"axle_force": "axle_force", "driven": DRIVEN}
         return ContactHistory(
             step=float(file.attrs["step"]),
@@ -73,7 +73,7 @@ class ContactHistory:
 
 
 def begun_with(job: Job, key: str) -> Chosen | None:
-    """The scheme of the checkpoint that a loop of these inputs goes on from, or None. Collective."""
+    """The scheme stored in a usable checkpoint of the same inputs, or None. Collective."""
 
     def found() -> Chosen | None:
         path = job.directory / CHECKPOINT
@@ -88,12 +88,12 @@ def begun_with(job: Job, key: str) -> Chosen | None:
 
 
 def forget_checkpoint(job: Job) -> None:
-    """The loop begins at t = 0 again. Collective."""
+    """Remove the checkpoint, so that the loop begins at t = 0 again. Collective."""
     on_root(job.comm, lambda: (job.directory / CHECKPOINT).unlink(missing_ok=True))
 
 
 class ContactFile:
-    """Blocks of steps, compressed, on the root process; a checkpoint is a copy with the loop's state."""
+    """Blocks of steps, compressed, on the root process; a checkpoint adds the loop's state."""
 
     def __init__(self, job: Job, key: str, setup: ContactSetup, attributes: dict):
         self._job, self._key, self._patch = job, key, setup.patch
@@ -113,8 +113,9 @@ class ContactFile:
         self._done = 0
 
     def open(self, stack: ExitStack, path: Path) -> dict[str, np.ndarray] | None:
-        """Begin the temporary file; the stack puts it in place at its end, or removes it after an
-        error. The state of a checkpoint of the same inputs to go on from, else None. Collective.
+        """Begin the temporary file, which the stack moves into place, or removes after an error.
+
+        Returns the state of a checkpoint of the same inputs to continue from, or None. Collective.
         """
         self._done, state = on_root(self._job.comm, lambda: self._open(stack, path))
         return state
@@ -134,7 +135,7 @@ class ContactFile:
         return len(self._file["time"]), state
 
     def _usable(self, wanted: str) -> bool:
-        """Whether there is a checkpoint to go on from; one that cannot serve is named."""
+        """Whether there is a usable checkpoint; reports why one is not usable."""
         reason = store.why_not(self._checkpoint, wanted, "contact")
         if reason and reason != "absent":
             observe.say(f"  {CHECKPOINT} exists, but {reason}: the loop begins at t = 0")
@@ -150,7 +151,7 @@ class ContactFile:
         forces = len(self._job.scene.force)
         driven: dict[str, tuple[tuple, str]] = {DRIVEN: ((forces, 3), "m")} if forces else {}
         driven |= corner.layout(self._job)
-        # A chunk of many points would be many megabytes: 4 MB at most is read at once.
+        # Limit a chunk, the least that is read at once, to 4 MB.
         rows = 2 ** int(np.log2(np.clip(500_000 // max(c, 1), 1, BLOCK)))
         for name, (shape, unit) in (self._layout | driven).items():
             width = tuple(c if n is None else n for n in shape)
@@ -163,15 +164,15 @@ class ContactFile:
         self._file.attrs.update(self._attributes)
 
     def add(self, instant, reading: np.ndarray | None = None) -> bool:
-        """Keep a step, with what was read of driven points and wheel. Whether it is time to `flush`."""
+        """Add a step, with the readings of driven points and wheel; returns whether to `flush`."""
         self._stack.append(instant)
         if reading is not None:
             self._readings.append(reading)
         return (self._done + len(self._stack)) % BLOCK == 0
 
     def flush(self, count: Callable[[dict[str, np.ndarray]], None]) -> None:
-        """Write the n steps kept since the last time, once `count` has seen them: all of `Instant`
-        and `total_force` as arrays (n, ...) by name. Collective."""
+        """Write the n steps since the last call, after passing them to `count`: all fields of
+        `Instant` and `total_force` as arrays (n, ...) by name. Collective."""
         if not self._stack:
             return
         steps = _columns(self._stack)
@@ -190,7 +191,7 @@ class ContactFile:
         for name in self._layout | driven:
             dataset, values = self._file[name], (steps | driven)[name]
             if name == "horizontal_force" and not self._rubs:
-                dataset.resize(self._done + len(values), axis=0)  # what is not written is zero
+                dataset.resize(self._done + len(values), axis=0)  # unwritten entries are zero
             elif dataset.compression:
                 self._packer.append(dataset, values)
             else:
@@ -198,7 +199,7 @@ class ContactFile:
                 dataset[self._done :] = values
 
     def _read(self) -> dict[str, np.ndarray]:
-        """What was read beside the contact since the last time, name by name."""
+        """Readings other than contact since the last call, by name."""
         if not self._readings:
             return {}
         readings, forces = np.stack(self._readings), len(self._job.scene.force)
@@ -209,7 +210,7 @@ class ContactFile:
         return driven | corner.parts(wheel, corner.standing_moment(self._patch))
 
     def checkpoint(self, state: dict[str, np.ndarray]) -> None:
-        """Keep the steps flushed so far and the loop's state, whole or not at all. Collective."""
+        """Write a checkpoint of the flushed steps and the loop's state, atomically. Collective."""
         on_root(self._job.comm, lambda: self._save(state))
 
     def _save(self, state: dict[str, np.ndarray]) -> None:
@@ -232,7 +233,7 @@ class ContactFile:
 
 
 def _columns(instants: list[Instant]) -> dict[str, np.ndarray]:
-    """A block of steps, name by name."""
+    """A block of steps as arrays by name."""
     steps = {
         name: np.array(values)
         for name, values in zip(Instant._fields, zip(*instants, strict=True), strict=True)

@@ -1,4 +1,4 @@
-"""The cords of a static state: in static.h5, and in its headline."""
+"""Cord forces of a static state, in static.h5 and in its headline."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def fill(file: h5py.File, state: StaticState) -> None:
 
 
 def read(file: h5py.File) -> dict:
-    """What `fill` wrote, as fields of a static state."""
+    """The fields of a static state that `fill` wrote."""
     found = {
         name: CordForce(*(group[part][:] for part in _UNITS))
         for name, group in file.get("cords", {}).items()
@@ -30,7 +30,7 @@ def read(file: h5py.File) -> dict:
 
 
 def headline(state: StaticState) -> dict[str, tuple[float, str]]:
-    """The mass, the largest force of a cord, and the share of all plies' area whose cords are compressed."""
+    """Mass, largest cord force, and the share of the ply area whose cords are in compression."""
     figures = {"mass": (state.mass, "kg")}
     if not state.cords:
         return figures

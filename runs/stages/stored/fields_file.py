@@ -1,6 +1,7 @@
-"""The modes on all unknowns, in the shared cache beside modes.h5: a family with attachment modes solves them once.
+"""The modes on all unknowns, in the shared cache beside modes.h5.
 
-Not in the result folder: 38 MB for 157 modes of 30,240 unknowns. Those above LARGEST are solved once more by each member.
+A family with attachment modes thus solves them once. Not in the result folder: 38 MB for 157 modes
+of 30,240 unknowns. Those above LARGEST are solved again by each member.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.base.job import Job
 
 NAME = "fields"
-LARGEST = 300e6  # bytes: each process has them whole while they are written or read
+LARGEST = 300e6  # bytes: each process holds all of them while they are written or read
 _KEPT = ("orthonormality", "inertia_count", "counted_below", "rigid", "slices", "segments")
 
 
 def keep(job: Job, key: str, operators: Operators, modes: Modes) -> None:
-    """Keep the fields of the modes with the hash `key` where there is a cache. Collective."""
+    """Store the fields of the modes with the hash `key` in the cache, if any. Collective."""
     body = operators.body
     if job.cache.folder is None or _size(operators, len(modes.squares)) > LARGEST:
         return
@@ -47,8 +48,11 @@ def keep(job: Job, key: str, operators: Operators, modes: Modes) -> None:
 
 
 def kept(job: Job, key: str, operators: Operators, basis: ModalBasis) -> Modes | None:
-    """The modes of a basis with the hash `key` and their fields, from the cache; None where it has none, or those of
-    another solution (fields and modes.h5 come to the cache one by one, of any number of processes). Collective."""
+    """The modes of a basis with the hash `key`, with fields, from the cache; else None.
+
+    None also if they belong to another solution: fields and modes.h5 enter the cache separately,
+    from runs on any number of processes. Collective.
+    """
     count = basis.projection.own
     if job.fresh or job.cache.folder is None or _size(operators, count) > LARGEST:
         return None

@@ -1,4 +1,4 @@
-"""The friction of a static state: in static.h5, and in its headline."""
+"""Friction of a static state, in static.h5 and in its headline."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 from tireroad.fem.static.state import StaticState
 from tireroad.runs.files.store import put
 
-_SMALL = 1e-6  # of mu f: what a node that slips may be off it
+_SMALL = 1e-6  # of mu f: tolerance for a node that slips
 
 
 def fill(file: h5py.File, state: StaticState) -> None:
-    """Write `surface/pull` (s, 2) N and the travel in a radian; nothing without friction."""
+    """Write `surface/pull` (s, 2) N and the travel per radian; nothing without friction."""
     if state.pull is None:
         return
     put(file, "surface/pull", state.pull, "N")
@@ -23,7 +23,7 @@ def fill(file: h5py.File, state: StaticState) -> None:
 
 
 def read(file: h5py.File) -> dict:
-    """What `fill` wrote, as fields of a static state."""
+    """The fields of a static state that `fill` wrote."""
     if "pull" not in file["surface"]:
         return {}
     travel = file.attrs.get("travel")
@@ -34,7 +34,7 @@ def read(file: h5py.File) -> dict:
 
 
 def headline(state: StaticState, friction: float | None) -> dict[str, tuple[float, str]]:
-    """Resultant force, torque on the axle, moment about the vertical through the axle, and how much of the load sticks."""
+    """Horizontal force, axle torque, moment about the vertical, share of the load that sticks."""
     if state.pull is None or friction is None:
         return {}
     force, size = state.pull.sum(axis=0), np.linalg.norm(state.pull, axis=1)

@@ -1,4 +1,4 @@
-"""Levels and densities of all that a run in time tells: forces, moments, motion of chosen points."""
+"""Levels and densities of all histories of a run: forces, moments, motion of chosen points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from tireroad.runs.files.store import put
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
-# name in `third_octave/` -> name in `density/`, reference of the level, its unit, unit of the density, rate of what is kept
+# name in `third_octave/`: name in `density/`, reference of the level, its unit, unit of the
+# density, whether the rate is taken
 _KINDS = {
     "level": ("axle_force", FORCE, "1 N", "N2/Hz", False),
     "contact_level": ("contact_force", FORCE, "1 N", "N2/Hz", False),
@@ -19,7 +20,7 @@ _KINDS = {
     "point_velocity_level": ("point_velocity", VELOCITY, "1 nm/s", "m2/s2/Hz", True),
 }
 WEIGHTED = "_a_weighted"
-_ONE = {  # of all
+_ONE = {  # common to all
     "third_octave/centre": "Hz",
     "third_octave/nominal": "Hz",
     "third_octave/lines": "-",
@@ -42,7 +43,7 @@ UNITS = _ONE | {
 
 
 def series(history: ContactHistory, start: int) -> dict[str, np.ndarray]:
-    """What there is, by the names of the levels, from step `start` on: (n, d) in N, N m, and m of points."""
+    """The histories by level name from step `start` on: (n, d) in N, N m, and m for points."""
     found = {"contact_level": history.total_force, "level": history.axle_force}
     found |= {"hub_moment_level": history.wheel.get("hub_moment")}
     found |= {"point_velocity_level": history.driven}
@@ -50,10 +51,10 @@ def series(history: ContactHistory, start: int) -> dict[str, np.ndarray]:
 
 
 def levels_of(history: ContactHistory, start: int, up_to: float) -> dict[str, np.ndarray]:
-    """All of `UNITS` that the history has, after the run-in and below `up_to` Hz, by their names in spectra.h5.
+    """All entries of `UNITS` that the history provides, after the run-in and below `up_to` Hz.
 
-    Levels (b, 3), of points (b, k, 3), dB of the root mean square; `…_a_weighted` of the same, each line weighted;
-    densities (f, 3) or (f, k, 3).
+    By their names in spectra.h5: levels (b, 3), for points (b, k, 3), dB of the rms; `…_a_weighted`
+    with each line weighted; densities (f, 3) or (f, k, 3).
     """
     found: dict[str, np.ndarray] = {}
     for name, values in series(history, start).items():
@@ -82,7 +83,7 @@ def levels_of(history: ContactHistory, start: int, up_to: float) -> dict[str, np
 
 
 def describe(record: Record, found: dict[str, np.ndarray]) -> None:
-    """The sums over all bands, vertical, and what the record is too short for."""
+    """Record the vertical totals over all bands, and the bands that the record is too short for."""
     names = found["third_octave/nominal"]
     if len(names):
         record.headline["bands"] = (_named(names), "-")
@@ -102,17 +103,17 @@ def describe(record: Record, found: dict[str, np.ndarray]) -> None:
 
 
 def _named(bands: np.ndarray) -> str:
-    """The first and the last."""
+    """The first and the last band in words."""
     return f"{bands[0]:g} to {bands[-1]:g} Hz" if len(bands) > 1 else f"{bands[0]:g} Hz"
 
 
 def write(file: h5py.File, found: dict[str, np.ndarray]) -> None:
-    """All there is."""
+    """Write all datasets of `found`."""
     for name in UNITS:
         if name in found:
             put(file, name, found[name], UNITS[name])
 
 
 def read(file: h5py.File) -> dict[str, np.ndarray]:
-    """The same."""
+    """The same, read back."""
     return {name: file[name][()] for name in UNITS if name in file}

@@ -1,4 +1,4 @@
-"""modes.h5: frequencies, what the outer face shows, the small matrices; not the fields on all unknowns."""
+"""modes.h5: frequencies, traces on the outer face, small matrices; no fields on all unknowns."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _UNITS = {
 
 
 def fill(file, basis: ModalBasis, points: np.ndarray) -> None:
-    """Write a basis whose outer face has its nodes at `points` (s, 3) m at rest."""
+    """Write a basis; `points` (s, 3) m: the undeformed nodes of the outer face."""
     m, modes, labels = len(basis.frequency), basis.modes, basis.labels
     put(file, "frequency", basis.frequency, "Hz")
     put(file, "residual", modes.residual, "-")

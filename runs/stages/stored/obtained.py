@@ -1,4 +1,4 @@
-"""The product of a stage: of its own file, of the shared cache, or computed."""
+"""The product of a stage, from its own file, from the shared cache, or computed."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from tireroad.runs.stages.base.stage import Done, Stage
 
 @dataclass(frozen=True, kw_only=True)
 class Obtained:
-    """What is `done`, with the `record` of the computation; of a product that was `reused`, from where, and the
-    figures `known` of it from elsewhere."""
+    """A stage that is `done`.
+
+    `record` of the computation; for a reused product, by which run it was computed (`reused`) and
+    the figures `known` from there.
+    """
 
     done: Done
     record: Record | None = None
@@ -26,7 +29,7 @@ class Obtained:
 
 
 def obtained(stage: Stage) -> Obtained:
-    """Reuse the stage's file, of its folder or of the shared cache, or compute it. Collective."""
+    """Reuse the stage's product from its folder or the shared cache, or compute it. Collective."""
     job, name = stage.job, stage.name
     key, path = store.wanted_hash(name, stage.inputs()), job.path(name)
     with ExitStack() as claim:
@@ -44,10 +47,11 @@ def obtained(stage: Stage) -> Obtained:
 
 
 def _looked_up(stage: Stage, key: str, claim: ExitStack) -> tuple[str, str, dict[str, Any]]:
-    """(why the stage has to be computed, "" when not; by which run it was; figures that its folder's
-    summary lacks). Root process only.
+    """Look for a stored product.
 
-    What has to be computed is claimed: another run that wants the same waits until it is in the cache.
+    Returns why the stage has to be computed ("" if not), by which run the product was computed, and
+    the figures that this folder's summary lacks. A stage to be computed is claimed: another run
+    that needs it waits until it is in the cache. Root process only.
     """
     job, name = stage.job, stage.name
     if job.fresh:

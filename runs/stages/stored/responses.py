@@ -1,4 +1,4 @@
-"""Responses in a result file."""
+"""Responses in result files."""
 
 from __future__ import annotations
 
@@ -21,8 +21,11 @@ _UNITS = {
 
 
 def fill_response(file: h5py.File, name: str, response: Response, points: int) -> None:
-    """Write a response as a group, and for whoever reads the file the static flexibility of its first outputs, so many
-    displacements of `points`; what is read of the wheel follows them."""
+    """Write a response as a group.
+
+    For readers of the file, also the static flexibility of its first `points` outputs, which are
+    displacements; readings of the wheel follow them.
+    """
     for key, unit in _UNITS.items():
         put(file, f"{name}/{key}", getattr(response, key), unit)
     flexibility = (response.residual + response.static())[:points]
@@ -34,7 +37,7 @@ def fill_response(file: h5py.File, name: str, response: Response, points: int) -
 
 
 def read_responses(file: h5py.File) -> dict[str, Response]:
-    """All the responses of a file, by name."""
+    """All responses in a file, by name."""
     return {
         name: Response(
             **{key: group[key][:] for key in _UNITS},

@@ -1,4 +1,4 @@
-"""What is kept and reported of the road that was driven over: its texture, and what was done to a measurement."""
+"""What is stored and reported of the road: its texture, and the processing of a measured road."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tireroad.runs.stages.base.record import Record
 
 
 def describe(record: Record, setup: ContactSetup) -> None:
-    """The mean profile depth as a figure; what was done to a measurement in words."""
+    """Record the mean profile depth; report the processing of a measured road in words."""
     for note in setup.road.notes:
         observe.say(f"  road: {note}")
     texture = setup.road.texture
@@ -20,7 +20,7 @@ def describe(record: Record, setup: ContactSetup) -> None:
 
 
 def fill(file: h5py.File, setup: ContactSetup) -> None:
-    """Write the texture's third octaves, and the depth and the words as attributes."""
+    """Write the texture's third octaves; mean profile depth and notes as attributes."""
     road = setup.road
     if road.notes:
         file.attrs["road_notes"] = "; ".join(road.notes)

@@ -1,7 +1,8 @@
-"""The states of rotating.h5: those of the modes, and beside them those of the shapes that joined them.
+"""The states in rotating.h5: those of the modes and, apart, those of the shapes that joined them.
 
-A state of which the shapes of turning (modal.turning_shapes) have most is no eigenfrequency of the tire: it stands for what
-its modes set off in faster ones. There are as many as shapes; `turning/place` is where each stands among all.
+A state dominated by rotation shapes (modal.turning_shapes) is not an eigenfrequency of the tire: it
+represents the coupling of its modes to faster ones. There are as many as shapes; `turning/place`
+holds their indices among all states.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from tireroad.runs.files.store import put
 
 _STATES = {"eigenvalue": "1/s", "right": "-", "left": "s", "residual": "-", "left_residual": "-"}
 _BLOCK = {"block": "1/s", "block_right": "-", "block_left": "s"}
-_LAST = ("right",)  # the states lie along its last axis; of all others along the first
+_LAST = ("right",)  # the states lie along the last axis; for all others along the first
 
 
 def of_shapes(rolling: RollingModes) -> np.ndarray:
-    """Which of the states (q,) are of shapes: the foremost by their share in the state's own squared length."""
+    """Mask (q,) of the shapes' states: those with the largest share of shapes in their norm."""
     projection, right = rolling.basis.projection, rolling.states.right
     mask = np.zeros(right.shape[1], bool)
     if projection.shapes and not rolling.full:
@@ -29,7 +30,7 @@ def of_shapes(rolling: RollingModes) -> np.ndarray:
 
 
 def fill(file, rolling: RollingModes) -> None:
-    """Write the states and their block."""
+    """Write the states and the near-defective block."""
     states, joined = rolling.states, of_shapes(rolling)
     for group, mask in (("", ~joined), ("turning/", joined)):
         if group and not joined.any():
@@ -47,7 +48,7 @@ def fill(file, rolling: RollingModes) -> None:
 
 
 def read(file) -> StateModes:
-    """The states as they were solved."""
+    """The states in their original order."""
     values = {name: file[name][:] for name in (*_STATES, *_BLOCK)}
     if "turning" in file:
         place = file["turning/place"][:]

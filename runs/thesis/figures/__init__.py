@@ -1,1 +1,1 @@
-"""One module a group of the thesis's figures."""
+"""One module per group of figures of the thesis."""

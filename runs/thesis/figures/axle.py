@@ -13,22 +13,25 @@ from tireroad.runs.thesis.runner import Scenes, kept
 
 SCENE = "figure-7.4"
 SPEED = 125.0  # rad/s
-# A section found by trial that has the thesis's two frequencies, in its order of modes (figure 2.2 is a picture).
+# A section found by trial with the thesis's two frequencies in its order of modes (figure 2.2 gives
+# no numbers).
 FITTED = "tire.outer_radius=0.34", "tire.minor_radius=0.12", "tire.half_angle=136", "modal.count=12"
-PEAKS = 90.0, 188.0  # Hz, of the standing tire, section 7.2
+PEAKS = 90.0, 188.0  # Hz, tire at rest, section 7.2
 SOURCE = "section 7.2, figure 7.4"
 VERTICAL = 2
 
 
 def peaks(frequency: Array, size: Array) -> Array:
-    """Frequencies (Hz) at which a curve is largest locally."""
+    """Frequencies (Hz) of the local maxima of a curve."""
     inside = (size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])
     return frequency[1:-1][inside]
 
 
 def _curves(scenes: Scenes, *settings: str) -> tuple[Array, Array, Array, Array]:
-    """Frequencies (f,) Hz; vertical axle force per N (f,) by momentum and by the free rim; natural frequencies of
-    the tire whose rim is held. Collective."""
+    """Frequencies (f,) Hz; vertical axle force per N (f,), two ways; natural frequencies.
+
+    The force is by momentum and by the free rim, the frequencies with held rim. Collective.
+    """
     run = scenes.run(SCENE, *settings, until="response")
     names = FREQUENCY, MOMENTUM, FREE_RIM
     frequency, *found = kept(run, "response", lambda file: [file[name][:] for name in names])
@@ -47,7 +50,7 @@ def _rolling(inertia: str) -> tuple[str, str]:
     "splits and shifts them.",
 )
 def axle_force(scenes: Scenes) -> Reproduced:
-    """By the free rim as in the thesis, put right, and by momentum."""
+    """By the free rim as in the thesis, corrected, and by momentum."""
     frequency, momentum, free, natural = _curves(scenes)
     fitted = kept(
         scenes.run(SCENE, *FITTED, until="modes"), "modes", lambda file: file["frequency"][:]
@@ -76,7 +79,7 @@ def _listed(values: Array) -> str:
 
 
 def _of_modes(natural: Array, fitted: Array) -> tuple[Claim, ...]:
-    """The frequencies that the thesis names, of the torus here and of a section that fits them."""
+    """The frequencies named in the thesis, for the torus here and for a section that fits them."""
     because = (
         f"the section's size stands in figure 2.2, a picture; one of 120 mm radius and 136° on an outer radius of 340 mm has "
         f"{fitted[1]:.1f} and {fitted[4]:.1f} Hz"
@@ -98,7 +101,7 @@ def _of_modes(natural: Array, fitted: Array) -> tuple[Claim, ...]:
 
 
 def _claims(natural: Array, highest: Array, split: Array, off: dict[float, float]) -> tuple[Claim, ...]:  # fmt: skip
-    """Of the peaks, their shift, and the two ways."""
+    """Claims on the peaks, their shift, and the two methods."""
     nearest = np.abs(natural[:, None] - highest).min(axis=0).max(initial=0.0) if len(highest) else np.nan  # fmt: skip
     shift = np.abs(np.abs(split - highest[0]) - SPEED / (2 * np.pi)).max(initial=0.0) if len(split) else np.nan  # fmt: skip
     two = "distance of the free rim (7.4), put right, from the momentum form up to 300 Hz"

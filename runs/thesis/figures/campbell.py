@@ -10,7 +10,7 @@ from tireroad.runs.thesis.figures.green import DOPPLER, FULL, SCENE
 from tireroad.runs.thesis.plots import Curve, Panel, lines
 from tireroad.runs.thesis.runner import Scenes, kept
 
-BRANCHES, HIGHEST = 10, 100.0  # of the thesis's figure; rad/s
+BRANCHES, HIGHEST = 10, 100.0  # as in the thesis's figure; rad/s
 SETTINGS = (
     "modal.count=50",
     "damping.mass=0.001",  # 1/s, table B.1
@@ -21,7 +21,7 @@ LEFT_OUT = "the thesis leaves Coriolis and centrifugal forces out: with them the
 
 
 def off_lines(frequency: np.ndarray, wave: np.ndarray) -> np.ndarray:
-    """How far (b,) Hz branches (v, b) of wave numbers (b,) end from f ± n Ω/2π, the nearer of the two."""
+    """Distance (b,) Hz of branches (v, b), wave numbers (b,), from the nearer line f ± n Ω/2π."""
     shift = np.abs(frequency[-1] - frequency[0])
     return np.abs(shift - wave * HIGHEST / (2 * np.pi))
 
@@ -32,7 +32,7 @@ def off_lines(frequency: np.ndarray, wave: np.ndarray) -> np.ndarray:
     "Pairs of n waves around the tire, equal at rest, shift by ± n Ω/2π.",
 )
 def campbell(scenes: Scenes) -> Reproduced:
-    """By both inertias."""
+    """With both kinds of inertia."""
     panels, claims, worst = [], [], []
     for name, setting in (DOPPLER, FULL):
         run = scenes.run(SCENE, *SETTINGS, setting, until="rotating")

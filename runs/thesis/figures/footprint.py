@@ -1,4 +1,4 @@
-"""Figures 7.1 to 7.3: how the contact force is spread over the patch, standing, rolling, damped."""
+"""Figures 7.1 to 7.3: distribution of the contact force in the patch, at rest, rolling, damped."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tireroad.runs.thesis.runner import Scenes, kept
 
 SCENE = "figure-7.1"
 RISE = 1e-3  # m, section 7.1.1
-MIDDLE = 2e-5  # m from the middle that counts as symmetric
+MIDDLE = 2e-5  # m: offset from the middle that counts as symmetric
 SPEEDS, DAMPINGS = (0.0, 100.0, 150.0), (0.0, 2500.0, 5000.0)  # rad/s, figure 7.2; 1/s, figure 7.3
 AT_REST = "state at rest, small motions"
 STEADY = "steadily rolling state"
@@ -23,7 +23,7 @@ STEADY = "steadily rolling state"
 
 @dataclass(frozen=True)
 class Spread:
-    """Vertical `force` (c,) N on the points (c, 3) m of the patch, each for `area` (c,) m2."""
+    """Vertical `force` (c,) N at points (c, 3) m of the patch, each for `area` (c,) m2."""
 
     points: Array
     force: Array
@@ -31,7 +31,7 @@ class Spread:
 
     @property
     def load(self) -> float:
-        """N."""
+        """Load, N."""
         return float(self.force.sum())
 
     @property
@@ -41,7 +41,7 @@ class Spread:
 
     @property
     def inside(self) -> float:
-        """Mean pressure on the middle line over that beside it, where the patch is not near its ends."""
+        """Mean pressure on the middle line over that beside it, away from the ends of the patch."""
         pressure, touching = self.force / self.area, self.force > 0
         across = np.abs(self.points[:, 0]) < np.abs(self.points[touching, 0]).max() / 2
         width = np.abs(self.points[touching, 1]).max()
@@ -51,7 +51,10 @@ class Spread:
 
 
 def as_thesis(scenes: Scenes, speed: float, damping: float) -> Spread:
-    """By modes about the state at rest under 500 N, the road risen by 1 mm; mean of the run's second half. Collective."""
+    """By modes about the state at rest under 500 N, with the road raised by 1 mm. Collective.
+
+    Mean over the second half of the run.
+    """
     run = scenes.run(SCENE, *_settings(speed, damping), until="contact")
 
     def last(file) -> tuple[Array, Array, Array]:
@@ -62,7 +65,7 @@ def as_thesis(scenes: Scenes, speed: float, damping: float) -> Spread:
 
 
 def steady(scenes: Scenes, speed: float, damping: float) -> Spread:
-    """By the finite elements that roll steadily with the thesis's inertia, at that height of the road. Collective."""
+    """By steadily rolling elements, the thesis's inertia, at that road height. Collective."""
     rest = scenes.run(SCENE, *_settings(0.0, damping), until="static").static
     height = f"static.road_height={rest.road_height + RISE!r}"
     more = "static.load=", height, "static.steady_rolling=true"
@@ -76,7 +79,7 @@ def _settings(speed: float, damping: float) -> tuple[str, str]:
 
 
 def _picture(found: Sequence[Spread], titles: Sequence[str]) -> str:
-    """Pressure in kPa; all cases share their points."""
+    """Figure of the pressure in kPa; all cases share their points."""
     first = found[0]
     maps = [1e-3 * one.force / first.area for one in found]
     return footprints(first.points, maps, titles, "pressure in kPa", 10.2)
@@ -132,7 +135,7 @@ def by_damping(scenes: Scenes) -> Reproduced:
 
 
 def _forward(ways: dict[str, list[Spread]], titles: list[str], source: str) -> Reproduced:
-    """Three cases by both ways: the first symmetric, each of the others further forward than the one before."""
+    """Three cases by both methods: the first symmetric, each further one further forward."""
     claims: list[Claim] = []
     for way, cases in ways.items():
         x = [float(one.middle[0]) for one in cases]

@@ -1,4 +1,4 @@
-"""Figures 4.2, 4.3, 4.5: Green's functions of the standing and the rolling tire."""
+"""Figures 4.2, 4.3, 4.5: Green's functions of the tire at rest and rolling."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MODES, DAMPING, SPEED = 50, 100.0, 100.0
 
 
 def by_fourier(response: Response) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) s and Green's functions (n, r, k) as the inverse Fourier transform of H, thesis (4.16)."""
+    """Times (n,) s and Green's functions (n, r, k) by inverse Fourier transform of H, (4.16)."""
     frequency = np.arange(round(LONGEST * HIGHEST / 2) + 1) / LONGEST
     values = np.fft.irfft(response.receptance(frequency), axis=0) * HIGHEST
     return np.arange(len(values)) / HIGHEST, values
@@ -102,7 +102,7 @@ def standing(scenes: Scenes) -> Reproduced:
     "The same at 100 rad/s: the two ways agree.",
 )
 def rolling(scenes: Scenes) -> Reproduced:
-    """Ω = 100 rad/s by both inertias."""
+    """Ω = 100 rad/s with both kinds of inertia."""
     panels, claims = [], []
     for name, setting in (DOPPLER, FULL):
         times, g, fourier, response = _two_ways(scenes, "rotation.speed=100", setting)

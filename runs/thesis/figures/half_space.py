@@ -1,4 +1,4 @@
-"""Figure 5.5: an elastic half-space under roughness peaks, and the thesis's formula and solution of it."""
+"""Figure 5.5: an elastic half-space under roughness peaks; the thesis's formula and solution."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from tireroad.runs.thesis.runner import Scenes
 Array = NDArray[np.float64]
 YOUNGS_MODULUS, POISSON_RATIO = 20e6, 0.49  # Pa, -: caption of figure 5.5
 MODULUS = closed_forms.contact_modulus(YOUNGS_MODULUS, POISSON_RATIO)
-# The thesis's peaks are in its picture only; these are of a coarse asphalt's size.
-PITCH, POINTS = 1.0e-3, 33  # m, points a side
+# The thesis shows its peaks only as a picture; these have the size of coarse asphalt.
+PITCH, POINTS = 1.0e-3, 33  # m, points per side
 PEAKS = ((-12e-3, 1.0e-3), (0.0, 0.55e-3), (12e-3, 1.0e-3))  # x m, height m
-RADIUS, PRESSED = 8e-3, 0.5e-3  # m, of the peaks' tops and of the sphere; m from the highest peak
+RADIUS, PRESSED = 8e-3, 0.5e-3  # m: radius of peaks and sphere; indentation from the highest peak
 
 
 def printed(x: Array, y: float, a: float, b: float, put_right: bool = False) -> Array:
-    """The right-hand side of (5.4), m, its third term with the printed factor (x + a), or (x - a) `put_right`."""
+    """Right-hand side of (5.4), m; third factor (x + a) as printed, or (x - a) if `put_right`."""
 
     def log(p: Array, q: float, r: Array, s: float) -> Array:
         return np.log((q + np.hypot(q, p)) / (s + np.hypot(s, r)))
@@ -50,14 +50,14 @@ def _compliance(points: Array) -> Array:
 
 
 def as_thesis(compliance: Array, overlap: Array) -> Array:
-    """Forces (n,) N by section 5.3.2: those that press every overlapping point back, negative ones made zero."""
+    """Forces (n,) N by section 5.3.2: push overlapping points back, negative forces set to 0."""
     touching, force = overlap > 0, np.zeros(len(overlap))
     force[touching] = np.linalg.solve(compliance[np.ix_(touching, touching)], overlap[touching])
     return np.maximum(force, 0.0)
 
 
 def _spheres(points: Array, peaks: tuple[tuple[float, float], ...]) -> Array:
-    """Height (n,) m of spherical peaks over each other's feet."""
+    """Height (n,) m of overlapping spherical peaks."""
     heights = [
         top - ((points[:, 0] - x) ** 2 + points[:, 1] ** 2) / (2 * RADIUS) for x, top in peaks
     ]
@@ -127,7 +127,7 @@ def _points(compliance: Array, surface: Array, force: Array, middle: int) -> tup
 
 
 def _hertz(points: Array, compliance: Array) -> tuple[Claim, ...]:
-    """The load on one sphere by both ways, against Hertz."""
+    """The load on one sphere by both methods, against Hertz."""
     overlap = _spheres(points, ((0.0, 0.0),)) + PRESSED
     exact = closed_forms.hertz_sphere_load(PRESSED, RADIUS, MODULUS)
     return (

@@ -1,4 +1,4 @@
-"""Figures 6.5 and C.2: the simplified tire on a flat road that moves, by modes and by all unknowns."""
+"""Figures 6.5 and C.2: the simplified tire on a moving flat road, by modes and all unknowns."""
 
 from __future__ import annotations
 
@@ -15,15 +15,18 @@ from tireroad.runs.thesis.runner import Scenes
 from tireroad.runs.validation.histories import Trial, follow
 
 SCENE = "figure-6.5"
-ROAD = 1e-4  # m, section 6.3
+ROAD = 1e-4  # m: amplitude of the road, section 6.3
 RADIUS = 0.5  # spectral radius of the finite elements' scheme, as in runs.validation.tires
 SOURCE = "section 6.3, figure 6.5"
 
 
 @dataclass(frozen=True)
 class Moved:
-    """Displacement (n, 3) m of the lowest node, `beside` it 5° along the section, and vertical force (n,) N, from
-    t = `step` s on."""
+    """Motion of the lowest node, from t = `step` s on.
+
+    `lowest` (n, 3) m: its displacement; `beside`: that 5° along the section from it; vertical
+    `force` (n,) N.
+    """
 
     step: float
     lowest: Array
@@ -32,12 +35,12 @@ class Moved:
 
     @property
     def time(self) -> Array:
-        """(n,) s."""
+        """Times (n,) s."""
         return self.step * np.arange(1, len(self.force) + 1)
 
 
 def by_modes(scenes: Scenes, *settings: str) -> Moved:
-    """Collective."""
+    """The motion by modes. Collective."""
     run = scenes.run(SCENE, *settings, until="contact")
     history = run.done["contact"].product
     skip = int(history.time[0] == 0.0)
@@ -46,7 +49,10 @@ def by_modes(scenes: Scenes, *settings: str) -> Moved:
 
 
 def by_all_unknowns(scenes: Scenes) -> Moved:
-    """Full finite elements on the same points, without the brush: by symmetry it does not act. Once. Collective."""
+    """Full finite elements on the same points, without the brush, which by symmetry does not act.
+
+    Computed once. Collective.
+    """
     return scenes.once("moved road, all unknowns", lambda: _by_all_unknowns(scenes))
 
 
@@ -63,7 +69,7 @@ def _by_all_unknowns(scenes: Scenes) -> Moved:
 
 
 def distance(found: Array, exact: Array) -> float:
-    """Largest distance over half the range of `exact`."""
+    """Largest distance relative to half the range of `exact`."""
     return float(np.abs(found - exact).max() / (np.ptp(exact) / 2))
 
 
@@ -73,7 +79,7 @@ def distance(found: Array, exact: Array) -> float:
     "The displacement is close to Abaqus's; a little less than the road's, which the contact model lets in; none in x.",
 )
 def moved_road(scenes: Scenes) -> Reproduced:
-    """γ1 = 500 1/s of the caption, and 5000 1/s of table B.3."""
+    """With γ1 = 500 1/s of the caption, and 5000 1/s of table B.3."""
     exact, caption, table = by_all_unknowns(scenes), by_modes(scenes), by_modes(scenes, "damping.mass=5000")  # fmt: skip
     share = np.ptp(caption.lowest[:, 2]) / (2 * ROAD)
     off = distance(caption.lowest[:, 2], exact.lowest[:, 2])

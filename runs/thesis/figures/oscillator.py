@@ -1,4 +1,4 @@
-"""Figure D.1: the Green's function of an oscillator of one degree of freedom."""
+"""Figure D.1: the Green's function of an oscillator with one degree of freedom."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from tireroad.runs.thesis.figure import Reproduced, figure
 from tireroad.runs.thesis.plots import Curve, Panel, lines
 from tireroad.runs.thesis.runner import Scenes
 
-# (D.4) and (D.5) as printed: u, eigenvalue, a of each of the two terms.
+# (D.4) and (D.5) as printed: u, eigenvalue, a for each of the two terms.
 PRINTED = (
     (-0.56 - 0.44j, -0.50 + 0.87j, -0.85 + 0.22j),
     (-0.56 + 0.44j, -0.50 - 0.87j, -0.85 - 0.22j),
 )
-SECOND = 0.50 - 0.87j  # the second eigenvalue as (D.4) prints it
-DIGITS = 0.03  # of u u/a in (D.5), printed to two digits
+SECOND = 0.50 - 0.87j  # second eigenvalue as printed in (D.4)
+DIGITS = 0.03  # error of u u/a in (D.5), printed to two digits
 TIMES = np.linspace(0.0, 12.0, 481)  # s
 
 
@@ -27,7 +27,7 @@ TIMES = np.linspace(0.0, 12.0, 481)  # s
     "A decaying wave from two eigenvalues, -0.50 + 0.87i and (printed) 0.50 - 0.87i; its Green's function is (D.5).",
 )
 def oscillator(scenes: Scenes) -> Reproduced:
-    """By the program's own second eigenproblem. Not collective."""
+    """By the program's own quadratic eigenproblem. Not collective."""
     one = np.ones((1, 1))
     response: Response = couple(rotating(one, one), one, one, np.ones((3, 1)))
     found = response.impulse(TIMES)[:, 0, 0]

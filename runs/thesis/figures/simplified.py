@@ -1,4 +1,4 @@
-"""The simplified tire under a point force: any number of its modes, any residual, or all unknowns."""
+"""The simplified tire under a point force: any number of modes, any residual, or all unknowns."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tireroad.runs.thesis.runner import Scenes
 
 Array = NDArray[np.floating]
 SCENE = "figure-6.2"
-AVERAGE = 1.0  # spectral radius of average acceleration: the least error where nothing touches
+AVERAGE = 1.0  # spectral radius of average acceleration: the smallest error without contact
 VERTICAL = slice(2, 3)  # of x, y, z at the driven point
 
 
 class Simplified:
-    """Ten segments, driven at the lowest node, with damping gamma1 (1/s). All methods are collective."""
+    """Ten segments, driven at the lowest node, damping gamma1 (1/s). Methods are collective."""
 
     def __init__(self, scenes: Scenes, damping: float) -> None:
         self.comm = scenes.comm
@@ -37,7 +37,7 @@ class Simplified:
         return self.run.rolling.basis.frequency
 
     def response(self, count: int, residual: str = "none") -> Response:
-        """Of the lowest modes."""
+        """The response of the lowest modes."""
         rolling = rolling_modes(
             self.run.rolling.basis.first(count), self.run.rolling.turning, self.comm
         )
@@ -46,13 +46,13 @@ class Simplified:
         return made.response.between(VERTICAL, slice(None))
 
     def kept(self, count: int, dynamic: int) -> Response:
-        """Of `dynamic` modes, the others up to `count` static: (6.1), (6.2). All have to oscillate."""
+        """`dynamic` modes, those up to `count` static: (6.1), (6.2). All must oscillate."""
         whole = self.response(count)
         assert len(whole.eigenvalue) == count, "a mode does not oscillate: lower the damping"
         return whole.keeping(np.arange(count) < dynamic)
 
     def full(self, frequency: Array) -> Array:
-        """H (f,) m/N of all unknowns."""
+        """H (f,) m/N with all unknowns."""
         points = self._points
         return self.run.wheel.receptance(points.outputs, points.loads, frequency)[:, 2, 0]
 
@@ -63,12 +63,12 @@ class Simplified:
         )[:, 0]
 
     def full_history(self, force: Array, step: float) -> Array:
-        """The same of all unknowns."""
+        """The same with all unknowns."""
         return self._marched(full_tire(self.run, self._points, step, AVERAGE), force)[:, 2]
 
     @cached_property
     def compliance(self) -> float:
-        """Displacement per constant force, m/N, of all unknowns."""
+        """Static displacement per force, m/N, with all unknowns."""
         return float(self.full(np.zeros(1))[0].real)
 
     def _marched(self, tire: Recursion | FullTire, force: Array) -> Array:
@@ -83,8 +83,10 @@ class Simplified:
 
 
 def full_tire(run: Finished, points: Probes, step: float, radius: float) -> FullTire:
-    """All unknowns of a run's standing tire between probes, in steps of `step` s, by a scheme of this spectral
-    radius. Collective."""
+    """All unknowns of a run's non-rolling tire between probes, integrated in steps of `step` s.
+
+    `radius`: spectral radius of the scheme. Collective.
+    """
     wheel = run.wheel
     return FullTire(
         operators=wheel.operators,
@@ -99,13 +101,13 @@ def full_tire(run: Finished, points: Probes, step: float, radius: float) -> Full
 
 
 def sine(frequency: float, duration: float, step: float) -> tuple[Array, Array]:
-    """Times (n,) s, and a force of 1 N at the frequency (Hz)."""
+    """Times (n,) s, and a force (n,) of 1 N amplitude at the frequency (Hz)."""
     time = step * np.arange(round(duration / step) + 1)
     return time, np.sin(2 * np.pi * frequency * time)
 
 
 def amplitude(values: Array, frequency: float, step: float) -> float:
-    """Of the last whole period: the component at the frequency."""
+    """Amplitude over the last whole period: the component at the frequency."""
     count = round(1 / (frequency * step))
     turn = np.exp(-2j * np.pi * np.arange(count) / count)
     return float(np.abs(2 * (values[-count:] @ turn) / count))

@@ -10,8 +10,8 @@ from tireroad.runs.thesis.claim import Claim
 from tireroad.runs.thesis.figure import Reproduced, figure
 from tireroad.runs.thesis.runner import Scenes
 
-Read = Callable[[Any], float]  # of a scene whose tables are there
-# What stands in the tables: unit, where a scene has it, and why it may differ.
+Read = Callable[[Any], float]  # reads a value of a scene whose tables exist
+# Entries of the tables: unit, where a scene has the value, and why it may differ.
 KNOWN: dict[str, tuple[str, Read, str]] = {
     "elements": ("-", lambda scene: scene.tire.segments, ""),
     "E of the tire": ("Pa", lambda scene: scene.tire.material.law.youngs_modulus, ""),
@@ -75,7 +75,7 @@ def _reproduced(claims: Sequence[Claim]) -> Reproduced:
 
 @figure("table-B.1", "Parameters of the full tire", "100 segments, E = 480 MPa, almost undamped.")
 def full(scenes: Scenes) -> Reproduced:
-    """Of figures 4.2 to 4.5; the damping is theirs, figure by figure."""
+    """For figures 4.2 to 4.5, whose captions give their own damping."""
     run = scenes.run("figure-4.2", "damping.mass=0.001", until="static")
     printed = {"elements": 100, "E of the tire": 480e6, "γ1": 0.001, **RUBBER}
     return _reproduced([_nodes(run, "table B.1", 7600), *_claims(run, "table B.1", printed, {})])
@@ -85,7 +85,7 @@ def full(scenes: Scenes) -> Reproduced:
     "table-B.2", "Parameters of the simplified tire", "Ten segments, E = 480 MPa, γ1 = 5000 1/s."
 )
 def simplified(scenes: Scenes) -> Reproduced:
-    """Of figures 6.2 and 6.3."""
+    """For figures 6.2 and 6.3."""
     run = scenes.run("figure-6.2", until="static")
     printed = {"elements": 10, "E of the tire": 480e6, "γ1": 5000.0, **RUBBER}
     return _reproduced([_nodes(run, "table B.2", 760), *_claims(run, "table B.2", printed, {})])
@@ -97,7 +97,7 @@ def simplified(scenes: Scenes) -> Reproduced:
     "1000 modes on a standing tire, γ1 = 5000 1/s.",
 )
 def validation(scenes: Scenes) -> Reproduced:
-    """Of figure 6.5."""
+    """For figure 6.5."""
     run = scenes.run("figure-6.5", until="static")
     printed = {"Ω": 0.0, "modes": 1000, "γ1": 5000.0, "K_b": 199620.0, **TREAD}
     return _reproduced(_claims(run, "table B.3", printed, {"γ1": CAPTION}))
@@ -109,7 +109,7 @@ def validation(scenes: Scenes) -> Reproduced:
     "The full tire with E = 48 MPa, 500 modes, γ1 = 5000 1/s.",
 )
 def footprint(scenes: Scenes) -> Reproduced:
-    """Of figures 7.1 to 7.3."""
+    """For figures 7.1 to 7.3."""
     run = scenes.run("figure-7.1", until="static")
     printed = {
         "elements": 100,

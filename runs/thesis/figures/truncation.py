@@ -1,4 +1,4 @@
-"""Figures 6.2, 6.3, C.1, C.2: what modes that are left out are worth, and residual flexibility in their place."""
+"""Figures 6.2, 6.3 and C.1: mode truncation error, and residual flexibility in place of modes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tireroad.runs.thesis.runner import Scenes
 
 FEW, MANY, ALL = 10, 100, 1000  # modes
 STEP = 2e-4  # s
-TINY = 1e-6  # of a compliance: rounding
+TINY = 1e-6  # relative to a compliance: rounding
 OTHER_TIRE = "the size of the section stands in figure 2.2, a picture, and the mesh is another: this torus is stiffer"  # fmt: skip
 FULL_FE = "all unknowns of the same mesh"
 
@@ -24,7 +24,7 @@ FULL_FE = "all unknowns of the same mesh"
     "lies on that of 100 modes.",
 )
 def receptance(scenes: Scenes) -> Reproduced:
-    """With little damping, so that the peaks can be seen."""
+    """With low damping, to show the peaks."""
     tire, frequency = Simplified(scenes, 50.0), np.arange(0.0, 301.0, 1.0)
     responses = {f"{MANY} modes": tire.response(MANY), f"{FEW} modes": tire.response(FEW),
                  f"{FEW} modes and residual": tire.kept(MANY, FEW)}  # fmt: skip
@@ -65,7 +65,7 @@ def _receptance_claims(few: float, helped: float, off: float, whole: float) -> t
     "The fewer modes, the less the tire yields; with 1000 modes, the highest almost at 4000 Hz, it agrees with Abaqus.",
 )
 def point_force(scenes: Scenes) -> Reproduced:
-    """γ1 = 5000 1/s; all unknowns of the same mesh in the place of Abaqus."""
+    """With γ1 = 5000 1/s; all unknowns of the same mesh instead of Abaqus."""
     tire = Simplified(scenes, 5000.0)
     time, force = sine(5.0, 0.2, STEP)
     full = tire.full_history(force, STEP)
@@ -101,7 +101,7 @@ def _point_force_claims(share: dict[int, float], highest: float) -> tuple[Claim,
     "Green's function, they give the response of 100.",
 )
 def residual_response(scenes: Scenes) -> Reproduced:
-    """The residual answers at once; the pulse (C.4) is its like of one step."""
+    """The residual responds instantaneously; the pulse (C.4) is its equivalent over one step."""
     tire = Simplified(scenes, 50.0)
     time, force = sine(20.0, 0.2, STEP)
     responses = {f"{MANY} modes": tire.response(MANY), f"{FEW} modes": tire.response(FEW), f"{FEW} modes and residual": tire.kept(MANY, FEW)}  # fmt: skip

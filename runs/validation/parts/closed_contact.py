@@ -19,7 +19,7 @@ FRICTION, LOAD, HALF = 0.4, 1000.0, 0.02  # of the rolling cylinder and the brus
 
 
 def rows() -> Iterator[tuple]:
-    """All of them."""
+    """All cases."""
     yield from _love()
     yield from _sphere()
     yield from _cylinder()
@@ -69,7 +69,7 @@ def _sphere() -> Iterator[tuple]:
 
 
 def _cylinder() -> Iterator[tuple]:
-    # Strips 2000 half widths long: their ends change the middle by (1/2000)^2.
+    # Strips of 2000 half widths: their ends change the middle by (1/2000)^2.
     radius, half_width = 0.3, 0.02
     points, half_sizes = _cells(1.2 * half_width, 40.0, 120, 1)
     force = _half_space(points, half_sizes).solve(points[:, 0] ** 2 / (2 * radius) - 2e-3)
@@ -79,7 +79,7 @@ def _cylinder() -> Iterator[tuple]:
 
 
 def _punch() -> tuple:
-    """Aitken's extrapolation of three grids: the edge singularity leaves one power of the cell size."""
+    """Aitken's extrapolation of three grids: the edge singularity leaves one power of the size."""
     side, approach, loads = 0.02, 1e-3, []
     for n in (8, 16, 32):
         points, half_sizes = _cells(side, side, n, n)
@@ -117,7 +117,7 @@ def _cattaneo_mindlin() -> Iterator[tuple]:
 
 
 def _brush() -> Iterator[tuple]:
-    """Bristles on a rigid body under a parabola of pressure."""
+    """Bristles on a rigid body under a parabolic pressure."""
     tread, (x, pitch) = 5e6, _line(200)
     edges = np.clip(np.stack([x - pitch / 2, x + pitch / 2]) / HALF, -1, 1)
     normal = 0.75 * LOAD * np.diff(edges - edges**3 / 3, axis=0)[0]
@@ -128,10 +128,10 @@ def _brush() -> Iterator[tuple]:
 
 
 def _carter() -> Iterator[tuple]:
-    """Bristles a thousand times stiffer than the half-space under them, nu = 0.
+    """Bristles a thousand times stiffer than the half-space below them, nu = 0.
 
-    A bristle is entered a pitch behind the leading edge, an error of first order: taken out by two
-    pitches.
+    A bristle enters one pitch behind the leading edge, a first-order error: removed by
+    extrapolation from two pitches.
     """
     modulus = 4e6
     radius = np.pi * modulus * HALF**2 / (4 * LOAD)
@@ -149,7 +149,8 @@ def _cylinder_force(cells: int, creepage: float, modulus: float) -> float:
     edges = np.clip(np.stack([x - pitch / 2, x + pitch / 2]) / HALF, -1, 1)
     over = edges * np.sqrt(1 - edges**2) + np.arcsin(edges)
     normal = LOAD * np.diff(over, axis=0)[0] / np.pi
-    # Strips 80 m long; in the plane their displacement has no zero: put at the contact's width.
+    # Strips 80 m long; the displacement of plane strain has no zero: it is set to 0 at the
+    # contact's width.
     strip, half = np.float64(40.0), np.float64(pitch / 2)
     lone = rectangle_potential(x[:, None] - x, 0 * x, half, strip)
     lone -= rectangle_potential(np.array(2.2 * HALF), np.array(0.0), half, strip)
@@ -158,7 +159,7 @@ def _cylinder_force(cells: int, creepage: float, modulus: float) -> float:
 
 
 def _line(cells: int) -> tuple[np.ndarray, float]:
-    """Middles of `cells` cells over the contact and three more on each side, and their pitch, m."""
+    """Centres of `cells` cells over the contact and three more on each side, and their pitch, m."""
     pitch = 2 * HALF / cells
     return pitch * (np.arange(cells + 6) - (cells + 5) / 2), pitch
 

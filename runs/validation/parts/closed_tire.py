@@ -21,12 +21,12 @@ from tireroad.modal.basis import Projection, project
 from tireroad.modal.rotating import matrices, rotating, standing
 from tireroad.modal.solver.modes import Modes
 
-FLAT = 1e6  # m, radius of the section circle: what is used of the torus is a cylinder
+FLAT = 1e6  # m, radius of the section circle: the part of the torus in use is a cylinder
 COMM = MPI.COMM_SELF
 
 
 def rows() -> Iterator[tuple]:
-    """All of them."""
+    """All cases."""
     yield from _tube()
     yield from _ring(0.0)
     yield from _ring(50.0)
@@ -50,10 +50,10 @@ def _cylinder(outer: float, thickness: float, width: float, mesh: tuple, rubber:
 
 
 def _tube() -> Iterator[tuple]:
-    """Thick Mooney tube, plane strain: the middle of one with clamped ends, which leave an axial
-    strain behind that falls with one over its length: 1.9, 1.0 % more growth at 1.6, 3 m.
+    """Thick Mooney tube in plane strain: the middle of a tube with clamped ends.
 
-    p = 2 (C1 + C2) [ln(a B/(b A)) + (a^2 - A^2)(a^-2 - b^-2)/2].
+    The ends leave an axial strain that falls with one over the length: 1.9, 1.0 % more growth at
+    1.6, 3 m. p = 2 (C1 + C2) [ln(a B/(b A)) + (a^2 - A^2)(a^-2 - b^-2)/2].
     """
     A, B = 0.25, 0.30
     rubber = compound("mooney-rivlin", 1000.0, c10=4e5, c01=1e5, bulk_modulus=1e9)
@@ -85,7 +85,7 @@ def _ring(speed: float) -> Iterator[tuple]:
     )
     body.rim = np.array([], dtype=np.int32)
     points = body.lattice.points(np.arange(body.lattice.size))
-    # The spin's hoop strain rho R^2 W^2/E, by a displacement that stretches nothing else.
+    # The hoop strain rho R^2 W^2/E of the spin, by a displacement without other strains.
     out = points * [1.0, 0.0, 1.0]
     out *= density * R**3 * speed**2 / E / np.linalg.norm(out, axis=1, keepdims=True)
     body.set_displacement(out)
@@ -108,10 +108,11 @@ def _ring(speed: float) -> Iterator[tuple]:
 
 
 def _bending_waves(points: np.ndarray, shape: np.ndarray, eigenvalue: np.ndarray) -> dict:
-    """Signed frequency (Hz) by wave number n and branch of a ring's waves exp(i (w t - n a)) in its plane, a the angle
-    from the lowest point against the sense of rotation: 1 the higher of the two, -1 the lower.
+    """Signed frequency (Hz) by wave number n and branch of in-plane waves exp(i (w t - n a)).
 
-    Told from all other states by their shapes (3 s, m), not by their frequencies.
+    a: angle from the lowest point against the sense of rotation. Branch 1 is the higher of the two
+    frequencies, -1 the lower. States are identified by their shapes (3 s, m), not by their
+    frequencies.
     """
     angle = np.arctan2(points[:, 0], -points[:, 2])
     field = shape.reshape(len(points), 3, -1)
@@ -129,8 +130,8 @@ def _bending_waves(points: np.ndarray, shape: np.ndarray, eigenvalue: np.ndarray
 
 
 def _soft_modes(operators: Operators) -> Modes:
-    """60 modes by SciPy: next to the ring's stiffness across, its softest bending is below what
-    modal.solver.undamped takes for digits."""
+    """60 modes by SciPy: relative to the ring's stiffness across, its softest bending is below what
+    modal.solver.undamped can resolve."""
     size = operators.stiffness.getSize()
     stiffness = sparse.csr_matrix(operators.stiffness.getValuesCSR()[::-1], shape=size)
     mass = sparse.diags(operators.mass).tocsc()
@@ -149,7 +150,7 @@ def _soft_modes(operators: Operators) -> Modes:
 
 
 def _oscillator() -> Iterator[tuple]:
-    """u'' + u' + u = 1 (thesis, appendix D): 1 - e^{-t/2} (cos w t + sin w t/sqrt 3), w = sqrt 3/2."""
+    """u'' + u' + u = 1 (appendix D): 1 - e^{-t/2} (cos w t + sin w t/sqrt 3), w = sqrt 3/2."""
     one = np.ones((1, 1))
     states = standing(Projection(squares=np.ones(1), momentum=np.ones((3, 1))), (1.0, 0.0))
     tire = Recursion(

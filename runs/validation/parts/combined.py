@@ -1,7 +1,8 @@
-"""Part of `validate stability`: what can be combined in a scene, on one coarse tire, through all stages.
+"""Part of `validate stability`: combinations of a scene's options on one coarse tire, all stages.
 
-Every value of each of axle, shape of the road, tread, bristles, pattern and road comes up, and pairs that could feed each other:
-a wheel that moves on rubber that creeps, patterns with friction, drums with jumps, slip with camber.
+Every value of axle, road shape, tread, bristles, pattern and road occurs, and pairs that could
+amplify each other: a moving wheel on creeping rubber, patterns with friction, drums with jumps,
+slip with camber.
 """
 
 from __future__ import annotations
@@ -138,7 +139,7 @@ COMBINATIONS = {
 
 
 def rows(names: list[str] | None = None) -> list[list]:
-    """Package, case, what happened, how it was caught, of each combination. Collective."""
+    """Package, case, result and how it was caught, for each combination. Collective."""
     with TemporaryDirectory() as folder:
         return [
             ["all stages", name, *_ended(COMBINATIONS[name], Path(folder))]
@@ -147,7 +148,7 @@ def rows(names: list[str] | None = None) -> list[list]:
 
 
 def _ended(one: Combination, folder: Path) -> tuple[str, str]:
-    """What happened, and how it was caught."""
+    """The result, and how it was caught."""
     from tireroad.runs.scene.load import load
 
     text = _BASE.format(**vars(one))

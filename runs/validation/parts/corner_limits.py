@@ -1,4 +1,4 @@
-"""A wheel on its corner against what it must come to: a held axle, the force by the blocked force, a free wheel."""
+"""A wheel on its corner against its limits: a held axle, the blocked force, a free wheel."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ HELD = CORNER.format(body=300.0, spring=1e15).replace("body_mass = 300.0\n", "")
 
 
 def table() -> Table:
-    """Asked and found."""
+    """Targets and results."""
     with tempfile.TemporaryDirectory() as folder:
         base = Path(folder)
         corner, told = _run(base, CORNER.format(body=300.0, spring=25e3))
@@ -75,7 +75,7 @@ def table() -> Table:
 
 
 def _run(base: Path, text: str) -> tuple[dict[str, np.ndarray], dict]:
-    """Forces of contact.h5, and the summary, of a scene in a folder where stages are reused."""
+    """Forces in contact.h5 and the summary of a scene, in a folder whose stages are reused."""
     (base / "scene.toml").write_text(text)
     scene, out = load(base / "scene.toml"), base / "out"
     out.mkdir(exist_ok=True)

@@ -1,6 +1,7 @@
-"""Rolling cylinders of a rubber that creeps, against published pressures: (case, unit, computed, exact).
+"""Rolling cylinders of creeping rubber, published pressures: (case, unit, computed, exact).
 
-Two cylinders of polyamide: G, nu, common radius, load of 1 m, speed. Wang and Knothe, J. Appl. Mech. 60 (1993) 310.
+Two cylinders of polyamide: G, nu, common radius, load of 1 m, speed. Wang and Knothe, J. Appl.
+Mech. 60 (1993) 310.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 SHEAR, NU, RADIUS, LOAD, SPEED = 1143e6, 0.4, 0.05, 600e3, 1.0
 POINTS, DX, DY = 99, 0.16e-3, 1.0
 PUBLISHED = {1e-9: 60.32, 0.009: 78.74, 0.045: 84.72, 2.0: 85.31}  # MPa at relaxation times, s
-# One body against a rigid one gives way as two of twice its modulus.
+# One body against a rigid one deforms like two with twice its modulus.
 INFLUENCE = partial(half_space_influence, youngs_modulus=(1 + NU) * SHEAR, poisson_ratio=NU)
 
 
@@ -34,7 +35,7 @@ def rows() -> Iterator[tuple]:
 
 
 def influence(x: Array, y: Array, a: Array, b: Array) -> Array:
-    """Of one point's rectangle, m/Pa."""
+    """Influence of one point's rectangle, m/Pa."""
     return INFLUENCE(x, y, a, b)
 
 
@@ -70,6 +71,6 @@ def matrix(patch: Patch) -> np.ndarray:
 
 
 def rolled(time: float) -> np.ndarray:
-    """Pressures (MPa) of the steadily rolling cylinder with one relaxation `time` (s), modulus halved."""
+    """Pressures (MPa) of the rolling cylinder with one relaxation `time` (s), modulus halved."""
     patch, creep = cylinder(), (np.array([1.0]), np.array([time]))
     return pressed(ActiveSet(matrix(patch) @ steady(creep, patch, SPEED)), patch.gap)

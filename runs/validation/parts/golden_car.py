@@ -1,4 +1,4 @@
-"""The golden car, wheel and body without a tire, against its published poles: (case, unit, computed, exact)."""
+"""The golden car, without a tire, against its published poles: (case, unit, computed, exact)."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tireroad.modal.basis import Projection
 from tireroad.modal.corner import Corner
 from tireroad.modal.rolling import decouple
 
-GOLDEN = 653.0, 63.3, 6.0, 0.15  # k_t, k_s 1/s2, c 1/s, m_u of a body of 1 kg
+GOLDEN = 653.0, 63.3, 6.0, 0.15  # k_t, k_s 1/s2, c 1/s, m_u for a body of 1 kg
 PUBLISHED = -2.590 + 7.323j, -20.410 + 64.423j  # 1/s
 
 
 def rows() -> Iterator[tuple]:
-    """Real and imaginary parts of both poles, by the polynomial of the car."""
+    """Real and imaginary parts of both poles, against the polynomial of the car."""
     for number, (found, exact) in enumerate(zip(poles(), exact_poles(), strict=True), 1):
         for part, one, other in (
             ("real", found.real, exact.real),
@@ -31,7 +31,7 @@ def rows() -> Iterator[tuple]:
 
 
 def golden_car() -> Basis:
-    """Wheel and body without any tire, read and loaded at one point under the axle. Collective."""
+    """Wheel and body without a tire, read and loaded at one point under the axle. Collective."""
     _, k_s, c, m_u = GOLDEN
     axle = Axle(
         wheel_mass=m_u,
@@ -53,13 +53,13 @@ def golden_car() -> Basis:
 
 
 def response() -> Response:
-    """At that point, up and down. Collective."""
+    """The vertical response at that point. Collective."""
     point = sparse.csr_matrix([[0.0, 0.0, 1.0]])
     return golden_car().couple(point, point)
 
 
 def poles() -> list[complex]:
-    """1/s, in the order of PUBLISHED: H(s) + 1/k_t = 0, where the road holds a massless tire's spring. Collective."""
+    """Poles 1/s as in PUBLISHED: H(s) + 1/k_t = 0 with a massless tire spring. Collective."""
     wheel = response()
 
     def closed(
@@ -73,7 +73,7 @@ def poles() -> list[complex]:
 
 
 def exact_poles() -> list[complex]:
-    """1/s, likewise: (m_u s2 + c s + k_s + k_t)(s2 + c s + k_s) = (c s + k_s)^2."""
+    """Poles 1/s, in the same order: (m_u s2 + c s + k_s + k_t)(s2 + c s + k_s) = (c s + k_s)^2."""
     k_t, k_s, c, m_u = GOLDEN
     spring = np.array([c, k_s])
     both = np.polymul([m_u, c, k_s + k_t], [1.0, c, k_s])

@@ -1,7 +1,8 @@
-"""A tread pattern on a rigid wheel and a rigid road: orders of its pitches by hand, (case, unit, computed, exact).
+"""Pitch orders of a tread pattern on a rigid wheel: (case, unit, computed, exact).
 
-Grooves that never touch, on a bed of springs: F(t) is the sum of the slick's forces over the land; its order n has the groove's Fourier
-coefficient sin(n pi w/l)/(n pi), w the groove's width and l the pitch, times the transform of the slick's force along x.
+For grooves that never touch, on a bed of springs, F(t) is the sum of the slick's forces over the
+land. Its order n is the groove's Fourier coefficient sin(n pi w/l)/(n pi), with groove width w and
+pitch l, times the transform of the slick's force along x.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ from tireroad.runs.scene.tables.pattern import Groove
 
 BED, SPEED, STEP, PITCHES = 2e8, 20.0, 1e-4, 40
 AROUND = 2.0  # m
-WIDTH, LOAD, TIMES = 0.012, 500.0, 10  # m of a groove, N, pitches that pass
+WIDTH, LOAD, TIMES = 0.012, 500.0, 10  # m: width of a groove; N; number of pitches that pass
 
 
 class Rigid:
-    """A tire that does not give way."""
+    """A rigid tire."""
 
     comm = MPI.COMM_SELF
 
@@ -69,24 +70,24 @@ def orders(force: np.ndarray) -> np.ndarray:
 
 
 def by_hand(order: int) -> float:
-    """N."""
+    """The amplitude of an order in closed form, N."""
     slick, pitch = oval(), AROUND / PITCHES
     along = abs(np.sum(slick.force * np.exp(2j * np.pi * order * slick.points[:, 0] / pitch)))
     return float(abs(2 * np.sin(np.pi * order * WIDTH / pitch) / (np.pi * order)) * along)
 
 
 def oval() -> Patch:
-    """A slick's footprint."""
+    """The footprint of a slick."""
     return oval_patch((120, 5), (0.001, 0.02), LOAD)
 
 
 def grooves(**given) -> Pattern:
-    """One groove a pitch, of equal pitches."""
+    """One groove per pitch, all pitches equal."""
     return Pattern(AROUND, [Groove(**given)], pitch_starts(PITCHES, [1.0], 1, AROUND))
 
 
 def rolled(pattern: Pattern | None, steps: int) -> tuple[np.ndarray, Patch]:
-    """Vertical force (steps,) N of a rigid tire on a bed of springs on a flat road, and its patch."""
+    """Vertical force (steps,) N of a rigid tire on springs on a flat road, and its patch."""
     patch = oval()
     bed = winkler_compliance(patch.area, BED)
     patch = replace(patch, gap=np.where(patch.force > 0, 0.0, patch.gap))
@@ -94,7 +95,7 @@ def rolled(pattern: Pattern | None, steps: int) -> tuple[np.ndarray, Patch]:
     _, x1, y0, y1 = patch.extent
     road = RoadUnderTire(Flat()).prepare(x1, x1 + way.travel, y0, y1)
     setup = ContactSetup(patch=patch, reach=1.0, road=road, rolled=way, pattern=pattern)
-    if pattern is not None:  # as it settles: what lies over a groove carries nothing
+    if pattern is not None:  # settled: points over a groove carry nothing
         begun = setup.begun
         free = np.maximum(patch.force - begun / np.diag(bed), 0.0)
         lifted = np.maximum(begun - np.diag(bed) * patch.force, 0.0)

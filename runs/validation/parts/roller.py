@@ -1,7 +1,7 @@
-"""A rubber roller with a rigid core in plane strain: the finite-element tire as the cylinder of closed forms.
+"""A rubber roller in plane strain: the finite-element tire as a cylinder with closed forms.
 
-A torus whose section circle is so large that the strip of it in use is flat; its inner face is held, and nothing moves along
-the axle. Elements at the road are small, and grow from there around and inwards.
+A torus with such a large section circle that the strip in use is flat; its inner face is held, and
+nothing moves along the axle. Elements are small at the road and grow from there around and inwards.
 """
 
 from __future__ import annotations
@@ -27,7 +27,11 @@ E = TypeVar("E", bound=Equilibrium)
 
 @dataclass(frozen=True, kw_only=True)
 class Roller:
-    """`outer` radius, `thickness` of the rubber and `width` m; elements of `size` m up to `reach` m from the lowest point."""
+    """Dimensions of the roller and its mesh, m.
+
+    `outer` radius; `thickness` of the rubber; `width`; elements of `size` up to a distance `reach`
+    from the lowest point.
+    """
 
     outer: float = 0.3
     thickness: float = 0.1
@@ -47,7 +51,7 @@ class Roller:
         return np.pi / 4 * self.modulus * half**2 / self.outer * self.width
 
     def body(self) -> Body:
-        """On this process alone."""
+        """The finite-element body, on this process alone."""
         half = self.width / 2 / FLAT
         torus = Torus(
             outer_radius=self.outer,
@@ -84,7 +88,7 @@ class Roller:
 
 
 def _graded(size: float, end: float, reach: float) -> np.ndarray:
-    """Corners (m) from 0 to `end`, `size` apart up to `reach`, then ever further."""
+    """Corners (m) from 0 to `end`, spaced by `size` up to `reach`, then increasingly wider."""
     places = [0.0]
     while places[-1] < end:
         if places[-1] >= reach:
@@ -94,7 +98,7 @@ def _graded(size: float, end: float, reach: float) -> np.ndarray:
 
 
 def plane(equilibrium: E) -> E:
-    """The same problem with nothing moving along the axle."""
+    """The same problem without motion along the axle."""
     body, axial = equilibrium.body, equilibrium.body.space.sub(1)
     collapsed, _ = axial.collapse()
     everywhere = fem.locate_dofs_geometrical(
@@ -107,7 +111,7 @@ def plane(equilibrium: E) -> E:
 
 
 def middle(equilibrium: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
-    """Of the nodes that touch in the middle of the width, in the order of x: their place (m), and which of the tread's."""
+    """Positions x (m) of the touching nodes in the middle of the width, and their tread indices."""
     body = equilibrium.body
     points = body.space.tabulate_dof_coordinates()[body.tread]
     x = points[:, 0] + body.owned(body.u.x.array)[body.tread, 0]

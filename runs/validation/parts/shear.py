@@ -1,7 +1,7 @@
-"""A half-space that gives way sideways against closed forms and Kalker's table: (case, unit, computed, exact).
+"""A half-space sheared, against closed forms and Kalker: (case, unit, computed, exact).
 
-Of a disc of radius 1 m in cells, `n` across it; its area is the cells', by which forces are counted. A body on a rigid road is as
-two alike of twice the shear modulus.
+For a disc of radius 1 m in cells, `n` across it; forces are scaled by the cells' total area. A body
+on a rigid road behaves like two equal ones with twice the shear modulus.
 """
 
 from __future__ import annotations
@@ -20,16 +20,17 @@ from tireroad.contact.tread.compliance import Influence, half_space_influence
 from tireroad.contact.tread.kernel import GridPlaces, KernelTread
 from tireroad.contact.tread.shear import KernelShear, half_space_shear
 
-# C11, C22, C23 of a circle by Poisson's ratio: Kalker, Three-Dimensional Elastic Bodies in Rolling Contact, table E.3.
+# C11, C22, C23 of a circle by Poisson's ratio: Kalker, Three-Dimensional Elastic Bodies in Rolling
+# Contact, table E.3.
 KALKER = {0.25: (4.12, 3.67, 1.47), 0.5: (5.20, 3.98, 1.63)}
 CELLS = (6, 12, 24)
 CREEP, FRICTION = 1e-3, 0.5
 Array = NDArray[np.float64]
-SETTLED = 1e-5  # change of a step, of the force
+SETTLED = 1e-5  # relative change of the force in a step
 
 
 def rows() -> Iterator[tuple]:
-    """All of them."""
+    """All cases."""
     for nu in (0.25, 0.5):
         yield from pushed(nu, 24)
     for cells in (12, 24):
@@ -44,8 +45,11 @@ def rows() -> Iterator[tuple]:
 
 
 class Disc:
-    """`grid` of cells, their `x`, `y` and `line`, which of them are `inside`, their `pitch`, the radius of a circle of the area
-    of those; with or without the cells `around` it."""
+    """A disc of cells, with or without the cells `around` it.
+
+    `grid` of the cells, their `x`, `y` and `line`; `inside`: which lie in the disc; their `pitch`;
+    `radius` of a circle with the area of those inside.
+    """
 
     def __init__(self, cells: int, *, around: bool = False) -> None:
         self.pitch = 2.0 / cells
@@ -60,12 +64,12 @@ class Disc:
         self.radius = float(np.sqrt(inside.sum() * self.pitch**2 / np.pi))
 
     def shear(self, nu: float) -> KernelShear:
-        """Of shear modulus 1 Pa."""
+        """The tangential compliance for a shear modulus of 1 Pa."""
         return KernelShear(self.grid, _sideways(nu))
 
 
 class _Alone(KernelShear):
-    """Of two bodies alike: pressure moves both sideways by the same."""
+    """For two equal bodies: pressure moves both sideways by the same amount."""
 
     def __init__(self, disc: Disc, nu: float) -> None:
         super().__init__(disc.grid, _sideways(nu))
@@ -87,7 +91,7 @@ def _down(nu: float) -> Influence:
 
 
 def pushed(nu: float, cells: int) -> Iterator[tuple]:
-    """Under Hertz's pressure: shift 3 mu P (2 - nu)/(16 a G) [1 - (1 - Q/mu P)^(2/3)]."""
+    """Under Hertzian pressure: shift 3 mu P (2 - nu)/(16 a G) [1 - (1 - Q/mu P)^(2/3)]."""
     disc = Disc(cells)
     normal = np.sqrt(1 - disc.x**2 - disc.y**2) * disc.pitch**2
     total, count = float(normal.sum()), len(normal)
@@ -105,7 +109,7 @@ def pushed(nu: float, cells: int) -> Iterator[tuple]:
 
 
 def bonded(nu: float, cells: int) -> float:
-    """Load of a flat punch that sticks over that of one without friction: ln(3 - 4 nu)(1 - nu)/(1 - 2 nu)."""
+    """Load of a sticking flat punch over a frictionless one: ln(3 - 4 nu)(1 - nu)/(1 - 2 nu)."""
     disc = Disc(cells)
     count = len(disc.x)
     tread = KernelTread(disc.grid, _down(nu))
@@ -118,7 +122,7 @@ def bonded(nu: float, cells: int) -> float:
 
 
 def creep(nu: float, cells: int) -> tuple[float, float, float]:
-    """C11, C22, C23 of steady rolling that sticks: forces C11 G a^2 xi, C22 G a^2 eta, C23 G a^3 phi."""
+    """C11, C22, C23 of rolling without sliding: C11 G a^2 xi, C22 G a^2 eta, C23 G a^3 phi."""
     disc = Disc(cells, around=True)
     spin = CREEP * np.stack([disc.y, disc.x], axis=-1)
     along, across, turned = (_rolled(disc, nu, slip) for slip in ((CREEP, 0.0), (0.0, CREEP), spin))
@@ -127,7 +131,7 @@ def creep(nu: float, cells: int) -> tuple[float, float, float]:
 
 
 def _rolled(disc: Disc, nu: float, slip) -> np.ndarray:
-    """Horizontal force (2,) N, a cell a step, until it is steady."""
+    """Horizontal force (2,) N, rolled one cell per step until steady."""
     count = len(disc.x)
     brush = Brush(BrushLaw(np.inf, None, slip), disc.x, disc.line, disc.pitch, 1.0)
     brush.begin(disc.inside)

@@ -23,7 +23,7 @@ LAYER = Roller(outer=1.0, size=1e-3, reach=0.025, poisson_ratio=0.0)
 
 
 def rows() -> Iterator[tuple]:
-    """All of them."""
+    """All cases."""
     for pushed in standing(STIFF):
         name = f"roller pushed sideways to {pushed.share:.2f} of sliding, traction in the middle (Cattaneo, Mindlin)"
         yield name, "-", pushed.in_the_middle, 1 - np.sqrt(1 - pushed.share)
@@ -41,7 +41,7 @@ def rows() -> Iterator[tuple]:
 
 
 class Pressed:
-    """A roller under a load (N) without friction, and then with that of a `sliding` tread."""
+    """A roller under a load (N) without friction; `rubbing` adds the friction of a tread model."""
 
     def __init__(self, roller: Roller, load: float, friction: float) -> None:
         self.roller, self.load, self.friction = roller, load, friction
@@ -54,7 +54,7 @@ class Pressed:
             _check(step.converged)
 
     def rubbing(self, sliding: Sliding) -> RubbingEquilibrium:
-        """With friction, from the state without."""
+        """The problem with friction, starting from the state without."""
         given = self.body, AT_REST, self.friction, sliding
         problem = plane(RubbingEquilibrium(*given))
         problem.road.take(self._without.contact_force(), self._without.road_height)
@@ -62,7 +62,7 @@ class Pressed:
 
 
 class Pushed:
-    """`x` (n,) m of the nodes in contact in the middle of the width, their `normal` and `pull` (n,) N."""
+    """`x` (n,) m of the touching nodes in the middle of the width, `normal` and `pull` (n,) N."""
 
     def __init__(self, problem: RubbingEquilibrium, friction: float) -> None:
         self.x, some = middle(problem)
@@ -72,12 +72,12 @@ class Pushed:
 
     @cached_property
     def used(self) -> np.ndarray:
-        """Force over that at which a node slides, (n,)."""
+        """Tangential force over the force at which a node slides, (n,)."""
         return self.pull / (self._friction * self.normal)
 
     @property
     def in_the_middle(self) -> float:
-        """That in the middle."""
+        """`used` in the middle of the contact."""
         return float(np.interp(0.5 * (self.x[0] + self.x[-1]), self.x, self.used))
 
 
@@ -94,7 +94,7 @@ def standing(roller: Roller, pushes: tuple[float, ...] = (2e-4, 4e-4)) -> Iterat
 
 
 def rolling(roller: Roller, shares: tuple[float, ...]) -> Iterator[tuple[float, float]]:
-    """(share of the creepage at which all slides, force over that of sliding), driving."""
+    """(share of the creepage of full sliding, force over that of full sliding), driving."""
     full = FRICTION * HALF / roller.outer
     drag = Rolling(Pressed(roller, roller.hertz_load(HALF), FRICTION))
     for share in shares:
@@ -102,7 +102,7 @@ def rolling(roller: Roller, shares: tuple[float, ...]) -> Iterator[tuple[float, 
 
 
 class Rolling:
-    """The roller as it rolls on; `free` m: how far it travels in a radian when nothing drags."""
+    """The rolling roller; `free` m: its travel per radian without drag."""
 
     def __init__(self, pressed: Pressed) -> None:
         self._pressed, radius = pressed, pressed.roller.outer
@@ -119,7 +119,7 @@ class Rolling:
         self.free = float(found.root)
 
     def __call__(self, travel: float) -> Pushed:
-        """The state at that travel, m in a radian."""
+        """The state at that travel, m per radian."""
         self._sliding.radius = travel
         step = self._problem.solve(self._problem.road.height, load=self._pressed.load)
         _check(step.converged)
@@ -127,10 +127,10 @@ class Rolling:
 
 
 def over_brush(roller: Roller, creepage: float = 1e-3, half: float = 0.02) -> float:
-    """Force of a layer that sticks all along its contact, over that of a brush of its shear modulus over its thickness.
+    """Force of a layer that sticks throughout, over that of a brush of its G / thickness.
 
-    nu = 0: each column of the layer carries for itself, p = E/h (half^2 - x^2)/2R. It takes its neighbours along
-    over a length of its thickness, so that the two differ by a first power of that.
+    nu = 0: each column of the layer carries for itself, p = E/h (half^2 - x^2)/2R. It drags its
+    neighbours along over a length of its thickness, so the difference is of first order in that.
     """
     h, width, young = roller.thickness, roller.width, roller.youngs_modulus
     load = young / h * 2 * half**3 / 3 / roller.outer * width

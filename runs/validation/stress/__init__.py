@@ -1,1 +1,1 @@
-"""The parts of `validate stability`, a package of the program each."""
+"""Parts of `validate stability`, one per package of the program."""

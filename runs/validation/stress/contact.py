@@ -1,4 +1,4 @@
-"""Part of `validate stability`: the contact loop where it could blow up, with a made-up tire."""
+"""Part of `validate stability`: the contact loop at its limits, with a synthetic tire."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ SHEAR = MatrixShear(
     PATCH.half_sizes,
     lambda x, y, a, b: half_space_shear(x, y, a, b, 5e6, 0.45),
 )
-CRITICAL = 60.0  # m/s: the wave speed of the strip
-SHORTEST = 0.06  # s: the road's waves are full grown after 15 ms
+CRITICAL = 60.0  # m/s: wave speed of the strip
+SHORTEST = 0.06  # s: the road's waves reach full height after 15 ms
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,9 @@ class Case:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a case ended: steps taken, largest load (N), variation of the load in the last tenth over
-    that in the middle, worst residual of a step, whether it left the road; `refused`, or what else is
-    to be said."""
+    """Result of a case: steps; largest load (N); `growth`: variation of the load in the last tenth
+    over that in the middle; worst residual of a step; whether it `left` the road; reason if
+    `refused`, or another remark (`said`)."""
 
     name: str
     steps: int
@@ -73,7 +73,7 @@ class Ended:
 
     @property
     def row(self) -> list:
-        """Package, case, what happened, how it was caught."""
+        """Package, case, result, how it was caught."""
         if self.refused:
             return ["contact", self.name, "refused", self.refused.removeprefix("contact: ")]
         if not np.isfinite(self.load):
@@ -86,17 +86,17 @@ class Ended:
 
 
 def wavy(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """5 mm of waves, 0.25 m long, grown over 0.3 m."""
+    """5 mm of waves, 0.25 m long, eased in over 0.3 m."""
     return 5e-3 * np.clip(x / 0.3, 0.0, 1.0) ** 3 * np.sin(25 * x + 10 * y)
 
 
 def outcomes() -> list[Ended]:
-    """All cases."""
+    """Results of all cases."""
     return [thrown_up(), *(outcome(case) for case in cases()), one_mode(), many_points()]
 
 
 def table(found: list[Ended]) -> Table:
-    """The figures of all cases."""
+    """Figures of all cases."""
     columns = [("case", ""), ("steps", "-"), ("largest load", "N"), ("variation of the load", "-"),
                ("worst residual", "-"), ("left the road", "-"), ("refused", "")]  # fmt: skip
     rows = [
@@ -112,9 +112,9 @@ def table(found: list[Ended]) -> Table:
 
 
 def thrown_up(steps: int = 1_000_000) -> Ended:
-    """Undamped, standing, thrown up by a blow of the road and left alone: the energy of each step.
+    """An undamped tire at rest, thrown up by a jump of the road: is its energy conserved?
 
-    Waves |z|^2/m, springs (residual and tread), the load's height f_s . g.
+    Energy: waves |z|^2/m, springs (residual and tread), potential of the load f_s . g.
     """
     strip, step = Strip(damping=0.0), 3e-4
     response = strip.response(PATCH.points, 6, 3, residual=5).resolved(step)
@@ -140,7 +140,7 @@ def thrown_up(steps: int = 1_000_000) -> Ended:
 
 
 def cases() -> Iterator[Case]:
-    """The stress list."""
+    """The list of cases."""
     waves = Drive(wavy, lambda t: 0.0, 20.0)
     for step in (1e-6, 1e-5, 1e-4, 1e-3):
         for scheme in ("linear", "constant"):

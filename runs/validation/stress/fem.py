@@ -1,4 +1,4 @@
-"""Static states at and beyond the limits: each converges, or stops with the reason and a last good state."""
+"""Static states at and beyond the limits: each converges, or stops with reason and last state."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.runs.measure.torus import thesis_torus
 
-BALANCED = 1e-9  # residual of a state in equilibrium, of the force scale
+BALANCED = 1e-9  # residual of an equilibrium, relative to the force scale
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """What is asked of a small torus: Pa, N, m, rad/s; `mesh` segments, elements along the arc, order;
-    `size` of the elements under the road.
+    """A static state of a small torus: Pa, N, m, rad/s.
+
+    `mesh`: segments, elements along the arc, order; `size`: relative element size at the road.
     """
 
     name: str
@@ -38,7 +39,7 @@ class Attempt:
 
 
 def attempts() -> Iterator[Attempt]:
-    """The list."""
+    """The list of cases."""
     small = (8, 6, 2)
     yield Attempt("deflection of 150 mm", 4.8e6, inflation=2e4, deflection=0.15, mesh=small)
     yield Attempt("inflation of 5 MPa, E = 1 MPa", 1e6, inflation=5e6, mesh=small)
@@ -56,8 +57,10 @@ def attempts() -> Iterator[Attempt]:
 
 @dataclass(frozen=True)
 class Ended:
-    """The state in the end, the solver's message where that is not the one asked for, and the residual with
-    which the equations are solved again from it, in `steps` of Newton: 0 where it is in balance.
+    """The final state, the solver's message if it is not the one asked for, and the check.
+
+    The equations are solved again from the state: `residual`, and Newton `steps`, 0 if in
+    equilibrium.
     """
 
     state: StaticState
@@ -67,12 +70,12 @@ class Ended:
 
     @property
     def balanced(self) -> bool:
-        """Whether the state in the end, be it the last good one, is one of equilibrium."""
+        """Whether the final state, possibly the last good one, is in equilibrium."""
         return self.steps == 0 and self.residual <= BALANCED
 
 
 def result(asked: Attempt) -> Ended:
-    """Load, and look at what is left."""
+    """Load the tire, and check the equilibrium of the final state."""
     segments, arc, order = asked.mesh
     section = thesis_torus(
         segments=segments, elements_arc=arc, order=order, footprint_size=asked.size
@@ -102,12 +105,12 @@ def result(asked: Attempt) -> Ended:
 
 
 def rows() -> list[list]:
-    """(package, case, what happened, how it was caught) of every attempt."""
+    """(package, case, result, how it was caught) for every attempt."""
     return [["fem", asked.name, *outcome(result(asked))] for asked in attempts()]
 
 
 def outcome(ended: Ended) -> tuple[str, str]:
-    """What happened, and how it was caught: for the table."""
+    """The result, and how it was caught, for the table."""
     state = ended.state
     moved = np.abs(state.displacement).max()
     if not np.isfinite(moved):

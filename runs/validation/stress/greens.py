@@ -25,7 +25,7 @@ DAMPING = {
 
 
 def rows() -> list[list]:
-    """(package, case, what happened, how it was caught)."""
+    """(package, case, result, how it was caught)."""
     found = [_damped(name, value) for name, value in DAMPING.items()]
     found += [_defective(split) for split in (0.0, 1e-13, 1e-10, 1e-6)]
     found += [_long(), _limits()]
@@ -33,7 +33,7 @@ def rows() -> list[list]:
 
 
 def _responses(damping: float) -> list[Response]:
-    """By the closed formula and by the second eigenproblem."""
+    """Responses by the closed form and by the quadratic eigenproblem."""
     projection = Projection(squares=SQUARES, momentum=np.ones((3, 3)))
     both = standing(projection, (damping, 0.0)), rotating(damping * np.eye(3), np.diag(SQUARES))
     return [couple(modes, SHAPE, SHAPE, np.ones((3, 3))) for modes in both]
@@ -66,7 +66,7 @@ def _followed(response: Response, force: np.ndarray, step: float, scheme: str) -
 
 
 def _exact(damping: float, force: np.ndarray, step: float, scheme: str) -> np.ndarray:
-    """Displacements (n, 3) after each step, the force's pieces as states of their own."""
+    """Displacements (n, 3) after each step, the force's course in the step as extra states."""
     wide = np.zeros((12, 12))
     wide[:3, 3:6], wide[3:6, :3], wide[3:6, 3:6] = (
         np.eye(3),
@@ -74,7 +74,7 @@ def _exact(damping: float, force: np.ndarray, step: float, scheme: str) -> np.nd
         -damping * np.eye(3),
     )
     wide[3:6, 6:9], wide[6:9, 9:] = SHAPE.T, np.eye(3)
-    # In units of the fastest rate the exponential does not lose what it is asked for.
+    # Scaled by the fastest rate, so that the exponential does not lose digits.
     scale = np.repeat([1.0, 2.6e4, 1.0, 1 / step], 3)
     moved = linalg.expm(wide * step * scale / scale[:, None])
     moved = moved * scale[:, None] / scale
@@ -87,7 +87,7 @@ def _exact(damping: float, force: np.ndarray, step: float, scheme: str) -> np.nd
 
 
 def _defective(split: float) -> list:
-    """Two coupled modes at a double root with one vector, or all but."""
+    """Two coupled modes at an exactly or nearly defective double root."""
     stiffness = np.array([[1e4, 50.0], [split * 50.0, 1e4]])
     drag, shape = 4.0 * np.eye(2), np.array([[1.0, 0.3], [0.2, 1.0]])
     modes: StateModes = rotating(drag, stiffness)
@@ -102,7 +102,7 @@ def _defective(split: float) -> list:
 
 
 def _long() -> list:
-    """Many steps undamped: each mode keeps its amplitude."""
+    """Many undamped steps: each mode must keep its amplitude."""
     tire = Recursion(response=_responses(0.0)[0], step=3e-4, scheme="linear", comm=MPI.COMM_SELF)
     tire.start(np.zeros(3))
     tire.predict()
@@ -123,7 +123,7 @@ def _long() -> list:
 
 
 def _limits() -> list:
-    """A state that turns 1e-12 or 1e4 radians a step, against its own limits."""
+    """A state that turns 1e-12 to 1e4 radians per step, against its closed form."""
     worst = 0.0
     for turn in (1e-12, 1e-8, 1e-4, 1e4):
         one = np.ones((1, 1))

@@ -1,4 +1,4 @@
-"""Modes of a small tire at the limits: double eigenvalues, past critical speed, damping, buckling."""
+"""Modes of a small tire at the limits: double roots, beyond critical speed, damping, buckling."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from tireroad.runs.measure.torus import thesis_torus
 
 COUNT = 120
 DAMPING = (0.0, 500.0, 5e3, 1e5)  # gamma1, 1/s
-SPEEDS = (0.0, 0.3, 0.999, 1.3)  # of the critical one
+SPEEDS = (0.0, 0.3, 0.999, 1.3)  # of the critical speed
 
 
 def rows() -> list[list]:
-    """(package, case, what happened, how it was caught)."""
+    """(package, case, result, how it was caught)."""
     section = thesis_torus(segments=8, elements_arc=4)
     body = Body(
         MPI.COMM_SELF,
@@ -49,7 +49,7 @@ def _modes(operators: Operators) -> Modes:
 
 
 def _double(operators: Operators) -> list:
-    """A round tire: every wave has a twin."""
+    """An axisymmetric tire: every wave has a twin."""
     modes = _modes(operators)
     gaps = np.diff(modes.frequency) / modes.frequency[:-1]
     pairs = np.count_nonzero(gaps < 1e-8)
@@ -61,7 +61,7 @@ def _double(operators: Operators) -> list:
 
 
 def _negative(body: Body) -> list:
-    """Outer pressure: the stiffness turns negative."""
+    """External pressure: the stiffness becomes indefinite."""
     case = "negative stiffness: 5 MPa from outside"
     try:
         _modes(Operators(body, -5e6))
@@ -71,7 +71,7 @@ def _negative(body: Body) -> list:
 
 
 def _damped(projection: Projection, gamma: float) -> list:
-    """All speeds up to past the critical one, both kinds of inertia; `checks` raises what fails."""
+    """Speeds up to beyond the critical one, both kinds of inertia; `checks` raises any failure."""
     case = f"gamma1 = {gamma:g} 1/s, speeds to 1.3 of critical"
     worst, states = 0.0, 0
     try:

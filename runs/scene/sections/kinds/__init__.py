@@ -1,1 +1,1 @@
-"""One file for each kind of section: its keys, its elements, its compounds and cords."""
+"""One module per kind of section: its keys, elements, compounds and cords."""

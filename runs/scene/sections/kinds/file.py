@@ -1,4 +1,4 @@
-"""`section = "file"`: a tire from an Abaqus deck, a Gmsh mesh or a section file (docs/how-to/own-tire.md)."""
+"""`section = "file"`: an Abaqus deck, a Gmsh mesh or a section file (docs/how-to/own-tire.md)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @section_kind("file", "a section read from a file")
 class FileSection(SectionKind):
-    """Elements along and through the section are the file's."""
+    """The section of a file, which also sets the elements along it and through the wall."""
 
     file: str | None = filename(
         "Abaqus deck (.inp), Gmsh mesh (.msh) or section file (.toml, docs/section-file.md)"
@@ -43,7 +43,7 @@ class FileSection(SectionKind):
 
     @property
     def name(self) -> Path:
-        """The file."""
+        """The path of the file."""
         return Path(self.file or self.mesh or "")
 
     def check(self, tire: Tire, source: Source) -> None:
@@ -67,7 +67,7 @@ class FileSection(SectionKind):
         return own_file.own_materials(tire)
 
     def rubber(self, tire: Tire) -> tuple[float, float, float]:
-        """Of the softest compound, in which the wall bends most."""
+        """Values of the softest compound, in which the wall bends most."""
         soft = min(self.rubbers(tire).values(), key=lambda one: one.dynamic * one.law.youngs)
         return soft.dynamic * soft.law.youngs, soft.law.poisson, soft.density
 
@@ -80,7 +80,7 @@ class FileSection(SectionKind):
         return {ply.name: float(np.degrees(ply.angle)) for ply in own} | given
 
     def coarser(self, tire: Tire) -> FileSection:
-        """The file's elements: there are no others."""
+        """The file's own elements: there are no others."""
         return self
 
     def has_losses(self, tire: Tire) -> bool:

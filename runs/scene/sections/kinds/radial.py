@@ -1,4 +1,4 @@
-"""`section = "radial"`: the built-in passenger tire by its size (docs/radial-tire.md)."""
+"""`section = "radial"`: the built-in passenger tire, defined by its size (docs/radial-tire.md)."""
 
 from __future__ import annotations
 
@@ -29,15 +29,16 @@ if TYPE_CHECKING:
     from tireroad.runs.scene.tables.tire import Cords as Line
     from tireroad.runs.scene.tables.tire import Region, Tire
 
-# (elements around, along) that a search may take.
+# (elements around, along) available to a search.
 FINER = ((16, 14), (20, 18), (24, 22), (30, 26), (36, 32), (44, 38), (52, 46), (64, 56))
 
 
 @section_kind("radial", "the built-in radial passenger tire (docs/radial-tire.md)")
 class RadialSection(SectionKind):
-    """Layers by the size; compounds and cords too, unless [[tire.region]] or [[tire.cords]] name one."""
+    """Layers follow from the size; compounds and cords too, unless the scene changes them."""
 
-    # Fewer have the modes from 150 Hz on too low (docs/verification.md, Frequencies of the default mesh).
+    # With fewer, modes from 150 Hz up are too low (docs/verification.md, Frequencies of the default
+    # mesh).
     segments = 40
 
     size: str = text("205/60 R15", "size of the built-in passenger tire (docs/radial-tire.md)")
@@ -79,7 +80,7 @@ class RadialSection(SectionKind):
         }
 
     def rubber(self, tire: Tire) -> tuple[float, float, float]:
-        """Of the softest compound, in which the wall bends most."""
+        """Values of the softest compound, in which the wall bends most."""
         compounds = built(self.size).compounds.values()
         soft = min(compounds, key=lambda one: one["youngs_modulus"])
         return soft["dynamic"] * soft["youngs_modulus"], soft["poisson_ratio"], soft["density"]
@@ -111,12 +112,12 @@ class RadialSection(SectionKind):
         return replace(self, elements_arc=self.elements_arc // 2)
 
     def has_losses(self, tire: Tire) -> bool:
-        """All compounds of the built-in tire have one."""
+        """All compounds of the built-in tire have a loss factor."""
         return True
 
 
 def _known(table: str, given: Sequence[Region | Line], names: list[str], source: Source) -> None:
-    """Note what names no part of the tire, names it twice, or gives a part a place that it has already."""
+    """Note unknown or repeated names of parts, and keys for what follows from the tire's size."""
     default = type(given[0])() if given else None
     known = {name.upper() for name in names}
     for number, one in enumerate(given):
@@ -132,7 +133,7 @@ def _known(table: str, given: Sequence[Region | Line], names: list[str], source:
 
 
 def _compound(region: Region | None, values: dict[str, float]) -> Material:
-    """A built-in compound, with what a [[tire.region]] of its name changes."""
+    """A built-in compound, modified by the [[tire.region]] of its name."""
     from tireroad.fem.tire.material import Material, compound
 
     values |= losses_of(region)
@@ -148,7 +149,7 @@ def _compound(region: Region | None, values: dict[str, float]) -> Material:
 
 @lru_cache(maxsize=4)
 def built(size: str) -> Construction:
-    """What a tire of that size is built of."""
+    """The construction of a tire of that size."""
     from tireroad.fem.sections.radial import radial
 
     return radial(size)

@@ -1,4 +1,4 @@
-"""`section = "torus"`: a wall between two circles, of regions told by arc, side and depth."""
+"""`section = "torus"`: a wall between two circles; regions are given by arc, side and depth."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.tables.tire import Region, Tire
 
-# (segments, elements along the arc) where the scene does not say; by order. Largest error of the 28 lowest
-# frequencies of the torus without loads, E = 480 MPa, against Fourier series around (bench.series.harmonics):
-# 28 x 16 of order 3, 47,376 unknowns, 0.06 %, 0.23 % as graded for a road (30 x 14: 0.42 %); 100 x 16 of order 2,
-# 55,800: 1.4 to 1.75 %, as much processor time as 24 x 14 of order 3.
+# Default (segments, elements along the arc) by order. Largest error of the 28 lowest frequencies of
+# the unloaded torus, E = 480 MPa, against Fourier series around (bench.series.harmonics): 28 x 16
+# of order 3, 47,376 unknowns, 0.06 %, 0.23 % when graded for a road (30 x 14: 0.42 %); 100 x 16 of
+# order 2, 55,800 unknowns, 1.4 to 1.75 %, at the same CPU time as 24 x 14 of order 3.
 MESHES = {1: (160, 32), 2: (100, 16), 3: (28, 16)}
 
-# (elements around, along) that a search may take, of the order that is the cheapest for its error.
+# (elements around, along) available to a search, for the order with the lowest cost per error.
 FINER = (
     (16, 8),
     (20, 10),
@@ -46,7 +46,7 @@ ORDER = 3
 
 @section_kind("torus", "a wall between two circles about the section's centre: the thesis's tire")
 class TorusSection(SectionKind):
-    """Order 3 unless the scene says how many elements there are: finer ones of order 2 are asked for so."""
+    """Order 3 by default, but 2 for a given number of elements, which are then usually finer."""
 
     air = False
     tread_law = "half-space"
@@ -101,7 +101,7 @@ class TorusSection(SectionKind):
             self._check_cords(tire, which, source)
 
     def _check_circles(self, source: Source) -> None:
-        """That the wall fits its circle, the circle its radius, and the beads lie outside the axle."""
+        """Check that wall, section circle and outer radius fit, and the beads clear the axle."""
         wall, minor, outer = self.thickness, self.minor_radius, self.outer_radius
         bead = outer - minor + minor * math.cos(math.radians(self.half_angle))
         problems = (
@@ -125,7 +125,7 @@ class TorusSection(SectionKind):
         _note(("tire",), problems, source)
 
     def _check_cords(self, tire: Tire, which: int, source: Source) -> None:
-        """That a line of cords has a place in the wall and a name of its own."""
+        """Check that a line of cords lies within the wall and has a unique name."""
         cords, place = tire.cords[which], ("tire", "cords", str(which))
         low, high = cords.arc
         taken = [other.name for other in tire.cords[:which]]
@@ -213,7 +213,7 @@ class TorusSection(SectionKind):
 def _note(
     place: tuple[str, ...], problems: Iterable[tuple[str, bool, str]], source: Source
 ) -> None:
-    """Note the first of the problems (key, whether there is one, text): others may follow from it."""
+    """Note the first of the problems (key, whether it exists, text); others may be consequences."""
     for key, wrong, text in problems:
         if wrong:
             source.add((*place, key), text)
@@ -221,7 +221,7 @@ def _note(
 
 
 def patch(which: int, region: Region) -> Patch:
-    """The part of the section that a [[tire.region]] is."""
+    """The part of the section described by a [[tire.region]]."""
     low, high = np.radians(region.arc)
     sides = {"left": ((-high, -low),), "right": ((low, high),)}
     arcs = sides.get(region.side, sides["left"] + sides["right"])
@@ -229,7 +229,7 @@ def patch(which: int, region: Region) -> Patch:
 
 
 def rubber(part: Tire | Region) -> Material:
-    """The compound of the wall or of a part of it."""
+    """The compound of the wall or of one of its regions."""
     from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.tables.tire import Material as Table
 

@@ -1,1 +1,1 @@
-"""The time loop of a scene: how it is driven, in which steps, and when it stops."""
+"""The time loop of a scene: its excitation, time steps, and stopping."""

@@ -1,4 +1,4 @@
-"""A scene's time loop: the tire as it is driven, the normal solver, the brush."""
+"""A scene's time loop: the driven tire, the normal solver, the brush."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tireroad.runs.stages.build.point_forces import directions, histories
 
 
 def driven_tire(job: Job, tire, step: float, steps: int) -> Driven | None:
-    """The tire under the scene's prescribed forces, and with a wheel whose motions or moments are read, where there is either."""
+    """The tire under prescribed forces and with wheel readings; None if the scene has neither."""
     forces = job.scene.force
     if not forces and not corner.readings(job):
         return None
@@ -34,7 +34,7 @@ def driven_tire(job: Job, tire, step: float, steps: int) -> Driven | None:
 
 
 def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
-    """The tire as seen at the patch's points, normal solver and friction of the table [contact]."""
+    """The loop of tire, normal solver and friction, from the table [contact]."""
     patch = setup.patch
     p = len(patch.index)
     memory = tread_memory(spec, patch, setup.rolled.speed, step)
@@ -49,7 +49,7 @@ def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
 
 
 def bristles(spec, patch: Patch):
-    """Stiffness (N/m) of each point's bristle, or (c,) of them; inf where none give way, None without horizontal forces."""
+    """Bristle stiffness (N/m) per point, or (c,); inf if rigid, None without horizontal forces."""
     if not spec.rubs:
         return None
     if spec.brush_stiffness_per_area is not None:
@@ -60,8 +60,9 @@ def bristles(spec, patch: Patch):
 def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> Friction:
     """The brush of the scene, at rest.
 
-    What pressure does to the tread sideways counts from the static state on, as all motion does; where the slip of the
-    static shape counts (free rolling), that of its tread does too, but of one that creeps.
+    Shear of the tread by pressure counts from the static state, like all motion. If the slip of the
+    static shape counts (free rolling), the shear of its tread does too, except for a tread that
+    creeps.
     """
     patch, stiffness = setup.patch, bristles(spec, setup.patch)
     shear, pressed, moved = tread_shear(spec, patch, at_once), None, None
@@ -77,8 +78,11 @@ def _friction(spec, setup: ContactSetup, tire, step: float, at_once: float) -> F
 def freely_rolling(
     job: Job, setup: ContactSetup, response: Response, step: float, scheme: str
 ) -> tuple[ContactSetup, float]:
-    """The setup (settled) with the slip at which the tire rolls freely over a smooth road, and that slip: by the loop
-    itself, until the patch has passed six times. ConvergenceError where there is none. Collective."""
+    """The setup (settled) with the slip of free rolling on a smooth road, and that slip.
+
+    Found with the time loop itself, over six passages of the patch. Raises ConvergenceError if
+    there is none. Collective.
+    """
     x0, x1, _, _ = setup.patch.extent
     steps = max(int(np.ceil(6 * (x1 - x0) / setup.rolled.speed / step)), 20)
     smooth, load = setup.smooth(steps * step), float(setup.patch.force.sum())
@@ -92,7 +96,10 @@ def freely_rolling(
 
 
 class Forces(NamedTuple):
-    """Of the road on the tire, `contact`, and on the axle, `axle`, (n, 3) N after each of n steps of `step` s."""
+    """Forces (n, 3) N of the road on the tire (`contact`) and of the tire on the axle (`axle`).
+
+    After each of n steps of `step` s.
+    """
 
     contact: np.ndarray
     axle: np.ndarray
@@ -108,10 +115,10 @@ def forces(
     scheme: str,
     contact=None,
 ) -> Forces:
-    """The loop of the job's scene by another response, step or setup (settled), kept in memory. Collective.
+    """Run the loop of the job's scene with another response, step or setup (settled), in memory.
 
-    `scheme` "linear" or "constant"; `contact`, in place of the scene's table. ConvergenceError where the road touches
-    beyond the patch.
+    `scheme` "linear" or "constant"; `contact` replaces the scene's table. Raises ConvergenceError
+    if the road touches outside the patch. Collective.
     """
     kept = response.resolved(step)
     comm = sharers(kept, job.comm)

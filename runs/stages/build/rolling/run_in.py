@@ -1,4 +1,4 @@
-"""What of a run is left out of its figures: the run-in, while the road grows from flat."""
+"""The run-in, while the road grows from flat: it is left out of a run's figures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tireroad.runs.scene.tables.road import Road
 
 
 def run_in(setup: ContactSetup, road: Road) -> float:
-    """Time (s) until the whole patch is beyond the run-in; 0 where nothing grows."""
+    """Time (s) until the whole patch is past the run-in; 0 if there is none."""
     speed = setup.rolled.speed
     if speed == 0 or road.kind == "flat":
         return 0.0
@@ -18,6 +18,6 @@ def run_in(setup: ContactSetup, road: Road) -> float:
 
 
 def first_step(setup: ContactSetup, road: Road, time: np.ndarray) -> int:
-    """Number of the first step beyond the run-in; 0 when that takes half the run or more."""
+    """Index of the first step past the run-in; 0 if that is half the run or more."""
     start = int(np.searchsorted(time, run_in(setup, road)))
     return start if start < len(time) // 2 else 0

@@ -1,4 +1,4 @@
-"""The force's course within a step: as the scene says, or by what the contact's oscillation asks for."""
+"""The integration scheme: as the scene says, or as the contact's oscillation requires."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from tireroad.runs.stages.build.rolling.stepping import Planned
 def chosen_scheme(
     job: Job, record: Record, setup: ContactSetup, plan: Planned, begun: Chosen | None
 ) -> Chosen:
-    """What to take, and why; shown, and kept in the record.
+    """The scheme and the reason for it; both are reported.
 
-    `begun`: what was chosen for the checkpoint from which the loop goes on, or None.
+    `begun`: the choice stored in the checkpoint that the loop continues from, or None.
     """
     wanted = job.scene.time.scheme
     spec, patch = job.scene.contact, setup.patch
@@ -30,7 +30,7 @@ def chosen_scheme(
 
 
 def reported(record: Record, chosen: Chosen) -> Chosen:
-    """The choice, shown and kept in the record."""
+    """Report the choice in the terminal and the record; returns it."""
     observe.say(f"  scheme {chosen.scheme}: {chosen.reason}")
     record.indicators["reason for the scheme"] = (chosen.reason, "-")
     return chosen

@@ -1,4 +1,4 @@
-"""The steps of a run: given by the scene, or found from what has to be resolved."""
+"""The time steps of a run: given by the scene, or derived from what must be resolved."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from tireroad.runs.scene.tables.scene import Road
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 
-# Radians a kept mode may turn in one automatic step: 0.3 leaves less than a percent in its phase.
+# Radians that a kept mode may turn per automatic step: at 0.3 its phase error is below 1 %.
 _TURN = 0.3
 _LEAST_STEPS = 200
-_PER_PERIOD = 16  # steps in the shortest period of the excitation
+_PER_PERIOD = 16  # steps per shortest period of the excitation
 
 
 def run_time(time: Time) -> float:
-    """How long the run is, s: whole steps, so a little longer than a duration that is no multiple."""
+    """Duration of the run, s: whole steps, so slightly longer than one that is not a multiple."""
     if isinstance(time.step, str):
         return time.duration
     return steps_of(time.duration, time.step).duration
@@ -41,7 +41,7 @@ class Planned:
 
 @dataclass(frozen=True)
 class Integration:
-    """The `tire` in time, taken over `steps` steps of `step` s by a `scheme`."""
+    """The time integrator `tire`, for `steps` steps of `step` s with a `scheme`."""
 
     tire: Recursion | Convolution
     step: float
@@ -50,9 +50,9 @@ class Integration:
 
 
 def planned(job: Job, record: Record, response: Response, shortest: float) -> Planned:
-    """The steps of the scene's time table; what was chosen is shown. Collective.
+    """The steps from the scene's table [time]; the choice is reported. Collective.
 
-    `shortest` (s): the shortest period in the excitation.
+    `shortest` (s): shortest period of the excitation.
     """
     wanted = job.scene.time
     fastest = np.abs(response.every).max(initial=0.0)
@@ -78,7 +78,7 @@ def planned(job: Job, record: Record, response: Response, shortest: float) -> Pl
 
 
 def integration(job: Job, plan: Planned, scheme: str) -> Integration:
-    """The tire at t = 0, to be taken over the planned steps. Collective."""
+    """The integrator at t = 0 for the planned steps. Collective."""
     tire: Recursion | Convolution
     if scheme == "convolution":
         tire = Convolution(response=plan.response, step=plan.step, steps=plan.steps)
@@ -93,8 +93,10 @@ def integration(job: Job, plan: Planned, scheme: str) -> Integration:
 
 
 def passing_period(road: Road, spacing: float, speed: float) -> float:
-    """Shortest period (s) of the road as the tire meets it at `speed` (m/s): the shortest wave that its
-    `spacing` (m) resolves, the sine of its motion, or the acceleration of its ramp (one wave long).
+    """Shortest period (s) of the road's excitation at `speed` (m/s).
+
+    Of the shortest wave that its `spacing` (m) resolves, the sine of its motion, or the
+    acceleration of its ramp (one wave long).
     """
     motion = road.motion
     periods = [2 * spacing / speed if speed else np.inf]

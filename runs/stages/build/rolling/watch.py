@@ -1,4 +1,4 @@
-"""When a time loop stops, and when it keeps what it has."""
+"""Decides when a time loop stops and when it writes a checkpoint."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ _TOGETHER = 8  # steps between two agreements of several processes on whether to
 
 
 class Watch:
-    """Whether to stop, and whether a checkpoint is due: the same answer on every process.
+    """Whether to stop, and whether a checkpoint is due; the same answer on every process.
 
-    `every` (s, wall clock) between two checkpoints.
+    `every` (s, wall-clock time): interval between checkpoints.
     """
 
     def __init__(self, comm: MPI.Comm, every: float) -> None:
@@ -21,7 +21,7 @@ class Watch:
         self._count = 0
 
     def __call__(self, asked: str) -> tuple[str, bool]:
-        """Collective every few steps."""
+        """Stop signal ("" if none), and whether a checkpoint is due. Collective at some steps."""
         self._count += 1
         if self._comm.size > 1 and self._count % _TOGETHER:
             return "", False
