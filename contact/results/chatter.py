@@ -30,9 +30,9 @@ from tireroad.greens.response import Response
 
 Stiffness = float | np.ndarray
 
-# Steps in the fastest oscillation from which on forces are taken as linear: with fewer, undamped
-# modes gained energy between impacts (measured from 2.9 down: contact force a hundred times too
-# large).
+# Steps in the fastest oscillation from which forces are taken as linear at first. Undamped modes
+# gained energy between impacts at 2.9 steps and fewer (contact force a hundred times too large);
+# where the choice is wrong, LIMIT and the bound on growth find out in the loop.
 FEWEST = 2.5
 # Points for which the oscillation is computed, half as many for horizontal forces: a second of
 # eigenvalues.

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from tireroad.fem.errors import ConvergenceError
 
 Array = NDArray[np.float64]
-_LARGEST = 0.2
-_FIRST = 1e-3
+_SLIPS = (1e-3, 4e-3, 0.016, 0.064, 0.2)  # tried in turn for a bracket
 _TRIALS = 30
 TOLERANCE = 1e-4  # of the load
 
@@ -41,8 +40,8 @@ def shape_slip(positions: Array, ring: Array, shape: tuple[int, int], radius: fl
 def free_slip(drag: Callable[[float], float], load: float) -> float:
     """The slip at which `drag(slip)` (N, forward) vanishes, within 1e-4 of the `load` (N).
 
-    Regula falsi (Illinois) in a bracket sought outwards from 0: 1e-3, then four times as far while
-    that is at most 0.2. ConvergenceError if there is none.
+    Regula falsi (Illinois) in a bracket sought outwards from 0: 1e-3, then four times as far up to
+    0.2. ConvergenceError if there is none.
     """
     small = TOLERANCE * load
     low, at_low = 0.0, drag(0.0)
@@ -67,14 +66,13 @@ def free_slip(drag: Callable[[float], float], load: float) -> float:
 
 def _bracket(drag: Callable[[float], float], at_rest: float) -> tuple[float, float]:
     """A slip with drag of the other sign, and that drag: force increases with slip."""
-    slip = -np.sign(at_rest) * _FIRST
-    while abs(slip) <= _LARGEST:
+    for size in _SLIPS:
+        slip = -np.sign(at_rest) * size
         found = drag(slip)
         if found * at_rest <= 0:
             return slip, found
-        slip *= 4.0
     raise ConvergenceError(
         f"contact: no free rolling: the road pulls the tire by {at_rest:.4g} N without slip, and by {found:.4g} N at a "
-        f"slip of {slip / 4:.3g}: no slip up to {100 * _LARGEST:g} % cancels this force. Raise "
+        f"slip of {slip:.3g}: no slip up to {100 * _SLIPS[-1]:g} % cancels this force. Raise "
         "contact.friction, or leave out rotation.free_rolling"
     )

@@ -42,7 +42,7 @@ def run() -> list[Table]:
         for speed, count in RUNS:
             runs.append(_figures(Path(folder), speed, count))
             observe.say(f"  {speed:g} rad/s, {count} process(es): {runs[-1][0]:.1f} s")
-    names = ["all", *PARTS, "unknowns", "factorisations", "memory, a process", "error of the load"]
+    names = ["all", *PARTS, "unknowns", "Newton steps", "memory, a process", "error of the load"]
     units = [*["s"] * (1 + len(PARTS)), "-", "-", "GB", "%"]
     columns = [(f"{speed:g} rad/s, {count} process(es)", "-") for speed, count in RUNS]
     by_part = zip(names, units, zip(*runs, strict=True), strict=True)

@@ -96,6 +96,8 @@ class Cache:
 
     def described(self) -> str:
         """A table of the stages kept, most recently used first, and their total size."""
+        if self.folder is None:
+            return "no stages are kept: TIREROAD_CACHE is off, or the folder cannot be written"
         kept = self.entries()[::-1]
         lines = [f"{'stage':10s}{'scene':26s}{'MB':>9s}  last used"]
         for one in kept:

@@ -42,10 +42,6 @@ from tireroad.runs.stages.stored.contact_file import (
     forget_checkpoint,
 )
 
-LINEAR = (
-    1 / 3
-)  # of the static deflection: motion of the contact up to which a linear tire is trusted
-
 
 @dataclass(frozen=True, kw_only=True)
 class ContactStage(Stage[ContactHistory]):

@@ -35,10 +35,10 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.walk import walk
 
 PLANS = ("grid", "list", "latin-hypercube")
 MOST = 10_000
-FILES = ("road.file", "tire.file")  # keys of file names, relative to the sweep file
 _KEYS = {
     "name",
     "scene",
@@ -239,7 +239,8 @@ def _short(value: Any) -> str:
 
 def _absolute(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Make file names absolute, relative to the sweep file's folder."""
+    files = {name for name, *_, key in walk(Scene) if key.is_file}
     return {
-        key: str((folder / value).resolve()) if key in FILES and isinstance(value, str) else value
+        key: str((folder / value).resolve()) if key in files and isinstance(value, str) else value
         for key, value in settings.items()
     }

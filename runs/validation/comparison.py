@@ -106,10 +106,10 @@ class Comparison:
         reached = "yes" if within and gain >= asked else "no"
         named = f"{best.choice.modes} {best.choice.residual}, {ours.step:g} s"
         full = f"{theirs.step:g} s, {percent(reference.error):g} %"
-        before = modes_seconds + ours.setup - theirs.setup
+        before, saved = modes_seconds + ours.setup - theirs.setup, theirs.seconds - ours.seconds
         # Simulated time after which the modes have paid off, too.
-        pays = self._duration * before / (theirs.seconds - ours.seconds)
-        figures = [percent(best.error), full, digits(gain), digits(max(pays, 0.0))]
+        pays = digits(max(self._duration * before / saved, 0.0)) if saved > 0 else "never"
+        figures = [percent(best.error), full, digits(gain), pays]
         return [case, 100 * error, asked, named, *figures, reached]
 
     @property

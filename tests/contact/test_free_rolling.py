@@ -10,7 +10,7 @@ from tireroad.fem.errors import ConvergenceError
 LOAD = 1000.0
 
 
-@pytest.mark.parametrize("root", [0.0, 2e-4, -3e-3, 0.05])
+@pytest.mark.parametrize("root", [0.0, 2e-4, -3e-3, 0.05, 0.15])
 def test_the_root_of_a_saturating_force(root) -> None:
     asked = []
 

@@ -72,7 +72,7 @@ class CrgFile(Measured):
     """Heights along the reference line of an OpenCRG file."""
 
     what = "the OpenCRG road (crg)"
-    file: str | None = filename("measured road in OpenCRG 1.1, text or binary")
+    file: str | None = filename("measured road in OpenCRG (versions up to 1.2), text or binary")
 
     def make(self) -> Grid:
         """The road in the file; InputError if it cannot be used."""

@@ -14,9 +14,8 @@ from tireroad.runs.stages.build.rolling.stepping import Integration
 # Fewest point spacings per footprint width. Measured on cobblestones: deviation 23 % too large at
 # 1.8, 5 % too small at 2.5, 3 % at 3.6.
 FEW = 2.2
-LINEAR = (
-    1 / 3
-)  # of the static deflection: motion of the contact up to which a linear tire is trusted
+# Share of the static deflection: motion of the contact up to which a linear tire is trusted.
+LINEAR = 1 / 3
 
 
 def describe(record: Record, counted: Totals, solver, chosen: Integration, taken: int) -> None:

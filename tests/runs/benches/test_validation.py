@@ -54,6 +54,9 @@ def test_the_fastest_run_within_an_error_is_held_against_full_elements_within_it
     assert pays == pytest.approx(0.1 * 30.0 / (10.0 - 0.05), rel=1e-2)
     assert its == pytest.approx(0.8, rel=0.03)
     assert found.verdict("road", 0.01, 300.0, 30.0)[-1] == "no"
+    slow = Comparison(full, ("contact force",))
+    slow.add(Choice(50, "static", 1e-4), made(1e-4, 1.008, 10.0))
+    assert slow.verdict("road", 0.01, 1.0, 30.0)[-2] == "never"
     *_, gain, _, reached = found.verdict("road", 1e-4, 30.0, 30.0)
     assert (gain, reached) == (200.0, "no")
     table = found.table("title")

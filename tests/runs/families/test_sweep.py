@@ -12,7 +12,7 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.folder import held
 from tireroad.runs.sweep.command import sweep as run_sweep
-from tireroad.runs.sweep.definition import read
+from tireroad.runs.sweep.definition import _absolute, read
 
 pytestmark = pytest.mark.slow
 
@@ -54,6 +54,13 @@ def test_a_grid_is_every_combination(folder: Path) -> None:
     assert names[0] == "1_load-100_count-4" and len(set(names)) == 6
     scene = sweep.load(sweep.members[-1])
     assert (scene.static.load, scene.modal.count, scene.name) == (200.0, 6, names[-1])
+
+
+def test_file_names_are_relative_to_the_sweep_file(tmp_path: Path) -> None:
+    keys = "road.file", "tire.file", "tire.mesh", "pattern.file"
+    given = {key: "a.npz" for key in keys} | {"static.load": 300.0, "road.kind": "crg"}
+    found = _absolute(given, tmp_path)
+    assert found == given | {key: str(tmp_path / "a.npz") for key in keys}
 
 
 def test_a_range_with_a_count(folder: Path) -> None:

@@ -129,3 +129,4 @@ def test_a_cache_that_cannot_be_written_is_none(home: Path) -> None:
 def test_off_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TIREROAD_CACHE", "off")
     assert Cache.of_user().folder is None and Cache.of_user().entries() == []
+    assert "TIREROAD_CACHE is off" in Cache.of_user().described()
