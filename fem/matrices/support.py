@@ -1,16 +1,18 @@
 """Support of the tire in small motions: rim fixed or free, road absent or holding its nodes.
 
-A free rim is a massless rigid body without support. On its nodes
+A free rim is an unsupported rigid body without mass of its own. On its nodes
 
     u_i = a + theta x x_i,   six unknowns R eta with R^T M R = 1,
 
 so that the diagonal mass stays diagonal. The static state is that of the clamped rim. The wheel
 still carries the rim's static forces r, which rotate with it, and a constant force at the axle's
-centre. Rotating forces do second-order work, which adds to K on the rotations W_ab = sum_i (r_a x_b
-+ r_b x_a) / 2 - delta_ab r . x. A free tire without a road then has its six rigid modes at any
-inflation (a uniform pressure on the two equal bead circles of a rigid rim has no resultant), and K
-is symmetric. Mass-proportional damping then acts against the ground, as there is no wheel on an
-axle.
+centre. The second-order work of rotating forces adds to K, on the rotations,
+
+    W_ab = sum_i (r_a x_b + r_b x_a) / 2 - delta_ab r . x.
+
+A free tire without a road then has its six rigid modes at any inflation (a uniform pressure on the
+two equal bead circles of a rigid rim has no resultant), and K is symmetric. Mass-proportional
+damping then acts against the ground, as there is no wheel on an axle.
 """
 
 from __future__ import annotations
