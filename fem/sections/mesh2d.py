@@ -19,12 +19,12 @@ class SectionMesh:
     Every source of a section (torus, built-in tire, section file, deck) produces this mesh, from
     which alone the ring of hexahedra is made. With p = `order` of the elements, 1 to 3:
 
-    nodes (n, 2): r, y of all nodes; each is used, no two coincide. cells (c, (p + 1)^2): nodes of
-    each cell in tensor order, local (i, j) at i * (p + 1) + j, where
+    nodes (n, 2): r, y of all nodes; each is used, no two coincide.
+    cells (c, (p + 1)^2): nodes of each cell in tensor order, local (i, j) at i * (p + 1) + j, where
         xi = i / p and eta = j / p: equispaced on the reference square. d(r, y)/d(xi, eta) has a
         positive determinant; cells share whole edges or nothing.
-    region (c,): index into `regions`, names of the compounds. Sets of edges, (k, 2) of (cell,
-    side), side 0: xi = 0, 1: xi = 1, 2: eta = 0, 3: eta = 1:
+    region (c,): index into `regions`, names of the compounds.
+    Sets of edges, (k, 2) of (cell, side), side 0: xi = 0, 1: xi = 1, 2: eta = 0, 3: eta = 1:
       outer: the face away from the air, an ordered chain from the rim at the lower y to the rim at
           the higher y, each edge starting where the last one ended;
       tread: the part of `outer` that can touch the road (any order);
