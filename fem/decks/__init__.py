@@ -1,1 +1,3 @@
-"""Meshes from files: Abaqus decks and Gmsh meshes, read as data and made into sections. No dolfinx here."""
+"""Meshes from files: Abaqus decks and Gmsh meshes, read as data and made into sections. Without
+dolfinx.
+"""
