@@ -41,8 +41,7 @@ def _cpu() -> str:
 
 
 def _quietly(function: Callable) -> Callable:
-    """Wrap a compiling function: no log of compiler commands, no warnings of FFCx's unclosed lock
-    files."""
+    """Wrap a compiling function: no compiler log, no warnings of FFCx's unclosed lock files."""
 
     @functools.wraps(function)
     def quiet(*arguments: Any) -> Any:
@@ -101,8 +100,7 @@ def _nodes(degree: int, variant: basix.LagrangeVariant) -> np.ndarray:
 
 @_quietly
 def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, degree: int) -> dmesh.Mesh:
-    """Distributed mesh of curved hexahedra from each process's share of cells and points.
-    Collective."""
+    """Distributed mesh of curved hexahedra from each process's cells and points. Collective."""
     if HAS_BASIX_UFL:
         element = basix.ufl.element("Lagrange", "hexahedron", degree, shape=(3,))
         names = inspect.signature(dmesh.create_mesh).parameters
@@ -163,8 +161,7 @@ def evaluate(
 
 
 def cell_facets(mesh: dmesh.Mesh) -> np.ndarray:
-    """Facets (cells, 6) of this process's hexahedra, ghosts included, in the reference element's
-    order."""
+    """Facets (cells, 6) of own hexahedra, ghosts included, in the reference element's order."""
     mesh.topology.create_connectivity(3, 2)
     mesh.topology.create_connectivity(2, 3)  # newer releases do not create it when locating dofs
     return mesh.topology.connectivity(3, 2).array.reshape(-1, 6)

@@ -1,6 +1,4 @@
-"""Exceptions that end a run without a result. This module imports nothing, so all packages may use
-it.
-"""
+"""Exceptions that end a run without a result. Imports nothing, so all packages may use it."""
 
 
 class InputError(ValueError):
@@ -8,8 +6,7 @@ class InputError(ValueError):
 
 
 class ConvergenceError(RuntimeError):
-    """A solver failed; the message says what, where and what to try. The program ends with status
-    3."""
+    """A solver failed; the message says what, where and what to try. Exit status 3."""
 
 
 class LoadingStopped(ConvergenceError):

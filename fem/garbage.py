@@ -22,8 +22,7 @@ _kept: list[tuple[MPI.Comm, weakref.ref, PETSc.Vec]] = []
 
 
 def watch(comm: MPI.Comm, owner: object, mesh: Any) -> None:
-    """Let `collect(comm)` clean up the mesh's communicator until after `owner` is gone. Collective
-    on comm."""
+    """Let `collect(comm)` clean up the mesh's communicator until `owner` is gone. Collective."""
     keeper = PETSc.Vec().createMPI((0, PETSc.DETERMINE), comm=mesh.comm)
     _kept.append((comm, weakref.ref(owner), keeper))
 

@@ -13,8 +13,7 @@ OnlyFor = tuple[str, tuple[str, ...]] | None
 
 @dataclass(frozen=True)
 class Limits:
-    """A closed range; None: no limit. The lower limit of a size is the smallest sensible value, not
-    0."""
+    """A closed range; None: no limit. The lower limit of a size is the least sensible value."""
 
     least: float | None = None
     most: float | None = None
@@ -86,8 +85,7 @@ def described(value: Any) -> str:
 
 
 def finite(value: Any) -> float:
-    """A finite real number as a float (int is accepted, bool is not); raises ValueError
-    otherwise."""
+    """A finite real number as a float (int is accepted, not bool); else raises ValueError."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"must be a number, not {described(value)}")
     try:

@@ -1,5 +1,4 @@
-"""Finite-element model of a tire: unloaded, and the matrices of its small motions about a static
-state.
+"""Finite-element model of a tire: unloaded, and its small motions about a static state.
 
 Both are defined by small arrays. Expensive parts are built on first use, so a run that reads all
 later results from files builds no mesh.

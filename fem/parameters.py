@@ -14,8 +14,7 @@ from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite, keys
 
 
 class ParameterError(InputError):
-    """A parameter of a wrong type or out of range: `parameter` is its name, `reason` what is
-    wrong."""
+    """A parameter of wrong type or out of range: `parameter` is its name, `reason` the fault."""
 
     def __init__(self, parameter: str, reason: str, owner: str = "") -> None:
         super().__init__(f"{owner}: {parameter} {reason}" if owner else f"{parameter} {reason}")

@@ -1,6 +1,4 @@
-"""Named variants of a model: a new one is a decorated class in a file of its own or in a user's
-script.
-"""
+"""Named variants of a model: a new one is a decorated class in its own file or a user's script."""
 
 import importlib
 import pkgutil

@@ -38,8 +38,7 @@ class Column:
         return summed(self.comm, self.pushed.T @ vectors)
 
     def mended(self, answers: np.ndarray, s: complex = 0.0) -> np.ndarray:
-        """Responses (r, k) with air, from those without (r + 1 + a, k + 1 + a), rows and columns of
-        e last."""
+        """Responses (r, k) with air, from those without (r + 1 + a, k + 1 + a), those of e last."""
         q = self.pushed.shape[1]
         weight = self.duct.dynamic_stiffness(s, self.speed)
         core = np.eye(q) + answers[-q:, -q:] @ weight
@@ -59,8 +58,7 @@ class Column:
         return x - v @ (weight @ np.linalg.solve(core, self.coupling(x)))
 
     def following(self, shapes: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """The air's coordinates g (a, p) under permanent static shapes, own rows (n, p).
-        Collective."""
+        """The air's coordinates g (a, p) under constant shapes, own rows (n, p). Collective."""
         _, stiffness = self.duct.pencil(self.speed)
         stiffness = stiffness.T if transposed else stiffness
         driven = self.duct.circular[:, None] * self.coupling(shapes)[1:]

@@ -111,8 +111,7 @@ class Duct:
         return self.density * self.pressure @ flux
 
     def pencil(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
-        """The air's damping (1/s) and stiffness (1/s2) matrices (a, a) at `speed` rad/s, for unit
-        mass."""
+        """The air's damping (1/s) and stiffness (1/s2) (a, a) at `speed` rad/s, for unit mass."""
         drag = np.diag(self.loss) + 2 * speed * self.gyroscopic
         turning = speed * self.loss[:, None] * self.gyroscopic
         return drag, np.diag(self.circular**2) + speed**2 * self.convective + turning
@@ -133,8 +132,7 @@ class Duct:
         return linalg.block_diag(drag, own_drag), whole
 
     def dynamic_stiffness(self, s: complex, speed: float) -> np.ndarray:
-        """W(s) (1 + a, 1 + a): the air adds e^T W e to the tire's dynamic stiffness for motions
-        e^(st).
+        """W(s) (1 + a, 1 + a): the air adds e^T W e to the tire's dynamic stiffness at e^(st).
 
         At s = 0 and standing only the trapped air remains, 1 in the first place; if the wheel
         rotates, terms of the flow's Mach number squared are added.

@@ -84,8 +84,7 @@ class CavityTrace:
             yield index
 
     def columns(self, unknowns: Unknowns) -> sparse.csr_matrix:
-        """flux_f of own unknowns, (n, f) m2; its transpose times motions gives the displaced
-        volume. Collective.
+        """flux_f of own unknowns, (n, f) m2; its transpose maps motions to volume. Collective.
 
         A free rim carries the cone between the beads.
         """

@@ -1,3 +1,1 @@
-"""Meshes from files: Abaqus decks and Gmsh meshes, read as data and made into sections. Without
-dolfinx.
-"""
+"""Meshes from files, Abaqus decks and Gmsh meshes, made into sections. Without dolfinx."""

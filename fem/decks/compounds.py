@@ -35,8 +35,7 @@ class Rubber:
 
 @dataclass(frozen=True)
 class CordMaterial:
-    """Young's modulus in Pa, density in kg/m3 (0 if the deck has none), compression over
-    tension."""
+    """Young's modulus in Pa, density in kg/m3 (0 if not given), compression over tension."""
 
     youngs_modulus: float
     density: float
@@ -44,8 +43,7 @@ class CordMaterial:
 
 
 def rubber(compound: Compound, units: Units) -> Rubber:
-    """The compound of a solid section. Raises InputError for laws that the program does not
-    have."""
+    """The compound of a solid section. Raises InputError for laws the program does not have."""
     parts = _parts(compound)
     notes: list[str] = []
     if "HYPERELASTIC" in parts:
@@ -196,8 +194,7 @@ def _elastic(
 
 
 def _incompressible(model: str, values: dict, notes: list[str], name: str) -> float:
-    """Poisson's ratio, replaced by 0.49 above 0.4999; a bulk modulus of 0 is replaced likewise, in
-    `values`."""
+    """Poisson's ratio, 0.49 if above 0.4999; sets a bulk modulus of 0 in `values` likewise."""
     said = f"{name}: incompressible in the deck, taken with ν = {INCOMPRESSIBLE}"
     if model == "neo-hookean":
         if values["poisson_ratio"] <= 0.4999:

@@ -1,6 +1,4 @@
-"""Contents of a mesh file of any format: nodes, elements, sets, materials, cords, and what was not
-used.
-"""
+"""Contents of a mesh file of any format, and what of it was not used."""
 
 from __future__ import annotations
 
@@ -20,8 +18,7 @@ BOTH_SIDES = -2  # in a surface, of a membrane: where it lies
 
 @dataclass
 class Members:
-    """One set as written: labels, ranges (first, last, step) and names of other sets; `unsorted`:
-    keep the order."""
+    """One set as written: labels, ranges (first, last, step), names of other sets, and order."""
 
     labels: list[np.ndarray] = field(default_factory=list)
     ranges: list[tuple[int, int, int]] = field(default_factory=list)
@@ -196,8 +193,7 @@ class Deck:
         return (*self.surfaces, *self.node_sets.names)
 
     def rows(self, labels: np.ndarray, place: Place | None = None) -> np.ndarray:
-        """Rows of `points` for node labels of any shape. Raises InputError for an undefined
-        node."""
+        """Rows of `points` for node labels of any shape. InputError for an undefined node."""
         at = np.searchsorted(self.labels, labels)
         at[at == len(self.labels)] = 0
         if len(self.labels) == 0 or (self.labels[at] != labels).any():

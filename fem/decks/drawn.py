@@ -15,8 +15,7 @@ ELEMENTS = 26  # bead to bead, as in the built-in radial tire
 
 
 def drawn(path: Path) -> tuple[SectionMesh, tuple[Rubber, ...], tuple[Ply, ...]]:
-    """Mesh of order 2, compound of each region, and cords. Raises InputError with the file's
-    name."""
+    """Mesh of order 2, compound of each region, cords. Raises InputError with the file's name."""
     construction = read(path)
     try:
         mesh = construction.section(ELEMENTS)

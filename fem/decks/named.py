@@ -10,8 +10,7 @@ from tireroad.fem.errors import InputError
 
 
 def named_edges(deck: Deck, edges: DeckEdges, name: str, key: str) -> np.ndarray:
-    """Numbers of the edges of a surface, node set or set of membranes. Raises InputError for other
-    names.
+    """Edge numbers of a surface, node set or membrane set. InputError for other names.
 
     `key` is the scene's key, for the message."""
     surfaces = {surface.upper(): surface for surface in deck.surfaces}

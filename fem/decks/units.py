@@ -28,8 +28,7 @@ SYSTEMS = {
 
 
 def check_size(radius: float, unit: str, file: str) -> None:
-    """Raise InputError, naming the unit that fits, if the outer radius (in the deck's unit) is not
-    a tire's."""
+    """Raise InputError with the unit that fits if the outer radius (deck's unit) is no tire's."""
     if _SMALLEST <= radius * SYSTEMS[unit].length <= _LARGEST:
         return
     fitting = [name for name, of in SYSTEMS.items() if _SMALLEST <= radius * of.length <= _LARGEST]

@@ -1,6 +1,4 @@
-"""Exact static flexibility of the rotating tire: one factorisation, all loads as right-hand
-sides.
-"""
+"""Exact static flexibility of the rotating tire: one factorisation for all loads."""
 
 from __future__ import annotations
 
@@ -159,8 +157,7 @@ def static_shapes(
     air: Column | None = None,
     beside: np.ndarray | None = None,
 ) -> StaticShapes:
-    """Static shapes of the probes (p, 3 s), each used as load and as reading, with the air.
-    Collective.
+    """Static shapes of the probes (p, 3 s), both loads and readings, with the air. Collective.
 
     `beside`: own rows (b, n) that replace those of the momentum; its first three rows must be the
     momentum if there is air. An unsymmetric stiffness is factorised a second time, transposed; a
@@ -210,8 +207,7 @@ def compliance(
     air: Column | None = None,
     beside: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Displacement at the outputs per unit load, (r, k) m/N, with the air, on every process.
-    Collective.
+    """Displacement (r, k) m/N at the outputs per unit load, on every process. Collective.
 
     `outputs` (r, 3 s) and `loads` (k, 3 s) are weights of the outer face's nodes, three dofs a
     node. `beside`: own rows (b, n) of further readings, b more rows of the result, e.g. the tire's

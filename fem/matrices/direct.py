@@ -36,8 +36,7 @@ def solve_columns(
 def solve_parts(
     pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray | sparse.spmatrix
 ) -> Iterator[tuple[slice, np.ndarray]]:
-    """The same in blocks of columns, each with its slice: on a fine mesh all of them may not fit in
-    memory. Collective."""
+    """As `solve_columns`, in blocks, each with its slice, to save memory. Collective."""
     factor = pc.getFactorMatrix()
     if not isinstance(columns, np.ndarray):
         columns = columns.tocsc()

@@ -121,8 +121,7 @@ class Operators:
         return static + self._material(wall.stiffening()) if wall.stiffens else static
 
     def _material(self, share: Expr) -> ufl.Form:
-        """A share (a field constant in each cell) of the material part of the rubber's tangent, in
-        UFL."""
+        """A share (constant in each cell) of the rubber's material tangent, in UFL."""
         here = fem.Function(self.body.space)
         here.x.array[:] = self.body.u.x.array
         return tangent(self.body, added_stress(self.body, share, here))
@@ -141,8 +140,7 @@ class Operators:
         return Rotation(self.body, self._assemble)
 
     def consistent_mass(self) -> PETSc.Mat:
-        """int rho phi_i . phi_j by full integration, kg: reference for the diagonal `mass`.
-        Collective."""
+        """int rho phi_i . phi_j fully integrated, kg: reference for the diagonal. Collective."""
         body = self.body
         return self._assemble(body.inertia(ufl.inner(body.trial, body.test)))
 

@@ -12,8 +12,7 @@ _POINTS = 6  # Gauss points per direction in each element under a distributed lo
 
 
 def nodes(index: np.ndarray, count: int, component: int = 2) -> sparse.csr_matrix:
-    """Rows (k, 3 count) that pick one component at single nodes, `index` (k,) into the outer
-    face."""
+    """Rows (k, 3 count) for one component at single nodes, `index` (k,) into the outer face."""
     k = len(index)
     return sparse.csr_matrix(
         (np.ones(k), (np.arange(k), 3 * index + component)), shape=(k, 3 * count)
@@ -52,8 +51,7 @@ _STEP = 1e-5  # step of the difference quotient, as a fraction of an element
 
 
 def _area(lattice: Lattice, arc: np.ndarray) -> np.ndarray:
-    """Area of the undeformed outer face per ring and section angle, m2/rad2, at section angles
-    (k,)."""
+    """Undeformed outer area per ring and section angle, m2/rad2, at section angles (k,)."""
     element, local = _local(lattice.arc_corners, arc)
     low, high = np.clip(local - _STEP, 0, 1), np.clip(local + _STEP, 0, 1)
     ends = [lattice.tire.outer_line(element, t) for t in (low, high)]
@@ -82,8 +80,7 @@ def _line_rule(corners: np.ndarray, centre: float, half: float) -> tuple[np.ndar
 
 
 def _shape(corners: np.ndarray, edge: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Lagrange shape functions of all nodes of a line of elements at the points, (points,
-    nodes)."""
+    """Shape functions (points, nodes) of all nodes of a line of elements at the points."""
     first, values = line_shape(corners, edge, points)
     order = len(edge) - 1
     out = np.zeros((len(points), order * (len(corners) - 1) + 1))
@@ -94,8 +91,7 @@ def _shape(corners: np.ndarray, edge: np.ndarray, points: np.ndarray) -> np.ndar
 def line_shape(
     corners: np.ndarray, edge: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """First node (k,) of each point's element on a line, and the shape functions (k, order + 1)
-    there."""
+    """First node (k,) of each point's element on a line; shape functions (k, order + 1) there."""
     element, local = _local(corners, points)
     return (len(edge) - 1) * element, line(edge, local)
 

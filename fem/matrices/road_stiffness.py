@@ -41,8 +41,7 @@ class RoadStiffness:
     frictionless: float
 
     def at_constant_load(self, motion: int) -> float:
-        """Stiffness of one motion, N/m or N m/rad, when the road moves vertically to keep its
-        load."""
+        """Stiffness of one motion, N/m or N m/rad, at constant vertical load."""
         across = self.matrix[motion, _VERTICAL] * self.matrix[_VERTICAL, motion]
         return float(self.matrix[motion, motion] - across / self.matrix[_VERTICAL, _VERTICAL])
 
@@ -112,8 +111,7 @@ def _static_tangent(
 
 
 def _condensed(stiffness: PETSc.Mat, motions: np.ndarray, held: np.ndarray) -> np.ndarray:
-    """R^T S R (k, k) for held unknowns moved by `motions` (own rows n, k), the others free.
-    Collective."""
+    """R^T S R (k, k) for held unknowns moved by `motions`, own rows (n, k). Collective."""
     moved = np.where(held[:, None], motions, 0.0)
     loads = -multiply(stiffness, moved)
     loads[held] = 0.0

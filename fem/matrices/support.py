@@ -31,8 +31,7 @@ TURN = 3  # components 3, 4, 5 of an unknown: rotations about x, y, z
 
 @dataclass(frozen=True)
 class Support:
-    """`rim` "fixed" or "free"; `held`: this process's nodes whose vertical motion the road
-    holds."""
+    """`rim` "fixed" or "free"; `held`: own nodes whose vertical motion the road holds."""
 
     rim: str = "fixed"
     held: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
@@ -117,8 +116,7 @@ class Unknowns:
         return np.concatenate([own, on_rim]) if self.rim.mine else own
 
     def rim_motion(self, values: np.ndarray) -> np.ndarray:
-        """Translation of the axle's centre and rotation of the free rim (6, ...), on every process.
-        Collective."""
+        """Translation and rotation of the free rim (6, ...), on every process. Collective."""
         assert self.rim is not None, "only a free rim moves"
         return self.rim.coordinates @ self.rim.shared(values[len(self.free) :])
 

@@ -45,8 +45,7 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class CordLine:
-    """Cords on the inner side of the layer `under`, |s| <= `to`; as fem.tire.cords.Cords, angle in
-    rad."""
+    """Cords on the inner side of layer `under`, |s| <= `to`; as in Cords, angle in rad."""
 
     name: str
     under: str
@@ -61,8 +60,7 @@ class CordLine:
 
 @dataclass(frozen=True, kw_only=True)
 class Construction:
-    """`tread` m: limit of |s| that the road can touch; `compounds` by name: parameters of a
-    `Material`.
+    """`tread` m: limit of |s| that the road can touch; `compounds` by name, as in `Material`.
 
     `held` m: the rim holds the outer face from |s| = held, in addition to the ends; None: only the
     ends.
@@ -77,8 +75,7 @@ class Construction:
     held: float | None = None
 
     def section(self, elements: int, order: int = 2) -> SectionMesh:
-        """Section mesh: one element per layer, about `elements` bead to bead, with edges at all
-        boundaries.
+        """Section mesh, one element per layer, about `elements` bead to bead, edges at boundaries.
 
         Raises InputError for unknown names, layers without thickness or a wall that folds.
         """
@@ -145,8 +142,7 @@ class Construction:
             )
 
     def _surfaces(self) -> Callable[[np.ndarray], np.ndarray]:
-        """Function: depths (k, layers + 1) m of outer face and layers' inner sides at lengths (k,)
-        >= 0."""
+        """Function from lengths (k,) >= 0 to depths (k, layers + 1) m of the layers' faces."""
         lines = []
         for layer in self.layers:
             s, thickness = np.array(layer.thickness, float).T
@@ -187,8 +183,7 @@ class Construction:
         return PlyLine(line.name, (-end, end), self._depth(self._number(line.under))[0])
 
     def _size(self, s: np.ndarray, count: int) -> np.ndarray:
-        """Relative element size: graded geometrically to the beads, smaller at the ends of
-        cords."""
+        """Relative element size: graded to the beads, smaller at the ends of cords."""
         length = self._held
         thickness = self._surfaces()(np.array([length]))[0, -1]
         distance = np.maximum(length - np.abs(s), 0.0)
@@ -205,8 +200,7 @@ _ENDS, _ENDS_DEPTH = 0.06, 0.6  # of the half section: belt-end refinement, as f
 
 
 def _named(mesh: SectionMesh, arc: np.ndarray, tread: float, held: float) -> SectionMesh:
-    """Merge regions of equal compound, drop empty ones, and limit tread and rim to their parts of
-    the face."""
+    """Merge regions of equal compound, drop empty ones, limit tread and rim to their parts."""
     from dataclasses import replace
 
     used = [mesh.regions[i] for i in np.unique(mesh.region)]

@@ -14,8 +14,7 @@ ARC_NEAR = (0.2, 1.2)
 
 
 def near_road(distance: np.ndarray, footprint_size: float, near: tuple[float, float]) -> np.ndarray:
-    """Relative element size at a distance (rad) from the lowest point, linear between the two of
-    `near`."""
+    """Relative element size at a distance (rad) from the lowest point, linear within `near`."""
     part = np.clip((distance - near[0]) / (near[1] - near[0]), 0.0, 1.0)
     return footprint_size + (1 - footprint_size) * part
 

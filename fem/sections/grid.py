@@ -1,6 +1,4 @@
-"""Sections whose mesh is the product of two lines of elements: through the wall and bead to
-bead.
-"""
+"""Sections meshed as the product of two lines of elements: through the wall and along it."""
 
 from __future__ import annotations
 
@@ -28,8 +26,7 @@ class Patch:
 
 @dataclass(frozen=True)
 class PlyLine:
-    """A line of cords in a wall: from, to in rad, at a depth as a fraction of the wall (0 inner, 1
-    outer)."""
+    """A line of cords: from, to in rad, at a depth as a fraction of the wall (0 inner, 1 outer)."""
 
     name: str
     arc: tuple[float, float]
@@ -46,8 +43,7 @@ def product(
     plies: Sequence[PlyLine] = (),
     main: str = "wall",
 ) -> SectionMesh:
-    """The section with element corners at depths `wall` (0 to 1) and section angles `arc` (rad),
-    ascending.
+    """The section with ascending corners at depths `wall` (0 to 1) and angles `arc` (rad).
 
     `place(depth, angle)` gives (r, y) m. The inner face is at depth 0, the outer one, all of it
     tread, at 1; the rim is at both ends. Edges of patches and plies must be among the corners.
@@ -176,8 +172,7 @@ def _even(numbers: np.ndarray) -> bool:
 
 
 def _shared_out(count: int, weight: np.ndarray) -> np.ndarray:
-    """Elements of each part: near its share, at least one, at least `count` in total, equal for
-    mirrored parts."""
+    """Elements of each part: near its share, at least one, `count` in all, mirrored parts alike."""
     share = count * weight / weight.sum()
     numbers = np.maximum(1, np.floor(share + 0.5 - 1e-9 * len(weight))).astype(int)
     while numbers.sum() < count:

@@ -59,8 +59,7 @@ def interpolation(
     count: int,
     place: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> sparse.csr_matrix:
-    """Shape functions (k, count) at (cell, xi, eta) of a field on cells (c, n) with nodes at
-    `edge`."""
+    """Shape functions (k, count) at (cell, xi, eta) on cells (c, n) with nodes at `edge`."""
     cell, xi, eta = place
     shape = reference.tensor(reference.line(edge, xi), reference.line(edge, eta))
     rows = np.repeat(np.arange(len(cell)), shape.shape[1])

@@ -65,8 +65,7 @@ class SectionMesh:
         return np.einsum("ka,kax->kx", shape, self.nodes[self.cells[cells]])
 
     def on_nodes(self, order: int, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes (m, 2) and cells (c, (order + 1)^2) of this section with other nodes on element
-        edges.
+        """Nodes (m, 2) and cells (c, (order + 1)^2) of this section with other element nodes.
 
         `edge` (order + 1,): nodes on an edge of the reference element, instead of equispaced ones.
         The numbering does not depend on `edge`; at the mesh's own order it is unchanged.
@@ -96,13 +95,11 @@ class SectionMesh:
         return self.cells[cell[:, None], reference.side_nodes(self.order)[side]]
 
     def chain(self, edges: np.ndarray) -> np.ndarray:
-        """Nodes (k * order + 1,) along an ordered chain of edges (k, 2); empty if it is not a
-        chain."""
+        """Nodes (k * order + 1,) along a chain of edges (k, 2); empty if it is not a chain."""
         return _joined(self.side(edges))
 
     def _numbered(self, order: int) -> np.ndarray:
-        """Cells (c, (order + 1)^2) of another order: corners first, then nodes inside edges, then
-        inside cells."""
+        """Cells (c, (order + 1)^2) of another order: numbers of corners, then edges, then cells."""
         corners = self.cells[:, [0, self.order, -1 - self.order, -1]]
         used, corner = np.unique(corners, return_inverse=True)
         corner = corner.reshape(corners.shape)
@@ -131,8 +128,7 @@ def _first_use(cells: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _joined(sides: np.ndarray) -> np.ndarray:
-    """Nodes along a chain of edges (k, n), each turned to start where the last one ended; empty if
-    broken."""
+    """Nodes along a chain of edges (k, n), each starting at the end of the last; empty if broken."""
     sides = sides.copy()
     if len(sides) > 1 and sides[0, -1] not in sides[1, [0, -1]]:
         sides[0] = sides[0, ::-1]

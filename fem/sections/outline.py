@@ -54,8 +54,7 @@ class Outline:
 
 
 def arcs(through: npt.ArrayLike) -> np.ndarray:
-    """Points on consecutive circular arcs: `through` holds the start, then a point on and the end
-    of each arc."""
+    """Points on consecutive arcs: `through` is the start, then a middle and an end for each."""
     points = np.asarray(through, float)
     if points.ndim != 2 or len(points) < 3 or len(points) % 2 == 0:
         raise InputError("section: arcs are a start and two points (on the way, end) for each arc")

@@ -1,6 +1,4 @@
-"""The built-in radial passenger tire of a size like 205/60 R15; docs/radial-tire.md has the sources
-of all numbers.
-"""
+"""The built-in radial passenger tire, e.g. 205/60 R15; sources: docs/radial-tire.md."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""The reference quadrilateral [0, 1] x [0, 1]: tensor-product Lagrange functions, sides and grid
-points.
-"""
+"""The reference quadrilateral [0, 1] x [0, 1]: tensor-product Lagrange functions and sides."""
 
 from __future__ import annotations
 

@@ -14,8 +14,7 @@ from tireroad.fem.sections.mesh2d import SectionMesh
 
 @dataclass(frozen=True, kw_only=True)
 class Ring:
-    """The section revolved about the axle (y), with `segments` elements around of the section's
-    order.
+    """The section revolved about the axle (y), `segments` elements of its order around.
 
     `ring_corners` (segments + 1,) rad: angles of the element corners, ascending from 0, the lowest
     point, towards +x to 2 pi, or less for a sector. `arc_corners` (k + 1,) rad: ascending section
@@ -57,8 +56,7 @@ class Ring:
         return self.segments * len(self.section.outer)
 
     def outer_line(self, element: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """(r, y) (k, 2) m on the outer face at t (k,), 0 to 1 from bead to bead, on edges (k,) of
-        the chain."""
+        """(r, y) (k, 2) m on outer edges (k,) of the chain at t (k,), 0 to 1 from bead to bead."""
         cell, side = self.section.outer[element].T
         t = np.where(self._turned[element], 1 - t, t)
         fixed = np.where(side % 2 == 1, 1.0, 0.0)

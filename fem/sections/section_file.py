@@ -1,6 +1,4 @@
-"""Reader of section files: constructions written in TOML (docs/section-file.md). Nothing is
-executed.
-"""
+"""Reader of section files, constructions in TOML (docs/section-file.md). Executes nothing."""
 
 from __future__ import annotations
 
@@ -36,8 +34,7 @@ _RANGES = {
 
 
 def read(path: Path | str) -> Construction:
-    """The construction in a file. Raises InputError, with the file's name, for any undocumented
-    content."""
+    """The construction in a file. Raises InputError, with its name, for undocumented content."""
     path = Path(path)
     try:
         data = path.read_bytes()

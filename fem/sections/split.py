@@ -35,8 +35,7 @@ def _cut(corners: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 
 def split_section(section: SectionMesh, along: np.ndarray) -> SectionMesh:
-    """The section with strips of cells split in two, from outer edges `along` (k,) bool to the far
-    side.
+    """The section with strips of cells under outer edges `along` (k,) bool split in two.
 
     A strip runs from an edge to the opposite one of the same cell and on through the next, so that
     cells still share whole edges. The shape is that of the original cells.

@@ -20,8 +20,7 @@ LEAST = (6, 2)  # elements around and along: minimum for a tire
 
 @dataclass(frozen=True, kw_only=True)
 class Torus:
-    """A toroidal tire: section circle of `minor_radius` (to its outer face), revolved about the
-    axle (y).
+    """A toroidal tire: section circle of outer radius `minor_radius` about the axle (y).
 
     Lengths in m; `half_angle` in rad: arc from the crown to each bead. `segments` elements around,
     `elements_arc` along the arc, `elements_thickness` through the wall, all of `order`;
@@ -140,8 +139,7 @@ _ENDS, _ENDS_DEPTH = np.radians(8), 0.7
 
 
 def _near_ends(angle: np.ndarray, ends: Sequence[float]) -> np.ndarray:
-    """Relative element size at section angles, rad, near the ends of plies and their mirror
-    images."""
+    """Relative element size at section angles, rad, near the ends of plies (both sides)."""
     if not len(ends):
         return np.ones_like(angle)
     both = np.concatenate([ends, -np.asarray(ends)])

@@ -69,8 +69,7 @@ class SectionReader:
         self.unused.append(f"*SHELL SECTION: not used ({card.place})")
 
     def _layer(self, card: Card, lines: list[Data], _: int) -> None:
-        """Data lines: name, area, spacing, position, material, angle, direction, extension,
-        radius."""
+        """Data: name, area, spacing, position, material, angle, direction, extension, radius."""
         if self._membranes is None:
             raise card.place.error(
                 "*REBAR LAYER belongs after a *SURFACE SECTION or *MEMBRANE SECTION; cords in shells are not read"

@@ -12,8 +12,7 @@ from tireroad.fem.decks.files.lines import Place
 
 @dataclass(frozen=True)
 class Kind:
-    """An element shape: `role` solid or membrane, dimension of the deck, numbers of nodes and
-    corners, faces.
+    """An element shape: `role` solid or membrane, dimension of the deck, nodes and faces.
 
     A face is given by its corner nodes, in the manual's order S1, S2, ...
     """

@@ -104,8 +104,7 @@ class Generator:
                 self._sets.add_nodes(card, made)
 
     def _ncopy(self, card: Card, lines: list[Data], scope: int) -> None:
-        """Copy the nodes of a set, shifted, rotated or reflected, with labels increased by a
-        number."""
+        """Copy the nodes of a set, shifted, rotated or reflected; labels grow by a number."""
         change = self._whole(card, "CHANGE NUMBER")
         old = self._ordered(card.options.get("OLD SET", ""), card.place)
         self._count(len(old), card.place)
@@ -115,8 +114,7 @@ class Generator:
         self._sets.into(self._sets.node_sets, card.options.get("NEW SET"), old + change)
 
     def _elgen(self, card: Card, lines: list[Data], scope: int) -> None:
-        """Copies of an element in a row, rows and layers; data: element, then number, node and
-        element increments."""
+        """Copies of an element in rows and layers; data: element, then counts and increments."""
         for place, parts in data_lines(lines):
             numbers = [label(part, place) if part else 1 for part in parts]
             numbers += [1] * (10 - len(numbers))
@@ -179,8 +177,7 @@ class Generator:
 
 
 def _shares(intervals: int, bias: float, two_step: bool, place: Place) -> np.ndarray:
-    """Positions of the nodes between two ends, 0 to 1: each interval is 1/bias times the one before
-    it.
+    """Positions of nodes between two ends, 0 to 1; each interval is 1/bias times the last.
 
     With `two_step` this holds for pairs of equal intervals, for second-order elements.
     """

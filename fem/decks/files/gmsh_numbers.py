@@ -1,6 +1,4 @@
-"""The parts of a Gmsh file and their numbers, text or binary, with checks against the part's
-size.
-"""
+"""The parts of a Gmsh file and their numbers, text or binary, never read past their end."""
 
 from __future__ import annotations
 
@@ -29,8 +27,7 @@ class Part:
 
 
 def parts(data: bytes, name: str) -> dict[str, Part]:
-    """The parts of a file by name, the first of each. Raises InputError for a part without an
-    end."""
+    """The parts of a file by name, the first of each. InputError for a part without end."""
     found: dict[str, Part] = {}
     at, line = 0, 1
     while match := _BEGIN.search(data, at):
@@ -57,8 +54,7 @@ class _Numbers:
         return self.part.place.error(message)
 
     def fits(self, count: int, size: int) -> int:
-        """The count, checked: the part must be able to hold that many items of `size` bytes (or
-        characters)."""
+        """The count, if the part can hold that many items of `size` bytes (or characters)."""
         if not count >= 0 or count * (size if self.binary else 2) > len(self.part.text) + 64:
             raise self.error(f"{count} entries are announced and not there: is the file cut short?")
         return int(count)

@@ -14,8 +14,7 @@ _APART = 1e-9  # of the deck's size: tolerance for a node defined again at the s
 
 
 class KnownNodes:
-    """Blocks of nodes in the order of definition; for a node defined twice the last position
-    holds."""
+    """Blocks of nodes in the order of definition; of repeated nodes the last one holds."""
 
     def __init__(self) -> None:
         self.blocks = self.count = 0
@@ -33,8 +32,7 @@ class KnownNodes:
         return self.table(file)[0]
 
     def points(self, labels: np.ndarray, asked: Place) -> np.ndarray:
-        """Positions (n, 3) of nodes. Raises InputError for a node not defined before the line
-        `asked`."""
+        """Positions (n, 3) of nodes. InputError for a node not yet defined at `asked`."""
         if len(self._new) > _FEW:
             self.table(asked.file)
         found = np.full((len(labels), 3), np.nan)
@@ -46,8 +44,7 @@ class KnownNodes:
         return found
 
     def table(self, file: str) -> tuple[np.ndarray, np.ndarray]:
-        """Labels, ascending, and points. Raises InputError for a node defined twice at different
-        places."""
+        """Labels, ascending, and points. InputError for a node defined at two places."""
         if self._new:
             parts = [(self._labels, self._points), *self._new]
             labels, points = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
@@ -97,8 +94,7 @@ class KnownElements:
         return np.sort(np.concatenate([np.empty(0, np.int64), *(b.labels for b in self.blocks)]))
 
     def one(self, label: int, asked: Place) -> Block | None:
-        """A single element; None if it may be of an unused type. Raises InputError if it is not
-        defined."""
+        """A single element; None if it may be of an unused type. InputError if undefined."""
         for number, block in enumerate(self.blocks[self._indexed :], self._indexed):
             self._place |= {name: (number, row) for row, name in enumerate(block.labels.tolist())}
         self._indexed = len(self.blocks)

@@ -107,8 +107,7 @@ def _stream(file: BinaryIO, path: Path, reading: _Reading) -> Iterator[Card | Da
 
 
 def _pieces(file: BinaryIO, path: Path, reading: _Reading) -> Iterator[tuple[int, bytes]]:
-    """(number of the first line, text) of pieces of whole lines that do not split a keyword
-    line."""
+    """(first line number, text) of pieces of whole lines that do not split a keyword line."""
     left, number = b"", 1
     while True:
         new = file.read(PIECE)
@@ -182,8 +181,7 @@ def _options(parts: list[str]) -> dict[str, str]:
 
 
 def _beside(name: str, place: Place, reading: _Reading) -> Path:
-    """The path of an included file. Raises InputError if it is not in the deck's folder or
-    below."""
+    """The path of an included file. Raises InputError unless it is in the deck's folder."""
     if not name or "\0" in name or len(name) > 1000:
         raise place.error("INPUT= names no file")
     path = (reading.folder / name.replace("\\", "/")).resolve()

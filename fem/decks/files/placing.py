@@ -10,8 +10,7 @@ _SAME = 1e-6  # of a radius: tolerance for the two ends of an arc
 
 
 def along_line(first: np.ndarray, last: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Points at fractions (k,) of the way from `first` to `last`, arrays that broadcast to (..., k,
-    3)."""
+    """Points (..., k, 3) at fractions (k,) of the way from `first` to `last`."""
     return first + share[:, None] * (last - first)
 
 
@@ -38,8 +37,7 @@ def along_arc(
 
 
 def turned(points: np.ndarray, axis: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
-    """Points (k, 3) rotated about a unit axis through the origin by angles (rad), right-handed
-    (Rodrigues)."""
+    """Points (k, 3) rotated about a unit axis through the origin by angles (rad): Rodrigues."""
     cosine, sine = (np.asarray(f(angle))[..., None] for f in (np.cos, np.sin))
     along = (points @ axis)[:, None] * axis
     return along + cosine * (points - along) + sine * np.cross(axis, points)

@@ -27,8 +27,7 @@ def ends(quads: Quads, edges: np.ndarray) -> np.ndarray:
 
 
 def strings(pairs: np.ndarray) -> tuple[list[np.ndarray], list[int]]:
-    """Line elements (k, 2) in order: the indices of each chain, and the nodes where three or more
-    meet.
+    """Line elements (k, 2) in order: indices of each chain, and nodes where three or more meet.
 
     A closed line is one chain. Chains end at branches.
     """
@@ -70,8 +69,7 @@ def along(pairs: np.ndarray) -> np.ndarray:
 
 
 def forward(quads: Quads, edges: np.ndarray) -> np.ndarray:
-    """An ordered chain, reversed if needed to run towards higher y at its middle (higher r where
-    level)."""
+    """An ordered chain, running towards higher y at its middle (higher r where level)."""
     nodes = along(ends(quads, edges))
     middle = (len(nodes) - 1) // 2
     step = quads.points[nodes[middle + 1]] - quads.points[nodes[middle]]

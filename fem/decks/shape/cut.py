@@ -46,8 +46,7 @@ def cut(
     path: Mapping[int, float],
     fail: Callable[[str], Exception],
 ) -> Quads:
-    """Split the cells at the marked sides and onwards in both directions, to the boundary or round
-    the section.
+    """Split the cells at the marked sides and onwards, to the boundary or round the section.
 
     `path`: the cells in which the cut is part of the line, with its position halfway through; sides
     created there get `number`. `fail` creates the error for a cut that would cross itself.

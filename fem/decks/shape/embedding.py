@@ -37,8 +37,7 @@ def lay_all(
 
 
 def _elements(deck: Deck, layer: Layer) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """End nodes (k, 2), points (k, 3, 2) at start, middle, end, and labels (k,) of a layer's
-    membranes."""
+    """End nodes (k, 2), points (k, 3, 2) and labels (k,) of a layer's membranes."""
     wanted = deck.element_sets.labels(layer.elements, layer.place)
     ends, points, labels = [], [], []
     for block in deck.blocks:

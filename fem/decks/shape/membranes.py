@@ -1,6 +1,4 @@
-"""Position of membranes in a section: on element sides, or inside elements, which are split along
-them.
-"""
+"""Membranes in a section: on element sides, or inside elements, which are split along them."""
 
 from __future__ import annotations
 
@@ -34,8 +32,7 @@ class Line:
     hosts: frozenset | None = None
 
     def at(self, s: np.ndarray) -> np.ndarray:
-        """Positions (k, 2) at s, counted in elements from the start; the line is extrapolated
-        beyond its ends."""
+        """Positions (k, 2) at s, in elements from the start; extrapolated beyond the ends."""
         number = np.clip(np.floor(s).astype(int), 0, len(self.points) - 1)
         return np.einsum("ka,kax->kx", shape(s - number), self.points[number])
 
@@ -151,8 +148,7 @@ def _candidates(sides: np.ndarray, line: Line) -> Iterator[tuple[int, float]]:
 
 
 def _meet(side: np.ndarray, line: Line, s: float) -> tuple[float, float] | None:
-    """(t, s) where a side (3, 2) meets the line, by Newton's method; None if it does not or runs
-    along it."""
+    """(t, s) where a side (3, 2) meets the line; None if it does not or runs along it."""
     t, step = 0.5, 1e-6
     for _ in range(20):
         off = shape(np.array([t]))[0] @ side - line.at(np.array([s]))[0]
@@ -172,8 +168,7 @@ def _meet(side: np.ndarray, line: Line, s: float) -> tuple[float, float] | None:
 def _follow(
     quads: Quads, line: Line, stations: list[_Station]
 ) -> tuple[dict[int, float], dict[int, float], list[int]]:
-    """Sides to cut, the cells concerned (with the position halfway), and whole sides on the
-    line."""
+    """Sides to cut, the cells concerned (position halfway), and whole sides on the line."""
     if len(stations) < 2:
         raise line.fail("it crosses no element")
     at = defaultdict(set)
@@ -231,8 +226,7 @@ def _opposite(
 
 
 def _half_way(quads: Quads, path: dict, line: Line) -> dict[int, float]:
-    """Position of the line across each cell, halfway along, from the parabola through three of its
-    points."""
+    """Position of the line halfway across each cell: parabola through three of its points."""
     cells = np.array(list(path), np.int64)
     middle = line.at(np.array([(a.s + b.s) / 2 for a, b in path.values()]))
     places = inverse(quads.points[quads.cells[cells]], middle)[0] if len(cells) else cells

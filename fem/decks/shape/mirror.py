@@ -26,8 +26,7 @@ def is_half(quads: Quads) -> bool:
 
 
 def mirrored(quads: Quads) -> Quads:
-    """Both halves with shared nodes on the centre plane. Raises InputError if it is not a half
-    section."""
+    """Both halves, sharing nodes on the centre plane. InputError if it is not a half section."""
     if not is_half(quads):
         low, high = quads.points[:, 1].min(), quads.points[:, 1].max()
         raise InputError(

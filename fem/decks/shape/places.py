@@ -26,8 +26,7 @@ def rates(nine: np.ndarray, where: np.ndarray) -> np.ndarray:
 def inverse(
     nine: np.ndarray, points: np.ndarray, limit: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Reference coordinates (k, 2) of points (k, 2) in cells (k, 9, 2), and remaining distances, by
-    Newton's method.
+    """Coordinates (k, 2) of points (k, 2) in cells (k, 9, 2), and residual distances: Newton.
 
     Coordinates are kept within `limit` of the cell.
     """
@@ -44,8 +43,7 @@ def inverse(
 
 
 def locate(quads: Quads, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cells (k,) that contain points (k, 2), their coordinates (k, 2), and distance outside (k,),
-    in cells.
+    """Cells (k,) containing points (k, 2), coordinates (k, 2), distance outside (k,) in cells.
 
     A point near no cell has cell -1 and an infinite distance.
     """

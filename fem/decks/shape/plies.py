@@ -48,8 +48,7 @@ class Laid:
     directions: np.ndarray
 
     def mirrored(self) -> Laid:
-        """With the other half, rotated by a half turn about the vertical, so that cords continue
-        straight."""
+        """With the other half, turned by 180 deg about the vertical so that cords continue."""
         return Laid(
             self.numbers,
             np.concatenate([self.middles, self.middles * [1, -1]]),
@@ -60,8 +59,7 @@ class Laid:
 def plies(
     quads: Quads, laid: Laid, layer: Layer, material: CordMaterial, length: float
 ) -> list[Ply]:
-    """The plies of one cord layer: one for each unbroken line, more if the angle varies along
-    it."""
+    """The plies of one cord layer: one per unbroken line, more if the angle varies along it."""
     sides = with_origin(quads, laid.numbers)
     found, branches = strings(ends(quads, sides))
     if branches:
@@ -122,8 +120,7 @@ def _geometry(layer: Layer, r: float) -> tuple[float, float]:
 
 
 def from_circumference(angle: float, sense: int) -> float:
-    """An angle from the meridian (rad) converted to one from the circumference, in (-pi/2,
-    pi/2]."""
+    """Angle from the meridian (rad) converted to one from the circumference, (-pi/2, pi/2]."""
     turned = float(np.arctan2(sense * np.cos(angle), -np.sin(angle)))
     turned -= np.pi * np.ceil(turned / np.pi - 0.5)
     return 0.0 if abs(turned) < 1e-12 else turned

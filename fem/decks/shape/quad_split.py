@@ -66,8 +66,7 @@ def shape(t: np.ndarray) -> np.ndarray:
 
 
 def place(nine: np.ndarray, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
-    """Points (..., k, 2) at reference coordinates (k,) of cells given by their nine points (..., 9,
-    2)."""
+    """Points (..., k, 2) at reference coordinates (k,) of cells of nine points (..., 9, 2)."""
     both = (shape(xi)[:, :, None] * shape(eta)[:, None, :]).reshape(-1, 9)
     return np.einsum("ka,...ax->...kx", both, nine)
 
@@ -81,8 +80,7 @@ def nine_points(nodes: np.ndarray, raw: Raw, edge: np.ndarray, middles: np.ndarr
 
 
 def split(nodes: np.ndarray, raws: dict, edges: tuple, middles: np.ndarray) -> Quads:
-    """Split every triangle into three cells and every quadrilateral into four, so that whole sides
-    meet.
+    """Split triangles into three cells, quadrilaterals into four, so that whole sides meet.
 
     Points are identified by (0, node, 0), (1, edge, quarter from its lower end) or (2, element,
     position in it).
@@ -144,8 +142,7 @@ def _quarters(
 def _thirds(
     nodes: np.ndarray, raw: Raw, edge: np.ndarray, middles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """points (3 c, 9, 2), origin (3 c, 4) and identifiers (3 c, 9, 3) of the thirds of
-    triangles."""
+    """points (3 c, 9, 2), origin (3 c, 4), identifiers (3 c, 9, 3) of thirds of triangles."""
     six = np.concatenate([nodes[raw.corners], middles[edge]], axis=1)
     forward = raw.corners < np.roll(raw.corners, -1, axis=1)
     number = np.arange(len(edge))
@@ -189,8 +186,7 @@ def _edge_middle(k: int) -> np.ndarray:
 
 
 def _six(area: np.ndarray) -> np.ndarray:
-    """Quadratic functions (k, 6) of a triangle at area coordinates (k, 3): corners, then edges 12,
-    23, 31."""
+    """Quadratic functions (k, 6) of a triangle at area coordinates (k, 3): corners, edges 12, 23, 31."""
     corner = area * (2 * area - 1)
     edge = 4 * area * np.roll(area, -1, axis=1)
     return np.concatenate([corner, edge], axis=1)

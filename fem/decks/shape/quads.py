@@ -82,8 +82,7 @@ def _raw(deck: Deck, blocks: list[Block], corners: int, region_of: dict[int, int
 
 
 def _positive(deck: Deck, block: Block) -> None:
-    """Check that corners are counter-clockwise in (r, z) and all corner angles are below 180
-    degrees."""
+    """Check that corners run counter-clockwise in (r, z) with angles below 180 degrees."""
     count = block.kind.corners
     corners = deck.points[deck.rows(block.nodes[:, :count], block.place)][:, :, :2]
     after, before = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
@@ -111,8 +110,7 @@ def _pairs(raw: Raw) -> np.ndarray:
 def _middles(
     deck: Deck, ends: np.ndarray, parts: Sequence[tuple[np.ndarray, Raw]], blocks: list[Block]
 ) -> np.ndarray:
-    """The middle of each edge: the deck's node if an element has one, otherwise halfway between its
-    ends."""
+    """The middle of each edge: the deck's node if there is one, else halfway between its ends."""
     nodes = deck.points[:, :2]
     middles = nodes[ends].mean(axis=1)
     node = np.full(len(ends), -1)

@@ -33,8 +33,7 @@ class _Section:
 
 
 def reduced(deck: Deck) -> tuple[Deck, np.ndarray | None]:
-    """A two-dimensional deck unchanged; a body of revolution as its section and its ring angles
-    (rad).
+    """A two-dimensional deck as is; a body of revolution as section and ring angles (rad).
 
     Raises InputError for any other body."""
     if deck.dimension == 2:
@@ -85,8 +84,7 @@ def _positive(deck: Deck, block: Block, rows: np.ndarray) -> None:
 
 
 def _sections(deck: Deck, block: Block, rows: np.ndarray, section: _Section) -> list[Block]:
-    """The section cells of a block: the face of each solid that lies in a meridian plane, each
-    once."""
+    """Section cells of a block: the meridian face of each solid, listed once."""
     shape, rings = block.kind, section.rings
     every = rings.ring[deck.rows(block.nodes, block.place)]
     start = _meridian_faces(rings, shape.faces, rows, block)
@@ -123,8 +121,7 @@ def _cell(ring: np.ndarray, face: tuple, middle: dict, rings: Rings) -> list[int
 def _meridian_faces(
     rings: Rings, faces: Sequence[tuple[int, ...]], rows: np.ndarray, block: Block
 ) -> np.ndarray:
-    """For each solid the index of its first face whose corners have one angle and distinct
-    rings."""
+    """For each solid the index of its first face with one angle and distinct rings."""
     found = np.full(len(rows), -1)
     for number in reversed(range(len(faces))):
         angle, ring = rings.angle[rows[:, faces[number]]], rings.ring[rows[:, faces[number]]]
@@ -228,8 +225,7 @@ def _element_sets(deck: Deck, owner: dict) -> Sets:
 
 
 def _surface(rows: np.ndarray, section: _Section) -> np.ndarray:
-    """(section label, face of its cell) of faces that extend around the axis; membranes
-    unchanged."""
+    """(section label, face of its cell) of faces around the axis; membranes unchanged."""
     found = set()
     for label, face in rows.tolist():
         cell = section.owner.get(label)

@@ -28,8 +28,7 @@ class Rings:
 
 
 def find_rings(deck: Deck, corners: np.ndarray) -> Rings:
-    """The axis about which the corner nodes form rings of equal angles. Raises InputError if there
-    is none."""
+    """The axis about which corner nodes form rings of equal angles. InputError if none."""
     best: tuple[int, int, int] = (len(corners) + 1, 0, 0)  # more positions than possible
     for axis in (1, 2, 0):
         rings = _rings(deck.points, axis, corners)
