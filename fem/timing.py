@@ -9,8 +9,7 @@ from typing import ClassVar
 
 
 class Timing(dict[str, float]):
-    """`with timing("assembly"):` adds the seconds spent inside to that part, by `clock`. Not
-    collective."""
+    """`with timing("assembly"):` adds the seconds inside to that part. Not collective."""
 
     clock: ClassVar[Callable[[], float]] = time.perf_counter
 

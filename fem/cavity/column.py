@@ -25,8 +25,7 @@ from tireroad.fem.tire.body import Body
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """`duct` on every process; `pushed`: this process's rows (n, 1 + a) of e^T; `speed` of the
-    wheel, rad/s."""
+    """`duct` on every process; `pushed`: own rows (n, 1 + a) of e^T; `speed` in rad/s."""
 
     comm: MPI.Comm
     duct: Duct

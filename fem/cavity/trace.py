@@ -56,8 +56,7 @@ class CavityTrace:
         self._flux = compat.form(-chi * pushed * inner)
 
     def profile(self) -> Profile:
-        """The cavity's section around the ring. Raises InputError if it is not a closed tube.
-        Collective."""
+        """The cavity's section around the ring. InputError if it is no closed tube. Collective."""
         moments = np.array([self._scalars() for _ in self._each_wave()])
         moments = self._body.comm.allreduce(moments)
         around = 2 * np.pi  # the rim is axisymmetric: it contributes to the mean only

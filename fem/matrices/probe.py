@@ -20,8 +20,7 @@ def nodes(index: np.ndarray, count: int, component: int = 2) -> sparse.csr_matri
 
 
 def along(index: np.ndarray, count: int, vectors: np.ndarray) -> sparse.csr_matrix:
-    """Rows (k, 3 count) of the components along `vectors` (k, 3) at single nodes, `index` (k,) into
-    the outer face."""
+    """Rows (k, 3 count) for components along `vectors` (k, 3) at nodes `index` (k,)."""
     k = len(index)
     rows = np.repeat(np.arange(k), 3)
     columns = (3 * index[:, None] + np.arange(3)).ravel()

@@ -128,7 +128,7 @@ def _first_use(cells: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _joined(sides: np.ndarray) -> np.ndarray:
-    """Nodes along a chain of edges (k, n), each starting at the end of the last; empty if broken."""
+    """Nodes along a chain of edges (k, n), each starting where the last ends; empty if broken."""
     sides = sides.copy()
     if len(sides) > 1 and sides[0, -1] not in sides[1, [0, -1]]:
         sides[0] = sides[0, ::-1]

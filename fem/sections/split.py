@@ -104,8 +104,7 @@ class _Children:
         return self.owner[cells], place[:, 0], place[:, 1]
 
     def edges(self, edges: np.ndarray, turned: np.ndarray | None = None) -> np.ndarray:
-        """The children's edges (k', 2) of edges (k, 2), in the side's direction or, if `turned`,
-        against it."""
+        """The children's edges (k', 2) of edges (k, 2), reversed for sides that are `turned`."""
         found = []
         for number, (cell, side) in enumerate(edges):
             across, step = self.parts[cell], _along(side)

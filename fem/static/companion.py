@@ -1,5 +1,4 @@
-"""A tire in equilibrium on the road, and the same tire near that state on another mesh, for mesh
-errors.
+"""A tire in equilibrium on the road, and near that state on another mesh, for mesh errors.
 
 Half of the ring is used where a half turn leaves the state unchanged
 (fem.static.symmetry.half_turn).
@@ -62,22 +61,19 @@ class Balance:
         )._by(loader.halved)
 
     def _by(self, half: HalfTurnEquilibrium | None) -> Balance:
-        """The same state with the half-ring problem as `solved`, if that has this state.
-        Collective."""
+        """The same state, with the half-ring problem as `solved` if that has it. Collective."""
         if half is None or not _has_all_of(half, self.lattice, self.displacement):
             return self
         return replace(self, solved=half)
 
     def near(self, ring: Ring) -> Equilibrium:
-        """The problem of the same tire with another `ring` of elements, at this state but not in
-        equilibrium. Collective."""
+        """The same tire's problem on another `ring` of elements, at this state. Collective."""
         if ring is self.ring and isinstance(self.solved, HalfTurnEquilibrium):
             return self.solved
         return self._problem(ring, self._sampled(ring))
 
     def balanced_on(self, ring: Ring, allowed: float) -> Balance:
-        """Equilibrium of the same tire on the same road with other elements, up to `allowed` N.
-        Collective.
+        """Equilibrium on the same road with other elements, up to `allowed` N. Collective.
 
         Raises ConvergenceError if none is found.
         """
@@ -131,8 +127,7 @@ class Balance:
         return other
 
     def _half(self, ring: Ring, displacement: np.ndarray) -> HalfTurnEquilibrium | None:
-        """The half-ring problem, if half of the ring represents the whole state; else None.
-        Collective."""
+        """The half-ring problem, if half of the ring has the whole state; else None. Collective."""
         if not (self.solved.shape.flat and looks_the_same(ring, self.rolling)):
             return None
         half = HalfTurnEquilibrium(self.solved.body, self.rolling, ring)
@@ -153,8 +148,7 @@ class Balance:
 
 
 def _between(line: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Indices (n, 2) of the neighbours of each value (n,) on an ascending line, twice the same if
-    it is one."""
+    """Indices (n, 2) of each value's neighbours on an ascending line, equal if it is on it."""
     above = np.clip(np.searchsorted(line, values - _ROUNDING), 0, len(line) - 1)
     below = np.clip(np.searchsorted(line, values + _ROUNDING, side="right") - 1, 0, len(line) - 1)
     return np.stack([below, above], axis=-1)

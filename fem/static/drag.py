@@ -9,8 +9,7 @@ from tireroad.fem.tire.body import Body
 
 
 class Drag:
-    """Springs of `stiffness` (owned unknowns,) N/m between the displacement at the last `here` and
-    the current one."""
+    """Springs of `stiffness` (owned unknowns,) N/m to the displacement at the last `here`."""
 
     def __init__(self, body: Body, stiffness: float) -> None:
         """Proportional to nodal mass, with mean `stiffness` (N/m) per unknown. Collective."""

@@ -228,8 +228,7 @@ class Equilibrium(Forces):
         return self.road.points()
 
     def contact_force(self) -> np.ndarray:
-        """Vertical force of the road on the owned nodes (nodes,), N, not negative. Not
-        collective."""
+        """Vertical road force (nodes,) N on the owned nodes, not negative. Not collective."""
         return self.road.at_nodes()
 
     def resume(self, displacement: np.ndarray, force: np.ndarray, height: float | None) -> Step:

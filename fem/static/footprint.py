@@ -119,8 +119,7 @@ class _Lines:
         return cls((float(min(edge)), float(max(edge))), chord[order], across[order])
 
     def area(self, between: tuple[float, float]) -> float:
-        """Area (m2) of a contact bounded across the lines by `between` m, elliptic beyond the
-        outermost lines."""
+        """Area (m2) of a contact limited across the lines by `between` m, with elliptic ends."""
         low, high = between
         held = (self.place >= low) & (self.place <= high)
         chord, place = self.chord[held], self.place[held]

@@ -1,6 +1,4 @@
-"""Assembled residual forces and tangent of one body at its present displacement, without the
-road.
-"""
+"""Assembled residual and tangent of one body at its present displacement, without a road."""
 
 from __future__ import annotations
 

@@ -41,8 +41,7 @@ class System(Protocol):
         ...
 
     def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Motion (m) of the owned dofs under forces (N), and force (N) at the held ones.
-        Collective."""
+        """Motion (m) of the owned dofs under forces (N), force (N) at held ones. Collective."""
         ...
 
 
@@ -187,8 +186,7 @@ class HeldSystem:
         return found
 
     def _fill(self, right: PETSc.Mat, numbers: np.ndarray, dofs: np.ndarray) -> None:
-        """Unit forces at free dofs; for held dofs the forces of their unit motion on the free
-        ones."""
+        """Unit forces at free dofs; for held ones the forces of a unit motion on the free ones."""
         assert self._pull is not None, "columns() before take()"
         held = np.isin(dofs, self._held)
         moved = self._dense(right.getSize()[1], self._pull.getSizes()[1])

@@ -33,8 +33,7 @@ Array = np.ndarray
 def held_step(
     comm: MPI.Comm, system: System, road: Road, given: tuple[Array, Moved | None, float | None]
 ) -> tuple[Array, Array] | None:
-    """One linearised step: motion (m) of the owned dofs and reactions (N) at the held ones.
-    Collective.
+    """One linearised step: motion (m) of owned dofs, reactions (N) at held ones. Collective.
 
     `given`: residual forces (N), the prescribed motion of the held dofs, and a load (N) or None;
     with a load the road is raised to carry it. Returns None if nothing resists the road. The road's
@@ -102,8 +101,7 @@ class LinearContact:
     def step(
         self, out: Array, closing: Moved | None, load: float | None, given: float | None = None
     ) -> tuple[Array, Array] | None:
-        """As `held_step`, but first settles the road's active set; the road may rise by a `given`
-        m."""
+        """`held_step` that first settles the active set; the road may rise by a `given` m."""
         road = self._road
         free = self._answer(*self._system.solve(-out, closing), out)
         free.gap += self._gathered(road.gap())
@@ -131,8 +129,7 @@ class LinearContact:
     def _settled(
         self, held: Array, found: _Found, solved: Callable[[Array], _Found]
     ) -> tuple[Array, _Found]:
-        """The held set that no longer changes and its solution, or the given ones if there is
-        none."""
+        """The first held set that no longer changes, with its solution; else the given ones."""
         first = held, found
         for _ in range(_ROUNDS):
             if (found.wanted == held).all():

@@ -1,5 +1,4 @@
-"""Error estimate of the load from two companions: finer elements at the footprint, another order
-everywhere.
+"""Error of the load from two companions: refined at the footprint, and of another order.
 
 Where contact ends, the surface opens as d^(3/2), d being the distance from the edge, which lies
 anywhere in an element. This error fluctuates from mesh to mesh, and no coarser mesh reveals it.
@@ -58,8 +57,7 @@ class LoadError:
 
     @property
     def signed(self) -> bool:
-        """Whether the sign of the error is known: not if the two parts nearly cancel, or `bulk` is
-        unknown."""
+        """Whether the error's sign is known: both parts are, and do not nearly cancel."""
         if self.bulk is None:
             return False
         return self.relative > CANCELS * max(abs(self.footprint), abs(self.bulk))
@@ -91,8 +89,7 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
 
 
 def at_finer_footprint(given: Balance) -> Balance:
-    """The same tire on the same road with the elements at the footprint split in two.
-    Collective."""
+    """The same tire and road with the elements at the footprint split in two. Collective."""
     lattice, force = given.lattice, given.face_force
     around = _touched(np.asarray(force.any(axis=1)), lattice.ring_corners, lattice, closed=True)
     along = _touched(np.asarray(force.any(axis=0)), lattice.arc_corners, lattice, closed=False)
@@ -141,8 +138,7 @@ def _spot(given: Balance) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def _touched(nodes: np.ndarray, corners: np.ndarray, lattice: Lattice, closed: bool) -> np.ndarray:
-    """Flags of the intervals between corners that contain a marked node, and of their
-    neighbours."""
+    """Flags of intervals between corners with a marked node, and of their neighbours."""
     order, count = len(lattice.edge) - 1, len(corners) - 1
     index = order * np.arange(count)[:, None] + np.arange(order + 1)
     held = nodes[index % len(nodes)].any(axis=1)

@@ -27,8 +27,7 @@ def press(
     friction: Friction | None = None,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> StaticState:
-    """Static state of the tire inflated to `inflation` (Pa), on a `road` if one of the next three
-    is given.
+    """Static state of the tire inflated to `inflation` (Pa) and pressed on a `road`.
 
     `load` N on the road, `deflection` m from first touch, or `road_height` m, the road's z;
     `rolling`: inertia and damping of steady rolling; `friction`: optional; `report` is called after
@@ -50,8 +49,7 @@ def place(
     road_height: float | None,
     friction: Friction | None = None,
 ) -> Loader:
-    """Press the inflated tire on the road as in `press`; load and deflection are along the road's
-    normal.
+    """Press the inflated tire on the road as in `press`; load and deflection along its normal.
 
     Returns the loader of the state found, which is another one with friction. Collective.
     """

@@ -89,8 +89,7 @@ class Road:
         self.active, self.force, self.height = kept
 
     def choose(self) -> bool:
-        """Set the active set of the present state; True if it changed on any process.
-        Collective."""
+        """Update the active set; True if it changed on any process. Collective."""
         wanted = self.pressing() > self.stiffness * self.gap()
         changed = bool((wanted != self.active).any())
         self.active = wanted
@@ -98,8 +97,7 @@ class Road:
         return self._body.comm.allreduce(changed, op=MPI.LOR)
 
     def lay_on(self) -> None:
-        """Place active nodes exactly on the road, where rounding would leave a gap or penetration.
-        Collective."""
+        """Place active nodes exactly on the road, without gaps by rounding. Collective."""
         field, level = self._body.u.x, np.full(len(self.dofs), self.height)
         if not self.shape.flat:
             level += self.shape.height(*self.places().T[:2])
@@ -124,8 +122,7 @@ class Road:
         return None
 
     def pulled(self) -> np.ndarray | None:
-        """Force (nodes, 2) N along and across the road on all owned nodes; None without
-        friction."""
+        """Force (nodes, 2) N along and across the road on own nodes; None without friction."""
         return None
 
     def load(self) -> float:

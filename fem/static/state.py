@@ -66,8 +66,7 @@ class StaticState:
 
     @property
     def frames(self) -> np.ndarray | None:
-        """Unit vectors (s, 3, 3) along, across and normal to the road at each point; None on a
-        level plane."""
+        """Unit vectors (s, 3, 3) along, across and normal to the road; None on a level plane."""
         return None if self.road.flat else self.road.frames(*self.positions[:, :2].T)
 
     @property
@@ -113,8 +112,7 @@ class StaticState:
 
     @property
     def penetration(self) -> float:
-        """Largest penetration of an outer-face node into the road as solved, m; 0 without a
-        road."""
+        """Largest penetration of outer-face nodes into the road, m; 0 without a road."""
         if self.road_height is None:
             return 0.0
         return max(float((self.road_height - self.seen[:, 2]).max()), 0.0)

@@ -25,8 +25,7 @@ class TreadSurface:
         self._located: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def weights(self, ring: np.ndarray, arc: np.ndarray) -> sparse.csr_matrix:
-        """Shape functions (k, s) of the face's nodes at angles around the axle and along the
-        section, rad."""
+        """Shape functions (k, s) of the face at angles around the axle and the section, rad."""
         lattice, edge = self._lattice, self._lattice.edge
         around, ring_shape = line_shape(lattice.ring_corners, edge, ring % (2 * np.pi))
         along, arc_shape = line_shape(lattice.arc_corners, edge, arc)
@@ -68,8 +67,7 @@ class TreadSurface:
         return float(found.min())
 
     def _closed_in(self, ring: np.ndarray, arc: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-        """Boxes (k, 2) a third as wide around the lowest of 7 x 7 points in each, and its height
-        (k,)."""
+        """Boxes (k, 2) a third as wide around the lowest of 7 x 7 points, and heights (k,)."""
         t = np.linspace(0, 1, 7)
         place = [box[:, :1] + (box[:, 1:] - box[:, :1]) * t for box in (ring, arc)]
         grid = np.repeat(place[0], 7, axis=1), np.tile(place[1], (1, 7))
@@ -82,8 +80,7 @@ class TreadSurface:
         return boxes, height.min(axis=1)
 
     def locate(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles (rad) of the points seen from below at x, y (k,) m, and whether each was found
-        (k,) bool.
+        """Angles (rad) of the points seen from below at x, y (k,) m; found or not (k,) bool.
 
         Newton's method on the deformed surface, starting from linear interpolation between the
         nodes; results are cached by x, y.

@@ -14,8 +14,7 @@ from tireroad.fem.tire.body import Body
 
 @dataclass(frozen=True, kw_only=True)
 class Rolling:
-    """Steady rolling: `speed` Omega in rad/s, `damping` gamma1 in 1/s, `stiffness_damping` gamma2
-    in s.
+    """Steady rolling: Omega `speed` rad/s, gamma1 `damping` 1/s, gamma2 `stiffness_damping` s.
 
     `inertia` "full": of the inertial rate, Omega^2 S (X + u), with centrifugal forces; "doppler":
     of the body rate only, Omega^2 S_B u, as in the pencil of that name. At speed 0 nothing is
@@ -58,8 +57,7 @@ def elastic_work(body: Body, pressure: Expr) -> ufl.Form:
 
 
 def added_stress(body: Body, share: Expr, before: fem.Function) -> ufl.Form:
-    """int share (S(C) - S(C_0)) : delta E: virtual work of a share of the rubber's stress since
-    state `before`.
+    """int share (S(C) - S(C_0)) : delta E: work of a share of the stress added since `before`.
 
     `share` is constant in each cell. The derivative at `before` is that share of the material part
     of the tangent, without geometric stiffness, pressure and cords.
@@ -135,8 +133,7 @@ def tangent(body: Body, residual: ufl.Form) -> ufl.Form:
 
 
 def stress_prediction(body: Body, before: fem.Function) -> ufl.Form:
-    """Correction that makes the tangent that of a mixed Newton method in displacements and
-    stresses.
+    """Correction to the tangent of a mixed Newton method in displacements and stresses.
 
     There the stresses S at the Gauss points are independent unknowns; S = S(C(u)) is linearised
     along with equilibrium and condensed. The residual is unchanged; the geometric stiffness int S :

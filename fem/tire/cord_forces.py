@@ -41,8 +41,7 @@ class CordForce:
 
 
 def cord_forces(body: Body) -> dict[str, CordForce]:
-    """The forces of all plies, by name, at the body's displacement, on every process.
-    Collective."""
+    """Cord forces by ply at the present displacement, on every process. Collective."""
     found = {}
     for number, one in enumerate(body.plies.cords):
         chain = body.ring.section.plies[one.name]

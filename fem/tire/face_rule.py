@@ -34,8 +34,7 @@ def edge_rule(order: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def face_points(axis: int, side: int, line: np.ndarray) -> np.ndarray:
-    """Tensor-product points (n^2, 3) of a line on a face; the lower of the other two axes varies
-    slowest."""
+    """Tensor points (n^2, 3) of a line on a face; the lower of the other axes varies slowest."""
     points = np.full((len(line) ** 2, AXES), float(side))
     first, second = (other for other in range(AXES) if other != axis)
     grid = np.array(list(itertools.product(line, line)))
@@ -44,8 +43,7 @@ def face_points(axis: int, side: int, line: np.ndarray) -> np.ndarray:
 
 
 class Face:
-    """The face of every cell of a mesh on which the reference coordinate `axis` equals `side` (0 or
-    1)."""
+    """The face of all cells of a mesh where reference coordinate `axis` is `side` (0 or 1)."""
 
     def __init__(self, mesh: Mesh, axis: int, side: int, order: int) -> None:
         self.mesh, self.axis, self.side, self._order = mesh, axis, side, order
@@ -69,8 +67,7 @@ class Face:
         return self.area * integrand * ufl.Measure("dx", domain=self.mesh, metadata=metadata)
 
     def tangents(self) -> tuple[Expr, Expr]:
-        """(e_circ, e_across) in UFL: around the axle, and e_circ x normal, both tangential to the
-        face."""
+        """(e_circ, e_across) in UFL: around the axle, and e_circ x normal, both in the face."""
         X = ufl.SpatialCoordinate(self.mesh)
         along = ufl.as_vector((-X[2], 0.0, X[0]))
         # The polynomial face is not exactly a surface of revolution.

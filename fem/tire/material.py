@@ -35,8 +35,7 @@ def compound(
     loss_factor: float = 0.0,
     **parameters: float,
 ) -> Material:
-    """Material of the law `model` (fem.tire.laws) with its `parameters` (Pa, -), others at their
-    defaults.
+    """Material of law `model` (fem.tire.laws); `parameters` (Pa, -) not given at their defaults.
 
     Raises InputError for a value out of range or a parameter of another law.
     """

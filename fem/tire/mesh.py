@@ -54,8 +54,7 @@ class Lattice:
         return position(self.ring[i], self.section[node])
 
     def ids(self, points: np.ndarray) -> np.ndarray:
-        """Ids of the nodes nearest to points (n, 3), since the element's own map may deviate
-        slightly."""
+        """Ids of the nodes nearest to points (n, 3), as element maps deviate slightly."""
         x, y, z = points.T
         ring = np.arctan2(x, -z) % (2 * np.pi)
         i = _nearest(np.append(self.ring, 2 * np.pi), ring) % len(self.ring)
@@ -71,8 +70,7 @@ class Lattice:
         return _cells(self, compat.field_nodes(self.tire.order), np.arange(self.tire.elements))
 
     def quads(self) -> np.ndarray:
-        """The outer face as quadrilaterals (q, 4) between neighbouring nodes, indices into the
-        face."""
+        """The outer face as quadrilaterals (q, 4) of neighbouring nodes, indices into it."""
         around, along = self.face_shape
         i, j = np.meshgrid(np.arange(around), np.arange(along - 1), indexing="ij")
         next_i = (i + 1) % around
@@ -81,8 +79,7 @@ class Lattice:
 
 
 def position(ring: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Cartesian positions (n, 3) from ring angles (n,) rad and section positions (r, y) (n, 2)
-    m."""
+    """Cartesian positions (n, 3) from ring angles (n,) rad and section (r, y) (n, 2) m."""
     r, y = place[:, 0], place[:, 1]
     return np.stack([r * np.sin(ring), y, -r * np.cos(ring)], axis=-1)
 

@@ -78,8 +78,7 @@ class Sheet:
 
 
 class Plies:
-    """All cords of a body with elements of `order`; without cords every form is 0. Collective to
-    make."""
+    """All cords of a body; without any, every form is 0. Collective to make."""
 
     def __init__(
         self, mesh: Mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]
@@ -145,8 +144,7 @@ def _sum(forms: Iterable[ufl.Form]) -> ufl.Form | int:
 
 
 def _sheets(mesh: Mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]) -> list[Sheet]:
-    """The fewest sheets that hold all plies: one per cell face, more where plies coincide.
-    Collective."""
+    """The fewest sheets for all plies: one per cell face, more where plies coincide. Collective."""
     cells = mesh.topology.index_map(3)
     count = cells.size_local + cells.num_ghosts
     taken: dict[tuple[int, int, int], np.ndarray] = {}

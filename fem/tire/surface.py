@@ -7,8 +7,7 @@ from mpi4py import MPI
 
 
 class Gather:
-    """Gathers values at chosen lattice nodes from their owners to every process, in the order of
-    `wanted`.
+    """Gathers values at chosen lattice nodes on every process, in the order of `wanted`.
 
     `owned`: ids of this process's owned nodes; `wanted`: ids to gather, the same on all
     processes.

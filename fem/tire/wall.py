@@ -79,8 +79,7 @@ class Wall:
         return field
 
     def stiffening(self) -> fem.Function:
-        """Excess of the dynamic over the static modulus, as a fraction of the static one: dynamic -
-        1."""
+        """Excess of the dynamic modulus over the static one, as a fraction of it: dynamic - 1."""
         return self._by_cell([m.dynamic - 1 for m in self._materials])
 
     def losses(self) -> fem.Function:

@@ -1,5 +1,4 @@
-"""The cavity's air in an implicit time step of the full finite elements: its few unknowns,
-eliminated.
+"""The cavity's air in an implicit step of the full finite elements, eliminated.
 
     [A + E E^T    -E' w ] [u]   [r]
     [ -w E'^T       Z   ] [g] = [q],    Z = c2 + c1 D_a + K_a,
@@ -52,13 +51,11 @@ class AirStep:
         return self._comm.bcast(own if self.mine else None, root=self._comm.size - 1)
 
     def right(self, own: np.ndarray, air: np.ndarray) -> np.ndarray:
-        """Own rows (n,) of the tire's right-hand side with the contribution of forces (a,) on the
-        air."""
+        """Own rows (n,) of the tire's right-hand side, with forces (a,) on the air eliminated."""
         return own + self._air.pushed[:, 1:] @ (self._driven * (self._inverse @ air))
 
     def complete(self, free: np.ndarray, air: np.ndarray) -> np.ndarray:
-        """Own rows (n + rows, ...) of u and g, from A^-1 right (n, ...) and forces (a, ...) on the
-        air."""
+        """Own rows (n + rows, ...) of u and g, from A^-1 right (n, ...), air forces (a, ...)."""
         u = free - self._columns @ (self._mend @ self._air.coupling(free))
         moved = self._air.coupling(u)[1:]
         g = self._inverse @ (air + (self._driven * moved.T).T)

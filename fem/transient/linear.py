@@ -33,8 +33,7 @@ _STATE = ("displacement", "velocity", "acceleration", "balanced")
 
 
 class FullTire:
-    """All degrees of freedom of the tire, between the forces and displacements of the contact
-    patch.
+    """All degrees of freedom of the tire, between forces and displacements of the patch.
 
     The interface is that of greens.recursion.Recursion, so the same contact loop runs on it.
     `outputs` (r, 3 s) and `loads` (k, 3 s) are weights of the outer face's nodes; `air`: the
@@ -178,8 +177,7 @@ class FullTire:
         self.displacement, self.acceleration = new, acceleration
 
     def wheel_motion(self) -> np.ndarray:
-        """Motion of rim and body (7,): three translations m, three rotations rad, the body's height
-        m."""
+        """Motion (7,) of rim and body: three translations m, three rotations rad, height m."""
         assert self.wheel is not None and self._air is not None, "the wheel is held"
         return self.wheel.shown @ self._air.shared(self.displacement[self._tire :])
 
@@ -195,8 +193,7 @@ class FullTire:
         return kept
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Continue from a snapshot, taken between `advance` and `predict` on any number of
-        processes."""
+        """Continue from a snapshot, before `predict`; any number of processes may have written it."""
         for k, name in enumerate(_STATE):
             own = self._operators.restrict(kept[name][self._operators.body.ids])
             if self._air and self._air.mine:
@@ -204,6 +201,5 @@ class FullTire:
             setattr(self, name, own)
 
     def inertia_force(self) -> np.ndarray:
-        """Rate of the momentum (3,) of tire and air, N; the convective parts cancel around the
-        ring."""
+        """Rate of momentum (3,) of tire and air, N; convective parts cancel around the ring."""
         return summed(self.comm, self._carried @ self.balanced)

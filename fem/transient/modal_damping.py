@@ -19,8 +19,7 @@ from tireroad.fem.matrices.operators import Operators
 
 
 class ModalDamping:
-    """`fields`: own rows (n, m) of M-orthonormal modes, kg^-1/2; `excess` (m,) 1/s. Collective to
-    make.
+    """`fields`: own rows (n, m) of M-orthonormal modes, kg^-1/2; `excess` (m,) 1/s. Collective.
 
     `body`: the matrix B of a wheel that rotates at `speed` (rad/s), None if standing.
     """
@@ -46,8 +45,7 @@ class ModalDamping:
     def joined(
         self, solve: Callable[[np.ndarray], np.ndarray], share: float
     ) -> Callable[[np.ndarray], np.ndarray]:
-        """Solver of A + share D_x + K_x, own rows (n, k) to own rows, from `solve`, that of A.
-        Collective."""
+        """Solver of A + share D_x + K_x, own rows (n, k), from `solve`, that of A. Collective."""
         reading = share * self._weighted + self._turned
         through = solve(self._push)
         small = np.eye(through.shape[1]) + summed(self._comm, reading.T @ through)

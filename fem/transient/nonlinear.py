@@ -1,5 +1,4 @@
-"""Full finite elements in time with large motions, standing or rolling: the reference for
-linearisation.
+"""Full finite elements in time with large motions, standing or rolling.
 
     M u'' + (D + 2 Omega G) u' + F(u) = W^T f + f_static,   D = gamma1 M + gamma2 K,
 
@@ -104,8 +103,7 @@ class NonlinearTire(FullTire):
         return self._freed(here - self._solved(self._dynamic(here) + self._elastic))
 
     def settle(self, force: np.ndarray) -> np.ndarray | None:
-        """None if the motion under a force (k,) N is in equilibrium to TOLERANCE; then call
-        `advance`.
+        """None if the motion under a force (k,) N is in equilibrium; then call `advance`.
 
         Otherwise a better displacement (r,) m without new force, for which to solve the contact
         again. Raises ConvergenceError after MOST_TURNS iterations.
@@ -163,14 +161,12 @@ class NonlinearTire(FullTire):
         return self.comm.allreduce(fem.assemble_scalar(self._potential_form))
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Continue from a snapshot, taken between `advance` and `predict` on any number of
-        processes."""
+        """Continue from a snapshot, before `predict`; any number of processes may have written it."""
         super().restore(kept)
         self._elastic = self._at(self.displacement, self._forces) - self._rest
 
     def energy(self) -> float:
-        """Kinetic energy plus energy stored in wall and inflation since the static state, J;
-        standing wheel."""
+        """Kinetic energy and energy stored since the static state, J; standing wheel only."""
         kinetic = self.comm.allreduce(self._mass @ self.velocity**2) / 2
         return kinetic + self._at(self.displacement, self._stored) - self._rest_potential
 

@@ -1,5 +1,4 @@
-"""A moving wheel in an implicit time step of the full finite elements: its few unknowns,
-eliminated.
+"""A moving wheel in an implicit step of the full finite elements, eliminated.
 
 Small motions w of the tire relative to its rim, and xi of rim and body, have the blocks of
 modal.corner with the unit matrix in place of modes:
@@ -91,8 +90,7 @@ def _transposed(matrix: PETSc.Mat, vectors: Array) -> Array:
 
 
 class WheelStep:
-    """Counterpart of AirStep for the `wheel`; `weights` (c1 1/s, c2 1/s2). Creation and all methods
-    are collective."""
+    """AirStep's counterpart for the `wheel`; `weights` (c1 1/s, c2 1/s2). All is collective."""
 
     def __init__(
         self, wheel: Wheel, solve: Callable[[Array], Array], weights: tuple[float, float]
@@ -121,8 +119,7 @@ class WheelStep:
         return own
 
     def complete(self, free: Array, wheel: Array) -> Array:
-        """Own rows (n + rows, ...) of u and x, from A^-1 right (n, ...) and forces (c, ...) on the
-        wheel."""
+        """Own rows (n + rows, ...) of u and x, from A^-1 right (n, ...), wheel forces (c, ...)."""
         x = self._inverse @ (wheel - summed(self._comm, self._rows.T @ free))
         u = free - self._columns @ x
         return np.concatenate([u, x]) if self.mine else u

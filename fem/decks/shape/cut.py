@@ -104,8 +104,7 @@ def _closed(
 
 
 def _cut_sides(quads: Quads, marks: Marks, points: list) -> dict[int, tuple]:
-    """New points of each cut side: (middle of its lower part, cut, middle of the other), from its
-    lower end."""
+    """New points of each cut side from its lower end: first middle, cut, second middle."""
     found = {}
     sides = {int(side[1]): side for side in quads.sides().reshape(-1, 3)}
     for middle, t in marks.items():

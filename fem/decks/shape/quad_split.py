@@ -72,8 +72,7 @@ def place(nine: np.ndarray, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
 
 
 def nine_points(nodes: np.ndarray, raw: Raw, edge: np.ndarray, middles: np.ndarray) -> np.ndarray:
-    """Nine points (c, 9, 2) of quadrilaterals; the centre of an eight-node one follows from the
-    others."""
+    """Nine points (c, 9, 2) of quadrilaterals; a missing centre follows from the others."""
     corner, middle = nodes[raw.corners], middles[edge]
     centre = middle.sum(axis=1) / 2 - corner.sum(axis=1) / 4
     return np.concatenate([corner, middle, centre[:, None]], axis=1)[:, TENSOR]
@@ -112,8 +111,7 @@ def _named(sort: int, number: np.ndarray, place_in: int = 0) -> np.ndarray:
 def _quarters(
     nodes: np.ndarray, raw: Raw, edge: np.ndarray, middles: np.ndarray, first: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """points (4 c, 9, 2), origin (4 c, 4) and identifiers (4 c, 9, 3) of the quarters of
-    quadrilaterals."""
+    """points (4 c, 9, 2), origin (4 c, 4), identifiers (4 c, 9, 3) of quadrilaterals' quarters."""
     grid = np.linspace(0, 1, 5)
     xi, eta = (part.ravel() for part in np.meshgrid(grid, grid, indexing="ij"))
     points = place(nine_points(nodes, raw, edge, middles), xi, eta).reshape(-1, 5, 5, 2)
@@ -186,7 +184,7 @@ def _edge_middle(k: int) -> np.ndarray:
 
 
 def _six(area: np.ndarray) -> np.ndarray:
-    """Quadratic functions (k, 6) of a triangle at area coordinates (k, 3): corners, edges 12, 23, 31."""
+    """Quadratic functions (k, 6) of a triangle at area coordinates (k, 3); edges 12, 23, 31."""
     corner = area * (2 * area - 1)
     edge = 4 * area * np.roll(area, -1, axis=1)
     return np.concatenate([corner, edge], axis=1)

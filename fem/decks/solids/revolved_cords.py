@@ -49,7 +49,7 @@ def _layer(deck: Deck, layer: Layer, senses: dict[int, int], axis: int) -> Layer
 
 
 def _from_circumference(deck: Deck, layer: Layer, axis: int) -> int:
-    """0: angle from the meridian; 1 or -1: cylindrical system with axis along or against the axle."""
+    """0: angle from the meridian; 1 or -1: cylindrical system, axis along or against the axle."""
     if not layer.orientation:
         if axis == 0:
             return 0

@@ -28,8 +28,7 @@ _REACH = 0.9  # of the drum's radius
 
 @dataclass(frozen=True, kw_only=True)
 class RoadShape:
-    """`camber` rad; `drum_radius` m, None for a flat road; `inside`: the tire runs inside the
-    drum."""
+    """`camber` rad; `drum_radius` m, None: flat road; `inside`: the tire runs inside the drum."""
 
     camber: float = 0.0
     drum_radius: float | None = None
@@ -64,8 +63,7 @@ class RoadShape:
         return -self._sign * near / np.sqrt(self.drum_radius**2 - near**2) / self.upright, across
 
     def bending(self, x: Array) -> Array:
-        """Curvature of the road along xi, positive towards its normal, 1/m: -1/R on a drum, 1/R
-        inside one."""
+        """Curvature along xi towards the road's normal, 1/m: -1/R on a drum, 1/R inside one."""
         if self.drum_radius is None:
             return np.zeros(np.shape(x))
         return np.where(self._near(x) == x, -self._sign / self.drum_radius, 0.0)
@@ -83,8 +81,7 @@ class RoadShape:
         return np.stack([along, y * self.upright - z * math.sin(self.camber)], axis=-1)
 
     def frames(self, x: Array, y: Array) -> Array:
-        """Unit vectors (n, 3, 3) in the wheel's axes: along the road, across it to the left, normal
-        to it."""
+        """Unit vectors (n, 3, 3) in the wheel's axes: along the road, to its left, normal to it."""
         along, across = self.slopes(x, y)
         one, nothing = np.ones(len(along)), np.zeros(len(along))
         left = _unit(np.stack([nothing, one, across], axis=-1))

@@ -51,8 +51,7 @@ class Unrolled:
         return change
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """B^T K B plus the stiffness from the rotation of the road's normal forces; valid until the
-        next call."""
+        """B^T K B plus the stiffness of the rotating normal forces; valid until the next call."""
         if self._tangent is not None:
             self._tangent.destroy()
         transform = self._transform(matrix)

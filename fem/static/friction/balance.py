@@ -1,6 +1,4 @@
-"""Equilibrium on a smooth road with Coulomb friction: one Newton loop for contact, stick and
-slip.
-"""
+"""Equilibrium on a smooth road with Coulomb friction: contact, stick, slip in one Newton loop."""
 
 from __future__ import annotations
 
@@ -17,8 +15,7 @@ from tireroad.fem.tire.body import Body
 
 
 class RubbingEquilibrium(Equilibrium):
-    """`Equilibrium` of nodes that slide as given by `sliding`, with coefficient `friction`.
-    Collective."""
+    """`Equilibrium` with coefficient `friction` and slip as in `sliding`. Collective."""
 
     road: RubbingRoad
 
@@ -43,8 +40,7 @@ class RubbingEquilibrium(Equilibrium):
         return super().solve(road_height, load, allowed)
 
     def nudged(self, load: float) -> np.ndarray:
-        """Sum (2,) N of the forces along and across the road after one linearised step under `load`
-        (N).
+        """Sum (2,) N of the forces along and across the road after one step under `load` (N).
 
         The stick and slip sets are kept, and the state is restored. Raises ConvergenceError for a
         singular tangent. Collective."""

@@ -159,8 +159,7 @@ class RubbingRoad(Road):
         )
 
     def _sources(self) -> tuple[Array, Array]:
-        """At slipping nodes the unknowns (k, m) whose forces give mu f, and their factors (k,
-        m)."""
+        """At slipping nodes: unknowns (k, m) whose forces give mu f, and factors (k, m)."""
         stretch, lean = (part[self._slips] for part in self._lie())
         upright = self.dofs[self._slips, None]
         if self.shape.flat:

@@ -65,8 +65,7 @@ class Slide:
         self._sliding.commit()
 
     def start(self, slip: tuple[float, float]) -> float:
-        """Go to the start of the curve: from a state with `slip` of the wheel to none along the
-        axis.
+        """Go to the start of the curve, where the wheel's slip along the axis is zero.
 
         Returns the slope of the force there, N/m, for a rolling wheel N. Raises ConvergenceError if
         the state is not recovered."""
@@ -109,8 +108,7 @@ class Slide:
         at, begins = start, True
 
         def attempt(target: float) -> Step:
-            """Each part starts from the last stick and slip state: new contacts have slid since
-            then only."""
+            """Each part starts from the last stick and slip; new contacts have slid since then."""
             nonlocal at, begins
             if begins:
                 self._sliding.commit()

@@ -47,8 +47,7 @@ class Sliding(Protocol):
         ...
 
     def ahead(self, members: Array) -> Array:
-        """Global block numbers of the nodes ahead of `members` (indices in n); -1: none. Not
-        collective."""
+        """Global block numbers of the nodes ahead of `members`; -1: none. Not collective."""
         ...
 
 
@@ -80,8 +79,7 @@ class Standing:
 
 
 class Passing:
-    """Slip in steady rolling; `radius` m: travel of the wheel per radian, along the road; `slip`
-    (s_x, s_y)."""
+    """Slip in steady rolling: travel per radian `radius` m, and `slip` (s_x, s_y)."""
 
     def __init__(
         self,

@@ -49,8 +49,7 @@ class RubbingSystem:
         return found
 
     def solve(self, right: Array, moved: Moved | None = None) -> tuple[Array, Array]:
-        """du (m) of the owned dofs, and forces (N) at the held ones; `right` already includes L
-        (`RubbingRoad.rows`)."""
+        """du (m) of the owned dofs, forces (N) at held ones; `right` already includes L."""
         change, force = self._inner.solve(right, moved)
         if self._carried is None:
             return change, force
@@ -114,8 +113,7 @@ class RubbingSystem:
 
 
 def _sparse(matrix: PETSc.Mat, rows: Array, columns: Array, values: Array) -> PETSc.Mat:
-    """A matrix of the same shape as another, from local rows and global columns; duplicates are
-    added."""
+    """A matrix shaped like another, from local rows and global columns; duplicates add up."""
     (count, whole), _ = matrix.getSizes()
     entries = np.ravel(values), (np.ravel(rows), np.ravel(columns))
     local = sparse.csr_matrix(entries, shape=(count, whole))

@@ -1,6 +1,4 @@
-"""Transfer of a static state to another mesh of the same tire, as a start close to its
-equilibrium.
-"""
+"""Transfer of a static state to another mesh of the same tire, as a close start."""
 
 from __future__ import annotations
 
@@ -21,8 +19,7 @@ if TYPE_CHECKING:
 def carried_over(
     state: StaticState, tire: TireModel, other: TireModel, load: float | None
 ) -> StaticState | None:
-    """Static state of the `other` mesh of the same tire, by Newton's method from the `state` of
-    this one.
+    """Static state of the `other` mesh, by Newton's method from the `state` of this one.
 
     Inflation, rolling and road height are kept; with a `load` (N) the road carries that instead.
     The height of first touch is taken from the state. None if no equilibrium is found.
@@ -38,8 +35,7 @@ def carried_over(
 
 
 def sampled(lattice: Lattice, values: np.ndarray, target: Lattice) -> np.ndarray:
-    """Values (n, 3) at the nodes of a lattice, interpolated to those of another lattice of the same
-    tire."""
+    """Values (n, 3) of a lattice interpolated to another lattice of the same tire."""
     section = lattice.tire.section
     place = locate(section.nodes, section.cells, section.order, target.section)
     across = interpolation(lattice.cells_2d, lattice.edge, lattice.shape[1], place)

@@ -24,8 +24,7 @@ _ROAD = "active", "force", "height"
 
 
 class History:
-    """Solutions of the equilibrium problems of one stage, in order; no record without a
-    `journal`."""
+    """Solutions of the equilibrium problems of one stage, in order; none without a `journal`."""
 
     def __init__(self, journal: Journal | None) -> None:
         self._journal = journal
@@ -57,8 +56,7 @@ class History:
         return problem.solved(_read(entry))
 
     def predict(self, predict: Callable[[], bool]) -> bool:
-        """Result of `predict()`, or the recorded one if the solution after it is known.
-        Collective."""
+        """Result of `predict()`, or the recorded one if the next solution is known. Collective."""
         if self._journal is None:
             return predict()
         if self._journal.done < len(self._journal.found):

@@ -31,8 +31,7 @@ class Journal:
         return len(self.found)
 
     def next(self, comm: MPI.Comm, serves: Callable[[Entry], bool] | None = None) -> Entry | None:
-        """The next step's stored result, if all processes of `comm` have it and `serves` accepts it
-        on all.
+        """The next step's stored result, if all processes have it and `serves` accepts it.
 
         Otherwise None: the result must be passed to `add`, and the remaining stored ones are
         dropped. Collective on comm."""

@@ -31,8 +31,7 @@ _MOST = 6  # steps with springs
 
 
 def cords_strained(equilibrium: Equilibrium, load: float) -> bool:
-    """Whether cord strain leaves a residual so large, relative to `load` (N), that a tangent is
-    useless. Collective."""
+    """Whether the residual of strained cords far exceeds `load` (N): tangents are useless. Collective."""
     cords = equilibrium.body.plies.cords
     return bool(cords) and equilibrium.out_of_balance() > _STRAINED * load
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Step:
-    """Outcome of one equilibrium solve: `iterations` tangents, `residual` relative to the force
-    scale."""
+    """Outcome of one solve: `iterations` tangents, `residual` relative to the force scale."""
 
     converged: bool
     iterations: int

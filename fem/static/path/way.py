@@ -30,8 +30,7 @@ class _Known:
 
 
 class Way:
-    """Path of a loader's inflated body from its present state without a road. All methods are
-    collective."""
+    """Path of a loader's body from a state without a road. All methods are collective."""
 
     def __init__(self, loader: Loader) -> None:
         self._loader, self._equilibrium, self._body = loader, loader.equilibrium, loader.body
@@ -43,8 +42,7 @@ class Way:
         self._raise_road(0.0, deflection, 0.0)
 
     def carry(self, load: float) -> float:
-        """Raise the road until it carries `load` (N); returns the deflection (m). Bracketed secant
-        method.
+        """Raise the road until it carries `load` (N) by bracketed secants; the deflection (m).
 
         Intermediate states may have a residual; the state that an error leaves has none.
         """
@@ -56,8 +54,7 @@ class Way:
             return self._seek(load, 0.0)
 
     def _seek(self, load: float, allowed: float) -> float:
-        """The deflection (m) for `load`, intermediate states having up to `allowed` (N) of
-        residual."""
+        """Deflection (m) for `load`; intermediate states may have `allowed` (N) of residual."""
         self._known = self._known[:1]
         self._body.u.x.array[:] = self._known[0].displacement
         trial = 0.4 * self._body.ring.thickness
@@ -81,8 +78,7 @@ class Way:
         )
 
     def _meet(self, load: float, trial: float) -> bool:
-        """Solve for state and road height at the given load, from the estimate at the `trial`
-        deflection."""
+        """Solve for state and road height at the given load, from the estimate at `trial`."""
         self._near(trial)
         step = self._equilibrium.solve(self._loader.touch + trial, load)
         self._loader.newton_steps += step.iterations
@@ -91,13 +87,11 @@ class Way:
         return step.converged
 
     def _near(self, trial: float) -> bool:
-        """Estimate the state at a deflection, from the last tangent or known states; whether it
-        could be."""
+        """Estimate the state at a deflection, by the last tangent or known states; success."""
         return self._equilibrium.predict(self._loader.touch + trial) or self._guess(trial)
 
     def _guess(self, trial: float) -> bool:
-        """Extrapolate from the two known states nearest to a deflection; False if there are not
-        two."""
+        """Extrapolate from the two known states nearest to a deflection; False without two."""
         near = sorted(self._known, key=lambda k: abs(k.deflection - trial))[:2]
         if len(near) < 2:
             return False

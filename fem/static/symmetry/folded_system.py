@@ -12,8 +12,7 @@ from tireroad.fem.timing import Timing
 
 
 class FoldedSystem:
-    """P^T K P, the counterpart of `HeldSystem` for half a ring. Followers keep a unit diagonal
-    row."""
+    """P^T K P: a `HeldSystem` of half a ring. Followers keep a unit diagonal row."""
 
     def __init__(
         self, comm: MPI.Comm, matrix: PETSc.Mat, kind: str, timing: Timing, cut: Cut
@@ -39,8 +38,7 @@ class FoldedSystem:
         return self._inner.take(self._folding.matrix, held, closing, raising)
 
     def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Motion (m) of all owned dofs under folded forces (N), and force (N) at the held ones.
-        Collective."""
+        """Motion (m) of owned dofs under folded forces (N), force (N) at held ones. Collective."""
         change, force = self._inner.solve(right, moved)
         self._cut.unfold(change)
         return change, force
@@ -58,8 +56,7 @@ class FoldedSystem:
 
 
 class _Folding:
-    """`matrix` P^T K P and the summation map from the entries of K: pattern made once, values per
-    `fill`."""
+    """`matrix` P^T K P, its pattern made once and its values summed from K in `fill`."""
 
     def __init__(self, matrix: PETSc.Mat, cut: Cut) -> None:
         comm, size = matrix.comm.tompi4py(), matrix.getSize()[0]

@@ -46,8 +46,7 @@ def looks_the_same(ring: Ring, rolling: Rolling) -> bool:
 
 
 class HalfTurnEquilibrium(Equilibrium):
-    """Equilibrium of half of a body's ring, from the lowest point over x > 0 to the highest.
-    Collective.
+    """Equilibrium of half a ring, from the lowest point over x > 0 to the highest. Collective.
 
     The state is `body.u` of its own `body`; loads passed and returned are those of the whole
     tire.
@@ -108,8 +107,7 @@ class HalfTurnEquilibrium(Equilibrium):
         return 2 * further, 2 * compliance
 
     def on(self, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement (n, 3) m and road force (n,) N at the nodes of the whole ring's lattice.
-        Collective."""
+        """Displacement (n, 3) m and road force (n,) N on the whole ring's lattice. Collective."""
         count, around = lattice.shape[1], lattice.shape[0]
         moved = self.body.displacement().reshape(-1, count, 3)
         force = self.body.everywhere(self.contact_force()).reshape(-1, count)

@@ -31,8 +31,7 @@ from tireroad.fem.tire.mesh import Lattice
 
 
 class RoundEquilibrium(Equilibrium):
-    """Equilibrium of the axisymmetric shape of a body's ring, on the shortest of its elements
-    around.
+    """Equilibrium of a ring's axisymmetric shape, on the shortest of its elements around.
 
     On the calling process only. The state is `body.u` of its own `body`, a sector.
     """
@@ -67,8 +66,7 @@ class RoundEquilibrium(Equilibrium):
 def inflated(
     whole: Body, rolling: Rolling, inflate: Callable[[RoundEquilibrium], None]
 ) -> RoundEquilibrium:
-    """The axisymmetric shape inflated by `inflate`; if that fails while rotating, via the state at
-    rest.
+    """The axisymmetric shape inflated by `inflate`; if rotation prevents it, via that at rest.
 
     Cords not yet tensioned by the pressure give way under centrifugal forces. The radial tire's
     section of 34 elements from bead to bead at 71.9 rad/s stops at 13 Pa, but converges in two
@@ -110,8 +108,7 @@ class RoundSystem:
         return True
 
     def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Motion (m) of all dofs of the sector under forces (N), and an empty array of
-        reactions."""
+        """Motion (m) of all dofs of the sector under forces (N), and no reactions."""
         assert self._factor is not None, "take() comes before"
         with self._timing("solve"):
             change = self._turned @ self._factor.solve(self._turned.T @ right)
