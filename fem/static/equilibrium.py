@@ -24,7 +24,7 @@ from tireroad.fem.tire.body import Body
 
 MOST_STEPS = 25  # tangents; a load step that needs more is better halved
 TOLERANCE = 1e-12  # of the force scale
-_SERVES = 0.2  # least reduction by a reused tangent, whose step costs 1/20 of a new one
+_SERVES = 0.2  # error ratio up to which a tangent is reused, at 1/20 of a new one's cost
 _STAYS = 1e-10  # of the wall: rounding when a state is transferred from half the ring and back
 _DIVERGED = 1e8  # times the force scale, beyond which Newton's method does not recover
 

@@ -193,7 +193,7 @@ class FullTire:
         return kept
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Continue from a snapshot, before `predict`; any number of processes may have written it."""
+        """Continue from a snapshot, before `predict`; written by any number of processes."""
         for k, name in enumerate(_STATE):
             own = self._operators.restrict(kept[name][self._operators.body.ids])
             if self._air and self._air.mine:

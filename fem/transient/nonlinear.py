@@ -161,7 +161,7 @@ class NonlinearTire(FullTire):
         return self.comm.allreduce(fem.assemble_scalar(self._potential_form))
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Continue from a snapshot, before `predict`; any number of processes may have written it."""
+        """Continue from a snapshot, before `predict`; written by any number of processes."""
         super().restore(kept)
         self._elastic = self._at(self.displacement, self._forces) - self._rest
 

@@ -31,7 +31,8 @@ _MOST = 6  # steps with springs
 
 
 def cords_strained(equilibrium: Equilibrium, load: float) -> bool:
-    """Whether the residual of strained cords far exceeds `load` (N): tangents are useless. Collective."""
+    """Whether strained cords leave a residual so far above `load` (N) that a tangent is useless.
+    Collective."""
     cords = equilibrium.body.plies.cords
     return bool(cords) and equilibrium.out_of_balance() > _STRAINED * load
 
