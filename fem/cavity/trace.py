@@ -1,6 +1,7 @@
 """Geometry of the cavity, and the volume displaced by motions of the tire's wall.
 
-    int chi dV = closed int chi rho/2 e_rho . n dS,   int chi dA dtheta = closed int chi e_rho . n dS,
+    int chi dV = closed int chi rho/2 e_rho . n dS,
+    int chi dA dtheta = closed int chi e_rho . n dS,
     flux_f(u) = closed int chi_f u . n dS = d/de int chi_f dV of the shape x + e u,
 
 over the deformed inner face and the cone between its two bead ends, which belongs to the rim; n

@@ -29,10 +29,10 @@ def press(
 ) -> StaticState:
     """Static state of the tire inflated to `inflation` (Pa) and pressed on a `road`.
 
-    `load` N on the road, `deflection` m from first touch, or `road_height` m, the road's z;
-    `rolling`: inertia and damping of steady rolling; `friction`: optional; `report` is called after
-    every load step. Raises InputError for values out of range, ConvergenceError if no state is
-    found. Collective.
+    At most one of `load` N on the road, `deflection` m from first touch and `road_height` m, the
+    road's z; none: no road. `rolling`: inertia and damping of steady rolling; `friction`: optional;
+    `report` is called after every load step. Raises InputError for values out of range,
+    ConvergenceError if no state is found. Collective.
     """
     if not (math.isfinite(inflation) and inflation >= 0.0):
         raise InputError(f"inflation = {inflation:g} Pa must be 0 or more, and finite")

@@ -1,6 +1,7 @@
 """Modal damping in the full finite-element model: a low-rank matrix in addition to the sparse ones.
 
-    D_x = M Phi diag(e) Phi^T M,   and in the rolling pencil  K_x = Omega D_x M^-1 B = Omega M Phi diag(e) Phi^T B,
+    D_x = M Phi diag(e) Phi^T M,   and in the rolling pencil
+    K_x = Omega D_x M^-1 B = Omega M Phi diag(e) Phi^T B,
 
 e_k being the damping rate of mode k in excess of the sparse matrices' uniform one. A system A + c
 D_x + K_x is solved with A's factorisation and a small matrix (Sherman, Morrison and Woodbury).

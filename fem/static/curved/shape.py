@@ -4,7 +4,8 @@ In the wheel's axes the surface is z = h + s(x, y), h being its height under the
 tilted by gamma about x (its top to the right, -y, for gamma > 0), so the road's normal is (0, sin
 gamma, cos gamma) there, and
 
-    s = -y tan gamma + d(x) / cos gamma,   d = sqrt(R^2 - x^2) - R on a drum, R - sqrt(R^2 - x^2) inside one,
+    s = -y tan gamma + d(x) / cos gamma,
+    d = sqrt(R^2 - x^2) - R on a drum, R - sqrt(R^2 - x^2) inside one,
 
 for a drum with a horizontal axis. Beyond 0.9 R a drum is continued by its tangent; there is no
 contact there.
