@@ -101,10 +101,9 @@ class Axle:
 
     @property
     def adrift(self) -> np.ndarray:
-        """Motions (7, r) of wheel and body, one a column, that no spring resists.
+        """Motions (7, r) of wheel and body, one per column, that no spring resists.
 
-        Translations without a spring to the ground; with a body, wheel and body together in
-        height.
+        Translations without spring and damper; with a body, wheel and body together in height.
         """
         columns = []
         for k in self.moving:

@@ -211,8 +211,8 @@ def compliance(
 
     `outputs` (r, 3 s) and `loads` (k, 3 s) are weights of the outer face's nodes, three dofs a
     node. `beside`: own rows (b, n) of further readings, b more rows of the result, e.g. the tire's
-    first moment int rho u, kg m/N. Raises ConvergenceError if a solve leaves a relative residual
-    above 1e-8.
+    first moment int rho u, kg m/N; `air`: coupling to the cavity. Raises ConvergenceError if a
+    solve leaves a relative residual above 1e-8.
     """
     rows, columns = on_own_rows(operators, outputs).T.tocsr(), on_own_rows(operators, loads)
     if beside is not None:

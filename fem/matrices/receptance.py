@@ -1,7 +1,8 @@
 """Receptance of the full matrices, frequency by frequency: the reference for all modal ones.
 
-(K_Omega - w^2 M + i w E) u = b in real arithmetic, u = a + i c:  [[A, -w E], [w E, A]] [a; c] = [b;
-0]
+(K_Omega - w^2 M + i w E) u = b with u = a + i c in real arithmetic:
+
+    [[A, -w E], [w E, A]] [a; c] = [b; 0],   A = K_Omega - w^2 M
 """
 
 from __future__ import annotations
