@@ -133,7 +133,7 @@ def tangent(body: Body, residual: ufl.Form) -> ufl.Form:
 
 
 def stress_prediction(body: Body, before: fem.Function) -> ufl.Form:
-    """Correction to the tangent of a mixed Newton method in displacements and stresses.
+    """Correction that turns the tangent into that of a mixed (displacement-stress) Newton method.
 
     There the stresses S at the Gauss points are independent unknowns; S = S(C(u)) is linearised
     along with equilibrium and condensed. The residual is unchanged; the geometric stiffness int S :

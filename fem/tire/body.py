@@ -73,8 +73,8 @@ class Body:
         reduced = {"quadrature_degree": 2 * order - 1}
         self.reduced_dx = ufl.Measure("dx", domain=self.mesh, metadata=reduced)
         # Two surface tangents and a test function: exact integration makes the pressure stiffness
-        # symmetric. At order 3, degree 2 x order left an asymmetry of 7e-8, comparable to the
-        # softest mode.
+        # symmetric. At order 3, degree 2 x order left an asymmetry of 7e-8, more than the
+        # stiffness of the lowest modes.
         exact = {"quadrature_degree": 3 * order - 1}
         self.inner_ds = ufl.Measure(
             "ds", domain=self.mesh, subdomain_data=self.tire.facets, metadata=exact

@@ -25,7 +25,7 @@ from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.mesh import Lattice
 
-_SAME = 1e-9  # of the section's size: distance between a node and another's image
+_SAME = 1e-9  # of the section's size: distance of a cell's centre from another's image
 
 
 def looks_the_same(ring: Ring, rolling: Rolling) -> bool:
