@@ -23,12 +23,14 @@ class StaticState:
     3) m undeformed; `moved` (s, 3) m displacement; `force` (s,) N of the road on the tire along the
     wheel's z; `area` (s,) m2 associated with each node for uniform pressure; `half_sizes` (s, 2) m
     of the deformed rectangle around each node (x and y); `ring_rate` (s,) m/rad derivative of the
-    deformed x with respect to the ring angle. `road_height` (m) is None without a road; `inflation`
-    (Pa) and the steady `rolling` are the loads of this state. `cords` by name of the ply; `mass`
-    (kg) of wall and cords; `fine_extent`: contact extent on finer elements if known
-    (fem.static.load_error). With friction: `pull` (s, 2) N, force of the road on the tire along and
-    across it, and for a rolling tire `travel`, m per radian along the road without the wheel's
-    slip.
+    deformed x with respect to the ring angle.
+
+    `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are the
+    loads of this state. `cords` by name of the ply; `mass` (kg) of wall and cords; `fine_extent`:
+    contact extent on finer elements if known (fem.static.load_error).
+
+    With friction: `pull` (s, 2) N, force of the road on the tire along and across it, and for a
+    rolling tire `travel`, m per radian along the road without the wheel's slip.
     """
 
     displacement: np.ndarray
