@@ -1,4 +1,4 @@
-"""The tire as a body: mesh, materials, equilibrium, and the matrices at a static state."""
+"""The tire as a finite-element body: mesh, materials, equilibrium, matrices at a static state."""
 
 from tireroad.fem.exports import exported
 

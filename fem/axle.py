@@ -1,7 +1,8 @@
-"""What holds the wheel: nothing that gives way, a corner of a car, or a constant force alone.
+"""Suspension of the wheel: rigidly held, a corner of a car, or a constant force only.
 
-The wheel with its brake is one rigid body at the rim; springs and dampers lead from it to a body that moves
-up and down, or to the ground. In all other directions the body goes on at the car's own constant speed.
+The wheel and its brake are one rigid body attached to the rim. Springs and dampers connect it to a
+body that moves vertically, or to the ground. In all other directions the body moves at the constant
+speed of the car.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ _VERTICAL = 2
 class Axle:
     """A wheel that moves in the directions that are not `locked`.
 
-    `wheel_mass` kg; `wheel_inertia` (3,) kg m2 about x, y, z; `stiffness` and `damping` (6, 6): N/m and N s/m
-    for the three translations of the axle's centre, N m/rad and N m s/rad for the rotations, between wheel
-    and body; `body_mass` kg, None: springs and dampers to the ground. A static force holds the load.
+    `wheel_mass` kg; `wheel_inertia` (3,) kg m2 about x, y, z; `stiffness` and `damping` (6, 6)
+    between wheel and body: N/m and N s/m for the three translations of the axle's centre, N m/rad
+    and N m s/rad for the rotations; `body_mass` kg, None: springs and dampers go to the ground. The
+    static load is carried by a constant force.
     """
 
     wheel_mass: float
@@ -61,7 +63,7 @@ class Axle:
 
     @classmethod
     def held(cls) -> Axle:
-        """One that does not move at all."""
+        """An axle with all six directions locked."""
         return cls(
             wheel_mass=1.0,
             wheel_inertia=(1.0, 1.0, 1.0),
@@ -72,35 +74,36 @@ class Axle:
 
     @property
     def moving(self) -> list[int]:
-        """Directions (of six) in which the wheel moves."""
+        """Indices (0 to 5) of the directions in which the wheel moves."""
         return [k for k, name in enumerate(DIRECTIONS) if name not in self.locked]
 
     @property
     def taking_part(self) -> list[int]:
-        """Which of the seven motions of rim and body are coordinates."""
+        """Indices of the degrees of freedom in use: 0 to 5 of the wheel, 6 of the body."""
         return self.moving + [6] * self.has_body
 
     @property
     def has_body(self) -> bool:
-        """Whether a body moves beside the wheel."""
+        """Whether a body moves in addition to the wheel."""
         return self.body_mass is not None and _VERTICAL in self.moving
 
     @property
     def mass(self) -> np.ndarray:
-        """Of the wheel, (6, 6): kg, kg m2."""
+        """Mass matrix (6, 6) of the wheel: kg, kg m2."""
         return np.diag([*[self.wheel_mass] * 3, *self.wheel_inertia])
 
     @property
     def gyroscopic(self) -> np.ndarray:
-        """Moments (6, 6) per rate of the wheel's tilts, kg m2, at 1 rad/s: I_yy (w e_y) x the rate."""
+        """Gyroscopic matrix (6, 6), kg m2, at 1 rad/s: tilt rate x (I_yy e_y)."""
         out = np.zeros((6, 6))
         out[3, 5], out[5, 3] = -self.wheel_inertia[1], self.wheel_inertia[1]
         return out
 
     @property
     def adrift(self) -> np.ndarray:
-        """Motions (6 + 1, r) of wheel and body, by columns, that no spring knows: with a body the two
-        together in height; translations without a spring to the ground.
+        """Motions (7, r) of wheel and body, one per column, that no spring resists.
+
+        Translations without spring and damper; with a body, wheel and body together in height.
         """
         columns = []
         for k in self.moving:
@@ -114,6 +117,7 @@ class Axle:
         return np.array(columns).reshape(-1, 7).T
 
     def joined(self, matrix: np.ndarray) -> np.ndarray:
-        """A matrix (6, 6) of springs or dampers on wheel and body (7, 7): e = wheel - body in height."""
+        """The matrix (6, 6) of springs or dampers in terms of wheel and body (7, 7): their
+        elongation is wheel minus body in height."""
         apart = np.hstack([np.eye(6), -np.eye(6)[:, [_VERTICAL]]])
         return apart.T @ matrix @ apart

@@ -1,8 +1,8 @@
-"""What processes share of arrays: sums, whole arrays and objects that hold them, as buffers and not pickled.
+"""Collective operations on arrays: sums, gathering, and broadcast of objects that hold arrays.
 
-A pickle is a second and a third copy of what it holds, and ends at 2 GB, the largest count of bytes of a message.
-Sums and rows are messages of numbers (16 GB and more); objects go as their arrays, one after the other, and the
-little that is left of them.
+Arrays are sent as buffers. Pickling would make two further copies and is limited to 2 GB, the
+largest byte count of an MPI message. Messages counted in numbers or rows may hold 16 GB and more;
+of an object only the small remainder without its arrays is pickled.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 def summed(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
-    """The sum of arrays of numbers, of one shape, over the processes, on all of them. Collective."""
+    """Sum of arrays of equal shape over all processes, on all of them. Collective."""
     if comm.size == 1:
         return values
     total = np.array(values, order="C")
@@ -26,14 +26,14 @@ def summed(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
 
 
 def joined(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
-    """The arrays (n, ...) of all processes, one after the other, on every one. Collective."""
+    """The arrays (n, ...) of all processes concatenated, on every process. Collective."""
     if comm.size == 1:
         return values
     rows = np.array(comm.allgather(len(values)))
     each = int(np.prod(values.shape[1:], dtype=int))
     every = np.empty((rows.sum(), *values.shape[1:]), values.dtype)
     one = dtlib.from_numpy_dtype(values.dtype).Create_contiguous(max(each, 1)).Commit()
-    try:  # counts are rows: they stay below 2^31 where numbers do not
+    try:  # counts are rows: below 2^31 where the number of values is not
         comm.Allgatherv(
             [np.ascontiguousarray(values), one], [every, rows if each else 0 * rows, one]
         )
@@ -43,14 +43,14 @@ def joined(comm: MPI.Comm, values: np.ndarray) -> np.ndarray:
 
 
 def alike(comm: MPI.Comm, value: object) -> bool:
-    """Whether all processes have the same of a small thing. Collective."""
+    """Whether a small object is equal on all processes. Collective."""
     return comm.size == 1 or len(set(comm.allgather(value))) == 1
 
 
 def broadcast(comm: MPI.Comm, value: T, root: int = 0) -> T:
-    """The object that `root` has, on every process; its arrays are sent as they are. Collective."""
+    """The object of `root` on every process; its arrays are sent as buffers. Collective."""
     if comm.size == 1:
         return value
     sent = pkl5.Intracomm(comm).bcast(value, root)
-    # Root keeps its own: what the others open by way of it stays open.
+    # Root returns its own object, so that resources reached through it stay open.
     return value if comm.rank == root else sent

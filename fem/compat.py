@@ -1,6 +1,6 @@
-"""Everything that differs between dolfinx releases, found by feature and not by version number.
+"""All differences between dolfinx releases, detected by feature and not by version number.
 
-Debian 12 ships dolfinx 0.5.2 and Debian 13 ships 0.9; no other file of the program may ask which.
+Debian 12 ships dolfinx 0.5.2, Debian 13 ships 0.9. No other file of the program may ask which.
 """
 
 from __future__ import annotations
@@ -27,8 +27,10 @@ from tireroad.fem import form_cache
 
 
 def _cpu() -> str:
-    """A name for this kind of processor. In the compiler's flags it keeps what was compiled for one
-    kind out of the way of another that shares the cache, as the nodes of a cluster may.
+    """Hash of the processor type, passed as a compiler flag.
+
+    It separates compiled forms of different processors that share a cache, such as the nodes of a
+    cluster.
     """
     try:
         with open("/proc/cpuinfo") as file:
@@ -39,7 +41,7 @@ def _cpu() -> str:
 
 
 def _quietly(function: Callable) -> Callable:
-    """What compiles, without the compiler's command lines and FFCx's unclosed lock files."""
+    """Wrap a compiling function: no compiler log, no warnings of FFCx's unclosed lock files."""
 
     @functools.wraps(function)
     def quiet(*arguments: Any) -> Any:
@@ -62,8 +64,8 @@ except ImportError:  # dolfinx 0.5: elements come from legacy UFL
 else:
     HAS_BASIX_UFL = hasattr(basix.ufl, "element")
 
-# Newer FFCx vectorises better by itself; -O3 and the native instruction set halve the assembly
-# of a hyperelastic tangent on 27-node hexahedra either way.
+# Newer FFCx vectorises better by itself. In both cases -O3 and the native instruction set halve the
+# assembly time of a hyperelastic tangent on 27-node hexahedra.
 JIT = {
     "cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno", f"-DCPU_{_cpu()}"],
 }
@@ -73,20 +75,21 @@ _JIT_KEY = (
 
 
 def _options(folder: Path, **more: Any) -> dict:
-    """Keyword of what dolfinx compiles: in this folder (form_cache). On another node of a cluster
-    the folder's new files may be seen some seconds later."""
+    """Keyword argument with dolfinx's compiler options, `folder` being the cache (form_cache).
+
+    The timeout allows for file systems on which another node sees new files some seconds later."""
     return {_JIT_KEY: {**more, "cache_dir": str(folder), "timeout": 120}}
 
 
 def geometry_nodes(degree: int) -> np.ndarray:
     """Reference coordinates (nodes, 3) of a hexahedral geometry element, in its node order."""
-    # Through legacy UFL a geometry has equispaced nodes; basix.ufl warps them from order 3 on.
+    # With legacy UFL geometry nodes are equispaced; basix.ufl warps them from order 3 on.
     variants = basix.LagrangeVariant
     return _nodes(degree, variants.gll_warped if HAS_BASIX_UFL else variants.equispaced)
 
 
 def field_nodes(degree: int) -> np.ndarray:
-    """Reference coordinates (nodes, 3) of a Lagrange field: the Gauss-Lobatto points."""
+    """Reference coordinates (nodes, 3) of a Lagrange field's nodes: the Gauss-Lobatto points."""
     return _nodes(degree, basix.LagrangeVariant.gll_warped)
 
 
@@ -97,15 +100,16 @@ def _nodes(degree: int, variant: basix.LagrangeVariant) -> np.ndarray:
 
 @_quietly
 def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, degree: int) -> dmesh.Mesh:
-    """Distributed mesh of curved hexahedra from each process's share of cells and points. Collective."""
+    """Distributed mesh of curved hexahedra from each process's cells and points. Collective."""
     if HAS_BASIX_UFL:
         element = basix.ufl.element("Lagrange", "hexahedron", degree, shape=(3,))
         names = inspect.signature(dmesh.create_mesh).parameters
         key = "e" if "e" in names else "domain"
         keywords = {key: ufl.Mesh(element) if key == "domain" else element}
     else:
-        # FFCx writes this variant into the mesh of the first form it compiles, and not where the form
-        # is in its cache: left open, forms have another signature and compile again in the next run.
+        # Without an explicit variant FFCx sets it on the mesh only while compiling the first form,
+        # not when it loads that form from its cache. Forms would then have another signature in the
+        # next run and compile again.
         element = ufl.VectorElement("Lagrange", "hexahedron", degree, variant="equispaced")
         keywords = {"domain": ufl.Mesh(element)}
     return dmesh.create_mesh(comm, cells=cells, x=points, **keywords)
@@ -121,14 +125,14 @@ def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
 
 @_quietly
 def cell_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
-    """Scalars that are constant in each cell."""
+    """Space of scalars that are constant in each cell."""
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, ("DG", 0))
     return _space(mesh, ufl.FiniteElement("DG", mesh.ufl_cell(), 0))
 
 
 def _space(mesh: dmesh.Mesh, element: Any) -> fem.FunctionSpace:
-    """dolfinx 0.5 compiles elements too; newer releases take theirs from Basix."""
+    """A space of dolfinx 0.5, which compiles its elements; newer releases take them from Basix."""
     return form_cache.compiled(
         mesh.comm, lambda folder: fem.FunctionSpace(mesh, element, **_options(folder))
     )
@@ -145,7 +149,8 @@ def form(expression: ufl.Form) -> Any:
 def evaluate(
     expression: ufl.core.expr.Expr, points: np.ndarray, mesh: dmesh.Mesh, cells: np.ndarray
 ) -> np.ndarray:
-    """A scalar UFL expression (cells, points) at reference `points` (p, 3) of this process's cells. Collective."""
+    """A scalar UFL expression (cells, points) in this process's cells at reference `points` (p, 3).
+    Collective."""
     made = form_cache.compiled(
         mesh.comm, lambda folder: fem.Expression(expression, points, **_options(folder, **JIT))
     )
@@ -156,12 +161,12 @@ def evaluate(
 
 
 def cell_facets(mesh: dmesh.Mesh) -> np.ndarray:
-    """Facets (cells, 6) of the hexahedra of this process, ghosts included, in the reference element's order."""
+    """Facets (cells, 6) of own hexahedra, ghosts included, in the reference element's order."""
     mesh.topology.create_connectivity(3, 2)
-    mesh.topology.create_connectivity(2, 3)  # newer releases do not make it where dofs are located
+    mesh.topology.create_connectivity(2, 3)  # newer releases do not create it when locating dofs
     return mesh.topology.connectivity(3, 2).array.reshape(-1, 6)
 
 
 def meshtags(mesh: dmesh.Mesh, dim: int, entities: np.ndarray, values: np.ndarray) -> Any:
-    """Integer tags of mesh entities, entities ascending."""
+    """Integer tags of mesh entities, which must be in ascending order."""
     return dmesh.meshtags(mesh, dim, entities.astype(np.int32), values.astype(np.int32))

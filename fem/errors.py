@@ -1,16 +1,16 @@
-"""The ways a run can end without an answer. Nothing else is imported here, so every package may use it."""
+"""Exceptions that end a run without a result. Imports nothing, so all packages may use it."""
 
 
 class InputError(ValueError):
-    """What the user gave is wrong: a key, a range, a file, a folder. The program ends with status 2."""
+    """Invalid input: a key, a range, a file or a folder. The program ends with status 2."""
 
 
 class ConvergenceError(RuntimeError):
-    """A solver gave up: the message says what, where and what to try. The program ends with status 3."""
+    """A solver failed; the message says what, where and what to try. Exit status 3."""
 
 
 class LoadingStopped(ConvergenceError):
-    """Load steps that became too small; `fact` is where, without advice."""
+    """The load steps became too small; `fact` says where, without advice."""
 
     def __init__(self, fact: str) -> None:
         super().__init__(

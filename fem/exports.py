@@ -1,6 +1,7 @@
-"""Public names of a package, imported when they are first asked for (PEP 562).
+"""Public names of a package, imported at first access (PEP 562).
 
-So `import tireroad.contact` needs no finite elements, and no package imports another in a circle.
+With this, `import tireroad.contact` needs no finite elements, and packages have no circular
+imports.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 def exported(
     package: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """`__getattr__` and `__dir__` of a package whose public names are in the modules `homes`."""
+    """`__getattr__` and `__dir__` of a package; `homes` maps its public names to their modules."""
 
     def find(name: str) -> Any:
         if name not in homes:

@@ -1,9 +1,10 @@
-"""Where compiled forms are kept, so that a stop in the middle of a compilation leaves nothing behind.
+"""Cache of compiled forms that an interrupted compilation cannot damage.
 
-FFCx marks a form as being compiled by a file of its name and waits for whoever made it; a process that
-is killed leaves that file, and everybody who needs the form waits ten minutes in vain. So each
-process compiles in a folder of its own, which begins with links to all forms that are kept, and what
-it has compiled is kept, whole, afterwards. A folder whose process has died is removed by the next.
+FFCx marks a form under compilation by a file, and other processes wait for the one that made it. If
+that process is killed, the file remains and every process that needs the form waits ten minutes in
+vain. Therefore each process compiles in a folder of its own, which starts with links to all cached
+forms, and complete new forms are copied to the cache afterwards. Folders of dead processes are
+removed by the next run.
 """
 
 from __future__ import annotations
@@ -28,18 +29,18 @@ from typing import Any
 
 from tireroad.fem.errors import InputError
 
-DONE = ".c.cached"  # FFCx's mark of a module that is compiled
+DONE = ".c.cached"  # FFCx's mark of a compiled module
 _LOCK = "in-use"
-_ABANDONED = 3600.0  # s without a lock, of a folder of another machine
-_PATIENCE = 2.0  # s of compilation before it is announced
+_ABANDONED = 3600.0  # s after which another machine's folder without a lock is abandoned
+_PATIENCE = 2.0  # s of compilation after which it is announced
 _LIBRARY = tuple(EXTENSION_SUFFIXES)
 
 announce: Callable[[str], None] = logging.getLogger(__name__).warning
-"""Shows the user that forms are being compiled; the command line puts its own here."""
+"""Tells the user that forms are being compiled; the command line sets its own function."""
 
 
 def kept_in() -> Path:
-    """The folder of compiled forms of this Python, in the user's cache."""
+    """The folder of compiled forms for this Python version, in the user's cache."""
     return user_folder() / f"forms-{sys.implementation.cache_tag}"
 
 
@@ -50,10 +51,10 @@ def user_folder() -> Path:
 
 
 def compiled(comm: Any, make: Callable[[Path], Any]) -> Any:
-    """`make(folder)`, which compiles with `folder` as FFCx's cache; what it returns. Collective.
+    """Value of `make(folder)`, which compiles with `folder` as FFCx's cache. Collective.
 
-    Raises InputError where forms cannot be compiled or loaded: that is no fault of the scene's, but
-    of a compiler or a folder that the user can name.
+    Raises InputError when forms cannot be compiled or loaded: the cause is then a compiler or a
+    folder that the user can change, not the scene.
     """
     folder = Path(comm.bcast(str(_workshop()) if comm.rank == 0 else None))
     try:
@@ -65,7 +66,7 @@ def compiled(comm: Any, make: Callable[[Path], Any]) -> Any:
             " this needs a C compiler and some room: name another folder by XDG_CACHE_HOME, or"
             " remove this one if it is damaged"
         ) from error
-    except BaseException:  # a stop: the compiler would go on by itself
+    except BaseException:  # an interruption: the compiler would continue by itself
         end_compilers(folder)
         raise
     if comm.rank == 0:
@@ -82,7 +83,7 @@ def _cffi_error() -> type[Exception]:
 
 @cache
 def _workshop() -> Path:
-    """This process's own folder, with all forms that are kept."""
+    """This process's own folder, with links to all cached forms."""
     kept = kept_in()
     try:
         kept.mkdir(parents=True, exist_ok=True)
@@ -100,24 +101,24 @@ def _workshop() -> Path:
     return folder
 
 
-_held: list[int] = []  # locks of this process's folders, given up when it ends in whatever way
+_held: list[int] = []  # locks of this process's folders, released however it ends
 
 
 def _new_folder(kept: Path) -> Path:
     folder = Path(tempfile.mkdtemp(prefix=folder_prefix(os.getpid()), dir=kept))
     _held.append(os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
-    with suppress(OSError):  # a file system without locks
+    with suppress(OSError):  # the file system has no locks
         fcntl.flock(_held[-1], fcntl.LOCK_EX)
     return folder
 
 
 def folder_prefix(process: int) -> str:
-    """How the folder of a process of this machine begins."""
+    """Start of the name of a folder that a process of this machine made."""
     return f"run-{socket.gethostname()}-{process}-"
 
 
 def _sweep(kept: Path) -> None:
-    """Remove the folders of processes that have ended without doing so."""
+    """Remove the folders of processes that ended without removing them."""
     for folder in kept.glob("run-*"):
         with suppress(OSError):
             if _unlocked(folder):
@@ -132,7 +133,7 @@ def _sweep(kept: Path) -> None:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a folder in which compilers may still write until they have died."""
+    """Remove a folder to which compilers may write until they have died."""
     end_compilers(folder)
     for _ in range(10):
         shutil.rmtree(folder, ignore_errors=True)
@@ -142,19 +143,20 @@ def _remove(folder: Path) -> None:
 
 
 def _unlocked(folder: Path) -> bool:
-    """Whether a folder has no lock and nobody who is about to make it: its process was killed before, or while
-    it removed the folder.
+    """Whether a folder has no lock file and no live process that may still create it.
+
+    Its process was killed before it created the lock, or while it removed the folder.
     """
     if (folder / _LOCK).exists():
         return False
     process = folder.name.removeprefix(f"run-{socket.gethostname()}-").partition("-")[0]
     if process.isdigit():
         return not Path("/proc", process).exists()
-    return time.time() - folder.stat().st_mtime > _ABANDONED  # of another machine
+    return time.time() - folder.stat().st_mtime > _ABANDONED  # made on another machine
 
 
 def _forms(folder: Path) -> dict[str, list[str]]:
-    """The complete forms in a folder: their files, the mark last."""
+    """The complete forms in a folder by name: the files of each, the mark last."""
     files: dict[str, list[str]] = {}
     for name in os.listdir(folder):
         files.setdefault(name.partition(".")[0], []).append(name)
@@ -167,30 +169,30 @@ def _forms(folder: Path) -> dict[str, list[str]]:
 
 
 def _borrow(kept: Path, folder: Path, names: list[str]) -> None:
-    """Link a kept form into the folder."""
+    """Link a cached form into the folder."""
     for name in names:
         try:
             os.link(kept / name, folder / name)
         except FileNotFoundError:
-            return  # somebody has just removed it: it will be compiled
+            return  # another process has just removed it: the form will be compiled
         except OSError:
             os.symlink(kept / name, folder / name)
 
 
 def _keep(folder: Path) -> None:
-    """Keep what was compiled in the folder and is not kept yet."""
+    """Copy new complete forms of the folder to the cache."""
     kept = folder.parent
     if kept != kept_in():
-        return  # a temporary folder: nothing can be kept
+        return  # a temporary folder: there is no cache
     for form, names in _forms(folder).items():
         if not (kept / f"{form}{DONE}").exists():
-            with suppress(OSError):  # no room: this process has its own
+            with suppress(OSError):  # disk full: this process has its own copy
                 for name in names:
                     _put(folder / name, kept / name)
 
 
 def _put(source: Path, target: Path) -> None:
-    """A copy of the file under its name, whole at once and on the disk."""
+    """Copy a file to `target` atomically and flushed to disk."""
     part = target.with_name(f".{target.name}.{source.parent.name}.part")
     try:
         shutil.copyfile(source, part)
@@ -203,7 +205,7 @@ def _put(source: Path, target: Path) -> None:
 
 @contextmanager
 def _announced(folder: Path) -> Iterator[None]:
-    """Say once that forms are being compiled, where that takes over two seconds."""
+    """Announce once that forms are being compiled, if that takes more than `_PATIENCE` seconds."""
     timer = threading.Timer(_PATIENCE, _announce, (folder,))
     timer.daemon = True
     timer.start()

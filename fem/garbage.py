@@ -1,10 +1,11 @@
-"""Memory of PETSc objects that nobody holds any more.
+"""Release of PETSc objects that Python no longer references.
 
-petsc4py does not destroy what Python lets go of: such an object may be spread over processes, whose collectors run
-at different times. PETSc keeps it until all processes of its communicator ask together. dolfinx gives each mesh a
-communicator of its own, which goes with the mesh, so a small vector keeps each for that. Without this a process
-that loads one tire after the other, in a search or a notebook, grew by all their matrices and factors: 50 MB for
-each of 7,000 unknowns.
+petsc4py does not destroy them: an object may be distributed, and the garbage collectors of its
+processes run at different times. PETSc keeps such objects until all processes of their communicator
+call its cleanup. dolfinx gives each mesh a communicator of its own, which is freed with the mesh; a
+small vector keeps it alive until the cleanup. Without this, a process that loads one tire after
+another, as in a search or a notebook, kept all matrices and factors: 50 MB for each tire of 7,000
+unknowns.
 """
 
 from __future__ import annotations
@@ -21,14 +22,13 @@ _kept: list[tuple[MPI.Comm, weakref.ref, PETSc.Vec]] = []
 
 
 def watch(comm: MPI.Comm, owner: object, mesh: Any) -> None:
-    """From now on `collect(comm)` frees what is left on the communicator of the mesh, until `owner` has gone too.
-    Collective on comm."""
+    """Let `collect(comm)` clean up the mesh's communicator until `owner` is gone. Collective."""
     keeper = PETSc.Vec().createMPI((0, PETSc.DETERMINE), comm=mesh.comm)
     _kept.append((comm, weakref.ref(owner), keeper))
 
 
 def collect(comm: MPI.Comm) -> None:
-    """Destroy the PETSc objects of all meshes on `comm` that no process holds any more. Collective."""
+    """Destroy the unreferenced PETSc objects of all meshes on `comm`. Collective."""
     gc.collect()
     PETSc.garbage_cleanup(PETSc.COMM_SELF)
     PETSc.garbage_cleanup(comm)

@@ -1,6 +1,6 @@
-"""The description of one parameter: its unit, meaning and range, and how a value is read.
+"""Description of one parameter: unit, meaning and range, and how a value is read.
 
-A common root that all packages may import; it needs nothing but the standard library.
+All packages may import this module; it needs only the standard library.
 """
 
 import math
@@ -13,7 +13,7 @@ OnlyFor = tuple[str, tuple[str, ...]] | None
 
 @dataclass(frozen=True)
 class Limits:
-    """A range, both ends in it; None: no limit. A size ends at the least that makes sense, not at 0."""
+    """A closed range; None: no limit. The lower limit of a size is the least sensible value."""
 
     least: float | None = None
     most: float | None = None
@@ -24,12 +24,12 @@ class Limits:
         return ", ".join(part for part in (low, high) if part) or "any"
 
     def check(self, value: float, unit: str) -> None:
-        """ValueError for a value outside the range."""
+        """Raises ValueError for a value outside the range."""
         inside = (self.least is None or value >= self.least) and (
             self.most is None or value <= self.most
         )
         if not inside:
-            # A whole number may be too large for the format of real ones.
+            # The "g" format overflows for very large integers.
             written = f"{value:g}" if isinstance(value, float) else described(value)
             shown = f"{written} {unit}".rstrip(" -")
             raise ValueError(f"must be {self}{f' {unit}' if unit != '-' else ''}, not {shown}")
@@ -39,9 +39,9 @@ class Limits:
 class Key:
     """One parameter: how to read a value, its unit, meaning and allowed values.
 
-    `values` says in words what is allowed, unless `choices` are the words that are; `limits` is the
-    range of numbers; `optional`: it may be absent (None); `is_file`: the name of a file; `only_for`: (name of the selecting key, its values)
-    where a parameter belongs to some kinds of its table only.
+    `values` describes in words what is allowed, unless `choices` lists the allowed words; `limits`:
+    range of numbers; `optional`: may be absent (None); `is_file`: a file name; `only_for`: (name of
+    the selecting key, its values) for a parameter that only some kinds of its table have.
     """
 
     read: Callable[[Any], Any]
@@ -56,17 +56,17 @@ class Key:
 
     @property
     def allowed(self) -> str:
-        """What values it may have."""
+        """The allowed values, in words."""
         return self.values or ", ".join(self.choices)
 
 
 def key_of(item: Field) -> Key | None:
-    """The description of a field, None where it is no parameter."""
+    """The description of a field; None if it is not a parameter."""
     return item.metadata.get("key")
 
 
 def keys(of: type) -> Iterator[tuple[Field, Key]]:
-    """The parameters of a dataclass in their order."""
+    """The parameters of a dataclass, in order."""
     for item in fields(of):
         key = key_of(item)
         if key is not None:
@@ -74,7 +74,7 @@ def keys(of: type) -> Iterator[tuple[Field, Key]]:
 
 
 def described(value: Any) -> str:
-    """A value as the user wrote it, short enough for a message."""
+    """A value as the user wrote it, shortened for a message."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -85,7 +85,7 @@ def described(value: Any) -> str:
 
 
 def finite(value: Any) -> float:
-    """A finite real number as a float (an integer is one, a bool is not), else ValueError."""
+    """A finite real number as a float (int is accepted, not bool); else raises ValueError."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"must be a number, not {described(value)}")
     try:

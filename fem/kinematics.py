@@ -1,7 +1,7 @@
-"""Pure UFL: deformation gradient, follower pressure, and the motion of a wheel that turns in place.
+"""Kinematics in UFL: deformation gradient, follower pressure, motion of a wheel rotating in place.
 
-The mesh stands still; material runs through it with w = Omega e_y x X (physics of a rotating frame:
-Nackenhorst 2004, and thesis (2.6)-(2.8) with its errors put right). All of it is per unit Omega.
+The mesh is fixed in the non-rotating frame; material flows through it with w = Omega e_y x X
+(Nackenhorst 2004; thesis (2.6)-(2.8), corrected). All quantities are per unit Omega.
 """
 
 import ufl
@@ -15,7 +15,7 @@ def deformation_gradient(u: Expr) -> Expr:
 
 
 def pressure_virtual_work(u: Expr, v: Expr, normal: Expr) -> Expr:
-    """J F^-T N . v: virtual work per undeformed area of a unit follower pressure pushing inwards."""
+    """J F^-T N . v: virtual work per undeformed area of a unit follower pressure acting inwards."""
     F = deformation_gradient(u)
     return ufl.inner(ufl.det(F) * ufl.inv(F).T * normal, v)
 
@@ -27,7 +27,7 @@ def wheel_velocity(mesh: Mesh) -> Expr:
 
 
 def convective(u: Expr, w: Expr) -> Expr:
-    """grad(u) w: the rate of a field seen from the inertial frame when the field stands still."""
+    """grad(u) w: convective part of the inertial rate of u; the whole of it for a steady field."""
     return ufl.dot(ufl.grad(u), w)
 
 
@@ -37,5 +37,5 @@ def cross_axle(u: Expr) -> Expr:
 
 
 def body_rate(u: Expr, w: Expr) -> Expr:
-    """grad(u) w - e_y x u: the rate the rotating material sees of itself."""
+    """grad(u) w - e_y x u: rate of a steady field as seen by the rotating material."""
     return convective(u, w) - cross_axle(u)

@@ -1,7 +1,7 @@
-"""A tire as finite elements: as it was made, and the matrices of its small motions about a static state.
+"""Finite-element model of a tire: unloaded, and its small motions about a static state.
 
-Both are functions of small arrays, and expensive parts are made when they are first asked for: whoever
-reads all later results from files never makes a mesh.
+Both are defined by small arrays. Expensive parts are built on first use, so a run that reads all
+later results from files builds no mesh.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ RIMS, ROADS = ("fixed", "free"), ("forces", "held")
 
 
 class TireModel:
-    """A tire without loads: its `section`, the `lattice` of its nodes, and its finite elements, `body`."""
+    """An unloaded tire: its `section`, the `lattice` of its nodes and its finite-element `body`."""
 
     def __init__(self, section: Ring, make_body: Callable[[], Body]) -> None:
         self.section, self._make_body = section, make_body
 
     @cached_property
     def lattice(self) -> Lattice:
-        """The nodes of the displacement field, without a mesh."""
+        """The nodes of the displacement field; needs no mesh."""
         return field_lattice(self.section)
 
     @cached_property
     def body(self) -> Body:
-        """The finite-element body, whose displacement is that of whoever used it last. Collective."""
+        """The finite-element body, shared: its displacement is the one set last. Collective."""
         return self._make_body()
 
 
 class SmallMotions:
-    """The matrices of a tire's small motions about its static state, at that state's own inflation.
+    """Matrices of a tire's small motions about its static state, at the inflation of that state.
 
-    `rim` "fixed" or "free"; `road` "forces": the road is replaced by its static forces, or "held": the
-    nodes that touch it keep their height. Properties are collective at their first use.
+    `rim` "fixed" or "free"; `road` "forces": the road is replaced by its static forces, or "held":
+    the vertical motion of the nodes in contact is held. Properties are collective at first use.
     """
 
     def __init__(
@@ -70,15 +70,16 @@ class SmallMotions:
 
     @cached_property
     def operators(self) -> Operators:
-        """Mass and stiffness, and what the unknowns are."""
+        """Mass, stiffness and the map of unknowns."""
         self.body.set_displacement(self.static.displacement)
         held = {} if self._road == "forces" else {"held": self._touching()}
         support = Support(self.rim, **held)
         return Operators(self.body, self.static.inflation, support, self.static.rolling)
 
     def rim_motion(self, turns: bool) -> RimMotion | None:
-        """What the rim's motions meet in the matrices of a tire whose rim is held, `turns` or stands; None of a free rim, and
-        where the road holds what touches it. Collective.
+        """Coupling of the rim's rigid motions to a tire with fixed rim; `turns`: the wheel rotates.
+
+        None for a free rim, and where the road holds the nodes in contact. Collective.
         """
         if (self.rim, self._road) != ("fixed", "forces"):
             return None
@@ -94,10 +95,10 @@ class SmallMotions:
 
     @cached_property
     def rotation(self) -> Rotation:
-        """The matrices of the rotating frame."""
+        """The matrices of the rotating wheel."""
         return self.operators.rotation()
 
     @property
     def unknowns(self) -> int:
-        """Degrees of freedom that nothing holds."""
+        """Number of free degrees of freedom."""
         return self.operators.stiffness.getSize()[0]

@@ -1,9 +1,9 @@
-"""Parameters of models: type, unit, range and meaning of each, and how a value is checked.
+"""Parameters of models: type, unit, range, meaning, and the check of values.
 
-A field of a dataclass is made by `number`, `integer`, `flag`, `choice`, `text`, `filename` or `vector`;
-those fields are the only description of a parameter: the constructor, the scene file, `check`, the
-key reference and the error messages all follow from them. Like `fem.errors` this is a common root
-that all packages may import; it needs nothing but the standard library.
+Dataclass fields are made by `number`, `integer`, `flag`, `choice`, `text`, `filename` or `vector`.
+They are the only description of a parameter: the constructor, the scene file, `check`, the key
+reference and the error messages follow from them. Like `fem.errors`, all packages may import this
+module; it needs only the standard library.
 """
 
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite, keys
 
 
 class ParameterError(InputError):
-    """A parameter out of its range or type; `parameter` is its name, `reason` what is wrong."""
+    """A parameter of wrong type or out of range: `parameter` is its name, `reason` the fault."""
 
     def __init__(self, parameter: str, reason: str, owner: str = "") -> None:
         super().__init__(f"{owner}: {parameter} {reason}" if owner else f"{parameter} {reason}")
@@ -24,12 +24,12 @@ class ParameterError(InputError):
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
-    """Base of dataclasses made of parameters: the constructor checks every value, then `validate`.
+    """Base of dataclasses of parameters: the constructor checks each value, then calls `validate`.
 
     Raises ParameterError (an InputError) that names the parameter, its value and its range.
     """
 
-    owner = ""  # whose parameters they are, for messages
+    owner = ""  # what the parameters belong to, for messages
 
     def __post_init__(self) -> None:
         for item, key in keys(type(self)):
@@ -46,11 +46,11 @@ class Parameters:
             raise ParameterError(error.parameter, error.reason, self.owner) from None
 
     def validate(self) -> None:
-        """Conditions between parameters: raise ParameterError(name, reason) where one is not met."""
+        """Check conditions between parameters; raises ParameterError(name, reason)."""
 
 
 def parameter(key: Key, default: Any) -> Any:
-    """A dataclass field of the given description."""
+    """A dataclass field with the given description."""
     return field(default=default, metadata={"key": key})
 
 
@@ -64,7 +64,7 @@ def number(
     word: str | None = None,
     only_for: OnlyFor = None,
 ) -> Any:
-    """A finite real number, or the one `word` where given. A default of None makes it optional."""
+    """A finite real number, or the single `word` if given. A default of None makes it optional."""
     limits = Limits(least, most)
 
     def read(value: Any) -> float | str:
@@ -93,7 +93,7 @@ def number(
 def integer(
     default: int | None, doc: str, *, least: int, most: int, only_for: OnlyFor = None
 ) -> Any:
-    """A whole number between least and most. A default of None makes it optional."""
+    """An integer between least and most. A default of None makes it optional."""
     limits = Limits(least=least, most=most)
 
     def read(value: Any) -> int:
@@ -115,7 +115,7 @@ def integer(
 
 
 def flag(default: bool, doc: str, *, only_for: OnlyFor = None) -> Any:
-    """true or false."""
+    """A boolean, true or false."""
 
     def read(value: Any) -> bool:
         if not isinstance(value, bool):
@@ -128,7 +128,7 @@ def flag(default: bool, doc: str, *, only_for: OnlyFor = None) -> Any:
 def choice(
     default: str | None, choices: tuple[str, ...], doc: str, *, only_for: OnlyFor = None
 ) -> Any:
-    """One of a few words. A default of None makes it optional."""
+    """One of several words. A default of None makes it optional."""
     words = ", ".join(choices)
 
     def read(value: Any) -> str:
@@ -142,14 +142,14 @@ def choice(
 
 
 def text(default: str | None, doc: str, *, only_for: OnlyFor = None) -> Any:
-    """Any text that is not empty. A default of None makes it optional."""
+    """A text that is not empty. A default of None makes it optional."""
     optional = default is None
     key = Key(read=_read_text, doc=doc, values="text", optional=optional, only_for=only_for)
     return parameter(key, default)
 
 
 def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] = ()) -> Any:
-    """A list of finite numbers, of any length, each within the limits."""
+    """A list of finite numbers of any length, each within the limits."""
 
     def read(value: Any) -> tuple[float, ...]:
         if not isinstance(value, list | tuple):
@@ -164,7 +164,7 @@ def numbers(doc: str, unit: str, limits: Limits, default: tuple[float, ...] = ()
 
 
 def texts(doc: str, *, only_for: OnlyFor = None) -> Any:
-    """A list of texts, or one alone; empty by default."""
+    """A list of texts, or a single one; empty by default."""
 
     def read(value: Any) -> tuple[str, ...]:
         if isinstance(value, str):
@@ -177,7 +177,7 @@ def texts(doc: str, *, only_for: OnlyFor = None) -> Any:
 
 
 def filename(doc: str, *, only_for: OnlyFor = None) -> Any:
-    """The name of a file; in a scene relative to it. Absent by default."""
+    """The name of a file, in a scene relative to the scene file. Absent by default."""
     key = Key(
         read=_read_file, doc=doc, values="file", optional=True, is_file=True, only_for=only_for
     )
@@ -202,7 +202,7 @@ def vector(
     least: float | None = None,
     most: float | None = None,
 ) -> Any:
-    """A list of as many finite numbers as the default has."""
+    """A list of finite numbers, as many as the default has."""
     size = len(default)
     limits = Limits(least=least, most=most)
 

@@ -1,4 +1,4 @@
-"""Named variants of a model: a new one is a class with a decorator, in a file of its own or a user's."""
+"""Named variants of a model: a new one is a decorated class in its own file or a user's script."""
 
 import importlib
 import pkgutil
@@ -13,10 +13,10 @@ T = TypeVar("T", bound=Parameters)
 
 
 class Registry(Generic[T]):
-    """Classes of parameters by name.
+    """Parameter classes by name.
 
-    `label` is what they are ("road kind"), `package` the one whose modules are imported when a name
-    is first asked for, so that a file put there is found.
+    `label` says what they are ("road kind"). The modules of `package` are imported when a name is
+    first looked up, so that a file added there is found.
     """
 
     def __init__(self, label: str, package: str, base: type[T]) -> None:
@@ -27,9 +27,9 @@ class Registry(Generic[T]):
         self._found = False
 
     def register(self, name: str, doc: str) -> Callable[[type], type]:
-        """Decorator: makes a frozen dataclass of keywords out of a class, known by `name`.
+        """Decorator that makes the class a frozen keyword-only dataclass known by `name`.
 
-        `doc` is its line in the key reference. InputError for a name that is taken or a class that
+        `doc` is its line in the key reference. Raises InputError if the name is taken or the class
         is not derived from the registry's base.
         """
 
@@ -46,7 +46,7 @@ class Registry(Generic[T]):
         return decorate
 
     def forget(self, name: str) -> None:
-        """Take a variant out again: for notebooks and tests that register their own."""
+        """Remove a variant: for notebooks and tests that register their own."""
         self._classes.pop(name, None)
         self._docs.pop(name, None)
 
@@ -65,7 +65,7 @@ class Registry(Generic[T]):
         return self._classes[name]
 
     def make(self, name: str, **values: Any) -> T:
-        """The variant of that name with these parameters, the others at their defaults."""
+        """The variant `name` with these parameters, the others at their defaults."""
         return self[name](**values)
 
     def __contains__(self, name: object) -> bool:
@@ -77,10 +77,10 @@ class Registry(Generic[T]):
         return iter(sorted(self._classes))
 
     def doc(self, name: str) -> str:
-        """What the variant is, in a line."""
+        """One-line description of the variant."""
         self._find()
         return self._docs[name]
 
     def owners(self, parameter: str) -> list[str]:
-        """The variants that have a parameter of that name."""
+        """The variants that have a parameter of this name."""
         return [name for name in self if parameter in {one.name for one in fields(self[name])}]

@@ -1,4 +1,4 @@
-"""Seconds by part of a solver."""
+"""Seconds spent in each part of a solver."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import ClassVar
 
 
 class Timing(dict[str, float]):
-    """`with timing("assembly"):` adds the seconds inside to that part, by the `clock`. Not collective."""
+    """`with timing("assembly"):` adds the seconds inside to that part. Not collective."""
 
     clock: ClassVar[Callable[[], float]] = time.perf_counter
 
@@ -20,7 +20,7 @@ class Timing(dict[str, float]):
         self[part] = self.get(part, 0.0) + Timing.clock() - began
 
     def take(self, other: Timing) -> None:
-        """Add the seconds of another solver, which starts from none again."""
+        """Add the seconds of another solver and reset those to zero."""
         for part, seconds in other.items():
             self[part] = self.get(part, 0.0) + seconds
         other.clear()
@@ -28,7 +28,7 @@ class Timing(dict[str, float]):
 
 @contextmanager
 def by_processor() -> Iterator[None]:
-    """While inside, seconds are those that the processor works for this process: what a busy machine changes little."""
+    """Inside, measure CPU time of this process, which other load on the machine changes little."""
     before, Timing.clock = Timing.clock, time.process_time
     try:
         yield

@@ -1,4 +1,4 @@
-"""How a wheel turns."""
+"""Rotation of the wheel."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ INERTIAS = ("full", "doppler")
 
 @dataclass(frozen=True, kw_only=True)
 class Turning:
-    """How the wheel turns: `speed` rad/s, `damping` of the material as in modal.damping, (gamma1 1/s,
-    gamma2 s) or by strain energy, `inertia` "full", or "doppler": without Coriolis and centrifugal forces. At speed 0 it stands.
+    """Rotation of the wheel, and its damping.
+
+    `speed` rad/s, 0: standing; `damping` of the material, (gamma1 1/s, gamma2 s) or by strain
+    energy, as in modal.damping; `inertia` "full", or "doppler": without Coriolis and centrifugal
+    forces.
     """
 
     speed: float = 0.0

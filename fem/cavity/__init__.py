@@ -1,1 +1,1 @@
-"""The air inside the tire: gas, ring duct, and how the wall drives it."""
+"""The air inside the tire: gas, annular duct, and coupling to the wall."""

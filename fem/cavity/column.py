@@ -1,8 +1,8 @@
-"""The duct's air at the wall of one body: how it joins the full matrices, by few columns.
+"""Coupling of the duct's air to the full matrices of one body, as a low-rank term.
 
-A motion u of the tire drives the air by e u, e (1 + a, n) rows over the unknowns; the air that follows
-adds e^T W(s) e to the full matrices (fem.cavity.duct.Duct.dynamic_stiffness). Answers of the tire without air
-are mended by it (Woodbury):
+A motion u of the tire drives the air by e u, e (1 + a, n) being rows over the unknowns; the air
+adds e^T W(s) e to the full matrices (fem.cavity.duct.Duct.dynamic_stiffness). Responses of the tire
+without air are corrected for it (Woodbury):
 
     X <- X - V W (1 + e V W)^-1 e X,   X = A^-1 B,  V = A^-1 e^T.
 """
@@ -25,7 +25,7 @@ from tireroad.fem.tire.body import Body
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """`duct` on every process, `pushed` this one's rows (n, 1 + a) of e^T; the wheel's `speed`, rad/s."""
+    """`duct` on every process; `pushed`: own rows (n, 1 + a) of e^T; `speed` in rad/s."""
 
     comm: MPI.Comm
     duct: Duct
@@ -37,7 +37,7 @@ class Column:
         return summed(self.comm, self.pushed.T @ vectors)
 
     def mended(self, answers: np.ndarray, s: complex = 0.0) -> np.ndarray:
-        """Answers (r, k) with the air, from those without (r + 1 + a, k + 1 + a): e's rows and columns last."""
+        """Responses (r, k) with air, from those without (r + 1 + a, k + 1 + a), those of e last."""
         q = self.pushed.shape[1]
         weight = self.duct.dynamic_stiffness(s, self.speed)
         core = np.eye(q) + answers[-q:, -q:] @ weight
@@ -45,8 +45,9 @@ class Column:
         return answers[:-q, :-q] - answers[:-q, -q:] @ pull
 
     def with_air(self, solution: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """Own rows (n, p) of static shapes with the air, from A^-1 [B, e^T] (n, p + 1 + a); for A^T with
-        `transposed`. Collective.
+        """Own rows (n, p) of static shapes with air, from A^-1 [B, e^T] (n, p + 1 + a). Collective.
+
+        `transposed`: for A^T.
         """
         q = self.pushed.shape[1]
         x, v = solution[:, :-q], solution[:, -q:]
@@ -56,7 +57,7 @@ class Column:
         return x - v @ (weight @ np.linalg.solve(core, self.coupling(x)))
 
     def following(self, shapes: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """The air's coordinates g (a, p) when static shapes, own rows (n, p), stay for good. Collective."""
+        """The air's coordinates g (a, p) under constant shapes, own rows (n, p). Collective."""
         _, stiffness = self.duct.pencil(self.speed)
         stiffness = stiffness.T if transposed else stiffness
         driven = self.duct.circular[:, None] * self.coupling(shapes)[1:]
@@ -72,13 +73,14 @@ def make_column(
     up_to: float,
     loss_factor: float | None = None,
 ) -> Column:
-    """The air of a body at its static state: modes below `up_to` Hz. Collective.
+    """The air of a body at its static state, with modes below `up_to` Hz. Collective.
 
-    `inflation` Pa over the atmosphere, `temperature` K; `loss_factor` as in fem.cavity.duct.modes.
+    `inflation` Pa above atmospheric pressure, `temperature` K; `loss_factor` as in
+    fem.cavity.duct.modes.
     """
     trace = CavityTrace(body)
     gas = inflated(inflation, temperature)
-    # One process solves: LAPACK on another could turn a pair of equal frequencies.
+    # One process solves: LAPACK on another might rotate a pair of equal frequencies.
     profile = trace.profile()
     duct = modes(profile, gas, up_to, loss_factor) if body.comm.rank == 0 else None
     duct = body.comm.bcast(duct)

@@ -1,19 +1,21 @@
-"""The air in the tire as a ring duct that turns with the wheel: its own modes, without the wall.
+"""The air in the tire as an annular duct that rotates with the wheel: its modes with rigid walls.
 
-Air that the wheel carries along flows through the standing duct with A U = const = Omega V / 2 pi. Its
-displacement xi(s, t) along the ring about that flow, s on the line of the section's centroids, obeys
+Air carried along by the wheel flows through the non-rotating duct with A U = const = Omega V / 2
+pi. Its displacement xi(s, t) relative to that flow along the ring, s running along the line of
+section centroids, obeys
 
     rho0 A D^2 xi = -A dp/ds,   p = -rho0 c^2 [d(A xi)/ds + a] / A,   D = d/dt + U d/ds,
 
-a(s, t) the area that the wall's motion adds; standing, xi is the time integral of dpsi/ds of the velocity
-potential psi with  (A/c^2) psi'' - d/ds (A dpsi/ds) = da/dt. The Lagrangian of it,
+a(s, t) being the area added by the wall's motion. At rest xi is the time integral of dpsi/ds, psi
+being the velocity potential, with  (A/c^2) psi'' - d/ds (A dpsi/ds) = da/dt. The Lagrangian
 
-    1/2 int rho0 A (D xi)^2 ds - 1/2 int rho0 c^2 [d(A xi)/ds + a]^2 / A ds,
+    1/2 int rho0 A (D xi)^2 ds - 1/2 int rho0 c^2 [d(A xi)/ds + a]^2 / A ds
 
-has the tire's own form: mass, a skew gyroscopic matrix, a symmetric convective one; the wall meets the
-air in the stiffness alone, and nothing but the drive of a turning wheel can put energy in. Left out:
-what the flow changes in density and pressure (Mach number squared, 0.5 %), the pressure across a section that the
-Coriolis force of the moving air makes, and the flow all around the ring, whose circulation is kept.
+has the form of the tire's: mass, a skew gyroscopic and a symmetric convective matrix. Wall and air
+are coupled in the stiffness only, and only the drive of a rotating wheel can supply energy.
+Neglected: changes of density and pressure by the flow (Mach number squared, 0.5 %), the pressure
+difference across a section due to the Coriolis force of the moving air, and the flow around the
+whole ring, whose circulation is conserved.
 """
 
 from __future__ import annotations
@@ -25,15 +27,16 @@ from scipy import linalg
 
 from tireroad.fem.cavity.gas import Gas
 
-_STATIONS = 16  # a wave of the basis: integrals of products of three are exact, of others to 1e-6
+_STATIONS = 16  # per wave: integrals of triple products are exact, others to 1e-6
 
 
 @dataclass(frozen=True)
 class Profile:
-    """The cavity around the ring, from moments over cos and sin of whole multiples of the angle.
+    """The cavity around the ring, by Fourier moments over the angle.
 
-    `volume` (f,) m3: int chi_f dV; `area` (f,) m2: int chi_f dA dtheta, A the section in the plane
-    through the axle at theta, an angle from the lowest point towards +x. chi_f as in `waves`.
+    `volume` (f,) m3: int chi_f dV; `area` (f,) m2: int chi_f dA dtheta, A being the section in the
+    plane through the axle at theta, measured from the lowest point towards +x. chi_f as in
+    `waves`.
     """
 
     volume: np.ndarray
@@ -45,7 +48,7 @@ class Profile:
         return (len(self.volume) - 1) // 2
 
     def at(self, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dV/dtheta (m3/rad) and A (m2) at the angles (t,), by their Fourier series."""
+        """dV/dtheta (m3/rad) and A (m2) at the angles (t,), from their Fourier series."""
         chi = waves(self.count, angle)
         weight = np.full(chi.shape[1], 1 / np.pi)
         weight[0] /= 2
@@ -58,7 +61,7 @@ class Profile:
 
     @property
     def tube_radius(self) -> float:
-        """Radius (m) of the circle of the mean section."""
+        """Radius (m) of the circle with the area of the mean section."""
         return float(np.sqrt(self.area[0] / (2 * np.pi) / np.pi))
 
 
@@ -77,12 +80,12 @@ def waves(count: int, angle: np.ndarray, order: int = 0) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Duct:
-    """Modes of the air between rigid walls, at unit modal mass: a of them, and their pressure shapes.
+    """The a modes of the air between rigid walls, at unit modal mass, and their pressure shapes.
 
-    `circular` (a,) rad/s standing; `pressure` (1 + a, f) the coefficients over `waves` of
-    P_j, int rho0 / c^2 A P_i P_j ds = delta_ij, the first the uniform one, which has no motion along the
-    ring; `gyroscopic` (a, a) 1/rad skew and `convective` (a, a) 1/rad2, Omega taken out; `momentum`
-    (3, a) kg^1/2 per rate; `loss` (a,) 1/s. `density` kg/m3 of the air, `volume` m3.
+    `circular` (a,) rad/s at rest; `pressure` (1 + a, f): coefficients over `waves` of P_j, int rho0
+    / c^2 A P_i P_j ds = delta_ij, the first being uniform, without motion along the ring;
+    `gyroscopic` (a, a) 1/rad skew and `convective` (a, a) 1/rad2, Omega factored out; `momentum`
+    (3, a) kg^1/2 per unit rate; `loss` (a,) 1/s; `density` kg/m3 of the air, `volume` m3.
     """
 
     circular: np.ndarray
@@ -96,19 +99,19 @@ class Duct:
 
     @property
     def frequency(self) -> np.ndarray:
-        """(a,) Hz, standing, between rigid walls."""
+        """Frequencies (a,) Hz at rest between rigid walls."""
         return self.circular / (2 * np.pi)
 
     def coupling(self, flux: np.ndarray) -> np.ndarray:
-        """e (1 + a, m) 1/s from what motions displace: `flux` (f, m) int chi_f u . n dS, m3 a unit.
+        """e (1 + a, m) 1/s from `flux` (f, m), int chi_f u . n dS, m3 per unit of each motion.
 
-        With it and coordinates g of the air, the energy of compression is 1/2 |e eta - (0, w g)|^2, and
-        the first row alone is the adiabatic stiffness of the trapped air, rho0 c^2 / V (dV)^2.
+        With the air's coordinates g the energy of compression is 1/2 |e eta - (0, w g)|^2. The
+        first row alone gives the adiabatic stiffness of the trapped air, rho0 c^2 / V (dV)^2.
         """
         return self.density * self.pressure @ flux
 
     def pencil(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
-        """The air's own damping (1/s) and stiffness (1/s2) matrices (a, a), mass 1, at `speed` rad/s."""
+        """The air's damping (1/s) and stiffness (1/s2) (a, a) at `speed` rad/s, for unit mass."""
         drag = np.diag(self.loss) + 2 * speed * self.gyroscopic
         turning = speed * self.loss[:, None] * self.gyroscopic
         return drag, np.diag(self.circular**2) + speed**2 * self.convective + turning
@@ -116,11 +119,12 @@ class Duct:
     def joined(
         self, drag: np.ndarray, stiffness: np.ndarray, speed: float, coupling: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Damping and stiffness (m + a, m + a) of a tire with unit mass and its air, from those of the
-        tire (m, m) and e = `coupling` (1 + a, m):
+        """Damping and stiffness (m + a, m + a) of a tire of unit mass with its air.
+
+        From those of the tire (m, m) and e = `coupling` (1 + a, m); e' is e without its first row:
 
             [K + e^T e   -e'^T w ]      [D          0        ]
-            [ -w e'         K_a  ],     [0   D_a + 2 Omega G_a],    e' the rows of e without the first.
+            [ -w e'         K_a  ],     [0   D_a + 2 Omega G_a].
         """
         own_drag, own_stiffness = self.pencil(speed)
         across = -self.circular[:, None] * coupling[1:]
@@ -128,10 +132,10 @@ class Duct:
         return linalg.block_diag(drag, own_drag), whole
 
     def dynamic_stiffness(self, s: complex, speed: float) -> np.ndarray:
-        """W(s) (1 + a, 1 + a): the air adds e^T W e to what resists a motion of the tire with e^(st).
+        """W(s) (1 + a, 1 + a): the air adds e^T W e to the tire's dynamic stiffness at e^(st).
 
-        At rest and s = 0 the trapped air alone is left, 1 in the first place; when the wheel turns the
-        square of the flow's Mach number besides.
+        At s = 0 and standing only the trapped air remains, 1 in the first place; if the wheel
+        rotates, terms of the flow's Mach number squared are added.
         """
         drag, stiffness = self.pencil(speed)
         own = s**2 * np.eye(len(stiffness)) + s * drag + stiffness
@@ -140,9 +144,10 @@ class Duct:
 
 
 def modes(profile: Profile, gas: Gas, up_to: float, loss_factor: float | None = None) -> Duct:
-    """The duct's modes below `up_to` Hz, the lowest pair at least.
+    """The duct's modes below `up_to` Hz, at least the lowest pair.
 
-    `loss_factor`: damping rate over circular frequency; None: friction at the walls (Gas.wall_loss).
+    `loss_factor`: damping rate over circular frequency; None: boundary-layer losses
+    (Gas.wall_loss).
     """
     n = profile.count
     angle, width = _stations(_STATIONS * n)
@@ -156,10 +161,10 @@ def modes(profile: Profile, gas: Gas, up_to: float, loss_factor: float | None = 
     circular = np.sqrt(np.maximum(squares[1:], 0.0))
     kept = max(int((circular <= 2 * np.pi * up_to).sum()), 2)
     circular, shape = circular[:kept], _signed(shape[:, : kept + 1])
-    # Displacement shapes xi_j = P_j' / (w_j ds/dtheta), at unit mass because the potentials are.
+    # Displacement shapes xi_j = P_j' / (w_j ds/dtheta), of unit mass because the potentials are.
     along = slope @ shape[:, 1:] / stretch[:, None] / circular
     rate = _derivative(along)
-    flow = -profile.total / (2 * np.pi)  # A U at 1 rad/s: the wheel turns from +x to below
+    flow = -profile.total / (2 * np.pi)  # A U at 1 rad/s: the wheel turns from +x downwards
     turning = density * flow * width * along.T @ rate
     convective = -density * flow**2 * width * (rate.T / volume) @ rate
     if loss_factor is None:
@@ -181,8 +186,8 @@ def modes(profile: Profile, gas: Gas, up_to: float, loss_factor: float | None = 
 def momentum_of_waves(profile: Profile) -> np.ndarray:
     """int (dchi_f/dtheta) e_theta A dtheta = closed int chi_f n dS, (3, f) m2.
 
-    The first per density is the momentum of a potential chi_f, the second the force of a pressure
-    chi_f on wall and rim together: Gauss's theorem makes them one.
+    The first, times density, is the momentum of a potential chi_f, the second the force of a
+    pressure chi_f on wall and rim; by Gauss's theorem they are equal.
     """
     angle, width = _stations(_STATIONS * profile.count)
     _, area = profile.at(angle)
@@ -203,7 +208,7 @@ def _stretch(profile: Profile, angle: np.ndarray) -> np.ndarray:
 
 
 def _derivative(values: np.ndarray) -> np.ndarray:
-    """d/dtheta of periodic columns (t, k) at equal distances."""
+    """d/dtheta of periodic columns (t, k) at equidistant angles."""
     t = len(values)
     wave = 1j * np.fft.rfftfreq(t, 1 / t)[:, None]
     wave[-1] = 0.0 if t % 2 == 0 else wave[-1]
@@ -211,6 +216,6 @@ def _derivative(values: np.ndarray) -> np.ndarray:
 
 
 def _signed(shape: np.ndarray) -> np.ndarray:
-    """Columns with their largest entry positive."""
+    """Columns with their largest entry made positive."""
     largest = np.take_along_axis(shape, np.abs(shape).argmax(axis=0)[None], axis=0)
     return shape * np.sign(largest)

@@ -1,4 +1,4 @@
-"""The air inside the tire as an ideal gas, and what the walls take out of its waves."""
+"""The air inside the tire as an ideal gas, and its acoustic losses at the walls."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 GAS_CONSTANT = 287.0  # J/(kg K), of dry air
 RATIO = 1.4  # of specific heats
-ATMOSPHERE = 101325.0  # Pa: inflation is measured over it
+ATMOSPHERE = 101325.0  # Pa; inflation is measured above it
 _PRANDTL = 0.71
 
 
 @dataclass(frozen=True)
 class Gas:
-    """Still air: absolute `pressure` Pa and `temperature` K."""
+    """Air at rest: absolute `pressure` Pa and `temperature` K."""
 
     pressure: float
     temperature: float
@@ -35,15 +35,16 @@ class Gas:
         return 1.458e-6 * self.temperature**1.5 / (self.temperature + 110.4)
 
     def wall_loss(self, radius: float, circular: np.ndarray) -> np.ndarray:
-        """Rate of damping (1/s) of waves at `circular` rad/s in a tube of `radius` m.
+        """Damping rate (1/s) of waves at `circular` rad/s in a tube of `radius` m.
 
-        Twice the decay of the amplitude, by friction and heat conduction in the boundary layers
-        (Kirchhoff 1868; Pierce, Acoustics (1981), 10-5):  (2 / a) sqrt(mu w / 2 rho0) (1 + (gamma - 1) / sqrt(Pr)).
+        Twice the decay rate of the amplitude, by viscosity and heat conduction in the boundary
+        layers (Kirchhoff 1868; Pierce, Acoustics (1981), 10-5):  (2 / a) sqrt(mu w / 2 rho0) (1 +
+        (gamma - 1) / sqrt(Pr)).
         """
         layer = np.sqrt(self.viscosity * circular / (2 * self.density))
         return 2 / radius * layer * (1 + (RATIO - 1) / np.sqrt(_PRANDTL))
 
 
 def inflated(inflation: float, temperature: float) -> Gas:
-    """The air of a tire inflated by `inflation` Pa over the atmosphere, at `temperature` K."""
+    """The air of a tire at `inflation` Pa above atmospheric pressure and `temperature` K."""
     return Gas(inflation + ATMOSPHERE, temperature)

@@ -1,10 +1,12 @@
-"""What the tire's wall does to the air: the cavity's shape, and the volume that motions displace.
+"""Geometry of the cavity, and the volume displaced by motions of the tire's wall.
 
-    int chi dV = closed int chi rho/2 e_rho . n dS,   int chi dA dtheta = closed int chi e_rho . n dS,
+    int chi dV = closed int chi rho/2 e_rho . n dS,
+    int chi dA dtheta = closed int chi e_rho . n dS,
     flux_f(u) = closed int chi_f u . n dS = d/de int chi_f dV of the shape x + e u,
 
-over the deformed inner face and the cone between its two bead ends, which belongs to the rim; n out of
-the air, rho the distance from the axle, chi_f = 1, cos n theta, sin n theta of the deformed place's own angle.
+over the deformed inner face and the cone between its two bead ends, which belongs to the rim; n
+points out of the air, rho is the distance from the axle, chi_f = 1, cos n theta, sin n theta with
+theta of the deformed position.
 """
 
 from __future__ import annotations
@@ -24,26 +26,26 @@ from tireroad.fem.matrices.support import Unknowns
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.mesh import INNER
 
-WAVES = 24  # of the profile: a footprint an eighth of the ring long has few beyond
-_LEAST = 1e-12  # of a column's largest entry: below it is rounding
+WAVES = 24  # of the profile: a footprint of an eighth of the ring has little content beyond
+_LEAST = 1e-12  # of a column's largest entry; smaller ones are rounding
 
 
 class CavityTrace:
-    """The inner face of a body at its present displacement, over `count` waves, or as many as its
-    mesh can tell apart. Collective."""
+    """The inner face of a body at its present displacement, with `count` waves, by default as many
+    as its mesh resolves. Collective."""
 
     def __init__(self, body: Body, count: int | None = None) -> None:
-        # More waves than a quarter of the nodes around are the mesh's own ripples.
+        # Wave numbers above a quarter of the nodes around show only ripples of the mesh.
         self.count = count or max(min(WAVES, len(body.lattice.ring) // 4), 2)
         self._body = body
         self._ends = _bead_ends(body)
         u, v = body.u, body.test
-        # Waves are no polynomials: a few points more than a uniform pressure needs.
+        # The waves are not polynomials: a few more points than for a uniform pressure.
         finer = {"quadrature_degree": 3 * (len(body.lattice.edge) - 1) + 5}
         inner = ufl.Measure("ds", body.mesh, subdomain_data=body.tire.facets, metadata=finer)(INNER)
         x = ufl.SpatialCoordinate(body.mesh) + u
         reach = ufl.sqrt(x[0] ** 2 + x[2] ** 2)
-        # cos(n theta - phase) by the half angle: one form for all waves, on any UFL.
+        # cos(n theta - phase) with the half-angle formula: a single form for all waves, in any UFL.
         self._wave = fem.Constant(body.mesh, 0.0)
         self._phase = fem.Constant(body.mesh, 0.0)
         chi = ufl.cos(2 * self._wave * ufl.atan(x[0] / (reach - x[2])) - self._phase)
@@ -55,10 +57,10 @@ class CavityTrace:
         self._flux = compat.form(-chi * pushed * inner)
 
     def profile(self) -> Profile:
-        """The cavity's section around the ring. Raises InputError when it is no closed tube. Collective."""
+        """The cavity's section around the ring. InputError if it is no closed tube. Collective."""
         moments = np.array([self._scalars() for _ in self._each_wave()])
         moments = self._body.comm.allreduce(moments)
-        around = 2 * np.pi  # the rim is round: it adds to the mean alone
+        around = 2 * np.pi  # the rim is axisymmetric: it contributes to the mean only
         (r1, y1), (r2, y2) = self._ends
         moments[0] -= around * (y2 - y1) * np.array([(r1**2 + r1 * r2 + r2**2) / 6, (r1 + r2) / 2])
         found = Profile(*moments.T)
@@ -82,9 +84,9 @@ class CavityTrace:
             yield index
 
     def columns(self, unknowns: Unknowns) -> sparse.csr_matrix:
-        """flux_f of own unknowns, (n, f) m2: its transpose times motions is what they displace. Collective.
+        """flux_f of own unknowns, (n, f) m2; its transpose maps motions to volume. Collective.
 
-        A free rim takes the cone between the beads with it.
+        A free rim carries the cone between the beads.
         """
         nodal = sparse.hstack([self._column() for _ in self._each_wave()], format="csr")
         on_rim = None if unknowns.rim is None else rim_cone(*self._ends, self.count)
@@ -100,8 +102,9 @@ class CavityTrace:
 
 
 def rim_cone(end: tuple[float, float], other: tuple[float, float], count: int) -> np.ndarray:
-    """Force (m2) and moment about the origin (m3) of unit pressures chi_f on the cone between two
-    circles (radius, y) about the axle, (6, f), the air outside it.
+    """Force (m2) and moment about the origin (m3), (6, f), of unit pressures chi_f on a cone.
+
+    The cone joins two circles (radius, y) about the axle; the air lies outside it.
     """
     (r1, y1), (r2, y2) = end, other
     slope = (r2 - r1) / (y2 - y1)
@@ -120,7 +123,7 @@ def rim_cone(end: tuple[float, float], other: tuple[float, float], count: int) -
 
 
 def _bead_ends(body: Body) -> tuple[tuple[float, float], tuple[float, float]]:
-    """(radius, y) m of the inner face's two ends, by y: the rim holds them."""
+    """(radius, y) m of the inner face's two ends on the rim, ordered by y."""
     lattice = body.lattice
     section = lattice.tire.section
     line = lattice.section[section.chain(section.inner)]

@@ -1,1 +1,1 @@
-"""Meshes from files: Abaqus decks and Gmsh meshes, read as data and made into sections. No dolfinx here."""
+"""Meshes from files, Abaqus decks and Gmsh meshes, made into sections. Without dolfinx."""

@@ -1,4 +1,4 @@
-"""Materials of decks as the program's laws, in SI."""
+"""Materials of decks as laws of the program, in SI units."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from tireroad.fem.decks.prony import prony
 from tireroad.fem.decks.units import Units
 
 INCOMPRESSIBLE = 0.49  # Poisson's ratio in place of 1/2: changes modes by under 0.3 %
-_MODULUS = (1e4, 1e12)  # Pa, of anything in a tire
+_MODULUS = (1e4, 1e12)  # Pa; range of any material in a tire
 _DENSITY = (100.0, 2e4)  # kg/m3
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rubber:
-    """A compound: law of the long-term state and its coefficients by the keys of a scene, SI.
+    """A compound: law of the long-term state and its coefficients by scene key, in SI units.
 
-    `density` is None where the deck has none; `dynamic` and `loss_factor` are of a Prony series at
-    100 Hz. `notes` say what was taken otherwise than written.
+    `density` is None if the deck has none; `dynamic` and `loss_factor` are those of a Prony series
+    at 100 Hz. `notes` list what was interpreted differently from what is written.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Rubber:
 
 @dataclass(frozen=True)
 class CordMaterial:
-    """Young's modulus in Pa, density in kg/m3 (0 where the deck has none), compression over tension."""
+    """Young's modulus in Pa, density in kg/m3 (0 if not given), compression over tension."""
 
     youngs_modulus: float
     density: float
@@ -43,7 +43,7 @@ class CordMaterial:
 
 
 def rubber(compound: Compound, units: Units) -> Rubber:
-    """The compound of a solid section. Raises InputError for laws that are not among the program's."""
+    """The compound of a solid section. Raises InputError for laws the program does not have."""
     parts = _parts(compound)
     notes: list[str] = []
     if "HYPERELASTIC" in parts:
@@ -100,7 +100,7 @@ def _parts(compound: Compound) -> dict:
 def _numbers(
     part: Any, compound: Compound, notes: list[str], lines: int = 1
 ) -> tuple[Mapping[str, str], list[float], Place]:
-    """Options, the numbers of the first `lines` lines (those of the first temperature) and place."""
+    """Options, numbers of the first `lines` lines (the first temperature) and place."""
     options, table, place = part
     if not table and not {"MARLOW", "TEST DATA INPUT"} & set(options):
         raise place.error(f"material {compound.name}: no data; is the deck cut short?")
@@ -146,7 +146,7 @@ def _law(values: dict, bulk: float) -> tuple[str, dict]:
 
 
 def _form(options: Mapping[str, str], place: Place, name: str) -> tuple[int, bool]:
-    """(order N, of I1 alone) of a polynomial form. The default of Abaqus is POLYNOMIAL, N=1."""
+    """(order N, of I1 only) of a polynomial form. The Abaqus default is POLYNOMIAL, N=1."""
     for fixed, form in {
         "NEO HOOKE": (1, True),
         "MOONEY-RIVLIN": (1, False),
@@ -167,13 +167,13 @@ def _form(options: Mapping[str, str], place: Place, name: str) -> tuple[int, boo
 
 
 def _lines(options: Mapping[str, str]) -> int:
-    """How many lines hold the coefficients of one temperature: 9 C and 3 D do not fit into one."""
+    """Number of lines with the coefficients of one temperature: 9 C and 3 D do not fit in one."""
     full = not {"NEO HOOKE", "MOONEY-RIVLIN", "YEOH", "REDUCED POLYNOMIAL"} & set(options)
     return 2 if full and options.get("N") == "3" else 1
 
 
 def _names(order: int, reduced: bool) -> tuple[list[str], int]:
-    """Names of the coefficients Cij in the order of the manual, and how many Di follow."""
+    """Names of the coefficients Cij in the manual's order, and the number of Di that follow."""
     if reduced:
         return [f"c{i}0" for i in range(1, order + 1)], order
     names = [f"c{total - j}{j}" for total in range(1, order + 1) for j in range(total + 1)]
@@ -194,7 +194,7 @@ def _elastic(
 
 
 def _incompressible(model: str, values: dict, notes: list[str], name: str) -> float:
-    """Poisson's ratio, 0.49 in place of anything nearer to 1/2; the bulk modulus likewise."""
+    """Poisson's ratio, 0.49 if above 0.4999; sets a bulk modulus of 0 in `values` likewise."""
     said = f"{name}: incompressible in the deck, taken with ν = {INCOMPRESSIBLE}"
     if model == "neo-hookean":
         if values["poisson_ratio"] <= 0.4999:
@@ -211,14 +211,14 @@ def _incompressible(model: str, values: dict, notes: list[str], name: str) -> fl
 
 
 def _youngs(values: Mapping[str, float]) -> float:
-    """Young's modulus at small strain, of a nearly incompressible law where it is not given."""
+    """Young's modulus at small strain; if not given, that of the nearly incompressible law."""
     if "youngs_modulus" in values:
         return values["youngs_modulus"]
     return 6 * (values["c10"] + values.get("c01", 0.0))
 
 
 def _slope(parts: dict, compound: Compound) -> float:
-    """Slope at zero strain of *UNIAXIAL TEST DATA (stress, strain)."""
+    """Slope at zero strain of *UNIAXIAL TEST DATA (stress, strain), from its smallest strain."""
     for _, table, _ in (parts["UNIAXIAL TEST DATA"],) if "UNIAXIAL TEST DATA" in parts else ():
         points = sorted((row[1], row[0]) for row in table if len(row) > 1 and row[1] > 0)
         if points:

@@ -1,4 +1,4 @@
-"""What a file holds, whatever it was written by: nodes, elements, sets, materials, cords, and what was not used."""
+"""Contents of a mesh file of any format, and what of it was not used."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from tireroad.fem.decks.files.elements import Block
 from tireroad.fem.decks.files.lines import Place
 from tireroad.fem.errors import InputError
 
-ALL_FACES = -1  # of an element in a surface: those on the boundary
-BOTH_SIDES = -2  # of a membrane in a surface: where it lies
+ALL_FACES = -1  # in a surface, of a solid element: its faces on the boundary
+BOTH_SIDES = -2  # in a surface, of a membrane: where it lies
 
 
 @dataclass
 class Members:
-    """One set as written: labels, ranges (first, last, step), names of other sets; whether it is to stay so ordered."""
+    """One set as written: labels, ranges (first, last, step), names of other sets, and order."""
 
     labels: list[np.ndarray] = field(default_factory=list)
     ranges: list[tuple[int, int, int]] = field(default_factory=list)
@@ -28,9 +28,9 @@ class Members:
 
 @dataclass(frozen=True)
 class Sets:
-    """Sets of one sort ("node set", "element set") by name; a name is looked up in any case.
+    """Sets of one sort ("node set", "element set") by name, which is not case-sensitive.
 
-    `known` (n,) are all labels there are, ascending: a range takes those in it.
+    `known` (n,): all existing labels, ascending; a range selects among them.
     """
 
     sort: str
@@ -45,7 +45,7 @@ class Sets:
         return name.upper() in self.members
 
     def labels(self, name: str, asked: Place | None = None) -> np.ndarray:
-        """The labels of a set, ascending, each once. Raises InputError for a set that is not there."""
+        """The labels of a set, ascending and unique. Raises InputError for an unknown set."""
         return self._resolved(name.upper(), asked, {})
 
     def ordered(self, name: str, asked: Place) -> np.ndarray:
@@ -84,7 +84,7 @@ def _error(asked: Place | None, message: str) -> InputError:
 
 
 def missing(sort: str, name: str, names: Iterable[str]) -> str:
-    """That there is no such set, the nearest name, and the names there are."""
+    """Message that a set does not exist, with the nearest name and the existing ones."""
     known = list(names)
     near = difflib.get_close_matches(name.upper(), [k.upper() for k in known], 1, 0.6)
     hint = f"did you mean {near[0]}? " if near else ""
@@ -94,7 +94,7 @@ def missing(sort: str, name: str, names: Iterable[str]) -> str:
 
 @dataclass(frozen=True)
 class Solid:
-    """A *SOLID SECTION: elements of a set made of a material."""
+    """A *SOLID SECTION: the elements of a set consist of a material."""
 
     elements: str
     material: str
@@ -103,10 +103,11 @@ class Solid:
 
 @dataclass(frozen=True, kw_only=True)
 class Layer:
-    """A layer of cords in the membranes of a set, as the deck says it (its own units).
+    """A layer of cords in the membranes of a set, as in the deck (in its units).
 
-    `angle` in degrees from the meridian in axisymmetric elements, from the local first direction in
-    others; `geometry` CONSTANT, ANGULAR (spacing in degrees) or LIFT EQUATION (`extension`, `radius`).
+    `angle` in degrees: from the meridian in axisymmetric elements, otherwise from the local first
+    direction; `geometry` CONSTANT, ANGULAR (spacing in degrees) or LIFT EQUATION (`extension`,
+    `radius`).
     """
 
     name: str
@@ -124,8 +125,8 @@ class Layer:
 
 @dataclass(frozen=True)
 class Orientation:
-    """An *ORIENTATION: its system in capitals, the six numbers of two points, the normal's axis (1 to 3) and
-    the further turn about it in degrees.
+    """An *ORIENTATION: its system in capitals, the six coordinates of two points, the axis of the
+    normal (1 to 3) and the additional rotation about it in degrees.
     """
 
     system: str
@@ -137,7 +138,7 @@ class Orientation:
 
 @dataclass(frozen=True)
 class Embedded:
-    """Sets of membranes that lie inside solids of a host set (None: of any)."""
+    """Sets of membranes embedded in the solids of a host set (None: of any)."""
 
     elements: tuple[str, ...]
     host: str | None
@@ -155,11 +156,12 @@ class Compound:
 
 @dataclass(frozen=True, kw_only=True)
 class Deck:
-    """A mesh from a file, in the file's own units and numbers.
+    """A mesh from a file, in the file's own units and labels.
 
-    labels (n,) ascending and points (n, 3) of the nodes; surfaces: name -> (k, 2) of (element label,
-    face), a face counted from 0, ALL_FACES or BOTH_SIDES; `held`: node sets fixed to the rim;
-    `pressed`: surfaces under pressure in a step; `lines`: surfaces that may be lines of cords inside. `used` and `unused` are lines for the user.
+    labels (n,) ascending and points (n, 3) of the nodes; surfaces: name -> (k, 2) of (element
+    label, face), faces counted from 0, or ALL_FACES or BOTH_SIDES; `held`: node sets fixed to the
+    rim; `pressed`: surfaces under pressure in a step; `lines`: surfaces that may be cord lines
+    inside the body. `used` and `unused` are lines for the user.
     """
 
     file: str
@@ -182,16 +184,16 @@ class Deck:
 
     @property
     def dimension(self) -> int:
-        """2 for a section, 3 for a body: by its solids."""
+        """2 for a section, 3 for a body, from its solid elements."""
         return max((b.kind.dimension for b in self.blocks if b.kind.role == "solid"), default=2)
 
     @property
     def face_names(self) -> tuple[str, ...]:
-        """Names by which a face can be asked for."""
+        """Names by which a face can be requested."""
         return (*self.surfaces, *self.node_sets.names)
 
     def rows(self, labels: np.ndarray, place: Place | None = None) -> np.ndarray:
-        """Rows of `points` of node labels of any shape. Raises InputError for a node that is not there."""
+        """Rows of `points` for node labels of any shape. InputError for an undefined node."""
         at = np.searchsorted(self.labels, labels)
         at[at == len(self.labels)] = 0
         if len(self.labels) == 0 or (self.labels[at] != labels).any():
@@ -202,4 +204,4 @@ class Deck:
         return at
 
 
-SCOPE = 10**10  # a label of a part is its own one + SCOPE * number of the part
+SCOPE = 10**10  # labels are offset by SCOPE * number of their part

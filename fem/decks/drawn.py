@@ -1,4 +1,4 @@
-"""A section file (docs/section-file.md) as a tire from a file like any other."""
+"""A section file (docs/section-file.md), converted like other mesh files."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from tireroad.fem.sections.construction import Construction, CordLine
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.section_file import read
 
-ELEMENTS = 26  # bead to bead: as the built-in radial tire
+ELEMENTS = 26  # bead to bead, as in the built-in radial tire
 
 
 def drawn(path: Path) -> tuple[SectionMesh, tuple[Rubber, ...], tuple[Ply, ...]]:
-    """Mesh of order 2, compound of each region, cords. InputError, with the file, for what is wrong."""
+    """Mesh of order 2, compound of each region, cords. Raises InputError with the file's name."""
     construction = read(path)
     try:
         mesh = construction.section(ELEMENTS)

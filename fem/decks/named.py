@@ -10,7 +10,9 @@ from tireroad.fem.errors import InputError
 
 
 def named_edges(deck: Deck, edges: DeckEdges, name: str, key: str) -> np.ndarray:
-    """Numbers of the edges of a surface, node set or set of membranes; `key` is the scene's."""
+    """Edge numbers of a surface, node set or membrane set. InputError for other names.
+
+    `key` is the scene's key, for the message."""
     surfaces = {surface.upper(): surface for surface in deck.surfaces}
     if name.upper() in surfaces:
         return _of_surface(deck, edges, deck.surfaces[surfaces[name.upper()]])
@@ -38,7 +40,7 @@ def _of_surface(deck: Deck, edges: DeckEdges, rows: np.ndarray) -> np.ndarray:
 
 
 def membrane_edges(deck: Deck, edges: DeckEdges, labels: np.ndarray) -> np.ndarray:
-    """Numbers of the edges between whose ends membranes of the given labels lie."""
+    """Numbers of the edges on which membranes of the given labels lie."""
     found = [np.empty(0, np.int64)]
     for block in deck.blocks:
         if block.kind.role == "membrane":

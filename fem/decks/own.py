@@ -1,4 +1,4 @@
-"""From a file to a section: the one entry to this package."""
+"""From a mesh file to a section: the only entry point of this package."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from tireroad.fem.sections.mesh2d import SectionMesh
 
 @dataclass(frozen=True, kw_only=True)
 class Wishes:
-    """What a scene says of a file: names of faces, its unit of length ("m", "mm", "in"), whether it is half.
+    """Settings of the scene for a file: face names, length unit ("m", "mm", "in"), half section.
 
-    `materials` are the regions whose material the scene gives itself: the deck's is not looked at.
+    `materials`: regions or materials that the scene defines itself; the deck's are ignored.
     """
 
     inner: str | None = None
@@ -45,10 +45,10 @@ class Wishes:
 
 @dataclass(frozen=True, kw_only=True)
 class OwnSection:
-    """A section from a file, SI: mesh of order 2, compound of each region (None: the file has none), cords.
+    """A section from a file, in SI: mesh of order 2, compounds (None: not in the file), cords.
 
-    `used`, `unused` and `notes` are lines for the user: what was read, what not, what was guessed or
-    taken otherwise than written. `ring_angles` (rad) are those of a three-dimensional deck.
+    `used`, `unused` and `notes` are lines for the user: what was read, what was not, and what was
+    guessed or interpreted differently. `ring_angles` (rad): of a three-dimensional deck.
     """
 
     mesh: SectionMesh
@@ -61,9 +61,9 @@ class OwnSection:
 
 
 def read(path: Path | str, wishes: Wishes | None = None) -> OwnSection:
-    """The section of an Abaqus deck (.inp), a Gmsh mesh (.msh) or a section file (.toml). Not collective; reads files.
+    """Section of an Abaqus deck (.inp), Gmsh mesh (.msh) or section file (.toml). Not collective.
 
-    Raises InputError, with file and line, for all that keeps the file from being a tire's section.
+    Raises InputError, with file and line, for anything that prevents its use as a tire section.
     """
     path, wishes = Path(path), wishes or Wishes()
     if path.suffix.lower() == ".toml":
@@ -142,7 +142,7 @@ def _check_radius(deck: Deck, unit: str) -> None:
 
 
 def _names(deck: Deck, wishes: Wishes) -> dict[str, tuple[str, ...]]:
-    """The sets that make each face: the scene's, else what the deck itself holds or presses."""
+    """The sets that form each face: the scene's, otherwise those the deck holds or pressurises."""
     rim = wishes.rim or tuple(dict.fromkeys(name for name, _ in deck.held))
     if not rim and "RIM" in {name.upper() for name in deck.face_names}:
         rim = ("RIM",)
@@ -173,7 +173,7 @@ def _both_halves(quads: Quads, wishes: Wishes) -> Quads:
 
 
 def _sides(quads: Quads, numbers: list[np.ndarray], key: str) -> np.ndarray | None:
-    """The sides of the outline that lie on the named edges; None where nothing was named."""
+    """The sides of the outline that lie on the named edges; None if nothing was named."""
     if not numbers:
         return None
     sides = faces.on_outline(quads, with_origin(quads, np.concatenate(numbers)))
@@ -201,7 +201,7 @@ def _cords(deck: Deck, quads: Quads, laid: dict[str, Laid], units: Units) -> lis
 
 
 def _lines(deck: Deck, quads: Quads, edges: DeckEdges, origins: Origins, wishes: Wishes) -> dict:
-    """Named lines of a Gmsh mesh that lie inside the body, ready for cords of the scene."""
+    """Named lines inside the body of a Gmsh mesh, for cords of the scene."""
     faces_named = {name.upper() for names in _names(deck, wishes).values() for name in names}
     found = {}
     for name in deck.lines:
@@ -229,7 +229,7 @@ def _rubbers(deck: Deck, found: Regions, units: Units, wishes: Wishes) -> list[R
 
 
 def _centred(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """The points moved so that the middle of the width is y = 0, where it is off by over 5 % of it."""
+    """Points shifted to put the mid-width at y = 0, if it is off by over 5 % of the width."""
     low, high = points[:, 1].min(), points[:, 1].max()
     shift = (low + high) / 2
     if abs(shift) <= 0.05 * (high - low):

@@ -1,4 +1,4 @@
-"""Prony series as dynamic modulus and loss factor."""
+"""Dynamic modulus and loss factor from a Prony series."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-PRONY_FREQUENCY = 100.0  # Hz at which a series is read
+PRONY_FREQUENCY = 100.0  # Hz at which a series is evaluated
 
 
 def prony(parts: dict, options: Mapping[str, str], notes: list[str]) -> tuple[float, float, float]:
-    """(long-term share of the given moduli, dynamic over long-term modulus, loss factor)."""
+    """(long-term fraction of the given moduli, dynamic over long-term modulus, loss factor)."""
     if "VISCOELASTIC" not in parts:
         return 1.0, 1.0, 0.0
     given, table, place = parts["VISCOELASTIC"]

@@ -1,4 +1,4 @@
-"""Which compound each element of a section is made of."""
+"""Assignment of compounds to the elements of a section."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from tireroad.fem.errors import InputError
 
 @dataclass(frozen=True)
 class Regions:
-    """Names of the regions, the material each has in the deck (None: none), where that is said, and the
-    region's number of every element label.
+    """Names of the regions, their materials in the deck (None: none), the place that defines each,
+    and the region number of every element label (`of`).
     """
 
     names: tuple[str, ...]
@@ -26,7 +26,7 @@ class Regions:
 
 
 def regions(deck: Deck) -> Regions:
-    """The solid sections of a deck, or, where it has none, the element sets of its blocks."""
+    """The solid sections of a deck or, if it has none, its element sets."""
     blocks = [b for b in deck.blocks if b.kind.role == "solid" and len(b.labels)]
     if not blocks:
         raise InputError(
@@ -61,7 +61,7 @@ def regions(deck: Deck) -> Regions:
 
 
 def _by_set(deck: Deck, blocks: list[Block], labels: np.ndarray) -> Regions:
-    """One region for each element set, smallest sets first, and one of what is left."""
+    """One region per element set, smallest sets first, and one for the remaining elements."""
     sets = {
         name: np.intersect1d(deck.element_sets.labels(name), labels)
         for name in deck.element_sets.names

@@ -1,4 +1,4 @@
-"""The units of a deck: Abaqus has none, so one length unit stands for a consistent system."""
+"""Units of a deck: Abaqus has none, so a length unit stands for a consistent system."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 from tireroad.fem.errors import InputError
 
-_SMALLEST, _LARGEST = 0.1, 2.5  # m, outer radius of anything with this name
+_SMALLEST, _LARGEST = 0.1, 2.5  # m, range of the outer radius of a tire
 
 
 @dataclass(frozen=True)
 class Units:
-    """Factors to SI of lengths, stresses and densities; `words` names the system."""
+    """Factors to SI for lengths, stresses and densities; `words` names the system."""
 
     length: float
     stress: float
@@ -19,7 +19,7 @@ class Units:
     words: str
 
 
-# Each is consistent with the second: tonne for mm, slinch (lbf s2/in) for inches.
+# Consistent with the second: tonne for mm, slinch (lbf s2/in) for inches.
 SYSTEMS = {
     "m": Units(1.0, 1.0, 1.0, "m, kg, s, N, Pa"),
     "mm": Units(1e-3, 1e6, 1e12, "mm, t, s, N, MPa"),
@@ -28,7 +28,7 @@ SYSTEMS = {
 
 
 def check_size(radius: float, unit: str, file: str) -> None:
-    """That the outer radius (in the deck's unit) is a tire's; else InputError with the unit that fits."""
+    """Raise InputError with the unit that fits if the outer radius (deck's unit) is no tire's."""
     if _SMALLEST <= radius * SYSTEMS[unit].length <= _LARGEST:
         return
     fitting = [name for name, of in SYSTEMS.items() if _SMALLEST <= radius * of.length <= _LARGEST]

@@ -1,1 +1,1 @@
-"""Matrices of small motions about a static state, and solutions of them."""
+"""Matrices of small motions about a static state, and solutions with them."""

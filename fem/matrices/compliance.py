@@ -1,4 +1,4 @@
-"""Exact static flexibility in the rotating frame: one factorisation, all loads as right-hand sides."""
+"""Exact static flexibility of the rotating tire: one factorisation for all loads."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ def rotating_stiffness(
     damping: tuple[float, float],
     inertia: str = "full",
 ) -> PETSc.Mat:
-    """K_Omega = K + Omega^2 S + gamma1 Omega B + gamma2 Omega K M^-1 B; doppler: S_B for S. Collective."""
+    """K_Omega = K + Omega^2 S + gamma1 Omega B + gamma2 Omega K M^-1 B; "doppler": S_B for S.
+    Collective."""
     stiffness = operators.stiffness.copy()
     if speed == 0:
-        stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # not every copy knows it
+        stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # a copy may lose the flag
         return stiffness
     assert rotation is not None, "a speed needs the matrices of the rotating frame"
     add_part(stiffness, speed**2, rotation.carrying(inertia))
@@ -49,7 +50,7 @@ def rotating_damping(
     damping: tuple[float, float],
     inertia: str = "full",
 ) -> PETSc.Mat:
-    """D + 2 Omega G, D = gamma1 M + gamma2 K; doppler: B for G. Collective."""
+    """D + 2 Omega G with D = gamma1 M + gamma2 K; "doppler": B for G. Collective."""
     matrix = operators.stiffness.copy()
     matrix.scale(damping[1])
     if speed:
@@ -75,11 +76,12 @@ def add_diagonal(matrix: PETSc.Mat, values: np.ndarray) -> None:
 
 @dataclass(frozen=True)
 class StaticShapes:
-    """Shapes under constant unit loads and what the full matrices say of them.
+    """Shapes under constant unit loads b, and the full matrices projected on them.
 
-    `columns` this process's rows (n, p) of x = K_Omega^-1 b; with y = K_Omega^-T b, all (p, p) and on
-    every process: `compliance` b^T x m/N, `damping` y^T (D + 2 Omega G) x m s/N, `inertia` y^T M x
-    m s2/N; `momentum` (3, p) int rho x, kg m/N, or (b, p) of what was asked for in its place.
+    `columns`: this process's rows (n, p) of x = K_Omega^-1 b. With y = K_Omega^-T b, all (p, p) and
+    on every process: `compliance` b^T x m/N, `damping` y^T (D + 2 Omega G) x m s/N, `inertia` y^T M
+    x m s2/N. `momentum` (3, p): int rho x, kg m/N, or (b, p) for other rows requested in its
+    place.
     """
 
     columns: np.ndarray
@@ -90,9 +92,11 @@ class StaticShapes:
 
 
 class LoadedShapes:
-    """The shapes K_Omega^-1 b under constant loads b, the air's with them, by one factorisation that is kept until
-    `destroy`. Loads are own rows (n, p); they are solved some at a time, since thousands of them on a fine mesh would
-    not fit in memory. Relieved with a free rim, whose tire has to stand. All of it is collective.
+    """Shapes K_Omega^-1 b under constant loads b, with coupling to the air in the cavity.
+
+    Loads are own rows (n, p). They are solved in parts, since thousands of shapes on a fine mesh
+    would not fit in memory; the factorisation is kept until `destroy`. With a free rim: inertia
+    relief, for a standing tire only. All methods are collective.
     """
 
     def __init__(
@@ -105,7 +109,7 @@ class LoadedShapes:
             self._air = air
 
     def parts(self, loads: np.ndarray | sparse.spmatrix) -> Iterator[tuple[slice, np.ndarray]]:
-        """Which of the loads, and own rows (n, q) of their shapes."""
+        """Yields a slice of the loads and own rows (n, q) of their shapes."""
         for part, shapes in self._without_air(loads):
             if self._air is not None:
                 shapes = self._air.with_air(np.hstack([shapes, self._pushed]))
@@ -127,14 +131,14 @@ class LoadedShapes:
         return out
 
     def readings(self, rows: sparse.csr_matrix, loads: sparse.spmatrix) -> np.ndarray:
-        """rows K_Omega^-1 loads (r, p) of own columns of `rows` (r, n), on every process."""
+        """rows K_Omega^-1 loads (r, p) on every process, for own columns of `rows` (r, n)."""
         out = np.empty((rows.shape[0], loads.shape[1]))
         for part, shapes in self.parts(loads):
             out[:, part] = rows @ shapes
         return summed(self._operators.body.comm, out)
 
     def destroy(self) -> None:
-        """Gives the factor's memory back."""
+        """Free the factor's memory."""
         if self._factor is not None:
             self._factor.destroy()
 
@@ -147,11 +151,11 @@ def static_shapes(
     air: Column | None = None,
     beside: np.ndarray | None = None,
 ) -> StaticShapes:
-    """Static shapes of the probes (p, 3 s), each a load and a reading, with the air's; `beside` own rows (b, n) in the place
-    of those of the momentum, which are the first of them. Collective.
+    """Static shapes of the probes (p, 3 s), both loads and readings, with the air. Collective.
 
-    An unsymmetric stiffness is factorised a second time, transposed; a free tire that stands answers
-    by inertia relief (fem.matrices.inertia_relief).
+    `beside`: own rows (b, n) that replace those of the momentum; its first three rows must be the
+    momentum if there is air. An unsymmetric stiffness is factorised a second time, transposed; a
+    free standing tire is solved by inertia relief (fem.matrices.inertia_relief).
     """
     comm = operators.body.comm
     loads = on_own_rows(operators, probes)
@@ -176,7 +180,7 @@ def static_shapes(
 def _with_following(
     shapes: StaticShapes, air: Column, x: np.ndarray, y: np.ndarray
 ) -> StaticShapes:
-    """The same with the damping, inertia and momentum of the air that follows the shapes. Collective."""
+    """Add the damping, inertia and momentum of the air that follows the shapes. Collective."""
     g, h = air.following(x), air.following(y, transposed=True)
     drag, _ = air.duct.pencil(air.speed)
     momentum = shapes.momentum.copy()
@@ -197,11 +201,12 @@ def compliance(
     air: Column | None = None,
     beside: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Displacement at the outputs per unit load, (r, k) m/N, with the air's, on every process. Collective.
+    """Displacement (r, k) m/N at the outputs per unit load, on every process. Collective.
 
-    `outputs` (r, 3 s) and `loads` (k, 3 s) weigh the nodes of the outer face, three dofs a node. `beside`: own rows
-    (b, n) that are read besides, b rows more, as the first moment int rho u of the tire, kg m/N.
-    Raises ConvergenceError when a solve leaves a relative residual above 1e-8.
+    `outputs` (r, 3 s) and `loads` (k, 3 s) are weights of the outer face's nodes, three dofs a
+    node. `beside`: own rows (b, n) of further readings, b more rows of the result, e.g. the tire's
+    first moment int rho u, kg m/N; `air`: coupling to the cavity. Raises ConvergenceError if a
+    solve leaves a relative residual above 1e-8.
     """
     rows, columns = on_own_rows(operators, outputs).T.tocsr(), on_own_rows(operators, loads)
     if beside is not None:
@@ -216,10 +221,10 @@ def compliance(
 
 
 def on_own_rows(operators: Operators, probes: sparse.csr_matrix) -> sparse.csr_matrix:
-    """The probes as columns over this process's unknowns, (n, k). Collective.
+    """The probes as columns (n, k) over this process's unknowns. Collective.
 
-    Weights (k, 3 s) of the outer face's nodes, or (k, 3 s + 6) with those of a free rim's translation
-    and rotation.
+    `probes` are weights (k, 3 s) of the outer face's nodes, or (k, 3 s + 6) with those of a free
+    rim's translation and rotation.
     """
     body = operators.body
     face = body.surface

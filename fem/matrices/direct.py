@@ -1,4 +1,4 @@
-"""Direct solves by MUMPS: one factorisation, many right-hand sides together, each answer checked."""
+"""Direct solves by MUMPS: one factorisation, blocks of right-hand sides, every block checked."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
 
-_CHUNK = 64  # right-hand sides a solve: enough for BLAS 3 in MUMPS, little memory
+_CHUNK = 64  # right-hand sides per solve: enough for BLAS 3 in MUMPS, little memory
 RESIDUAL_TOLERANCE = 1e-8
-_SUMS = 4  # by which a chunk is checked: all of its products took as long as its solves
+_SUMS = 4  # random sums that check a block; checking every column took as long as the solves
 
 
 def solve_all(matrix: PETSc.Mat, loads: sparse.spmatrix) -> np.ndarray:
-    """Own rows of matrix^-1 loads (n, p), by one factorisation. Collective."""
+    """Own rows (n, p) of matrix^-1 loads by one factorisation. Collective."""
     pc = factorise(matrix)
     solution = solve_columns(pc, matrix, loads)
     pc.destroy()
@@ -26,7 +26,7 @@ def solve_all(matrix: PETSc.Mat, loads: sparse.spmatrix) -> np.ndarray:
 def solve_columns(
     pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray | sparse.spmatrix
 ) -> np.ndarray:
-    """Own rows of matrix^-1 columns, (n, k), by the matrix's factorisation; checked. Collective."""
+    """Own rows (n, k) of matrix^-1 columns by the given factorisation; checked. Collective."""
     out = np.empty(columns.shape)
     for part, solved in solve_parts(pc, matrix, columns):
         out[:, part] = solved
@@ -36,7 +36,7 @@ def solve_columns(
 def solve_parts(
     pc: PETSc.PC, matrix: PETSc.Mat, columns: np.ndarray | sparse.spmatrix
 ) -> Iterator[tuple[slice, np.ndarray]]:
-    """The same some columns a time, with where they stand: all of a fine mesh's need not fit in memory. Collective."""
+    """As `solve_columns`, in blocks, each with its slice, to save memory. Collective."""
     factor = pc.getFactorMatrix()
     if not isinstance(columns, np.ndarray):
         columns = columns.tocsc()
@@ -45,38 +45,41 @@ def solve_parts(
         loads = columns[:, part]
         dense = loads if isinstance(loads, np.ndarray) else loads.toarray()
         yield part, _solve(factor, matrix, dense)
-    factor.destroy()  # this hold on it, which petsc4py would keep for ever
+    factor.destroy()  # release this reference, which petsc4py would keep forever
 
 
 def symmetric(matrix: PETSc.Mat) -> bool:
-    """Whether the matrix is marked so."""
+    """Whether the matrix is marked symmetric."""
     known, symmetric = matrix.isSymmetricKnown()
     return bool(known and symmetric)
 
 
 def factorise(stiffness: PETSc.Mat) -> PETSc.PC:
-    """A direct factorisation by MUMPS: L D L^T where the matrix is marked symmetric. Collective."""
+    """Factorisation by MUMPS: L D L^T if the matrix is marked symmetric, else L U. Collective."""
     pc = PETSc.PC().create(stiffness.comm)
     pc.setOperators(stiffness)
     pc.setType(PETSc.PC.Type.CHOLESKY if symmetric(stiffness) else PETSc.PC.Type.LU)
     pc.setFactorSolverType("mumps")
     pc.setFactorSetUpSolverType()
     factor = pc.getFactorMatrix()
-    factor.setMumpsIcntl(14, 100)  # room for pivots that MUMPS did not foresee
+    factor.setMumpsIcntl(14, 100)  # workspace for pivoting beyond MUMPS's estimate
     factor.destroy()
     pc.setUp()
     return pc
 
 
 def _solve(factor: PETSc.Mat, stiffness: PETSc.Mat, loads: np.ndarray) -> np.ndarray:
-    """Own rows of stiffness^-1 loads, checked. Collective."""
+    """Own rows of stiffness^-1 loads. Collective.
+
+    Raises ConvergenceError for a relative residual above RESIDUAL_TOLERANCE."""
     right = _dense(loads, stiffness.comm)
     solution = right.duplicate()
     factor.matSolve(right, solution)
     out = solution.getDenseArray().copy()
     right.destroy()
     solution.destroy()
-    # Sums of the answers with random signs: squared, their defect is on average that of all answers together.
+    # Sums of the solutions with random signs: the expected square of their residual is that of all
+    # columns together.
     signs = np.random.default_rng(0).choice((-1.0, 1.0), (loads.shape[1], _SUMS))
     given = loads @ signs
     comm, defect = stiffness.comm.tompi4py(), multiply(stiffness, out @ signs) - given

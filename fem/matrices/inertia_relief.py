@@ -1,12 +1,12 @@
-"""Static flexibility of a tire that nothing holds: inertia relief.
+"""Static flexibility of a free tire by inertia relief.
 
-A rigid motion R has no stiffness, so K has no inverse. A load is balanced by the inertia of the rigid
-motions it sets off, and the answer is measured beside them:
+A rigid motion R has no stiffness, so K is singular. A load is balanced by the inertia forces of the
+rigid acceleration it causes, and the response is made orthogonal to the rigid motions:
 
     G = P K^+ P^T,   P = 1 - R R^T M,   R^T M R = 1   (MacNeal, Comput. Struct. 1 (1971) 581)
 
-K^+: as many of the rim's unknowns as there are rigid motions are held, which takes no force from a
-balanced load.
+For K^+ as many unknowns of the rim are held as there are rigid motions; a balanced load causes no
+reaction there.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from tireroad.fem.matrices.direct import RESIDUAL_TOLERANCE, multiply, solve_all
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.support import rigid_motions
 
-_ZERO = 1e-11  # of the largest K_ii / M_ii: motions with less have no stiffness, rounding is 1e-15
+_ZERO = 1e-11  # of the largest K_ii / M_ii; motions below have no stiffness, rounding is 1e-15
 
 
 def rigid_space(operators: Operators) -> np.ndarray:
-    """Own rows (n, r) of the M-orthonormal rigid motions without stiffness, found on K. Collective.
+    """Own rows (n, r) of the M-orthonormal rigid motions without stiffness. Collective.
 
-    Of the six motions of the deformed body those K gives no force: none with a clamped rim, six with a
-    free one without a road.
+    They are those of the deformed body's six rigid motions on which K exerts no force: none with a
+    clamped rim, six with a free rim and no road.
     """
     body, unknowns, mass = operators.body, operators.unknowns, operators.mass[:, None]
     if unknowns.rim is None:
@@ -47,8 +47,9 @@ def rigid_space(operators: Operators) -> np.ndarray:
 
 
 def statics(operators: Operators, stiffness: PETSc.Mat, loads: sparse.csr_matrix) -> np.ndarray:
-    """Own rows (n, p) of the shapes under constant loads: K^-1 loads, or relieved with a free rim,
-    whose tire has to stand. Collective.
+    """Own rows (n, p) of the shapes under constant loads. Collective.
+
+    K^-1 loads, or inertia relief with a free rim, for a standing tire only.
     """
     if operators.unknowns.rim is None:
         return solve_all(stiffness, loads)
@@ -56,9 +57,9 @@ def statics(operators: Operators, stiffness: PETSc.Mat, loads: sparse.csr_matrix
 
 
 def relieved(operators: Operators, loads: sparse.csr_matrix) -> np.ndarray:
-    """Own rows of G loads (n, p); K^-1 loads where nothing is rigid. Collective.
+    """Own rows (n, p) of G loads; K^-1 loads if there is no rigid motion. Collective.
 
-    Raises ConvergenceError when the balanced loads still press on what was held.
+    Raises ConvergenceError if the balanced loads leave a reaction at the held unknowns.
     """
     stiffness, comm = operators.stiffness, operators.body.comm
     rigid = rigid_space(operators)
@@ -87,7 +88,7 @@ def relieved(operators: Operators, loads: sparse.csr_matrix) -> np.ndarray:
 
 
 def _determinate(operators: Operators, rigid: np.ndarray) -> np.ndarray:
-    """Own rows, all of the rim, that hold the rigid motions and no more."""
+    """Own indices of rim unknowns that restrain the rigid motions statically determinately."""
     rim, count = operators.unknowns.rim, rigid.shape[1]
     if rim is None or not rim.mine:
         return np.zeros(0, PETSc.IntType)

@@ -1,9 +1,10 @@
-"""Matrices of small motions about a static state, on the unknowns that its support leaves.
+"""Matrices of small motions about a static state, on the unknowns that its support leaves free.
 
-For basis functions phi on the undeformed mesh, w = e_y x X (speed taken out), K the tangent with
-geometric and follower-pressure stiffness, the rubber's part at its dynamic moduli:
+For basis functions phi on the undeformed mesh and w = e_y x X (Omega factored out). K is the
+tangent stiffness with its geometric and follower-pressure parts, the rubber's material part with
+dynamic moduli:
 
-    M_ij = int rho phi_i . phi_j                    G_ij = skew part of int rho phi_i . (grad phi_j w)
+    M_ij = int rho phi_i . phi_j                    G_ij = skew of int rho phi_i . (grad phi_j w)
     S_ij = -int rho (grad phi_i w) . (grad phi_j w) Q_ij = int rho phi_i . (e_y x phi_j),  B = G - Q
     S_B_ij = -int rho (grad phi_i w - e_y x phi_i) . (grad phi_j w - e_y x phi_j)
 """
@@ -38,8 +39,9 @@ ROTATION = ("gyroscopic", "convective", "body", "body_convective")
 
 
 class Rotation:
-    """G, S and B of the full inertia, and S_B of the doppler one, Omega taken out of all: each made at its first use,
-    which is collective. A static flexibility needs two of the four.
+    """G, S and B of the full inertia and S_B of the doppler one, with Omega factored out.
+
+    Each is assembled at first use (collective): a static flexibility needs only two of the four.
     """
 
     def __init__(self, body: Body, assemble: Callable[[ufl.Form], PETSc.Mat]) -> None:
@@ -68,21 +70,21 @@ class Rotation:
         return self._assemble(self._body.inertia(-ufl.inner(test_rate, rate)))
 
     def coriolis(self, inertia: str) -> PETSc.Mat:
-        """What 2 Omega multiplies: G, or B of the doppler inertia, kg."""
+        """The factor of 2 Omega, kg: G, or B for the doppler inertia."""
         return self.gyroscopic if inertia == "full" else self.body
 
     def carrying(self, inertia: str) -> PETSc.Mat:
-        """What Omega^2 multiplies: S, or S_B of the doppler inertia, kg."""
+        """The factor of Omega^2, kg: S, or S_B for the doppler inertia."""
         return self.convective if inertia == "full" else self.body_convective
 
 
 class Operators:
     """Matrices on the unknowns of a body at its present displacement. Collective.
 
-    `mass` is the diagonal of the Gauss-Lobatto mass matrix, kg: positive, and of the full order of
-    the elements (the quadrature points are the nodes); `carried` (3, n) kg the momentum per rate of
-    each. `unknowns` says what they are. With a free
-    rim the static forces on it count, those of the `rolling` shape too (mass damping only).
+    `mass`: diagonal of the Gauss-Lobatto mass matrix, kg, positive and of the full order of the
+    elements (the quadrature points are the nodes); `carried` (3, n) kg: momentum per unit rate of
+    each unknown; `unknowns` describes them. With a free rim the static forces on the rim contribute
+    to the stiffness, including those of the `rolling` shape (mass damping only).
     """
 
     def __init__(
@@ -101,7 +103,7 @@ class Operators:
         self.stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
     def _add_turning(self, rim: Rim, inflation: float, rolling: Rolling) -> None:
-        """What the rim's static forces add to the stiffness of its rotations. Collective."""
+        """Add the stiffness against rotations of the rim due to its static forces. Collective."""
         body = self.body
         pressure = fem.Constant(body.mesh, inflation)
         out = fem.petsc.assemble_vector(compat.form(static_residual(body, pressure, rolling)))
@@ -120,14 +122,16 @@ class Operators:
         return static + self._material(wall.stiffening()) if wall.stiffens else static
 
     def _material(self, share: Expr) -> ufl.Form:
-        """A share (a field of the cells) of the material part of the rubber's tangent, in UFL."""
+        """A share (constant in each cell) of the rubber's material tangent, in UFL."""
         here = fem.Function(self.body.space)
         here.x.array[:] = self.body.u.x.array
         return tangent(self.body, added_stress(self.body, share, here))
 
     def loss_stiffness(self) -> PETSc.Mat | None:
-        """sum_r eta_r K_r, N/m, of the material parts of the regions' dynamic tangents, which a complex
-        modulus has beside K as its imaginary part; None where nothing loses. Collective.
+        """sum_r eta_r K_r, N/m, over the material tangents of the regions at dynamic moduli.
+
+        It is the imaginary part of the stiffness for a complex modulus; None without losses.
+        Collective.
         """
         wall = self.body.wall
         return self._assemble(self._material(wall.losses())) if wall.loses else None
@@ -137,7 +141,7 @@ class Operators:
         return Rotation(self.body, lambda form: _without_zeros(self._assemble(form)))
 
     def consistent_mass(self) -> PETSc.Mat:
-        """int rho phi_i . phi_j by full integration, kg: what the diagonal `mass` is compared to. Collective."""
+        """int rho phi_i . phi_j fully integrated, kg: reference for the diagonal. Collective."""
         body = self.body
         return self._assemble(body.inertia(ufl.inner(body.trial, body.test)))
 
@@ -153,12 +157,14 @@ class Operators:
         return self.unknowns.spread(values)
 
     def restrict(self, nodal: np.ndarray) -> np.ndarray:
-        """Own unknowns (n, ...) from owned nodal values (nodes, 3, ...) of such a motion. Collective."""
+        """Own unknowns (n, ...) from owned nodal values (nodes, 3, ...) of an admissible motion.
+        Collective."""
         return self.unknowns.restrict(nodal)
 
     def trace(self, values: np.ndarray) -> np.ndarray:
-        """What is seen of motions (n, m) outside, on every process: the outer face (3 s, m), and after
-        it the translation and rotation of a free rim (6, m). Collective.
+        """Outer-face motion (3 s, m) of the motions (n, m), on every process. Collective.
+
+        With a free rim its translation and rotation (6, m) follow.
         """
         face = self.body.surface(self.spread(values)).reshape(-1, values.shape[1])
         if self.unknowns.rim is None:
@@ -167,8 +173,11 @@ class Operators:
 
 
 def _without_zeros(matrix: PETSc.Mat) -> PETSc.Mat:
-    """The matrix without entries that are zero, in the place of the one given. G and S couple like components alone, a third
-    of what the mesh couples: products take a third of the time, and memory too. Collective."""
+    """The matrix without its zero entries; the one given is destroyed.
+
+    G and S couple like components alone, a third of the mesh's pattern: their products take a third
+    of the time and of the memory. Collective.
+    """
     sizes, comm = matrix.getSizes(), matrix.comm
     indptr, indices, values = matrix.getValuesCSR()
     matrix.destroy()

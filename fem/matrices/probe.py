@@ -1,4 +1,4 @@
-"""Forces and readings on the outer face: weights of its nodes, from the element's own shape functions."""
+"""Loads and readings on the outer face: nodal weights from the element's shape functions."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from scipy import sparse
 from tireroad.fem.sections.reference import line
 from tireroad.fem.tire.mesh import Lattice
 
-_POINTS = 6  # Gauss points a direction for each element a spread force covers
+_POINTS = 6  # Gauss points per direction in each element under a distributed load
 
 
 def nodes(index: np.ndarray, count: int, component: int = 2) -> sparse.csr_matrix:
-    """One component at single nodes: (k, 3 count), for `index` (k,) into the outer face."""
+    """Rows (k, 3 count) for one component at single nodes, `index` (k,) into the outer face."""
     k = len(index)
     return sparse.csr_matrix(
         (np.ones(k), (np.arange(k), 3 * index + component)), shape=(k, 3 * count)
@@ -20,7 +20,7 @@ def nodes(index: np.ndarray, count: int, component: int = 2) -> sparse.csr_matri
 
 
 def along(index: np.ndarray, count: int, vectors: np.ndarray) -> sparse.csr_matrix:
-    """The components along `vectors` (k, 3) at single nodes: (k, 3 count), for `index` (k,) into the outer face."""
+    """Rows (k, 3 count) for components along `vectors` (k, 3) at nodes `index` (k,)."""
     k = len(index)
     rows = np.repeat(np.arange(k), 3)
     columns = (3 * index[:, None] + np.arange(3)).ravel()
@@ -30,14 +30,14 @@ def along(index: np.ndarray, count: int, vectors: np.ndarray) -> sparse.csr_matr
 def spot(
     lattice: Lattice, ring: float, arc: float, spread: tuple[float, float] = (0.0, 0.0)
 ) -> np.ndarray:
-    """Weights (s,) of the outer-face nodes for a point, or a uniform traction of total 1 around it.
+    """Weights (s,) of the outer-face nodes for a point load, or a uniform traction of total 1.
 
-    Angles in rad: around the axle from the lowest point, along the section from the crown; `spread`
-    are the half widths. A reading with spread is the mean over the spot.
+    Angles in rad: `ring` around the axle from the lowest point, `arc` along the section from the
+    crown; `spread`: half widths. As a reading, a spread spot gives the mean over it.
     """
     around, ring_weight = _line_rule(lattice.ring_corners, ring, spread[0])
     along, arc_weight = _line_rule(lattice.arc_corners, arc, spread[1])
-    # Area per angles: the outer parts of a spread spot are the longer ones.
+    # Area per unit angles: the outer parts of the spot are longer.
     area = _area(lattice, along)
     arc_weight = arc_weight * area / (arc_weight @ area)
     shape_ring = ring_weight @ _shape(lattice.ring_corners, lattice.edge, around % (2 * np.pi))
@@ -46,11 +46,11 @@ def spot(
     return np.outer(shape_ring[:-1], shape_arc).ravel()
 
 
-_STEP = 1e-5  # of an element, of the difference quotient
+_STEP = 1e-5  # step of the difference quotient, as a fraction of an element
 
 
 def _area(lattice: Lattice, arc: np.ndarray) -> np.ndarray:
-    """Area of the undeformed outer face per angle around and section angle, m2/rad2, at angles (k,)."""
+    """Undeformed outer area per ring and section angle, m2/rad2, at section angles (k,)."""
     element, local = _local(lattice.arc_corners, arc)
     low, high = np.clip(local - _STEP, 0, 1), np.clip(local + _STEP, 0, 1)
     ends = [lattice.tire.outer_line(element, t) for t in (low, high)]
@@ -60,12 +60,12 @@ def _area(lattice: Lattice, arc: np.ndarray) -> np.ndarray:
 
 
 def directed(weights: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Weights over the three dofs a node, (3 s,), of a unit vector in the given direction."""
+    """Weights (3 s,) over three dofs a node for the unit vector along `direction`."""
     return np.outer(weights, np.asarray(direction) / np.linalg.norm(direction)).ravel()
 
 
 def _line_rule(corners: np.ndarray, centre: float, half: float) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss points and weights (sum 1) over centre +- half, split where elements meet."""
+    """Gauss points and weights (sum 1) on centre +- half, split at element boundaries."""
     if half == 0:
         return np.array([centre]), np.ones(1)
     turn = 2 * np.pi * np.arange(-1, 2)[:, None] if corners[0] == 0 else 0.0
@@ -79,7 +79,7 @@ def _line_rule(corners: np.ndarray, centre: float, half: float) -> tuple[np.ndar
 
 
 def _shape(corners: np.ndarray, edge: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Lagrange shape functions of all nodes on a line of elements at the points, (points, nodes)."""
+    """Shape functions (points, nodes) of all nodes of a line of elements at the points."""
     first, values = line_shape(corners, edge, points)
     order = len(edge) - 1
     out = np.zeros((len(points), order * (len(corners) - 1) + 1))
@@ -90,12 +90,12 @@ def _shape(corners: np.ndarray, edge: np.ndarray, points: np.ndarray) -> np.ndar
 def line_shape(
     corners: np.ndarray, edge: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """First node (k,) of each point's element on a line, and its shape functions (k, order + 1)."""
+    """First node (k,) of each point's element on a line; shape functions (k, order + 1) there."""
     element, local = _local(corners, points)
     return (len(edge) - 1) * element, line(edge, local)
 
 
 def _local(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Element (k,) of each point on a line, and its place in it, 0 to 1."""
+    """Element (k,) of each point on a line, and its local coordinate, 0 to 1."""
     element = np.clip(np.searchsorted(corners, points, side="right") - 1, 0, len(corners) - 2)
     return element, (points - corners[element]) / np.diff(corners)[element]

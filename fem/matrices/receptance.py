@@ -1,6 +1,8 @@
-"""Receptance from the full matrices, frequency by frequency: the reference for every modal one.
+"""Receptance of the full matrices, frequency by frequency: the reference for all modal ones.
 
-(K_Omega - w^2 M + i w E) u = b in real arithmetic, u = a + i c:  [[A, -w E], [w E, A]] [a; c] = [b; 0]
+(K_Omega - w^2 M + i w E) u = b with u = a + i c in real arithmetic:
+
+    [[A, -w E], [w E, A]] [a; c] = [b; 0],   A = K_Omega - w^2 M
 """
 
 from __future__ import annotations
@@ -26,12 +28,12 @@ def receptance(
     beside: np.ndarray | None = None,
     air: Column | None = None,
 ) -> np.ndarray:
-    """H (f, r, k) complex, m/N, on every process, at the frequencies in Hz. Collective.
+    """H (f, r, k) complex, m/N, at the frequencies in Hz, on every process. Collective.
 
-    With `beside` (m, n), on own unknowns, m rows more: those products with the motion, e.g. operators.carried for the
-    first moment int rho u of the tire, kg m/N; `air` takes part.
-    `stiffness` K_Omega and `damping` E as in fem.matrices.compliance. One unsymmetric factorisation of twice
-    the unknowns a frequency. Raises ConvergenceError when a solve leaves a residual above 1e-8.
+    `stiffness` K_Omega and `damping` E as in fem.matrices.compliance; `beside`: rows (m, n) on own
+    unknowns, m further readings, e.g. operators.carried for the tire's first moment int rho u, kg
+    m/N; `air`: coupling to the cavity. Each frequency takes one unsymmetric factorisation of twice
+    the unknowns. Raises ConvergenceError if a solve leaves a residual above 1e-8.
     """
     comm = operators.body.comm
     rows = on_own_rows(operators, outputs).T.tocsr()

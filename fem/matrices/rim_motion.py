@@ -1,8 +1,9 @@
-"""The rim moves and carries the whole tire along as a rigid body: what its matrices answer.
+"""Rigid motion of the rim with the whole tire: the products of the tire's matrices with it.
 
-R = (e_x, e_y, e_z, e_x x, e_y x, e_z x), x the deformed tire about the axle's centre. With K at the static state,
-the road's forces on it constant:  K R = 0 for translations, and for rotations the moment of loads that do not
-turn along; G R = S R = 0 for translations, which do not change what flows through the ring.
+R = (e_x, e_y, e_z, e_x x, e_y x, e_z x), x the deformed position relative to the axle's centre. K
+is that of the static state under constant road forces: K R = 0 for translations; for rotations K R
+is the moment of the loads that do not rotate with the tire. G R = S R = 0 for translations, as a
+uniform velocity does not change the flow of material through the ring.
 """
 
 from __future__ import annotations
@@ -34,17 +35,21 @@ TRANSLATIONS = slice(0, 3)
 
 @dataclass(frozen=True)
 class RimMotion:
-    """By the names of the matrices, `rows` (n, 6): X R on own unknowns of the tire with a fixed rim, and
-    `whole` (6, 6): R^T X R with the rim's own part; kg, N/m, kg/rad, kg/rad2 and with m or m2 for rotations. `rows`
-    have "body", B R, besides. Without gyroscopic, convective and body ones when the wheel stands.
+    """Products of the matrices X with the rim's motions R, by the names of the matrices.
+
+    `rows` (n, 6): X R on own unknowns of the tire with fixed rim, "body" (B R) included; `whole`
+    (6, 6): R^T X R including the rim's own part. kg, N/m; kg/rad, kg/rad2 and factors m, m2 for
+    rotations. A standing wheel has no "gyroscopic", "convective" and "body".
     """
 
     rows: dict[str, np.ndarray]
     whole: dict[str, np.ndarray]
 
     def moments(self, speed: float) -> np.ndarray:
-        """A (3, 3, n) on own unknowns at `speed` (rad/s): a hub that is held carries the moments of the loads less
-        A_2 u'' + A_1 u' + A_0 u, N m (modal.corner.Corner.moments)."""
+        """A (3, 3, n) on own unknowns at `speed` (rad/s), for the moments at a fixed hub, N m.
+
+        They are the moments of the loads minus A_2 u'' + A_1 u' + A_0 u
+        (modal.corner.Corner.moments)."""
         turned = {name: rows[:, TURN:].T for name, rows in self.rows.items()}
         out = np.stack([turned["stiffness"], np.zeros_like(turned["mass"]), turned["mass"]])
         if speed:
@@ -54,10 +59,11 @@ class RimMotion:
 
 
 def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> RimMotion:
-    """The rim's motions at the body's present displacement; the rim's static forces turn with it. Collective.
+    """Products with the rim's motions at the body's present displacement. Collective.
 
-    No matrix is made: stresses, cords and pressure turn with the material, F(Q x) = Q F(x), so that of a rotation
-    about e_k  K R = e_k x F,  F the nodal forces of the static state; the others act on R as linear forms.
+    The rim's static forces rotate with it. No matrix is assembled: stresses, cords and pressure
+    rotate with the material, F(Q x) = Q F(x), so for a rotation about e_k  K R = e_k x F,  F being
+    the nodal forces of the static state. The other matrices act on R as linear forms.
     """
     comm, unknowns = body.comm, Unknowns(body, FIXED)
     points = body.lattice.points(body.ids) + body.owned(body.u.x.array)
@@ -71,7 +77,7 @@ def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> R
     rows = {name: product[unknowns.free] for name, product in products.items()}
     products.pop("body", None)
     whole = {name: summed(comm, motions.T @ product) for name, product in products.items()}
-    # The wheel takes the forces of the rim: of the tire's own nodes, and the rim's where it rolls beside them.
+    # The wheel carries the forces on the rim: those of the tire's own nodes and those of rolling.
     rim = np.setdiff1d(np.arange(body.nodes), unknowns.free // 3)
     turned = _nodal_forces(body, inflation, rolling)[rim].T @ points[rim] - force.T @ points
     turned = summed(comm, turned)
@@ -85,7 +91,7 @@ def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> R
 
 
 def _nodal_forces(body: Body, inflation: float, rolling: Rolling) -> np.ndarray:
-    """Of stresses, pressure and rolling, own nodes (nodes, 3) N. Collective."""
+    """Forces (nodes, 3) N of stresses, pressure and rolling on own nodes. Collective."""
     work = static_residual(body, fem.Constant(body.mesh, inflation), rolling)
     return _assembled(body, work)
 
@@ -100,8 +106,10 @@ def _assembled(body: Body, form: ufl.Form) -> np.ndarray:
 
 
 def _turning(body: Body, motions: np.ndarray) -> dict[str, np.ndarray]:
-    """G R, S R and B R (3 nodes, 6); a translation meets nothing in G and S: what is there is rounding, or the mesh's
-    error in a closed surface. Collective."""
+    """G R, S R and B R (3 nodes, 6). Collective.
+
+    For translations G R and S R are set to 0: the assembled values are rounding, or the mesh's
+    error in a closed surface."""
     field = fem.Function(body.space)
     forms = {
         "gyroscopic": convection_form(body),
@@ -122,8 +130,10 @@ def _turning(body: Body, motions: np.ndarray) -> dict[str, np.ndarray]:
 def carried_pencil(
     axle: Axle, whole: Mapping[str, np.ndarray], speed: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass, damping and stiffness (7, 7) of the motions of rim and body alone, by the names of `RimMotion.whole`, at `speed`
-    (rad/s): the tire carried along, the wheel, what holds it.
+    """Mass, damping and stiffness (7, 7) of the rigid motions of rim and body at `speed` (rad/s).
+
+    They comprise the tire carried along (`whole`, by the names of `RimMotion.whole`), the wheel and
+    its suspension.
     """
     mass = np.zeros((7, 7))
     mass[:6, :6], mass[6, 6] = whole["mass"] + axle.mass, axle.body_mass or 1.0

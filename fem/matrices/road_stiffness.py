@@ -1,12 +1,12 @@
-"""Stiffness of the tire between its rim and the road it stands on, for small motions of the road.
+"""Stiffness of the tire between rim and road for small motions of the road.
 
-The nodes in contact move with the road as one rigid plate, R q (three translations, three rotations about the
-footprint's centre), or, without friction, up and down with it alone; the rim is held:
+The nodes in contact move with the road as a rigid plate, R q (three translations, three rotations
+about the footprint's centre), or without friction only vertically; the rim is held:
 
     S = R^T (K_hh - K_hf K_ff^-1 K_fh) R,
 
-K the static tangent. All of the footprint sticks: a real one slips at its edges under large forces, so S is the slope
-at the start of a test.
+K being the static tangent. The whole footprint sticks. A real one slips at its edges under large
+forces, so S is the initial slope of a test.
 """
 
 from __future__ import annotations
@@ -31,15 +31,17 @@ _VERTICAL = 2
 
 @dataclass(frozen=True)
 class RoadStiffness:
-    """`matrix` (6, 6) of the stuck footprint: force (N) and moment (N m) on the tire per x, y, z (m) and turn
-    about them (rad); `frictionless` N/m the vertical one of a footprint that slides freely.
+    """Road stiffness of a sticking and of a frictionless footprint.
+
+    `matrix` (6, 6), sticking: force (N) and moment (N m) on the tire per x, y, z (m) and rotation
+    about them (rad); `frictionless`: vertical stiffness of a footprint that slides freely, N/m.
     """
 
     matrix: np.ndarray
     frictionless: float
 
     def at_constant_load(self, motion: int) -> float:
-        """Stiffness of one motion, N/m or N m/rad, when the road gives way to keep its vertical force."""
+        """Stiffness of one motion, N/m or N m/rad, at constant vertical load."""
         across = self.matrix[motion, _VERTICAL] * self.matrix[_VERTICAL, motion]
         return float(self.matrix[motion, motion] - across / self.matrix[_VERTICAL, _VERTICAL])
 
@@ -60,7 +62,7 @@ class RoadStiffness:
 
     @property
     def asymmetry(self) -> float:
-        """Largest difference from its transpose, relative: zero where no drag acts (reciprocity)."""
+        """Largest relative difference from the transpose: zero without damping, by reciprocity."""
         scale = np.sqrt(np.outer(np.diag(self.matrix), np.diag(self.matrix)))
         return float(np.abs((self.matrix - self.matrix.T) / scale).max())
 
@@ -72,10 +74,10 @@ def road_stiffness(
     centre: np.ndarray,
     rolling: Rolling = AT_REST,
 ) -> RoadStiffness:
-    """At the body's present displacement. Collective.
+    """Road stiffness at the body's present displacement. Collective.
 
-    `inflation` Pa; `nodes` this process's indices of the nodes in contact; `centre` (3,) m what the road turns
-    about. Raises InputError for fewer than three nodes.
+    `inflation` Pa; `nodes`: this process's indices of the nodes in contact; `centre` (3,) m of the
+    road's rotations. Raises InputError for fewer than three nodes.
     """
     count = body.comm.allreduce(len(nodes))
     if count < 3:
@@ -98,7 +100,7 @@ def road_stiffness(
 def _static_tangent(
     body: Body, unknowns: Unknowns, inflation: float, rolling: Rolling
 ) -> PETSc.Mat:
-    """K, N/m, by the static moduli. Collective."""
+    """K with static moduli, N/m. Collective."""
     residual = static_residual(body, fem.Constant(body.mesh, inflation), rolling)
     matrix = fem.petsc.assemble_matrix(compat.form(tangent(body, residual)))
     matrix.assemble()
@@ -109,7 +111,7 @@ def _static_tangent(
 
 
 def _condensed(stiffness: PETSc.Mat, motions: np.ndarray, held: np.ndarray) -> np.ndarray:
-    """R^T S R (k, k) of held unknowns moved by `motions` (own rows n, k), the others free. Collective."""
+    """R^T S R (k, k) for held unknowns moved by `motions`, own rows (n, k). Collective."""
     moved = np.where(held[:, None], motions, 0.0)
     loads = -multiply(stiffness, moved)
     loads[held] = 0.0

@@ -1,15 +1,18 @@
-"""What holds the tire in its small motions: the rim, fixed or free, and the road, away or held.
+"""Support of the tire in small motions: rim fixed or free, road absent or holding its nodes.
 
-A free rim is a rigid body without mass of its own that nothing holds: on its nodes
+A free rim is an unsupported rigid body without mass of its own. On its nodes
 
     u_i = a + theta x x_i,   six unknowns R eta with R^T M R = 1,
 
-so the diagonal mass stays diagonal. The static state is that of the clamped rim; the wheel goes on
-taking the rim's static forces r, which turn with it, and a constant force at the axle's centre. Turned
-forces do work of the second order: K has W_ab = sum_i (r_a x_b + r_b x_a) / 2 - delta_ab r . x besides on
-the rotations. A free tire without a road then has its six rigid modes at any inflation (uniform pressure on two
-equal bead circles of a rigid rim has no resultant), and K is symmetric. Damping by the mass acts against
-the ground then, for want of a wheel on an axle.
+so that the diagonal mass stays diagonal. The static state is that of the clamped rim. The wheel
+still carries the rim's static forces r, which rotate with it, and a constant force at the axle's
+centre. The second-order work of rotating forces adds to K, on the rotations,
+
+    W_ab = sum_i (r_a x_b + r_b x_a) / 2 - delta_ab r . x.
+
+A free tire without a road then has its six rigid modes at any inflation (a uniform pressure on the
+two equal bead circles of a rigid rim has no resultant), and K is symmetric. Mass-proportional
+damping then acts against the ground, as there is no wheel on an axle.
 """
 
 from __future__ import annotations
@@ -28,7 +31,7 @@ TURN = 3  # components 3, 4, 5 of an unknown: rotations about x, y, z
 
 @dataclass(frozen=True)
 class Support:
-    """`rim` "fixed" or "free"; `held` this process's nodes whose vertical motion the road holds."""
+    """`rim` "fixed" or "free"; `held`: own nodes whose vertical motion the road holds."""
 
     rim: str = "fixed"
     held: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
@@ -38,11 +41,12 @@ FIXED = Support()
 
 
 class Unknowns:
-    """The unknowns of a supported body and the map T from them to its nodes. Collective to make.
+    """Unknowns of a supported body and the map T from them to its nodes. Collective to make.
 
-    `free` (k,) are this process's nodal dofs that are unknowns; the six of a free rim follow them on the
-    last process. For own unknowns: `mass` (n,) kg, the diagonal of T^T M T; `place` (n, 3) m, undeformed;
-    `component` (n,) 0, 1, 2 for x, y, z and 3, 4, 5 for rotations; `carried` (3, n) kg: momentum per rate.
+    `free` (k,): this process's nodal dofs that are unknowns; the six of a free rim follow on the
+    last process. For own unknowns: `mass` (n,) kg, the diagonal of T^T M T; `place` (n, 3) m,
+    undeformed; `component` (n,): 0, 1, 2 for x, y, z and 3, 4, 5 for rotations; `carried` (3, n)
+    kg: momentum per unit rate.
     """
 
     def __init__(self, body: Body, support: Support) -> None:
@@ -88,7 +92,7 @@ class Unknowns:
         return PETSc.Mat().createAIJ(sizes, csr=(*index, csr.data), comm=comm)
 
     def reduced(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """T^T X T of a matrix over all dofs of the body. Collective."""
+        """T^T X T for a matrix X over all dofs of the body. Collective."""
         if self._prolongation is None:
             return matrix.createSubMatrix(self._rows, self._rows)
         return matrix.ptap(self._prolongation)
@@ -102,7 +106,8 @@ class Unknowns:
         return out.reshape(self._body.nodes, 3, *values.shape[1:])
 
     def restrict(self, nodal: np.ndarray) -> np.ndarray:
-        """Own unknowns (n, ...) from owned nodal values (nodes, 3, ...) of such a motion. Collective."""
+        """Own unknowns (n, ...) from owned nodal values (nodes, 3, ...) of an admissible motion.
+        Collective."""
         flat = nodal.reshape(-1, *nodal.shape[2:])
         own = flat[self.free]
         if self.rim is None:
@@ -111,14 +116,15 @@ class Unknowns:
         return np.concatenate([own, on_rim]) if self.rim.mine else own
 
     def rim_motion(self, values: np.ndarray) -> np.ndarray:
-        """Translation of the axle's centre and rotation of the rim (6, ...), on every process. Collective."""
+        """Translation and rotation of the free rim (6, ...), on every process. Collective."""
         assert self.rim is not None, "only a free rim moves"
         return self.rim.coordinates @ self.rim.shared(values[len(self.free) :])
 
     def loads(
         self, nodal: sparse.csr_matrix, on_rim: np.ndarray | None = None
     ) -> sparse.csr_matrix:
-        """T^T of forces on own nodal dofs (3 nodes, k), and forces and moments (6, k) on the rim. Collective."""
+        """T^T of forces on own nodal dofs (3 nodes, k), plus forces and moments (6, k) on the rim.
+        Collective."""
         nodal = nodal.tocsr()
         own = nodal[self.free]
         if self.rim is None:
@@ -132,8 +138,10 @@ class Unknowns:
 
 
 class Rim:
-    """The bead faces as one rigid body: own `dofs` (d,), their motion `shape` (d, 6) per unknown, and
-    `coordinates` (6, 6): translation and rotation per unknown. `mine`: this process has the unknowns.
+    """The bead faces as one rigid body.
+
+    Own `dofs` (d,); `shape` (d, 6): their motion per unknown; `coordinates` (6, 6): translation and
+    rotation per unknown; `mine`: whether this process owns the unknowns.
     """
 
     def __init__(self, body: Body, nodes: np.ndarray, mass: np.ndarray) -> None:
@@ -144,26 +152,28 @@ class Rim:
         self.mine = body.comm.rank == body.comm.size - 1
         motions = rigid_motions(self._points)
         inertia = body.comm.allreduce(motions.T @ (self._mass[:, None] * motions))
-        # By Cholesky's factor a motion takes in those before it alone: mirror planes keep it.
+        # With the Cholesky factor each unknown combines only its own and earlier motions, which
+        # preserves mirror symmetries.
         self.coordinates = np.linalg.inv(np.linalg.cholesky(inertia)).T
         self.shape = motions @ self.coordinates
 
     def shared(self, values: np.ndarray) -> np.ndarray:
-        """The owner's (6, ...) values on every process. Collective."""
+        """The owner's values (6, ...) on every process. Collective."""
         return self._comm.bcast(values if self.mine else None, root=self._comm.size - 1)
 
     def unknowns(self, motion: np.ndarray) -> np.ndarray:
-        """The six (6, ...) of a rigid motion of the rim's own dofs (d, ...). Collective."""
+        """The six unknowns (6, ...) of a rigid motion given on the rim's own dofs (d, ...).
+        Collective."""
         weighted = self._mass.reshape(-1, *[1] * (motion.ndim - 1)) * motion
         return summed(self._comm, self.shape.T @ weighted)
 
     def momentum(self) -> np.ndarray:
-        """Momentum (3, 6) kg per rate of the six unknowns. Collective."""
+        """Momentum (3, 6) kg per unit rate of the six unknowns. Collective."""
         weighted = self._mass[:, None] * self.shape
         return summed(self._comm, np.stack([weighted[d::3].sum(axis=0) for d in range(3)]))
 
     def turning_stiffness(self, force: np.ndarray) -> np.ndarray:
-        """W (6, 6) of static forces (d,) N on the rim's dofs that turn with it. Collective."""
+        """W (6, 6) of static forces (d,) N on the rim's dofs that rotate with it. Collective."""
         product = summed(self._comm, force.reshape(-1, 3).T @ self._points)
         whole = np.zeros((6, 6))
         whole[TURN:, TURN:] = turning_moments(product)
@@ -171,7 +181,7 @@ class Rim:
 
 
 def turning_moments(product: np.ndarray) -> np.ndarray:
-    """W_ab (3, 3) N m/rad of forces that turn along, from sum_i r_a x_b N m."""
+    """W_ab (3, 3) N m/rad of forces that rotate with the rim, from sum_i r_a x_b N m."""
     return (product + product.T) / 2 - np.trace(product) * np.eye(3)
 
 

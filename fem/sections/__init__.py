@@ -1,1 +1,1 @@
-"""Cross-sections of tires as curved quadrilaterals: what is revolved into a ring. No dolfinx here."""
+"""Cross-sections of tires as curved quadrilaterals, to be revolved into a ring. Without dolfinx."""

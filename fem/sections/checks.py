@@ -1,4 +1,4 @@
-"""What makes a section mesh one that can be revolved into a tire, each fault by what and where."""
+"""Validity checks of a section mesh; each error names the fault and its position."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from tireroad.fem.sections import reference
 if TYPE_CHECKING:
     from tireroad.fem.sections.mesh2d import SectionMesh
 
-_SAME = 1e-9  # of the section's size: two nodes at one place
-_GAUSS = 4  # points a direction at which the Jacobian is looked at, beside the element's corners
+_SAME = 1e-9  # of the section's size: nodes closer than this coincide
+_GAUSS = 4  # points per direction at which the Jacobian is checked, besides the corners
 
 
 def check(mesh: SectionMesh) -> None:
-    """Raise InputError for the first rule of `SectionMesh` that is broken."""
+    """Raise InputError for the first rule of `SectionMesh` that is violated."""
     _arrays(mesh)
     _nodes(mesh)
     _jacobians(mesh)
@@ -110,7 +110,7 @@ def _one_body(mesh: SectionMesh) -> None:
 
 
 def _edges(mesh: SectionMesh) -> np.ndarray:
-    """How many cells have each side of each cell, (c, 4)."""
+    """Number of cells that share each side of each cell, (c, 4)."""
     sides = np.sort(mesh.cells[:, reference.side_nodes(mesh.order)], axis=2)
     _, inverse, count = np.unique(
         sides.reshape(-1, mesh.order + 1), axis=0, return_inverse=True, return_counts=True
@@ -155,7 +155,7 @@ def _outer(mesh: SectionMesh) -> None:
 
 
 def _inner(mesh: SectionMesh) -> None:
-    """One path: two ends of one edge, all others of two; both ends on the rim or on the outer face."""
+    """The inner face is one path whose two ends lie on the rim or at the ends of the outer face."""
     ends = mesh.side(mesh.inner)[:, [0, -1]]
     nodes, uses = np.unique(ends, return_counts=True)
     loose = nodes[uses == 1]

@@ -1,8 +1,9 @@
-"""A tire built from layers under its outer face: what the built-in radial tire and a section file say.
+"""A tire built from layers under its outer face, as described by the radial tire or a section file.
 
-Layers lie one under the other from the outer face inwards, each with a thickness along the section; cords lie on
-the inner side of a layer; parts of layers are other compounds. All lengths in m; places along the section by
-length s on the outer face from the crown, the same on both sides.
+Layers follow one another from the outer face inwards, each with a thickness that varies along the
+section. Cords lie on the inner side of a layer; parts of a layer may be of another compound.
+Lengths are in m; positions along the section are lengths s on the outer face from the crown, the
+same on both sides.
 """
 
 from __future__ import annotations
@@ -20,12 +21,13 @@ from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.outline import Outline
 from tireroad.fem.sections.ring import Ring, revolved
 
-LEAST = (6, 2)  # elements around and along: below, a tire is none
+LEAST = (6, 2)  # elements around and along: minimum for a tire
 
 
 @dataclass(frozen=True)
 class Layer:
-    """A compound under the layer before it; `thickness` pairs (s, m), s ascending, smooth between them."""
+    """A compound under the preceding layer; `thickness`: pairs (s, m), s ascending, interpolated
+    smoothly."""
 
     name: str
     compound: str
@@ -43,7 +45,7 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class CordLine:
-    """Cords on the inner side of the layer `under`, |s| <= `to`; as fem.tire.cords.Cords, angle in rad."""
+    """Cords on the inner side of layer `under`, |s| <= `to`; as in Cords, angle in rad."""
 
     name: str
     under: str
@@ -58,9 +60,10 @@ class CordLine:
 
 @dataclass(frozen=True, kw_only=True)
 class Construction:
-    """`tread` m: the road can touch |s| up to there. `compounds` by name: what a `Material` takes.
+    """`tread` m: limit of |s| that the road can touch; `compounds` by name, as in `Material`.
 
-    `held` m: the rim holds the outer face from |s| = held on, beside the ends; None: the ends alone.
+    `held` m: the rim holds the outer face from |s| = held, in addition to the ends; None: only the
+    ends.
     """
 
     outline: Outline
@@ -72,9 +75,9 @@ class Construction:
     held: float | None = None
 
     def section(self, elements: int, order: int = 2) -> SectionMesh:
-        """Its elements: one a layer through the wall, about `elements` bead to bead, edges at every edge.
+        """Section mesh, one element per layer, about `elements` bead to bead, edges at boundaries.
 
-        InputError for names that are not there, layers without thickness, a wall that folds.
+        Raises InputError for unknown names, layers without thickness or a wall that folds.
         """
         length, levels = self.outline.length, len(self.layers)
         self._check()
@@ -108,7 +111,7 @@ class Construction:
     def ring(
         self, segments: int, elements: int, order: int = 2, footprint_size: float = 1.0
     ) -> Ring:
-        """The section revolved; half the elements both ways make its coarser companion."""
+        """The section revolved; its coarser companion has half the elements in both directions."""
 
         def coarser() -> Ring | None:
             if segments // 2 < LEAST[0] or elements // 2 < 2 * LEAST[1]:
@@ -139,7 +142,7 @@ class Construction:
             )
 
     def _surfaces(self) -> Callable[[np.ndarray], np.ndarray]:
-        """Depths (k, layers + 1) m of outer face and inner sides of the layers at lengths (k,) >= 0."""
+        """Function from lengths (k,) >= 0 to depths (k, layers + 1) m of the layers' faces."""
         lines = []
         for layer in self.layers:
             s, thickness = np.array(layer.thickness, float).T
@@ -180,12 +183,12 @@ class Construction:
         return PlyLine(line.name, (-end, end), self._depth(self._number(line.under))[0])
 
     def _size(self, s: np.ndarray, count: int) -> np.ndarray:
-        """Relative element size: geometric to the beads, smaller at the ends of cords."""
+        """Relative element size: graded to the beads, smaller at the ends of cords."""
         length = self._held
         thickness = self._surfaces()(np.array([length]))[0, -1]
         distance = np.maximum(length - np.abs(s), 0.0)
         size = bead.size(distance, 2 * length, count, bead.LEAST * thickness / count)
-        size = np.where(np.abs(s) < length, size, self.outline.length)  # what is held: one element
+        size = np.where(np.abs(s) < length, size, self.outline.length)  # held part: one element
         ends = np.array([line.to for line in self.cords if line.to < length])
         if not len(ends):
             return size
@@ -193,11 +196,11 @@ class Construction:
         return size * (1 - _ENDS_DEPTH * np.exp(-((distance / (_ENDS * length)) ** 2)))
 
 
-_ENDS, _ENDS_DEPTH = 0.06, 0.6  # of the half section: where a belt ends, as for the torus
+_ENDS, _ENDS_DEPTH = 0.06, 0.6  # of the half section: belt-end refinement, as for the torus
 
 
 def _named(mesh: SectionMesh, arc: np.ndarray, tread: float, held: float) -> SectionMesh:
-    """Regions of one compound as one, without the empty ones; the tread up to its edge, the rim's hold."""
+    """Merge regions of equal compound, drop empty ones, limit tread and rim to their parts."""
     from dataclasses import replace
 
     used = [mesh.regions[i] for i in np.unique(mesh.region)]

@@ -1,4 +1,4 @@
-"""Sections that are a product of two lines of elements: through the wall and bead to bead."""
+"""Sections meshed as the product of two lines of elements: through the wall and along it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from tireroad.fem.sections.mesh2d import SectionMesh
 
 @dataclass(frozen=True)
 class Patch:
-    """A part of a wall that is another compound: section angles (rad, signed) and depths from, to.
+    """A part of a wall of another compound: signed section angles (rad) and depths, from and to.
 
-    Depth as a share of the wall, 0 the inner and 1 the outer face.
+    Depth as a fraction of the wall: 0 inner, 1 outer face.
     """
 
     name: str
@@ -26,7 +26,7 @@ class Patch:
 
 @dataclass(frozen=True)
 class PlyLine:
-    """A line of cords in a wall: from, to in rad, at a depth as a share of the wall (0 inner, 1 outer)."""
+    """A line of cords: from, to in rad, at a depth as a fraction of the wall (0 inner, 1 outer)."""
 
     name: str
     arc: tuple[float, float]
@@ -43,9 +43,10 @@ def product(
     plies: Sequence[PlyLine] = (),
     main: str = "wall",
 ) -> SectionMesh:
-    """The section whose element corners are at depths `wall` (0 to 1) and section angles `arc` (rad),
-    both ascending; `place(depth, angle)` gives (r, y) m. Inner face at depth 0, outer at 1, all of it
-    tread; rim at both ends. Edges of patches and plies must be among the corners.
+    """The section with ascending corners at depths `wall` (0 to 1) and angles `arc` (rad).
+
+    `place(depth, angle)` gives (r, y) m. The inner face is at depth 0, the outer one, all of it
+    tread, at 1; the rim is at both ends. Edges of patches and plies must be among the corners.
     """
     layers, along = len(wall) - 1, len(arc) - 1
 
@@ -73,7 +74,7 @@ def product(
 
 
 def _between(corners: np.ndarray, element: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Places within elements of a line; an element's end is the corner itself, to the last bit."""
+    """Positions within elements of a line; an element's end is exactly the corner."""
     inside = np.diff(corners)[element] * t + corners[element]
     return np.where(t == 1.0, corners[element + 1], inside)
 
@@ -96,7 +97,7 @@ def _nodes(
 
 
 def _regions(depth: np.ndarray, angle: np.ndarray, patches: Sequence[Patch]) -> np.ndarray:
-    """Number of the last patch that holds each cell, from 1; 0 for none."""
+    """Number of the last patch that contains each cell, from 1; 0: none."""
     owner = np.zeros(len(depth), int)
     for number, patch in enumerate(patches):
         along = [(angle > low) & (angle < high) for low, high in patch.arcs]
@@ -114,7 +115,7 @@ def _edges(cells: np.ndarray, side: int) -> np.ndarray:
 
 
 def _ply(ply: PlyLine, wall: np.ndarray, arc: np.ndarray) -> np.ndarray:
-    """Sides xi = 0 of the cells above the ply, or xi = 1 below the outer face."""
+    """Sides xi = 0 of the cells outside the ply, or xi = 1 below the outer face."""
     level = int(np.abs(wall - ply.depth).argmin())
     first, last = (int(np.abs(arc - end).argmin()) for end in ply.arc)
     along, top = len(arc) - 1, level == len(wall) - 1
@@ -129,11 +130,11 @@ def corners(
     high: float,
     between: Sequence[float] = (),
 ) -> np.ndarray:
-    """Ascending corners from low to high with one at each place of `between`, at least `count` elements.
+    """Ascending corners from low to high, one at each of `between`, for at least `count` elements.
 
-    `density(x)`: elements wanted per length, relative. Each part gets its share of the count, one
-    at the least; within it corners share out the density evenly. What is symmetric about the middle
-    stays so to the last bit.
+    `density(x)`: relative number of elements per length. Each part gets its share of the count, at
+    least one, and its corners divide the density evenly. Symmetry about the middle is preserved
+    exactly.
     """
     fixed = np.unique(np.concatenate([[low, high], between]))
     small = 1e-9 * (high - low)
@@ -171,7 +172,7 @@ def _even(numbers: np.ndarray) -> bool:
 
 
 def _shared_out(count: int, weight: np.ndarray) -> np.ndarray:
-    """Elements of each part, near to its share, one and all together `count` at the least, mirrored parts alike."""
+    """Elements of each part: near its share, at least one, `count` in all, mirrored parts alike."""
     share = count * weight / weight.sum()
     numbers = np.maximum(1, np.floor(share + 0.5 - 1e-9 * len(weight))).astype(int)
     while numbers.sum() < count:

@@ -1,4 +1,4 @@
-"""Where places lie in a section: cell and reference coordinates, and shape functions there."""
+"""Location of points in a section: cell, reference coordinates and shape functions."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from scipy.spatial import cKDTree
 
 from tireroad.fem.sections import reference
 
-_CANDIDATES = 9  # cells whose middles are next to a place: one of them holds it
+_CANDIDATES = 9  # cells whose centres are nearest to a point: one of them contains it
 _NEWTON = 12
-_OUTSIDE = 0.2  # of an element: a place off the mesh by its interpolation is not pulled in further
+_OUTSIDE = 0.2  # of an element: limit of the reference coordinates for points off the mesh
 
 
 def locate(
     nodes: np.ndarray, cells: np.ndarray, order: int, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cell, xi and eta, (k,) each, of places (k, 2) m in cells (c, n) of equispaced nodes.
+    """Cell, xi and eta, (k,) each, of points (k, 2) m in cells (c, n) of equispaced nodes.
 
-    Newton's method in the cells nearby; a place outside all goes to where it fits best.
+    Newton's method in the nearest cells; a point outside all of them gets the best fit.
     """
     near = min(_CANDIDATES, len(cells))
     _, candidates = cKDTree(nodes[cells].mean(axis=1)).query(points, k=near)
@@ -27,7 +27,7 @@ def locate(
     found = np.zeros((len(points), 3))
     for cell in candidates.T:
         place = _inverse(nodes[cells[cell]], order, points)
-        # Among cells that hold it any will do; of those that do not, the nearest.
+        # Any cell that contains the point will do; otherwise the nearest.
         excess = np.abs(place - 0.5).max(axis=1)
         better = excess < best - 1e-9
         best[better] = excess[better]
@@ -59,7 +59,7 @@ def interpolation(
     count: int,
     place: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> sparse.csr_matrix:
-    """Shape functions (k, count) of a field on cells (c, n) with nodes at `edge`, at (cell, xi, eta)."""
+    """Shape functions (k, count) at (cell, xi, eta) on cells (c, n) with nodes at `edge`."""
     cell, xi, eta = place
     shape = reference.tensor(reference.line(edge, xi), reference.line(edge, eta))
     rows = np.repeat(np.arange(len(cell)), shape.shape[1])

@@ -14,12 +14,12 @@ Position = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, kw_only=True)
 class SectionMesh:
-    """A section, undeformed, in (r, y) m: r > 0 from the axle, y along it, 0 the centre plane.
+    """An undeformed section in (r, y) m: r > 0 from the axle, y along it, 0 at the centre plane.
 
-    Whatever a section comes from (torus, built-in tire, section file, deck) ends in this, and the ring
-    of hexahedra is made from nothing else. With p = `order` of the elements, 1 to 3:
+    Every source of a section (torus, built-in tire, section file, deck) produces this mesh, from
+    which alone the ring of hexahedra is made. With p = `order` of the elements, 1 to 3:
 
-    nodes (n, 2): r, y of all nodes, each used, no two at one place.
+    nodes (n, 2): r, y of all nodes; each is used, no two coincide.
     cells (c, (p + 1)^2): nodes of each cell in tensor order, local (i, j) at i * (p + 1) + j, where
         xi = i / p and eta = j / p: equispaced on the reference square. d(r, y)/d(xi, eta) has a
         positive determinant; cells share whole edges or nothing.
@@ -27,16 +27,16 @@ class SectionMesh:
     Sets of edges, (k, 2) of (cell, side), side 0: xi = 0, 1: xi = 1, 2: eta = 0, 3: eta = 1:
       outer: the face away from the air, an ordered chain from the rim at the lower y to the rim at
           the higher y, each edge starting where the last one ended;
-      tread: the part of `outer` that can touch the road (order does not matter);
+      tread: the part of `outer` that can touch the road (any order);
       inner: the face under inflation pressure, one unbroken chain between the two rims (any order);
       rim: what the wheel holds (any order). Part of outer, inner or any other boundary edges.
     plies: name -> ordered chain of cell edges, inside or on the boundary, on which cords lie; each
-        edge is named once, by one of the cells that have it. Chains run towards higher y at their
-        middle; cord angles are positive from +x (forward at the lowest point) towards the chain's end.
-    position: (cells, xi, eta), (k,) each, to the exact (r, y) (k, 2), where there is an exact shape;
-        None: the Lagrange interpolation of the nodes is the shape.
+        edge is listed once, for one of its cells. Chains run towards higher y at their middle;
+        cord angles are positive from +x (forward at the lowest point) towards the chain's end.
+    position: maps (cells, xi, eta), (k,) each, to the exact (r, y) (k, 2), if there is an exact
+        shape; None: the Lagrange interpolation of the nodes is the shape.
 
-    A mesh that breaks one of these rules is an InputError that names the rule, cell and place.
+    Raises InputError for a mesh that violates a rule, with the rule, cell and position.
     """
 
     order: int
@@ -57,7 +57,7 @@ class SectionMesh:
         check(self)
 
     def at(self, cells: np.ndarray, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
-        """Places (k, 2) m at reference coordinates of cells, (k,) each."""
+        """Positions (k, 2) m at reference coordinates in cells, (k,) each."""
         if self.position is not None:
             return self.position(cells, xi, eta)
         edge = reference.equispaced(self.order)
@@ -65,10 +65,10 @@ class SectionMesh:
         return np.einsum("ka,kax->kx", shape, self.nodes[self.cells[cells]])
 
     def on_nodes(self, order: int, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes (m, 2) and cells (c, (order + 1)^2) of the same section with `edge` (order + 1,), the
-        nodes on one edge of the reference element, in place of equispaced ones.
+        """Nodes (m, 2) and cells (c, (order + 1)^2) of this section with other element nodes.
 
-        The numbers of nodes do not depend on `edge`. With the mesh's own order they are its own.
+        `edge` (order + 1,): nodes on an edge of the reference element, instead of equispaced ones.
+        The numbering does not depend on `edge`; at the mesh's own order it is unchanged.
         """
         cells = self.cells if order == self.order else self._numbered(order)
         count = cells.max() + 1
@@ -77,14 +77,14 @@ class SectionMesh:
         return self.at(owner, xi, eta), cells
 
     def of_order(self, order: int) -> SectionMesh:
-        """The same section of elements of another order; equal shape where the order is raised."""
+        """The same section with elements of another order; raising the order keeps the shape."""
         if order == self.order:
             return self
         nodes, cells = self.on_nodes(order, reference.equispaced(order))
         return replace(self, order=order, nodes=nodes, cells=cells)
 
     def moved(self, place: Callable[[np.ndarray], np.ndarray]) -> SectionMesh:
-        """The same elements with every point (r, y) at place((r, y)), (k, 2) to (k, 2) m."""
+        """The same elements with every point (r, y) mapped by `place`, (k, 2) to (k, 2) m."""
         exact = self.position
         position = None if exact is None else lambda *at: place(exact(*at))
         return replace(self, nodes=place(self.nodes), position=position)
@@ -95,11 +95,11 @@ class SectionMesh:
         return self.cells[cell[:, None], reference.side_nodes(self.order)[side]]
 
     def chain(self, edges: np.ndarray) -> np.ndarray:
-        """Nodes (k * order + 1,) along an ordered chain of edges (k, 2)."""
+        """Nodes (k * order + 1,) along a chain of edges (k, 2); empty if it is not a chain."""
         return _joined(self.side(edges))
 
     def _numbered(self, order: int) -> np.ndarray:
-        """Cells (c, (order + 1)^2) of another order: corners, then inner nodes of edges, then of cells."""
+        """Cells (c, (order + 1)^2) of another order: numbers of corners, then edges, then cells."""
         corners = self.cells[:, [0, self.order, -1 - self.order, -1]]
         used, corner = np.unique(corners, return_inverse=True)
         corner = corner.reshape(corners.shape)
@@ -120,7 +120,7 @@ class SectionMesh:
 
 
 def _first_use(cells: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """For each node a cell that has it, and its local number there."""
+    """For each node one cell that has it, and its local number there."""
     nodes, first = np.unique(cells, return_index=True)
     if len(nodes) != count:
         raise ValueError("a number of a node is not used")
@@ -128,7 +128,7 @@ def _first_use(cells: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _joined(sides: np.ndarray) -> np.ndarray:
-    """Nodes along a chain of edges (k, n) that are each turned to start where the last one ended."""
+    """Nodes along a chain of edges (k, n), each starting where the last ends; empty if broken."""
     sides = sides.copy()
     if len(sides) > 1 and sides[0, -1] not in sides[1, [0, -1]]:
         sides[0] = sides[0, ::-1]

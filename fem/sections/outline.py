@@ -1,4 +1,4 @@
-"""A smooth outer face of a section from a few points: by length along it from the crown, mirrored."""
+"""A smooth, symmetric outer face through a few points, parametrised by length from the crown."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _ARC = 24  # points on each arc
 class Outline:
     """The outer face, r and y in m, from the crown (y = 0) to the bead, with its mirror image.
 
-    `points` (k, 2) of (r, y), k >= 4, y = 0 first: a cubic spline through them by chord length, level at the
-    crown. `length` m from the crown to the bead.
+    `points` (k, 2) of (r, y), k >= 4, starting at y = 0: a cubic spline through them over chord
+    length, with zero slope at the crown. `length` m from crown to bead.
     """
 
     def __init__(self, points: np.ndarray) -> None:
@@ -54,7 +54,7 @@ class Outline:
 
 
 def arcs(through: npt.ArrayLike) -> np.ndarray:
-    """Points on circular arcs, each from the end of the last through a point to an end: start, then pairs."""
+    """Points on consecutive arcs: `through` is the start, then a middle and an end for each."""
     points = np.asarray(through, float)
     if points.ndim != 2 or len(points) < 3 or len(points) % 2 == 0:
         raise InputError("section: arcs are a start and two points (on the way, end) for each arc")

@@ -1,4 +1,4 @@
-"""The built-in radial passenger tire of a size like 205/60 R15: docs/radial-tire.md has every number's source."""
+"""The built-in radial passenger tire, e.g. 205/60 R15; sources: docs/radial-tire.md."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ COMPOUNDS = {
     "bead": (400e6, 0.49, 2200.0, 1.0, 0.05),
 }
 
-FLANGE = 0.016  # m above the rim: from there down the rim holds the tire
+FLANGE = 0.016  # m above the rim; below it the rim holds the tire
 RIM, WIDEST, APEX = 0.39, 0.60, 1.0
 FALL, TREAD, SHOULDER = 0.03, 0.29, 0.11
-LEAST_HEIGHT = 0.055  # m of a section: below, no sidewall is left above the flange
+LEAST_HEIGHT = 0.055  # m of a section; less leaves no sidewall above the flange
 
 
 class _Stations(NamedTuple):
@@ -50,7 +50,7 @@ class _Stations(NamedTuple):
 
 
 def radial(text: str) -> Construction:
-    """The construction of a size. InputError for a size that is none, or too low."""
+    """The construction for a size. Raises InputError for an invalid size or too low a section."""
     tire = size(text)
     if tire.height < LEAST_HEIGHT:
         raise InputError(
@@ -82,8 +82,8 @@ def _rubber(values: tuple[float, ...]) -> dict[str, float]:
 
 
 def _layers(at: _Stations) -> tuple[Layer, ...]:
-    """Thickness in mm at the crown, under the belt's edge, at the tread's edge, at the widest point, half way
-    from there to the flange, at the flange and at the heel.
+    """Layers with thickness in mm at the crown, under the belt edge, at the tread edge, at the
+    widest point, halfway from there to the flange, at the flange and at the heel.
     """
     places = (
         0.0,
@@ -123,7 +123,7 @@ def _outline(tire: Size) -> np.ndarray:
 
 
 def _leaving(middle: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Points of the circle through the widest point, upright there, to another point."""
+    """Points on the circle from the widest point, vertical there, to another point."""
     rise, back = end[0] - middle[0], middle[1] - end[1]
     radius = (rise**2 + back**2) / (2 * back)
     angle = np.arcsin(rise / radius) * np.array([0.4, 0.7, 1.0])
@@ -131,7 +131,7 @@ def _leaving(middle: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def _flat(tire: Size) -> float:
-    """Half width of the tread up to its rounded shoulder, m: low tires have it wider."""
+    """Half width of the tread up to its rounded shoulder, m: larger for low aspect ratios."""
     ratio = tire.height / tire.width
     return float(np.clip(TREAD + 0.3 * (0.6 - ratio), 0.27, 0.42)) * tire.width
 

@@ -1,4 +1,4 @@
-"""The reference quadrilateral [0, 1] x [0, 1]: tensor-product Lagrange functions, sides, midpoints."""
+"""The reference quadrilateral [0, 1] x [0, 1]: tensor-product Lagrange functions and sides."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ SIDES = ("xi = 0", "xi = 1", "eta = 0", "eta = 1")
 
 
 def equispaced(order: int) -> np.ndarray:
-    """Nodes of one edge of the reference element, (order + 1,), 0 and 1 included."""
+    """Equispaced nodes of one edge of the reference element, (order + 1,), 0 and 1 included."""
     return np.linspace(0.0, 1.0, order + 1)
 
 
 def line(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Lagrange functions (k, n) of the nodes (n,) at places t (k,)."""
+    """Lagrange functions (k, n) of the nodes (n,) at points t (k,)."""
     values = np.empty((len(t), len(nodes)))
     for a in range(len(nodes)):
         others = np.delete(nodes, a)
@@ -22,7 +22,7 @@ def line(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 
 def line_slope(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Derivatives (k, n) of the Lagrange functions of the nodes (n,) at places t (k,)."""
+    """Derivatives (k, n) of the Lagrange functions of the nodes (n,) at points t (k,)."""
     slopes = np.zeros((len(t), len(nodes)))
     for a in range(len(nodes)):
         others = np.delete(nodes, a)

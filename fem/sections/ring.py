@@ -1,4 +1,4 @@
-"""A section with what its revolution into a ring of elements needs."""
+"""A section and the data for its revolution into a ring of elements."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from tireroad.fem.sections.mesh2d import SectionMesh
 
 @dataclass(frozen=True, kw_only=True)
 class Ring:
-    """The section revolved about the axle (y) in `segments` elements around, all of the section's order.
+    """The section revolved about the axle (y), `segments` elements of its order around.
 
-    `ring_corners` (segments + 1,) rad: the angles of the element corners, ascending from 0, the lowest
-    point, towards +x, to 2 pi; of a sector, to less. `arc_corners` (k + 1,) rad: the section angle, ascending, where the k
-    edges of the outer face start and end; 0 is the crown, y > 0 positive. `thickness` m of a typical
-    wall and `height` m of the section: the scale of motions. `coarser`: the same tire of elements about
-    twice the size, None where there is none.
+    `ring_corners` (segments + 1,) rad: angles of the element corners, ascending from 0, the lowest
+    point, towards +x to 2 pi, or less for a sector. `arc_corners` (k + 1,) rad: ascending section
+    angles of the ends of the k outer-face edges, 0 at the crown, positive for y > 0. `thickness` m
+    of a typical wall and `height` m of the section: scales of motions. `coarser`: the same tire
+    with elements of about twice the size, None if there is none.
     """
 
     section: SectionMesh
@@ -32,17 +32,17 @@ class Ring:
 
     @property
     def segments(self) -> int:
-        """Elements around."""
+        """Number of elements around."""
         return len(self.ring_corners) - 1
 
     @property
     def order(self) -> int:
-        """Of the elements."""
+        """Element order."""
         return self.section.order
 
     @property
     def closed(self) -> bool:
-        """Whether it goes all the way round, and is no sector."""
+        """Whether the ring is complete and not a sector."""
         return bool(self.ring_corners[-1] - self.ring_corners[0] > 2 * np.pi * (1 - 1e-9))
 
     @property
@@ -56,7 +56,7 @@ class Ring:
         return self.segments * len(self.section.outer)
 
     def outer_line(self, element: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """(r, y) (k, 2) m on the outer face: place t (k,), 0 to 1 bead to bead, on edges (k,) of the chain."""
+        """(r, y) (k, 2) m on outer edges (k,) of the chain at t (k,), 0 to 1 from bead to bead."""
         cell, side = self.section.outer[element].T
         t = np.where(self._turned[element], 1 - t, t)
         fixed = np.where(side % 2 == 1, 1.0, 0.0)
@@ -76,7 +76,7 @@ def revolved(
     footprint_size: float,
     coarser: Callable[[], Ring | None],
 ) -> Ring:
-    """A section drawn in any way, in so many elements around, with the scales that follow from its mesh."""
+    """Any section revolved into `segments` elements, with the scales derived from its mesh."""
     return Ring(
         section=section,
         ring_corners=ring_corners(segments, footprint_size),
@@ -88,11 +88,10 @@ def revolved(
 
 
 def section_angles(section: SectionMesh) -> np.ndarray:
-    """Section angle (rad) of the corners of the outer face, ascending, 0 at the crown.
+    """Section angles (rad) of the outer face's corners, ascending, 0 at the crown.
 
-    The angle about the middle of the section: the point of the centre plane half way between the
-    crown and the beads. Where the face does not go round that point steadily, the same range is
-    shared out by length along the face.
+    Angles about the point of the centre plane halfway between the crown and the beads. If they do
+    not increase monotonically, the same range is distributed by length along the face.
     """
     line = section.nodes[section.chain(section.outer)]
     corners = line[:: section.order]

@@ -1,4 +1,4 @@
-"""The section file: a construction written by hand in TOML (docs/section-file.md). Data only; nothing is executed."""
+"""Reader of section files, constructions in TOML (docs/section-file.md). Executes nothing."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _RANGES = {
 
 
 def read(path: Path | str) -> Construction:
-    """The construction of a file. InputError, with the file, for all that is not as documented."""
+    """The construction in a file. Raises InputError, with its name, for undocumented content."""
     path = Path(path)
     try:
         data = path.read_bytes()
@@ -102,7 +102,7 @@ def _part(table: dict[str, Any], scale: float) -> Part:
 
 
 def _cords(table: dict[str, Any], scale: float) -> CordLine:
-    """Areas and spacings in m2 and m whatever the unit of the drawing, as in [[tire.cords]]."""
+    """Area in m2 and spacing in m whatever the unit of the drawing, as in [[tire.cords]]."""
     keys = {
         "name",
         "under",

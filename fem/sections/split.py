@@ -1,4 +1,4 @@
-"""Finer where it matters: strips of a section's cells, and segments of a ring, cut in two."""
+"""Local refinement: strips of a section's cells and segments of a ring are split in two."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from tireroad.fem.sections import reference
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.ring import Ring
 
-_SAME = 1e-7  # of the section's size: nodes of two cells that are one
+_SAME = 1e-7  # of the section's size: nodes of two cells closer than this are merged
 
 
 def split_ring(ring: Ring, around: np.ndarray, along: np.ndarray) -> Ring:
-    """The ring with the segments `around` (segments,) bool cut in two, and so the strips of cells under
-    the outer edges `along` (k,) bool. All nodes of the ring stay where they are, its shape too.
+    """The ring with segments `around` (segments,) bool and the strips of cells under outer edges
+    `along` (k,) bool split in two. The shape and all existing nodes are kept.
     """
     return replace(
         ring,
@@ -30,15 +30,15 @@ def split_ring(ring: Ring, around: np.ndarray, along: np.ndarray) -> Ring:
 
 
 def _cut(corners: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Ascending corners with one more in the middle of each wanted interval."""
+    """Ascending corners with a midpoint inserted in each wanted interval."""
     return np.sort(np.append(corners, ((corners[1:] + corners[:-1]) / 2)[wanted]))
 
 
 def split_section(section: SectionMesh, along: np.ndarray) -> SectionMesh:
-    """The section with strips of cells cut in two, from outer edges `along` (k,) bool to the other side.
+    """The section with strips of cells under outer edges `along` (k,) bool split in two.
 
-    A strip goes from an edge to the opposite one of the same cell, and on through the next; so cells
-    go on sharing whole edges. The shape is that of the section's own cells.
+    A strip runs from an edge to the opposite one of the same cell and on through the next, so that
+    cells still share whole edges. The shape is that of the original cells.
     """
     children = _Children(_strips(section, section.outer[along]))
     order = section.order
@@ -65,7 +65,7 @@ def split_section(section: SectionMesh, along: np.ndarray) -> SectionMesh:
 
 
 def _strips(section: SectionMesh, starts: np.ndarray) -> np.ndarray:
-    """Along which reference coordinates each cell is cut, (cells, 2) bool."""
+    """Reference coordinates along which each cell is split, (cells, 2) bool."""
     sides = section.cells[:, reference.side_nodes(section.order)][..., [0, -1]]
     across: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for cell, side in np.ndindex(sides.shape[:2]):
@@ -86,7 +86,7 @@ def _along(side: int) -> int:
 
 
 class _Children:
-    """The cells that `cut` (cells, 2) bool makes of each cell, its own ones following each other."""
+    """The cells into which `cut` (cells, 2) bool splits each cell, consecutive for each parent."""
 
     def __init__(self, cut: np.ndarray) -> None:
         self.parts = 1 + cut
@@ -99,12 +99,12 @@ class _Children:
     def in_parent(
         self, cells: np.ndarray, xi: np.ndarray, eta: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Cell and reference coordinates in the parent's section."""
+        """Cell and reference coordinates in the parent section."""
         place = self.start[cells] + self.size[cells] * np.stack([xi, eta], axis=-1)
         return self.owner[cells], place[:, 0], place[:, 1]
 
     def edges(self, edges: np.ndarray, turned: np.ndarray | None = None) -> np.ndarray:
-        """The children's edges (k', 2) of edges (k, 2), along the side or, where `turned`, against it."""
+        """The children's edges (k', 2) of edges (k, 2), reversed for sides that are `turned`."""
         found = []
         for number, (cell, side) in enumerate(edges):
             across, step = self.parts[cell], _along(side)
@@ -118,13 +118,13 @@ class _Children:
         return np.concatenate(found) if found else edges
 
     def chain(self, section: SectionMesh, edges: np.ndarray) -> np.ndarray:
-        """The same of an ordered chain of edges, in its order."""
+        """The children's edges of an ordered chain, in its order."""
         start = section.chain(edges)[:: section.order][:-1]
         return self.edges(edges, section.side(edges)[:, 0] != start)
 
 
 def _merged(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (n, 2) without repetition, and the number of each point (k,) among them."""
+    """Unique points (n, 2), and the index of each given point (k,) among them."""
     size = np.ptp(points, axis=0).max()
     a, b = cKDTree(points).query_pairs(_SAME * size, output_type="ndarray").T
     same = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(points),) * 2)

@@ -12,7 +12,7 @@ _SIZE = re.compile(r"\s*(\d{3})\s*/\s*(\d{2})\s*Z?R\s*(\d{2})\s*", re.IGNORECASE
 
 @dataclass(frozen=True)
 class Size:
-    """`width` of the section, `rim` radius and section `height`, all in m."""
+    """Section `width`, section `height` and `rim` radius, all in m."""
 
     width: float
     height: float
@@ -20,7 +20,9 @@ class Size:
 
 
 def size(text: str) -> Size:
-    """205/60 R15: section width in mm, height over width in %, rim diameter in inches."""
+    """Parse 205/60 R15: section width in mm, height over width in %, rim diameter in inches.
+
+    Raises InputError for another format or a size out of range."""
     found = _SIZE.fullmatch(text)
     if not found:
         raise InputError(f'tire.size = "{text[:40]}": must be like "205/60 R15"')

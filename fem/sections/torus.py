@@ -15,16 +15,16 @@ from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.ring import Ring
 
-LEAST = (6, 2)  # elements around and along: below, a tire is none
+LEAST = (6, 2)  # elements around and along: minimum for a tire
 
 
 @dataclass(frozen=True, kw_only=True)
 class Torus:
-    """A toroidal tire: section circle of `minor_radius` (to its outer face) about the axle (y).
+    """A toroidal tire: section circle of outer radius `minor_radius` about the axle (y).
 
-    Lengths in m, `half_angle` in rad: the arc from the crown to each bead. `segments` elements
-    around, `elements_arc` along the arc, `elements_thickness` through the wall, all of `order`;
-    elements where the road touches are `footprint_size` times as long as they would be otherwise.
+    Lengths in m; `half_angle` in rad: arc from the crown to each bead. `segments` elements around,
+    `elements_arc` along the arc, `elements_thickness` through the wall, all of `order`;
+    `footprint_size`: relative element length at the road.
     """
 
     outer_radius: float
@@ -43,7 +43,8 @@ class Torus:
             raise InputError(
                 f"torus: half_angle = {self.half_angle:g} rad must lie between 0 and pi: it is in radians"
             )
-        # A minor radius beyond the outer one is a barrel, up to the cylinder of closed forms.
+        # A minor radius larger than the outer one gives a barrel, up to the cylinder of closed
+        # forms.
         least = min(self.minor_radius, self.outer_radius)
         if not 0 < self.thickness < least or not math.isfinite(
             self.minor_radius + self.outer_radius
@@ -59,10 +60,10 @@ class Torus:
         return ring_corners(self.segments, self.footprint_size)
 
     def arc_corners(self, between: Sequence[float] = (), ends: Sequence[float] = ()) -> np.ndarray:
-        """Angles of the element corners along the section, rad, bead to bead; the crown is 0.
+        """Angles of the element corners along the section, rad, bead to bead, 0 at the crown.
 
-        With corners at the angles `between` and at their mirror images; smaller elements at `ends`, which
-        are among them.
+        Corners are placed at the angles `between` and their mirror images; elements are smaller at
+        `ends`, which are among them.
         """
         both = np.concatenate([between, -np.asarray(between)])
         half, size = self.half_angle, self._size
@@ -73,7 +74,7 @@ class Torus:
         return corners(self.elements_arc, density, -half, half, both)
 
     def _size(self, arc: np.ndarray) -> np.ndarray:
-        """Relative size of the elements at a section angle."""
+        """Relative element size at a section angle."""
         near = near_road(np.abs(arc), self.footprint_size, ARC_NEAR)
         if self.grading != "bead":
             return near
@@ -83,7 +84,7 @@ class Torus:
         return near * bead.size(edge, length, self.elements_arc, floor)
 
     def section(self, patches: Sequence[Patch] = (), plies: Sequence[PlyLine] = ()) -> SectionMesh:
-        """The section's elements, with edges exactly on those of patches and on plies."""
+        """The section mesh, with edges exactly on the boundaries of patches and on plies."""
         wall, arc = self.lines(patches, plies)
         return product(
             order=self.order, wall=wall, arc=arc, place=self._place, patches=patches, plies=plies
@@ -92,7 +93,7 @@ class Torus:
     def lines(
         self, patches: Sequence[Patch], plies: Sequence[PlyLine]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Corners through the wall, as shares of it, and along the arc, rad."""
+        """Corners through the wall, as fractions of it, and along the arc, rad."""
         arcs = [end for patch in patches for arc in patch.arcs for end in arc]
         ends = [end for ply in plies for end in ply.arc]
         arcs, ends = (
@@ -105,7 +106,7 @@ class Torus:
         return wall, self.arc_corners(arcs, ends)
 
     def ring(self, patches: Sequence[Patch] = (), plies: Sequence[PlyLine] = ()) -> Ring:
-        """The tire's elements, with edges exactly on those of patches and on plies."""
+        """The ring of elements, with edges exactly on the boundaries of patches and on plies."""
 
         def coarser() -> Ring | None:
             around, along = self.segments // 2, self.elements_arc // 2
@@ -130,14 +131,15 @@ class Torus:
         return np.stack([reach, wall * np.sin(arc)], axis=-1)
 
 
-# A belt ends in a singularity. Ten lowest frequencies of the belted torus (tests/verification/test_belted_torus),
-# worst of n = 0, 1, 2 above the reference: 16 elements along the arc 1.0 %, 20 elements 0.7 %;
-# ungraded, 16, 20, 24 and 32 elements: 1.8, 1.3, 0.8 and 0.5 %; more layers than one a ply gain nothing.
+# A belt ends in a singularity. Ten lowest frequencies of the belted torus
+# (tests/verification/test_belted_torus), largest excess over the reference for n = 0, 1, 2: 16
+# elements along the arc 1.0 %, 20 elements 0.7 %; ungraded with 16, 20, 24 and 32 elements: 1.8,
+# 1.3, 0.8 and 0.5 %. More than one layer per ply gains nothing.
 _ENDS, _ENDS_DEPTH = np.radians(8), 0.7
 
 
 def _near_ends(angle: np.ndarray, ends: Sequence[float]) -> np.ndarray:
-    """Relative element size at section angles, rad, for the ends of plies and their mirror images."""
+    """Relative element size at section angles, rad, near the ends of plies (both sides)."""
     if not len(ends):
         return np.ones_like(angle)
     both = np.concatenate([ends, -np.asarray(ends)])

@@ -1,1 +1,1 @@
-"""The inflated tire pressed on the road: equilibrium, loading, the state that comes of it."""
+"""Static states: the inflated tire pressed on the road, its equilibrium, load path and result."""

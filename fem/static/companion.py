@@ -1,6 +1,7 @@
-"""A tire in balance on the road, and the same tire on other elements near that state: what tells a mesh's error.
+"""A tire in equilibrium on the road, and near that state on another mesh, for mesh errors.
 
-By half of the ring where half a turn leaves the state as it is (fem.static.symmetry.half_turn).
+Half of the ring is used where a half turn leaves the state unchanged
+(fem.static.symmetry.half_turn).
 """
 
 from __future__ import annotations
@@ -23,13 +24,16 @@ from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.mesh import Lattice, field_lattice
 
 _ROUNDING = 1e-9  # rad
-_SAME = 1e-6  # of the wall: what half a turn may change
+_SAME = 1e-6  # of the wall: the change that a half turn may cause
 
 
 @dataclass(frozen=True, kw_only=True)
 class Balance:
-    """A tire of the elements of `ring`, rolling steadily, on the road at `height` (m), carrying `load` (N): `displacement` (n, 3) m
-    and `force` (n,) N of the road of all nodes of the whole `lattice`; `solved`, what found it."""
+    """A tire with the elements of `ring`, in static equilibrium on the road at `height` (m) under
+    `load` (N).
+
+    `displacement` (n, 3) m and `force` (n,) N of the road at all nodes of the whole `lattice`;
+    `solved`: the problem that found the state."""
 
     ring: Ring
     lattice: Lattice
@@ -57,21 +61,21 @@ class Balance:
         )._by(loader.halved)
 
     def _by(self, half: HalfTurnEquilibrium | None) -> Balance:
-        """The same as found by half of the ring, if that has this state. Collective."""
+        """The same state, with the half-ring problem as `solved` if that has it. Collective."""
         if half is None or not _has_all_of(half, self.lattice, self.displacement):
             return self
         return replace(self, solved=half)
 
     def near(self, ring: Ring) -> Equilibrium:
-        """The problem of the same tire on the elements of another `ring`, in this state but not in balance. Collective."""
+        """The same tire's problem on another `ring` of elements, at this state. Collective."""
         if ring is self.ring and isinstance(self.solved, HalfTurnEquilibrium):
             return self.solved
         return self._problem(ring, self._sampled(ring))
 
     def balanced_on(self, ring: Ring, allowed: float) -> Balance:
-        """The same tire on the same road in balance on other elements, but for `allowed` N. Collective.
+        """Equilibrium on the same road with other elements, up to `allowed` N. Collective.
 
-        ConvergenceError where no balance is found.
+        Raises ConvergenceError if none is found.
         """
         lattice, displacement = field_lattice(ring), self._sampled(ring)
         other = self._problem(ring, displacement)
@@ -93,12 +97,12 @@ class Balance:
 
     @property
     def face_force(self) -> np.ndarray:
-        """Force of the road (around, along) N on the outer face's nodes."""
+        """Force of the road (around, along) N on the nodes of the outer face."""
         return self.force[self.lattice.face].reshape(self.lattice.face_shape)
 
     @cached_property
     def extent(self) -> Footprint:
-        """Of the contact."""
+        """Extent of the contact."""
         face, shape = self.lattice.face, self.solved.shape
         places = self.lattice.points(face) + self.displacement[face]
         force, area = self.force[face], nodal_area(self.lattice, places)
@@ -112,7 +116,7 @@ class Balance:
         return sampled(self.lattice, self.displacement, field_lattice(ring))
 
     def _problem(self, ring: Ring, displacement: np.ndarray) -> Equilibrium:
-        """In that displacement (n, 3) m of the whole ring's nodes. Collective."""
+        """The problem at the displacement (n, 3) m of the whole ring's nodes. Collective."""
         body, shape = self.solved.body, self.solved.shape
         other: Equilibrium | None = self._half(ring, displacement)
         if other is None:
@@ -123,7 +127,7 @@ class Balance:
         return other
 
     def _half(self, ring: Ring, displacement: np.ndarray) -> HalfTurnEquilibrium | None:
-        """By half of the ring, where that has all of the state. Collective."""
+        """The half-ring problem, if half of the ring has the whole state; else None. Collective."""
         if not (self.solved.shape.flat and looks_the_same(ring, self.rolling)):
             return None
         half = HalfTurnEquilibrium(self.solved.body, self.rolling, ring)
@@ -131,7 +135,8 @@ class Balance:
         return half if _has_all_of(half, field_lattice(ring), displacement) else None
 
     def _touching(self, lattice: Lattice) -> np.ndarray:
-        """A force (n,) N above 0 on the nodes of other elements that lie between nodes that are pressed on."""
+        """A positive force (n,) N on those nodes of another lattice that lie between loaded nodes
+        of this one."""
         pressed = self.face_force > 0
         around = _between(np.append(self.lattice.ring, 2 * np.pi), lattice.ring) % len(pressed)
         along = _between(self.lattice.arc, lattice.arc)
@@ -143,20 +148,20 @@ class Balance:
 
 
 def _between(line: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Indices (n, 2) of the entries of an ascending line on either side of each value (n,), the same two where it is one."""
+    """Indices (n, 2) of each value's neighbours on an ascending line, equal if it is on it."""
     above = np.clip(np.searchsorted(line, values - _ROUNDING), 0, len(line) - 1)
     below = np.clip(np.searchsorted(line, values + _ROUNDING, side="right") - 1, 0, len(line) - 1)
     return np.stack([below, above], axis=-1)
 
 
 def _has_all_of(half: HalfTurnEquilibrium, lattice: Lattice, displacement: np.ndarray) -> bool:
-    """Whether half of a ring says the displacement (n, 3) m of the whole. Collective."""
+    """Whether half of a ring reproduces the displacement (n, 3) m of the whole. Collective."""
     off = np.abs(half.on(lattice)[0] - displacement).max()
     return bool(off < _SAME * lattice.tire.thickness)
 
 
 def _nodes(solved: Equilibrium, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement (n, 3) m and force of the road (n,) N at the nodes of the whole ring. Collective."""
+    """Displacement (n, 3) m and road force (n,) N at the nodes of the whole ring. Collective."""
     if isinstance(solved, HalfTurnEquilibrium):
         return solved.on(lattice)
     return solved.body.displacement(), solved.body.everywhere(solved.contact_force())

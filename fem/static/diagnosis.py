@@ -1,4 +1,4 @@
-"""Why a rolling tire has no static state: too much speed, or too much load."""
+"""Why a rolling tire has no static state: too high a speed, or too high a load."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from tireroad.fem.tire.body import Body
 def with_cause(
     error: ConvergenceError, loader: Loader, rolling: Rolling, press: Callable[[Loader], object]
 ) -> ConvergenceError:
-    """The error with its cause, where that is the speed of rotation.
+    """The error, with the cause added if that is the speed of rotation. Collective.
 
-    `press` inflates and loads a tire. It is tried once more on a body of its own, at rest: what
-    converges there fails for the speed. Collective; at most as long as the state at rest takes.
+    `press` inflates and loads a tire. It is repeated at rest on a separate body; if that converges,
+    the speed is the cause. Takes no longer than the state at rest.
     """
     if rolling.speed == 0 or not isinstance(error, LoadingStopped):
         return error

@@ -1,4 +1,4 @@
-"""A drag on the body of an equilibrium problem: what holds it back on its fall through a snap."""
+"""Springs to the current position that slow the motion of a body through a snap."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from tireroad.fem.tire.body import Body
 
 
 class Drag:
-    """Springs `stiffness` (owned unknowns,) N/m between the body's present place and that in which it is to be soon."""
+    """Springs of `stiffness` (owned unknowns,) N/m to the displacement at the last `here`."""
 
     def __init__(self, body: Body, stiffness: float) -> None:
-        """In proportion to the nodes' mass, of `stiffness` (N/m) an unknown in the mean. Collective."""
+        """Proportional to nodal mass, with mean `stiffness` (N/m) per unknown. Collective."""
         mass = body.nodal_mass()
         total, count = body.comm.allreduce(np.array([mass.sum(), len(mass)]))
         self._field = body.u.x
@@ -20,7 +20,7 @@ class Drag:
         self.here()
 
     def here(self) -> None:
-        """Hold the body back from where it is now."""
+        """Anchor the springs at the current displacement."""
         self._place = self._field.array[: len(self.stiffness)].copy()
 
     def add_to(self, out: np.ndarray) -> None:

@@ -1,8 +1,8 @@
-"""Static equilibrium under inflation, steady rolling and a smooth, frictionless road (friction: fem.static.friction).
+"""Static equilibrium under inflation, steady rolling and a smooth frictionless road.
 
-F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f, f >= 0 on the tread dofs,
-z + u_z >= z_road and one of both zero. On roads that are no level plane the tread's nodes move in the road's coordinates
-(fem.static.curved.unrolled).
+F_int(u) + p F_pressure(u) + Omega^2 S (X + u) + gamma1 Omega B u + gamma2 Omega K M^-1 B u = f,
+with f >= 0 and z + u_z >= z_road at the tread dofs, one of the two an equality. On roads other than
+a level plane they move in road coordinates (curved.unrolled). Friction: fem.static.friction.
 """
 
 from __future__ import annotations
@@ -24,17 +24,16 @@ from tireroad.fem.tire.body import Body
 
 MOST_STEPS = 25  # tangents; a load step that needs more is better halved
 TOLERANCE = 1e-12  # of the force scale
-_SERVES = 0.2  # a step with an old tangent costs a twentieth of one with a new tangent
-_STAYS = 1e-10  # of the wall: rounding, as a state is carried from half the ring and back
-_DIVERGED = 1e8  # times the force scale: nothing comes back from there
+_SERVES = 0.2  # error ratio up to which a tangent is reused, at 1/20 of a new one's cost
+_STAYS = 1e-10  # of the wall: rounding when a state is transferred from half the ring and back
+_DIVERGED = 1e8  # times the force scale, beyond which Newton's method does not recover
 
 
 class Equilibrium(Forces):
-    """The nonlinear problem of one body. Its solver is made once. Collective.
+    """The nonlinear problem of one body; its solver is created once. Collective.
 
-    `solve` starts from the body's displacement and puts it back when it does not converge. `road_height` (m) is that
-    of the last state that did, under the axle where its `shape` is no level plane; `force_scale`: N, by which
-    residuals are measured.
+    `solve` starts from the body's displacement and restores it on failure. `road_height` (m), that
+    of the last converged state, is under the axle if `shape` is not flat; `force_scale` N.
     """
 
     def __init__(self, body: Body, rolling: Rolling = AT_REST, shape: RoadShape = FLAT) -> None:
@@ -57,16 +56,16 @@ class Equilibrium(Forces):
         return HeldSystem(self.body.comm, self.matrix, kind, self.cost)
 
     def _make_contact(self) -> LinearContact | None:
-        """Settles the sets of contact within a step; None where the road is not flat."""
+        """Solver for the active set within a step; None if the road is not flat."""
         return LinearContact(self.body.comm, self._system, self.road) if self.shape.flat else None
 
     @property
     def _in_its_coordinates(self) -> Unrolled | None:
-        """Those in which Newton's method works now; None: the wheel's axes."""
+        """Coordinates in which Newton's method currently works; None: the wheel's axes."""
         return self._unrolled if self.road.height > -np.inf else None
 
     def _out(self) -> np.ndarray:
-        """Forces out of balance at the owned unknowns, N. Collective."""
+        """Residual forces at the owned unknowns, N. Collective."""
         out, along = self._assemble_residual(), self._in_its_coordinates
         if along is not None:
             along.turn(self._work.array)
@@ -74,23 +73,24 @@ class Equilibrium(Forces):
 
     @property
     def rounding(self) -> float:
-        """Force below which nothing is balanced, N."""
+        """Force below which residuals are rounding, N."""
         return TOLERANCE * self.force_scale
 
     def solve(
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
     ) -> Step:
-        """As `_solve`, or as the `history` of a computation that was stopped has it. Collective."""
+        """`_solve`, or its result from the `history` of an interrupted computation. Collective."""
         return self.history.solve(self, lambda: self._solve(road_height, load, allowed))
 
     def _solve(self, road_height: float | None, load: float | None, allowed: float) -> Step:
-        """Equilibrium with the road plane at the given height (m), or without a road. Collective.
+        """Equilibrium with the road at the given height (m), or without a road (None). Collective.
 
-        With a `load` (N) the road is moved, from the given height on, until it carries that. `allowed` N may stay
-        out of balance in a state that is only on the way to another. Newton's method and the active set of the
-        road in one loop: a dof is held where f - c gap > 0, with c the dof's own stiffness, which is complementarity
-        for any c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558); a new tangent settles its
-        sets (LinearContact), and serves while each step with it leaves a fifth of the error or less.
+        With a `load` (N) the road moves from that height until it carries it. `allowed` N of
+        residual may remain in an intermediate state. Newton's method and the active set share one
+        loop: a dof is held if f - c gap > 0 with its own stiffness c, which is complementarity for
+        any c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Each new
+        tangent settles the set (LinearContact) and is reused while each step leaves at most a fifth
+        of the error.
         """
         field = self.body.u.x
         kept, self._contact = (field.array.copy(), self.road.kept()), None
@@ -117,7 +117,7 @@ class Equilibrium(Forces):
         return self.solved(Step(False, tangents, error, reason))
 
     def solved(self, step: Step) -> Step:
-        """The step: the body is in the state that it has found, or was put back where it found none."""
+        """Record the outcome: the body is in the state found, or restored if there is none."""
         if step.converged:
             self._solved = self.body.u.x.array.copy()
             self.road_height = None if self.road.height == -np.inf else self.road.height
@@ -126,12 +126,13 @@ class Equilibrium(Forces):
         return step
 
     def predict(self, road_height: float) -> bool:
-        """As `_predict`, or as the `history` has it: the solution that follows is known then. Collective."""
+        """`_predict`, or its outcome in the `history` if the next solution is known. Collective."""
         return self.history.predict(lambda: self._predict(road_height))
 
     def _predict(self, road_height: float) -> bool:
-        """Go from the state that was solved for last to near that on a road at `road_height` (m) by its last tangent, which
-        settles the sets of contact; whether there is such a tangent, and the body still in that state. Collective.
+        """Move from the last solution to the estimate for `road_height` (m) by the last tangent and
+        its active sets. False if there is none, the body has left that state or the step fails.
+        Collective.
         """
         moved = np.abs(self._solved - self.body.u.x.array).max(initial=0.0)
         stays = bool(moved <= _STAYS * self.body.ring.thickness)
@@ -140,12 +141,12 @@ class Equilibrium(Forces):
         self._out()
         on_road = self.road.height > -np.inf
         rise = road_height - self.road.height if on_road else 0.0
-        if not on_road:  # nothing touches it yet, so nothing is raised by it
+        if not on_road:  # no node touches the road yet, so raising it moves none
             self.road.height = road_height
         return not self._move(None, None, rise)
 
     def _stopped(self, error: float, changed: bool, tangents: int, allowed: float) -> str:
-        """Why not to go on; empty while there is hope. Collective."""
+        """Reason to stop, or an empty string. Collective."""
         if not error < _DIVERGED:
             return "the residual grows without bound"
         enough = error <= TOLERANCE or (tangents > 0 and error <= allowed)
@@ -154,7 +155,7 @@ class Equilibrium(Forces):
         return "" if tangents < MOST_STEPS else f"no convergence in {MOST_STEPS} Newton steps"
 
     def _error(self, load: float | None) -> float:
-        """Norm of what is out of balance over the force scale, distance to the road as the dof's force."""
+        """Norm of residual, gaps of held dofs (as forces) and missing load over the force scale."""
         with self.cost("assembly"):
             out = self._out().copy()
         self.road.take_off(out)
@@ -165,11 +166,11 @@ class Equilibrium(Forces):
         return float(np.hypot(np.sqrt(square), missing)) / self.force_scale
 
     def out_of_balance(self) -> float:
-        """Norm of the forces (N) that are, in the present state under the present forces of the road. Collective."""
+        """Norm of the residual (N) in the present state under its road forces. Collective."""
         return self._error(None) * self.force_scale
 
     def _take_tangent(self) -> bool:
-        """Assemble and factorise at the present state, the held dofs on their way to the road."""
+        """Assemble and factorise the tangent at the present state, held dofs moving to the road."""
         with self.cost("assembly"):
             self._assemble_tangent()
             along = self._in_its_coordinates
@@ -179,7 +180,7 @@ class Equilibrium(Forces):
         return taken
 
     def _move(self, closing: Moved | None, load: float | None, rise: float | None = None) -> str:
-        """One linearised step to balance, of a road that may `rise` (m). Why it cannot be taken, or nothing. Collective."""
+        """One linearised step; the road may `rise` (m). Reason for failure, or "". Collective."""
         given = self.road.rows(self._work.array_r.copy()), closing, load
         if self._contact is None or self.road.height == -np.inf:
             step = held_step(self.body.comm, self._system, self.road, given)
@@ -196,7 +197,7 @@ class Equilibrium(Forces):
         return ""
 
     def road_stiffness(self) -> float:
-        """Force (N) the road gains per metre it rises with the points that touch it now. Collective."""
+        """Road force gained per metre of rise, N/m, with the present contact nodes. Collective."""
         self._before.x.array[:] = self.body.u.x.array
         if not self._take_tangent():
             return float("nan")
@@ -204,9 +205,9 @@ class Equilibrium(Forces):
         return self.body.comm.allreduce(self.road.upward(force))
 
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:
-        """Under a vertical traction in place of the road: the height (m) that the face gains by one step of
-        Newton's method from the present state, and that by a newton more. Collective.
-        `weights` (s,) of the outer face's nodes, of sum 1, say where the `load` (N) acts and the height is read."""
+        """Rise (m) of the face in a Newton step under a vertical traction, without a road, and rise
+        per newton. `weights` (s,) of the outer face, of sum 1, distribute the `load` (N) and
+        average the rise. Raises ConvergenceError for a singular tangent. Collective."""
         self._before.x.array[:], self._contact = self.body.u.x.array, None
         out = self._assemble_residual().copy()
         self._assemble_tangent()
@@ -223,24 +224,24 @@ class Equilibrium(Forces):
         return self.road.load()
 
     def points(self) -> int:
-        """Nodes that the road presses on. Collective."""
+        """Number of nodes loaded by the road. Collective."""
         return self.road.points()
 
     def contact_force(self) -> np.ndarray:
-        """Vertical force of the road on the owned nodes (nodes,), N; not negative. Not collective."""
+        """Vertical road force (nodes,) N on the owned nodes, not negative. Not collective."""
         return self.road.at_nodes()
 
     def resume(self, displacement: np.ndarray, force: np.ndarray, height: float | None) -> Step:
-        """Solve from a state found by other means: displacement (n, 3) m and force of the road (n,) N of all
-        lattice nodes, on a road at `height` (m). What is in balance stays as it is. Collective."""
+        """Solve from displacement (n, 3) m and road force (n,) N of all lattice nodes, road at
+        `height` (m). A state already in equilibrium stays unchanged. Collective."""
         self.body.set_displacement(displacement)
         if height is not None:
             self.road.take(force[self.body.ids], height)
         return self.solve(height)
 
     def _yardsticks(self) -> float:
-        """Force scale (N): the undeformed body's typical stiffness of a dof times the wall, so that 1e-12 of it is far
-        below any load of interest. The road's stiffness is that of its dofs."""
+        """Force scale (N): the undeformed body's typical dof stiffness times the wall thickness;
+        1e-12 of it is far below any load of interest. The road takes the stiffness of its dofs."""
         self._before.x.array[:] = self.body.u.x.array
         self._assemble_tangent()
         diagonal = self.matrix.getDiagonal()

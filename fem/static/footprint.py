@@ -1,4 +1,4 @@
-"""Contact pressure and the extent of the footprint, from nodal forces and gaps on the outer face."""
+"""Contact pressure and extent of the footprint from nodal forces and gaps on the outer face."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tireroad.fem.tire.mesh import Lattice
 
 @dataclass(frozen=True)
 class Footprint:
-    """Length (x), width (y) in m and area in m2 of where the pressure is positive."""
+    """Length (x) and width (y) in m, and area in m2, of the region of positive pressure."""
 
     length: float
     width: float
@@ -19,12 +19,12 @@ class Footprint:
 
 
 def nodal_area(lattice: Lattice, positions: np.ndarray) -> np.ndarray:
-    """Horizontal area (s,) m2 that each node of the deformed outer face (s, 3) stands for.
+    """Horizontal area (s,) m2 associated with each node of the deformed outer face (s, 3).
 
-    The row sums of the surface's mass matrix by the Lobatto rule of the nodes: positive in every
-    order, so that pressure = force/area has the force's sign. On a plane they are what a uniform
-    pressure puts on the nodes; a node's share of distances is not (a factor 2 between corners and
-    middles of quadratic elements).
+    Row sums of the surface mass matrix by the Lobatto rule of the nodes. They are positive for
+    every order, so that pressure = force/area has the sign of the force. On a plane they are
+    proportional to the nodal forces of a uniform pressure; areas from node spacings are not (a
+    factor 2 between corner and mid-side nodes of quadratic elements).
     """
     around, along = lattice.face_shape
     order = len(lattice.edge) - 1
@@ -55,10 +55,11 @@ def footprint(
 ) -> Footprint:
     """Extent of the contact on a face of `shape` (around, along); arrays (s,), positions (s, 3).
 
-    Where a smooth body lets go of a plane, the gap opens as d^(3/2) (1 + c d) of the distance d to the edge (Johnson,
-    Contact Mechanics, 1985, 5.3), so gap^(2/3) through the next three nodes of a line tells where it begins. That is the
-    edge, up to half a node's spacing inside the last node that presses, which stands for that much. The area is the
-    mean of those that the lines around and the lines across cover.
+    At the edge of contact of a smooth body with a plane the gap opens as d^(3/2) (1 + c d), d being
+    the distance from the edge (Johnson, Contact Mechanics, 1985, 5.3). The edge is therefore
+    extrapolated from gap^(2/3) at the next three nodes of a line. It may lie up to half a node
+    spacing inside the last loaded node, which represents that length. The area is the mean of the
+    areas covered by the lines around and by the lines across.
     """
     inside = (pressure > 0).reshape(shape)
     if not inside.any():
@@ -74,7 +75,7 @@ def footprint(
 
 
 def _opposite(inside: np.ndarray) -> int:
-    """The line across the face in the middle of the longest part of the ring without contact."""
+    """Index of the line across the face in the middle of the longest arc without contact."""
     lines = np.flatnonzero(inside.any(axis=1))
     free = np.diff(np.append(lines, lines[0] + len(inside)))
     longest = int(free.argmax())
@@ -83,8 +84,10 @@ def _opposite(inside: np.ndarray) -> int:
 
 @dataclass(frozen=True)
 class _Lines:
-    """Contact along the k lines of the face in one direction that have some: `ends` m in that direction, of each line
-    the length `chord` (k,) m and its `place` (k,) m in the other direction."""
+    """Contact along the k lines in one direction that touch the road.
+
+    `ends` m: limits in that direction; `chord` (k,) m: contact length of each line; `place` (k,) m:
+    its position in the other direction."""
 
     ends: tuple[float, float]
     chord: np.ndarray
@@ -92,8 +95,8 @@ class _Lines:
 
     @classmethod
     def of(cls, points: np.ndarray, gap: np.ndarray, inside: np.ndarray, axis: int) -> _Lines:
-        """Along the first index of points (n, m, 3) m with a gap (n, m) m, `inside` (n, m) where they press; `axis` 0
-        where that is along x."""
+        """Lines along the first index of points (n, m, 3) m with gap (n, m) m and contact flags
+        `inside` (n, m); `axis` is their direction, 0: x, 1: y."""
         share = (inside[:-1] & inside[1:]).astype(float)
         edge = []
         for forward in (True, False):
@@ -102,7 +105,8 @@ class _Lines:
                 here = points[turn][:, line], gap[turn][:, line], inside[turn][:, line]
                 place, part = _edge(*here, last)
                 edge.append(place[axis])
-                # The last node that presses may itself be beyond the edge: then the segment before it is shorter.
+                # The edge may lie before the last loaded node, which then shortens the preceding
+                # segment.
                 share[turn][last if part >= 0 else last - 1, line] += part
         length = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=2)
         some = inside.any(axis=0)
@@ -115,8 +119,7 @@ class _Lines:
         return cls((float(min(edge)), float(max(edge))), chord[order], across[order])
 
     def area(self, between: tuple[float, float]) -> float:
-        """Area (m2) of a contact that ends, across the lines, at the two places `between` m, round as an ellipse beyond
-        the outermost lines."""
+        """Area (m2) of a contact limited across the lines by `between` m, with elliptic ends."""
         low, high = between
         held = (self.place >= low) & (self.place <= high)
         chord, place = self.chord[held], self.place[held]
@@ -130,8 +133,10 @@ class _Lines:
 def _edge(
     points: np.ndarray, gap: np.ndarray, inside: np.ndarray, last: int
 ) -> tuple[np.ndarray, float]:
-    """The place (3,) m where a contact ends on a line of nodes (n, 3), of which `last` presses and the next does not, and
-    the part of the segment beyond that node; below 0 of the one before it."""
+    """Edge of contact on a line of nodes (n, 3) whose node `last` is loaded and the next is not.
+
+    Returns its position (3,) m, and its distance from that node as a fraction of the next segment,
+    or, if negative, of the one before."""
     free = last + 1 + np.arange(_NODES)
     free = free[free < len(points)]
     free = free[~np.logical_or.accumulate(inside[free])]
@@ -144,11 +149,13 @@ def _edge(
     return points[last] + abs(part) * (points[other] - points[last]), part
 
 
-_NODES = 3  # beyond the contact, that tell where it ends
+_NODES = 3  # beyond the contact, used to extrapolate its edge
 
 
 def _begins(away: np.ndarray, rise: np.ndarray) -> float:
-    """Where a parabola through up to three points (away, rise), or the line through two, leaves zero, at most the first."""
+    """Zero of the parabola through three points (away, rise), or of the line through two.
+
+    It is at most away[0]; 0 if the points do not rise, half of away[0] for a single point."""
     if len(away) == 1:
         return float(away[0]) / 2
     slopes = np.diff(rise) / np.diff(away)

@@ -1,4 +1,4 @@
-"""The forces out of balance in one body at its present displacement, and their tangent, as assembled vectors and matrices."""
+"""Assembled residual and tangent of one body at its present displacement, without a road."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ from tireroad.fem.tire.body import Body
 
 
 class Forces:
-    """Everything but the road. Forms and matrix are made once. Collective.
+    """All forces except those of the road. Forms and matrix are created once. Collective.
 
-    `pressure` (Pa) may be changed; `cost`: seconds by part; `drag`: what holds the body back on its fall through a snap.
+    `pressure` (Pa) may be changed; `cost`: seconds by part; `drag`: springs that slow the body
+    during a snap.
     """
 
     def __init__(self, body: Body, rolling: Rolling) -> None:
@@ -47,7 +48,7 @@ class Forces:
         self._rim = (3 * body.rim[body.rim < body.nodes, None] + np.arange(3)).ravel()
 
     def _assemble_residual(self) -> np.ndarray:
-        """Forces out of balance at the owned dofs, N; on the rim 0, where the wheel takes them."""
+        """Residual forces at the owned dofs, N; 0 on the rim, where the wheel takes them."""
         if self._damping:
             self._damping.update()
         with self._work.localForm() as local:
@@ -69,5 +70,5 @@ class Forces:
             self.matrix = self._damping.added_to(self._local_tangent)
 
     def _inside_out(self) -> bool:
-        """Whether the wall is turned inside out in some Gauss point; no energy tells J from -J."""
+        """Whether det F <= 0 at some Gauss point: the energy does not distinguish J from -J."""
         return self.body.comm.allreduce(fem.assemble_scalar(self._inverted)) > 0

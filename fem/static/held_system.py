@@ -1,4 +1,4 @@
-"""The linearised equilibrium with some dofs held: factorised once, solved as often as it serves."""
+"""The linearised equilibrium with some dofs held: one factorisation, any number of solves."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from petsc4py import PETSc
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import Timing
 
-_CHUNK = 64  # columns solved for at a time
+_CHUNK = 64  # right-hand sides per solve
 _SINGULAR = (-6, -10)  # MUMPS's INFOG(1): structurally, numerically
 
 
 @dataclass(frozen=True)
 class Moved:
-    """A motion (m) of the owned dofs, not 0 at held ones alone, and the force (N) it takes at all."""
+    """A prescribed motion (m) of the owned dofs, nonzero at held ones only, and the force K change
+    (N) it causes at all dofs."""
 
     change: np.ndarray
     force: np.ndarray
 
 
 class System(Protocol):
-    """The linearised equilibrium as Newton's method needs it; as `HeldSystem` says."""
+    """The linearised equilibrium as Newton's method uses it; see `HeldSystem`."""
 
     @property
     def closing(self) -> Moved: ...
@@ -36,33 +37,33 @@ class System(Protocol):
     def take(
         self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
     ) -> bool:
-        """Factorise; False when the matrix is singular. Collective."""
+        """Factorise; False if the matrix is singular. Collective."""
         ...
 
     def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Motion (m) of the owned dofs under forces (N), and force (N) at the held ones. Collective."""
+        """Motion (m) of the owned dofs under forces (N), force (N) at held ones. Collective."""
         ...
 
 
 class Columns(System, Protocol):
-    """A system whose factor serves when other dofs are held."""
+    """A system whose factorisation remains usable when other dofs are held."""
 
     def columns(
         self, numbers: np.ndarray, dofs: np.ndarray, count: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As `HeldSystem` says. Collective."""
+        """See `HeldSystem`. Collective."""
         ...
 
     def spread(self, motion: np.ndarray) -> np.ndarray:
-        """The motion of all owned dofs, those included that follow others. Collective."""
+        """The motion of all owned dofs, including dependent ones. Collective."""
         ...
 
 
 class HeldSystem:
-    """K du = right, with du given at the held dofs. All methods are collective.
+    """K du = right, with du prescribed at the held dofs. All methods are collective.
 
-    `take` factorises; `solve` then costs two triangular solves, and stays of use as long as the
-    tangent is near the one taken and the same dofs are held. `closing` and `raising` are the
+    `take` factorises; each `solve` then costs two triangular solves. The factorisation is usable
+    while the tangent changes little and the same dofs are held. `closing` and `raising` are the
     motions given to `take`.
     """
 
@@ -72,17 +73,17 @@ class HeldSystem:
         self._comm, self._timing = comm, timing
         self._ksp = _solver(comm, matrix, factorisation)
         self._right, self._x = matrix.createVecs()
-        self._reaction: PETSc.Mat | None = None  # rows of the held dofs, and their columns
+        self._reaction: PETSc.Mat | None = None  # rows of the held dofs; _pull: their columns
         self._pull: PETSc.Mat | None = None
 
     def take(
         self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
     ) -> bool:
-        """Factorise `matrix` without the owned dofs `held`, which move by `closing` (m) in the next step,
-        and by `raising` (m per m) as the road rises.
+        """Factorise `matrix` with the owned dofs `held`, which move by `closing` (m) in the next
+        step and by `raising` (m per m) as the road rises.
 
-        False when it is singular; ConvergenceError when the factorisation fails by other causes. What
-        it does to the matrix makes it useless for anything else.
+        Returns False if it is singular; raises ConvergenceError if the factorisation fails
+        otherwise. `matrix` is modified and must not be used afterwards.
         """
         rows = (held + matrix.getOwnershipRange()[0]).astype(PETSc.IntType)
         self._held = held
@@ -92,9 +93,7 @@ class HeldSystem:
             self.raising = self._moved(matrix, raising)
             matrix.zeroRowsColumns(rows, 1.0)
         with self._timing("factorisation"):
-            self._ksp.setOperators(
-                matrix
-            )  # not always the one it was made with (fem.static.curved)
+            self._ksp.setOperators(matrix)  # may differ from the first one (fem.static.curved)
             self._ksp.getPC().setUp()
         return self._checked()
 
@@ -119,7 +118,7 @@ class HeldSystem:
     def _checked(self) -> bool:
         factors = self._ksp.getPC().getFactorMatrix()
         code, detail = factors.getMumpsInfog(1), factors.getMumpsInfog(2)
-        factors.destroy()  # this hold on them, which petsc4py would keep for ever
+        factors.destroy()  # release this reference, which petsc4py would keep forever
         if code < 0 and code not in _SINGULAR:
             raise ConvergenceError(
                 f"static: MUMPS could not factorise the tangent, INFOG(1) = {code}, INFOG(2) = "
@@ -130,9 +129,9 @@ class HeldSystem:
         return code >= 0
 
     def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Motion (m) of the owned dofs under forces (N) on them, and force (N) it takes at the held ones.
+        """Motion (m) of the owned dofs under forces (N), and the force (N) needed at the held dofs.
 
-        The held dofs move as in `moved`, `closing` or `raising`, or stay.
+        The held dofs move as in `moved` (`closing` or `raising`), or stay.
         """
         with self._timing("solve"):
             self._right.array[:] = right if moved is None else right - moved.force
@@ -152,10 +151,11 @@ class HeldSystem:
     def columns(
         self, numbers: np.ndarray, dofs: np.ndarray, count: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Motion (m) of the owned dofs and force (N) at the held ones, by a unit force on each of some dofs, or by a unit
-        motion of those that are held: (owned, count), (held, count).
+        """Responses to a unit force on each of some free dofs, or a unit motion of held ones.
 
-        `numbers` (k,) of this process's `dofs` (k,) among the `count` of all.
+        Returns the motion (m) of the owned dofs (owned, count) and the force (N) at the held ones
+        (held, count). `numbers` (k,) are the column numbers, among all `count`, of this process's
+        `dofs` (k,).
         """
         motion = np.empty((self._x.getLocalSize(), count))
         force = np.empty((len(self._held), count))
@@ -170,7 +170,7 @@ class HeldSystem:
     def _columns(
         self, numbers: np.ndarray, dofs: np.ndarray, count: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As many as fit in memory several times over."""
+        """One block of `columns`, small enough for memory."""
         assert self._reaction is not None, "columns() before take()"
         right, x = self._dense(count), self._dense(count)
         self._fill(right, numbers, dofs)
@@ -186,7 +186,7 @@ class HeldSystem:
         return found
 
     def _fill(self, right: PETSc.Mat, numbers: np.ndarray, dofs: np.ndarray) -> None:
-        """Unit forces, and of held dofs what their unit motion takes at the free ones."""
+        """Unit forces at free dofs; for held ones the forces of a unit motion on the free ones."""
         assert self._pull is not None, "columns() before take()"
         held = np.isin(dofs, self._held)
         moved = self._dense(right.getSize()[1], self._pull.getSizes()[1])
@@ -201,7 +201,7 @@ class HeldSystem:
         forces.destroy()
 
     def spread(self, motion: np.ndarray) -> np.ndarray:
-        """The motion of all owned dofs, those included that follow others."""
+        """The motion of all owned dofs, including dependent ones: here there are none."""
         return motion
 
     def _dense(self, count: int, rows: tuple | None = None) -> PETSc.Mat:
@@ -219,7 +219,7 @@ def _solver(comm: MPI.Comm, matrix: PETSc.Mat, factorisation: str) -> PETSc.KSP:
     pc = ksp.getPC()
     pc.setType(factorisation)
     pc.setFactorSolverType("mumps")
-    # Room for pivots that MUMPS did not foresee: a turning tire's tangent is not symmetric.
+    # Workspace for pivoting beyond MUMPS's estimate: the tangent of a rotating tire is unsymmetric.
     room = PETSc.Options("static_")
     if not room.hasName("mat_mumps_icntl_14"):
         room["mat_mumps_icntl_14"] = 100

@@ -1,13 +1,14 @@
-"""What the road holds after a linearised step: a linear complementarity problem on the tread's nodes.
+"""Contact within a linearised step: a linear complementarity problem on the tread nodes.
 
-With K du = right solved for the nodes that were held when K was factorised, a node that is held since adds a force, one
-that is free since a motion, each times a column of K's inverse:
+K du = right is solved with the nodes held that were held when K was factorised. Each node held
+since then adds a force, each node released since then a motion, both times a column of K's inverse:
 
     gap = gap_0 + C z + gap_l rise,    force = force_0 + D z + force_l rise,
 
-z such that gap = 0 where the road holds and force = 0 where it does not, rise such that it carries the load. A node is
-held where force > c gap, as in `Equilibrium.solve`; sets are changed until they stay. Columns cost a
-seventh of a solve each, as they are solved for together.
+with z such that gap = 0 at held nodes and force = 0 at free ones, and rise such that the road
+carries the load. As in `Equilibrium.solve` a node is held if force > c gap; the sets are updated
+until they stay the same. Columns are solved for together, at a seventh of the cost of a solve
+each.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from mpi4py import MPI
 from tireroad.fem.static.held_system import Columns, Moved, System
 from tireroad.fem.static.road import Road
 
-_ROUNDS = 10  # changes of the sets in one step
-_MOST = 400  # columns of one factor
-_OFF = 1e-12  # m off the road: rounding leaves less
+_ROUNDS = 10  # updates of the sets in one step
+_MOST = 400  # columns per factorisation
+_OFF = 1e-12  # m from the road: rounding leaves less
 
 Array = np.ndarray
 
@@ -32,11 +33,12 @@ Array = np.ndarray
 def held_step(
     comm: MPI.Comm, system: System, road: Road, given: tuple[Array, Moved | None, float | None]
 ) -> tuple[Array, Array] | None:
-    """The linearised step (m) of the owned dofs to balance from forces (N), and the reactions (N) at the held ones,
-    which move as told; with a load (N) the road is raised to that. `given`: these three.
+    """One linearised step: motion (m) of owned dofs, reactions (N) at held ones. Collective.
 
-    None where nothing resists the road. The road's force is the reaction of the linearised problem; what is out of
-    balance is no force of the road (seen: held dofs let go and caught for ever). Collective.
+    `given`: residual forces (N), the prescribed motion of the held dofs, and a load (N) or None;
+    with a load the road is raised to carry it. Returns None if nothing resists the road. The road's
+    force is the reaction of the linearised problem: a residual is no force of the road (otherwise
+    held dofs were seen to be released and held again forever).
     """
     out, closing, load = given
     change, force = system.solve(-out, closing)
@@ -55,7 +57,7 @@ def held_step(
 
 @dataclass(frozen=True)
 class _Found:
-    """z of which nodes, and rise; which nodes are to be held, and the road's force (N) on all."""
+    """z at the `nodes` and rise; the nodes that should be held, and the road's force (N) on all."""
 
     nodes: Array
     parts: tuple[Array, float]
@@ -65,14 +67,14 @@ class _Found:
 
 @dataclass
 class _Answer:
-    """Motion (m) of the owned dofs; of all processes' tread nodes gap (m) and force (N)."""
+    """Motion (m) of the owned dofs; gap (m) and force (N) of the tread nodes of all processes."""
 
     motion: Array
     gap: Array
     force: Array
 
     def plus(self, times: float, other: _Answer) -> _Answer:
-        """With so many times another one."""
+        """This answer plus `times` the other."""
         return _Answer(
             self.motion + times * other.motion,
             self.gap + times * other.gap,
@@ -81,7 +83,7 @@ class _Answer:
 
 
 class LinearContact:
-    """Of the factor that a system has. All methods are collective."""
+    """The contact problem for the current factorisation of a system. All methods are collective."""
 
     def __init__(self, comm: MPI.Comm, system: System, road: Road) -> None:
         self._comm, self._system, self._road = comm, cast(Columns, system), road
@@ -89,17 +91,17 @@ class LinearContact:
         first = sum(counts[: comm.rank])
         self._own = slice(first, first + len(road.dofs))
         self._stiffness = self._gathered(road.stiffness)
-        self._base = self._gathered(road.active)  # held in the factor
-        self._number = np.full(len(self._base), -1)  # of each node's column
+        self._base = self._gathered(road.active)  # held in the factorisation
+        self._number = np.full(len(self._base), -1)  # column number of each node
         none = np.empty((len(self._base), 0))
         self._columns = _Answer(np.empty((system.closing.change.size, 0)), none, none)
         self._lift: _Answer | None = None
-        self.changed = False  # whether other nodes are held than in the factor
+        self.changed = False  # whether the held nodes differ from those of the factorisation
 
     def step(
         self, out: Array, closing: Moved | None, load: float | None, given: float | None = None
     ) -> tuple[Array, Array] | None:
-        """As `held_step`, but the road first gets the nodes that it holds after the step, and rises by a `given` m."""
+        """`held_step` that first settles the active set; the road may rise by a `given` m."""
         road = self._road
         free = self._answer(*self._system.solve(-out, closing), out)
         free.gap += self._gathered(road.gap())
@@ -112,7 +114,7 @@ class LinearContact:
         found = self._solved(free, lift, held, load)
         if (
             closing is not None or given is not None
-        ):  # nearer to balance, of an old tangent, sets are not believed
+        ):  # near equilibrium the sets of a reused tangent are unreliable
             held, found = self._settled(
                 held, found, lambda held: self._solved(free, lift, held, load)
             )
@@ -127,7 +129,7 @@ class LinearContact:
     def _settled(
         self, held: Array, found: _Found, solved: Callable[[Array], _Found]
     ) -> tuple[Array, _Found]:
-        """The sets that stay, or those that were given where none do."""
+        """The first held set that no longer changes, with its solution; else the given ones."""
         first = held, found
         for _ in range(_ROUNDS):
             if (found.wanted == held).all():
@@ -141,10 +143,10 @@ class LinearContact:
     def _solved(
         self, free: _Answer, lift: _Answer | None, held: Array, load: float | None
     ) -> _Found:
-        """z, rise, and gap and force of the tread's nodes, for the nodes that the road is to hold."""
+        """z, rise, gaps and forces of the tread nodes for the set `held`."""
         off = (
             held & self._base & (np.abs(free.gap) > _OFF)
-        )  # it left the road since, and comes back
+        )  # released since the factorisation, and held again
         changed = np.flatnonzero((held ^ self._base) | off)
         self._add_columns(changed)
         use = self._number[changed]
@@ -155,7 +157,7 @@ class LinearContact:
         on, own = held[changed], self._stiffness[changed]
         rows = np.where(on[:, None], own[:, None] * gap[changed], force[changed])
         right = -np.where(on, own * rest[0][changed], rest[1][changed])
-        unit = np.where(self._base[changed], 1 / own, 1.0)  # of each unknown: all in N
+        unit = np.where(self._base[changed], 1 / own, 1.0)  # scales all to N
         if lift is not None:
             rows, right = (
                 np.vstack([rows, force.sum(axis=0)]),
@@ -173,7 +175,7 @@ class LinearContact:
         )
 
     def _add_columns(self, nodes: Array) -> None:
-        """Those of the nodes that have none yet."""
+        """Compute the columns of nodes that have none yet."""
         new = nodes[self._number[nodes] < 0]
         if not len(new):
             return
@@ -192,7 +194,7 @@ class LinearContact:
         self._number[new] = np.arange(len(new)) + (self._number.max() + 1)
 
     def _lifted(self) -> _Answer:
-        """By a road that rises by one and stays where it is held."""
+        """Response to a unit rise of the road with its nodes held."""
         if self._lift is None:
             nothing = np.zeros_like(self._system.closing.force)
             self._lift = self._answer(*self._system.solve(nothing, self._system.raising), nothing)

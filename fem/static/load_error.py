@@ -1,10 +1,11 @@
-"""The error of the load by two companions: one finer where the tire touches, one of another order everywhere.
+"""Error of the load from two companions: refined at the footprint, and of another order.
 
-Where the road lets go, the surface bends as d^(3/2) of the distance d to the edge, which falls anywhere in an
-element: the error of that goes up and down from mesh to mesh, and no coarser mesh tells it. So the elements
-at the footprint are cut in two, and the road is met again from the state that is there. What the elements
-are too stiff everywhere else is told by elements of another order on the same mesh: how far the footprint
-sinks, under one and the same traction, by a step of Newton's method from the state that is there.
+Where contact ends, the surface opens as d^(3/2), d being the distance from the edge, which lies
+anywhere in an element. This error fluctuates from mesh to mesh, and no coarser mesh reveals it.
+Therefore the elements at the footprint are split in two, and equilibrium is solved again from the
+present state. The excess stiffness of all other elements is estimated with elements of another
+order on the same mesh: how far the footprint sinks under the same traction in one Newton step from
+the present state.
 """
 
 from __future__ import annotations
@@ -23,25 +24,28 @@ from tireroad.fem.static.path.near import cords_strained
 from tireroad.fem.static.virtual_work import Rolling
 from tireroad.fem.tire.mesh import Lattice, field_lattice
 
-HIGHEST = 3  # order of elements there is
-CUBIC = 0.1  # error of elements of order 3 over that of order 2 on the same mesh
-# Of the bulk's error: the rest is that of the elements at the footprint, which are smaller in the first companion.
-# Estimated over true error of the soft torus 4 and 12 mm on the road, of order 2 on 16 x 8, 20 x 8 and 24 x 10
-# elements and of order 3 on 16 x 6 and 30 x 14 (4 mm): 0.6 to 1.3 so (bench discretisation).
-# Beside order 3 cut in two at the footprint once or twice (known to 0.2 %), 16 x 8, 20 x 8 and 24 x 10 of order 2 at
-# 2, 4 and 12 mm: 0.7 to 2.0 in size; with the wrong sign in two of the nine, in which both parts all but cancel.
+HIGHEST = 3  # highest element order available
+CUBIC = 0.1  # ratio of the errors of order 3 and order 2 on the same mesh
+# Fraction of the bulk error that remains: the rest comes from the elements at the footprint, which
+# the first companion refines. Estimated over true error of the soft torus at 4 and 12 mm
+# deflection, order 2 on 16 x 8, 20 x 8 and 24 x 10 elements and order 3 on 16 x 6 and 30 x 14 (4
+# mm): 0.6 to 1.3 (bench discretisation). Compared with order 3 split once or twice at the footprint
+# (known to 0.2 %), order 2 on 16 x 8, 20 x 8 and 24 x 10 at 2, 4 and 12 mm: 0.7 to 2.0 in
+# magnitude, with the wrong sign in two of the nine cases, where the two parts nearly cancel.
 REMAINS = 0.7
-ENOUGH = 1e-4  # of the load: what of it may be out of balance in a companion
+ENOUGH = 1e-4  # of the load: residual allowed in a companion
 UNKNOWN = "these elements strain the cords too much between their integration points; take smaller elements"
-CANCELS = 0.5  # of the larger part: what is left of both, below which its sign is not known
+CANCELS = 0.5  # of the larger part: sums below this have an unknown sign
 
 
 @dataclass(frozen=True)
 class LoadError:
-    """`load` N of ever smaller elements as estimated, `relative` how far the load is from it; what of
-    that is of the `footprint`'s elements and what of all in `bulk` (relative, above 0 where the load is
-    too large; None where it is not known: both are then of the footprint's alone); `extent` of the footprint on the
-    finer companion, of so many `unknowns`.
+    """Estimated discretisation error of the load.
+
+    `load` N extrapolated to infinitely small elements; `relative`: relative deviation from it, in
+    magnitude; its parts `footprint` (elements at the footprint) and `bulk` (all elements),
+    relative, positive if the load is too large. `bulk` None: unknown, the estimate then has the
+    footprint's part only. `extent`: footprint on the finer companion, which has `unknowns`.
     """
 
     load: float
@@ -53,16 +57,16 @@ class LoadError:
 
     @property
     def signed(self) -> bool:
-        """Whether it is known on which side the load errs: not where both parts all but cancel each other."""
+        """Whether the error's sign is known: both parts are, and do not nearly cancel."""
         if self.bulk is None:
             return False
         return self.relative > CANCELS * max(abs(self.footprint), abs(self.bulk))
 
 
 def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
-    """How far the load at this height of the road is from that of ever smaller elements; or why it is unknown.
+    """Estimated error of the load at the present road height, or the reason why it is unknown.
 
-    Collective; the body is left as it is.
+    The body is left unchanged. Collective.
     """
     if not loader.load():
         return "nothing touches the road"
@@ -85,7 +89,7 @@ def load_error(loader: Loader, rolling: Rolling) -> LoadError | str:
 
 
 def at_finer_footprint(given: Balance) -> Balance:
-    """The same tire on the same road, elements at the footprint cut in two. Collective."""
+    """The same tire and road with the elements at the footprint split in two. Collective."""
     lattice, force = given.lattice, given.face_force
     around = _touched(np.asarray(force.any(axis=1)), lattice.ring_corners, lattice, closed=True)
     along = _touched(np.asarray(force.any(axis=0)), lattice.arc_corners, lattice, closed=False)
@@ -93,15 +97,17 @@ def at_finer_footprint(given: Balance) -> Balance:
 
 
 def _bulk(given: Balance) -> float | None:
-    """How far the load is too large since the elements are too stiff, relative; None where the state strains elements of
-    another order too much for one step to tell. Collective."""
+    """Relative excess of the load because the elements are too stiff. Collective.
+
+    None if the state strains the cords of the other-order elements too much for a single step to be
+    meaningful."""
     ring, load = given.ring, given.load
     order = ring.order + 1 if ring.order < HIGHEST else ring.order - 1
     section, corners = ring.section.of_order(order), ring.ring_corners
     half = ring.coarser() if order > ring.order else None
     if half is not None:
-        # Of the higher order half as many elements around say the same (50 x 16 of order 2: 0.741 % of the load
-        # by all of them, 0.747 % by half) at half the cost.
+        # For the higher order half as many elements around give the same result at half the cost
+        # (50 x 16, order 2: 0.741 % of the load with all elements, 0.747 % with half).
         corners = half.ring_corners
     other = replace(ring, ring_corners=corners, section=section)
     place, spread = _spot(given)
@@ -116,7 +122,7 @@ def _bulk(given: Balance) -> float | None:
 
 
 def _spot(given: Balance) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Middle and half widths (rad, around and along) of where the tire touches, an element at least."""
+    """Centre and half widths of the contact (rad, around and along), at least one element each."""
     lattice, force = given.lattice, given.face_force
     around = (lattice.ring + np.pi) % (2 * np.pi) - np.pi
     places, spreads = [], []
@@ -132,7 +138,7 @@ def _spot(given: Balance) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def _touched(nodes: np.ndarray, corners: np.ndarray, lattice: Lattice, closed: bool) -> np.ndarray:
-    """Intervals between the corners with one of the marked nodes of their line, and those next to them."""
+    """Flags of intervals between corners with a marked node, and of their neighbours."""
     order, count = len(lattice.edge) - 1, len(corners) - 1
     index = order * np.arange(count)[:, None] + np.arange(order + 1)
     held = nodes[index % len(nodes)].any(axis=1)

@@ -1,4 +1,4 @@
-"""The static state of a tire in one call: inflate it, press it on the road."""
+"""Static state of a tire in one call: inflate it and press it on the road."""
 
 from __future__ import annotations
 
@@ -27,13 +27,12 @@ def press(
     friction: Friction | None = None,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> StaticState:
-    """The tire inflated to `inflation` (Pa) and, with one of the others, on a `road`, with `friction` where it is
-    given.
+    """Static state of the tire inflated to `inflation` (Pa) and pressed on a `road`.
 
-    `load` N on the road, or `deflection` m of the road from first touch, or `road_height` m, z of its
-    plane; none of them: no road. `rolling`: inertia and damping of the steadily rolling shape. `report`
-    hears of every load step. The state knows its inflation and its rolling. InputError for values out
-    of range, ConvergenceError where no state is found. Collective.
+    At most one of `load` N on the road, `deflection` m from first touch and `road_height` m, the
+    road's z; none: no road. `rolling`: inertia and damping of steady rolling; `friction`: optional;
+    `report` is called after every load step. Raises InputError for values out of range,
+    ConvergenceError if no state is found. Collective.
     """
     if not (math.isfinite(inflation) and inflation >= 0.0):
         raise InputError(f"inflation = {inflation:g} Pa must be 0 or more, and finite")
@@ -50,8 +49,9 @@ def place(
     road_height: float | None,
     friction: Friction | None = None,
 ) -> Loader:
-    """Press the inflated tire on the road, as `press` says: load and deflection along its normal. The loader of the
-    state found, with friction another one. Collective.
+    """Press the inflated tire on the road as in `press`; load and deflection along its normal.
+
+    Returns the loader of the state found, which is another one with friction. Collective.
     """
     given = {"load": load, "deflection": deflection, "road_height": road_height}
     named = [name for name, value in given.items() if value is not None]

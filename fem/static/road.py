@@ -1,4 +1,4 @@
-"""The smooth road under the tread nodes of one body: which touch it, and with what force."""
+"""The smooth road under the tread nodes of one body: nodes in contact and their forces."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from tireroad.fem.tire.body import Body
 
 
 class Road:
-    """A surface of a `shape` at `height` (m under the axle; -inf: none) and the owned tread nodes that can meet it, in the
-    order of `body.tread`: `dofs` their vertical unknowns, `active` those that touch, `force` N on each, along the way the
-    road is raised by a metre of height, `stiffness` N/m of each unknown.
+    """A surface of given `shape` at `height` (m under the axle; -inf: no road).
+
+    Arrays run over the owned tread nodes, in the order of `body.tread`: `dofs`: vertical unknowns;
+    `active`: in contact; `force` N, work-conjugate to the road's height; `stiffness` N/m of each
+    unknown.
     """
 
     def __init__(self, body: Body, shape: RoadShape = FLAT) -> None:
@@ -32,7 +34,7 @@ class Road:
         return self.dofs[self.active]
 
     def places(self) -> np.ndarray:
-        """x, y and z (n, 3) m of the owned tread nodes."""
+        """Deformed positions (n, 3) m of the owned tread nodes."""
         body = self._body
         points = body.space.tabulate_dof_coordinates()[body.tread]
         return points + body.owned(body.u.x.array)[body.tread]
@@ -43,51 +45,51 @@ class Road:
         return height if self.shape.flat else height - self.shape.height(*self.places().T[:2])
 
     def pressing(self) -> np.ndarray:
-        """The normal force's part (n,) N along the wheel's z."""
+        """Component of the normal force along the wheel's z, (n,) N."""
         return self.force
 
     def gap(self) -> np.ndarray:
-        """Height of the owned tread nodes above the road, m; infinite without one."""
+        """Height of the owned tread nodes above the road, m; infinite without a road."""
         return self.tread_height() - self.height
 
     def distance(self) -> np.ndarray:
-        """Of the nodes that touch, to the road, as the unknown's force (N)."""
+        """Gaps of the active nodes times their stiffness, N."""
         return (self.stiffness * self.gap())[self.active]
 
     def steps(self) -> tuple[np.ndarray, np.ndarray]:
-        """What held unknowns have to move by (m) to where they are to be, and by how much as the road rises (m per m)."""
+        """Motion (m) of the held unknowns to the road, and their motion per metre of rise."""
         return -self.gap()[self.active], np.ones(int(self.active.sum()))
 
     def weigh(self, diagonal: np.ndarray) -> None:
-        """Take the stiffness (N/m) of the owned unknowns."""
+        """Set the stiffness (N/m) from the diagonal over the owned unknowns."""
         self.stiffness = diagonal[self.dofs].copy()
 
     def take_off(self, out: np.ndarray) -> None:
-        """Subtract the road's forces from forces (N) at the owned unknowns."""
+        """Subtract the road's forces from the forces (N) at the owned unknowns."""
         out[self.dofs] -= self.force
 
     def rows(self, out: np.ndarray) -> np.ndarray:
-        """What of forces out of balance (N) stands at the unknowns that Newton's method solves for."""
+        """The residual (N) in the unknowns that Newton's method solves for."""
         return out
 
     def upward(self, reaction: np.ndarray) -> float:
-        """Of the reactions (N) at the held unknowns, the sum of those that carry the load. Not collective."""
+        """Sum of those reactions (N) at held unknowns that carry the load. Not collective."""
         return float(reaction.sum())
 
     def react(self, reaction: np.ndarray) -> None:
-        """Take the reactions (N) at the held unknowns. Collective."""
+        """Take the reactions (N) at the held unknowns as the road's forces. Collective."""
         self.force[self.active] = reaction
 
     def kept(self) -> tuple[Any, ...]:
-        """What `put_back` puts back."""
+        """The state for `put_back`."""
         return self.active.copy(), self.force.copy(), self.height
 
     def put_back(self, kept: tuple[Any, ...]) -> None:
-        """Be as `kept` says."""
+        """Restore a state from `kept`."""
         self.active, self.force, self.height = kept
 
     def choose(self) -> bool:
-        """Take the active set of the present state; whether it is another one on any process. Collective."""
+        """Update the active set; True if it changed on any process. Collective."""
         wanted = self.pressing() > self.stiffness * self.gap()
         changed = bool((wanted != self.active).any())
         self.active = wanted
@@ -95,7 +97,7 @@ class Road:
         return self._body.comm.allreduce(changed, op=MPI.LOR)
 
     def lay_on(self) -> None:
-        """Put what touches on the road to the last bit: rounding would leave a gap or a penetration. Collective."""
+        """Place active nodes exactly on the road, without gaps by rounding. Collective."""
         field, level = self._body.u.x, np.full(len(self.dofs), self.height)
         if not self.shape.flat:
             level += self.shape.height(*self.places().T[:2])
@@ -103,24 +105,24 @@ class Road:
         field.scatter_forward()
 
     def take(self, force: np.ndarray, height: float) -> None:
-        """Start from the forces (N) of the owned nodes on a road at `height` (m). Collective."""
+        """Start from forces (N) of the owned nodes on a road at `height` (m). Collective."""
         self.force, self.height = force[self._body.tread], height
         self.active = self.force > 0
         self.lay_on()
 
     def at_nodes(self) -> np.ndarray:
-        """Normal force on all owned nodes, its part along the wheel's z, N; not negative."""
+        """Normal force on all owned nodes, its component along the wheel's z, N; not negative."""
         force = np.zeros(self._body.nodes)
         force[self._body.tread] = self.pressing()
         return force
 
     @property
     def travel(self) -> float | None:
-        """How far a wheel that rolls on it with friction travels in a radian, m; None of any other."""
+        """Travel per radian of a wheel rolling with friction, m; None for all others."""
         return None
 
     def pulled(self) -> np.ndarray | None:
-        """Force (nodes, 2) N along and across the road on all owned nodes; None without friction."""
+        """Force (nodes, 2) N along and across the road on own nodes; None without friction."""
         return None
 
     def load(self) -> float:
@@ -128,5 +130,5 @@ class Road:
         return self._body.comm.allreduce(float(self.force.sum()))
 
     def points(self) -> int:
-        """Nodes pressed on. Collective."""
+        """Number of nodes in contact with positive force. Collective."""
         return self._body.comm.allreduce(int((self.force > 0).sum()))

@@ -1,7 +1,8 @@
-"""Damping by the stiffness in the shape of the rolling tire: f = gamma2 Omega K(u) r, r = M^-1 B u.
+"""Stiffness-proportional damping in the steady shape of the rolling tire: f = gamma2 Omega K(u) r,
+r = M^-1 B u.
 
-r is the body rate of the displacement per unit speed, as a field of the finite elements: its gradient
-exists, which that of grad(u) w does not between elements, and at a small motion f is the term
+r is the body rate of the displacement per unit speed, projected on the finite-element space: its
+gradient exists, unlike that of grad(u) w across elements. For small motions f becomes the term
 gamma2 Omega K M^-1 B of the rotating pencil.
 """
 
@@ -19,9 +20,9 @@ from tireroad.fem.tire.body import Body
 
 
 class ShapeDamping:
-    """The force as `work`, a UFL form, and what its derivative by u has beyond that of `work`.
+    """The force as the UFL form `work`, and the part of its derivative that UFL does not see.
 
-    `update` must be called before `work` is assembled. All methods are collective.
+    Call `update` before assembling `work`. All methods are collective.
     """
 
     def __init__(self, body: Body, pressure: Expr, rolling: Rolling) -> None:
@@ -30,13 +31,13 @@ class ShapeDamping:
         self._factor = float(rolling.speed * rolling.stiffness_damping)
         elastic = elastic_work(body, pressure)
         factor = fem.Constant(body.mesh, self._factor)
-        # Carried out at once: UFL numbers the arguments of a derivative of a derivative wrongly.
+        # Expanded at once: UFL numbers the arguments of nested derivatives wrongly.
         along = ufl.derivative(elastic, body.u, self._rate)
         self.work = factor * ufl.algorithms.expand_derivatives(along)
         self._clamp = [body.clamp()]
         self._stiffness_form = compat.form(ufl.derivative(elastic, body.u, body.trial))
         self._stiffness = fem.petsc.create_matrix(self._stiffness_form)
-        # The rim turns as one with the wheel: it has no rate of its own, nor makes any.
+        # The rim rotates rigidly with the wheel: it has no body rate and contributes to none.
         self._rate_matrix = fem.petsc.assemble_matrix(
             compat.form(body_rate_form(body)), self._clamp, 0.0
         )
@@ -48,14 +49,14 @@ class ShapeDamping:
         self._product: PETSc.Mat | None = None
 
     def update(self) -> None:
-        """Take the rate of the body's present displacement."""
+        """Set the rate of the body's present displacement."""
         self._in.array[:] = self._body.owned(self._body.u.x.array).ravel()
         self._rate_matrix.mult(self._in, self._out)
         self._body.owned(self._rate.x.array)[:] = self._out.array_r.reshape(-1, 3)
         self._rate.x.scatter_forward()
 
     def added_to(self, tangent: PETSc.Mat) -> PETSc.Mat:
-        """tangent + gamma2 Omega K M^-1 B, in a matrix of its own and always the same one."""
+        """tangent + gamma2 Omega K M^-1 B, always in the same matrix."""
         self._stiffness.zeroEntries()
         fem.petsc.assemble_matrix(self._stiffness, self._stiffness_form, bcs=self._clamp)
         self._stiffness.assemble()

@@ -1,4 +1,4 @@
-"""What the static solve leaves behind: small arrays that every process holds, and no dolfinx object."""
+"""Result of a static solve: small arrays held by every process, and no dolfinx object."""
 
 from __future__ import annotations
 
@@ -17,17 +17,20 @@ from tireroad.fem.tire.mesh import Lattice
 
 @dataclass(frozen=True, kw_only=True)
 class StaticState:
-    """The tire at rest on the `road`, a level plane unless its shape says otherwise.
+    """The static state of the tire on the `road`.
 
-    `displacement` (n, 3) m of all lattice nodes; of the outer face, in the order of its ids:
-    `points` (s, 3) m undeformed, `moved` (s, 3) m displacement, `force` (s,) N of the road on the
-    tire along the wheel's z, `area` (s,) m2 that a uniform pressure is shared out by, `half_sizes` (s, 2) m of the deformed rectangle each node stands for (x and y),
-    `ring_rate` (s,) m/rad the derivative of the deformed x by the angle around the axle.
-    `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are what it was
-    computed for, and travel with it. `cords` by name of the ply; `mass` (kg) of wall and cords. `fine_extent`: the extent of the
-    contact on finer elements, where that is known (fem.static.load_error).
-    With friction: `pull` (s, 2) N, the road's force on the tire along and across it, and of a tire that rolls `travel`,
-    m in a radian along the road without the wheel's slip.
+    `displacement` (n, 3) m of all lattice nodes. On the outer face, in its node order: `points` (s,
+    3) m undeformed; `moved` (s, 3) m displacement; `force` (s,) N of the road on the tire along the
+    wheel's z; `area` (s,) m2 associated with each node for uniform pressure; `half_sizes` (s, 2) m
+    of the deformed rectangle around each node (x and y); `ring_rate` (s,) m/rad derivative of the
+    deformed x with respect to the ring angle.
+
+    `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are the
+    loads of this state. `cords` by name of the ply; `mass` (kg) of wall and cords; `fine_extent`:
+    contact extent on finer elements if known (fem.static.load_error).
+
+    With friction: `pull` (s, 2) N, force of the road on the tire along and across it, and for a
+    rolling tire `travel`, m per radian along the road without the wheel's slip.
     """
 
     displacement: np.ndarray
@@ -58,14 +61,14 @@ class StaticState:
 
     @property
     def deflection(self) -> float | None:
-        """Way along that normal from first touch, m; None without a road."""
+        """Deflection along that normal from first touch, m; None without a road."""
         if self.road_height is None:
             return None
         return (self.road_height - self.touch_height) * self.road.upright
 
     @property
     def frames(self) -> np.ndarray | None:
-        """Unit vectors (s, 3, 3) along, across and normal to the road at each point; None on a level plane."""
+        """Unit vectors (s, 3, 3) along, across and normal to the road; None on a level plane."""
         return None if self.road.flat else self.road.frames(*self.positions[:, :2].T)
 
     @property
@@ -98,20 +101,20 @@ class StaticState:
 
     @property
     def seen(self) -> np.ndarray:
-        """Positions (s, 3) m with their heights over the road's shape: as from a level plane."""
+        """Positions (s, 3) m with heights relative to the road's shape, as if on a level plane."""
         places = self.positions
         places[:, 2] -= self.road.height(*places[:, :2].T)
         return places
 
     @property
     def gap(self) -> np.ndarray:
-        """Height of the outer face above the road, (s,) m; 0 where it touches."""
+        """Height of the outer face above the road, (s,) m; 0 in contact."""
         gap = self.seen[:, 2] - self.road_height
         return np.where(self.force > 0, 0.0, gap)
 
     @property
     def penetration(self) -> float:
-        """How far the deepest point of the outer face is inside the road as solved, m; 0 without one."""
+        """Largest penetration of outer-face nodes into the road, m; 0 without a road."""
         if self.road_height is None:
             return 0.0
         return max(float((self.road_height - self.seen[:, 2]).max()), 0.0)
@@ -119,9 +122,9 @@ class StaticState:
     def rolling_radius(self) -> float:
         """Effective rolling radius, m: material speed over the road per unit speed of rotation.
 
-        r_e = dx/dtheta of the deformed surface, averaged over the footprint with the contact force,
-        or at the lowest crown point without a road: the speed at which that material would stick. With friction
-        the travel in a radian that was found with it.
+        r_e = dx/dtheta of the deformed surface, averaged over the footprint with the contact force
+        (the speed at which that material would stick), or at the lowest crown point without a road.
+        With friction: the travel per radian of that solution.
         """
         if self.travel is not None:
             return self.travel
@@ -137,7 +140,7 @@ class StaticState:
         return np.divide(self.force, self.area, out=np.zeros_like(self.force), where=touching)
 
     def footprint(self) -> Footprint:
-        """Extent of the contact: as told by finer elements, else of these; zeros without a road."""
+        """Extent of the contact, from finer elements if available; zeros without a road."""
         if self.fine_extent is not None:
             return self.fine_extent
         if self.road_height is None:
@@ -146,7 +149,7 @@ class StaticState:
 
 
 def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
-    """Collect the converged state on every process. Collective."""
+    """Gather the converged state on every process. Collective."""
     body, road_height = equilibrium.body, equilibrium.road_height
     displacement = body.displacement()
     face = body.lattice.face

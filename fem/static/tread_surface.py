@@ -1,4 +1,4 @@
-"""The deformed outer face between its nodes: weights and positions at any place on it."""
+"""Interpolation on the deformed outer face: weights and positions at any point."""
 
 from __future__ import annotations
 
@@ -9,13 +9,11 @@ from scipy.interpolate import LinearNDInterpolator
 from tireroad.fem.matrices.probe import line_shape
 from tireroad.fem.tire.mesh import Lattice
 
-_WINDOW = np.radians(75)  # of the ring and the arc around the lowest point: it faces down there
-_STEP = 1e-6  # rad, of the difference quotients; Newton's rate, not its answer, depends on it
+_WINDOW = np.radians(75)  # around the lowest point, where the face points downwards
+_STEP = 1e-6  # rad, of the difference quotients; affects Newton's rate only, not the result
 _NEWTON = 30
 _CLOSE = 1e-11  # m
-_CLOSE_ANGLE = (
-    1e-9  # rad; at a lowest point the height's error is the square of it, times the radius
-)
+_CLOSE_ANGLE = 1e-9  # rad; at a lowest point the height error is its square times the radius
 
 
 class TreadSurface:
@@ -27,7 +25,7 @@ class TreadSurface:
         self._located: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def weights(self, ring: np.ndarray, arc: np.ndarray) -> sparse.csr_matrix:
-        """Shape functions (k, s) of the face's nodes at angles around the axle and the section, rad."""
+        """Shape functions (k, s) of the face at angles around the axle and the section, rad."""
         lattice, edge = self._lattice, self._lattice.edge
         around, ring_shape = line_shape(lattice.ring_corners, edge, ring % (2 * np.pi))
         along, arc_shape = line_shape(lattice.arc_corners, edge, arc)
@@ -45,10 +43,11 @@ class TreadSurface:
         return self.weights(ring, arc) @ self._positions
 
     def lowest(self) -> float:
-        """Height of the lowest point of the face, m: where a road that comes up touches first.
+        """Height of the lowest point of the face, m: where a rising road touches first.
 
-        An element dips below its lowest node by less than its nodes' range, so all that could reach
-        below every node are looked at; each by a grid that closes in on its lowest point.
+        An element dips below its lowest node by less than the range of its nodes. All elements that
+        could reach below every node are searched, each with a grid that closes in on its lowest
+        point.
         """
         lattice, edge = self._lattice, self._lattice.edge
         order = len(edge) - 1
@@ -68,7 +67,7 @@ class TreadSurface:
         return float(found.min())
 
     def _closed_in(self, ring: np.ndarray, arc: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-        """Boxes (k, 2) a third as wide around the lowest of 7 x 7 points in each, and its height (k,)."""
+        """Boxes (k, 2) a third as wide around the lowest of 7 x 7 points, and heights (k,)."""
         t = np.linspace(0, 1, 7)
         place = [box[:, :1] + (box[:, 1:] - box[:, :1]) * t for box in (ring, arc)]
         grid = np.repeat(place[0], 7, axis=1), np.tile(place[1], (1, 7))
@@ -81,9 +80,10 @@ class TreadSurface:
         return boxes, height.min(axis=1)
 
     def locate(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Angles (rad) of the places seen from below at x, y (k,) m, and which were found (k,) bool.
+        """Angles (rad) of the points seen from below at x, y (k,) m; found or not (k,) bool.
 
-        Newton's method on the deformed surface from the linear inverse between the nodes; once for the same places.
+        Newton's method on the deformed surface, starting from linear interpolation between the
+        nodes; results are cached by x, y.
         """
         key = x.tobytes() + y.tobytes()
         if key not in self._located:

@@ -1,4 +1,4 @@
-"""The virtual work of a body's stresses, inflation and steady rolling, as UFL forms. Not collective."""
+"""Virtual work of stresses, inflation and steady rolling as UFL forms. Not collective."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from tireroad.fem.tire.body import Body
 
 @dataclass(frozen=True, kw_only=True)
 class Rolling:
-    """Steady rolling: speed Omega in rad/s, damping gamma1 in 1/s, stiffness_damping gamma2 in s.
+    """Steady rolling: Omega `speed` rad/s, gamma1 `damping` 1/s, gamma2 `stiffness_damping` s.
 
-    `inertia` "full": of the whole motion, Omega^2 S (X + u), centrifugal forces included; "doppler": of
-    the body rate alone, Omega^2 S_B u, as in the pencil of that name. At speed 0 nothing is added.
+    `inertia` "full": of the inertial rate, Omega^2 S (X + u), with centrifugal forces; "doppler":
+    of the body rate only, Omega^2 S_B u, as in the pencil of that name. At speed 0 nothing is
+    added.
     """
 
     speed: float = 0.0
@@ -30,19 +31,20 @@ AT_REST = Rolling()
 
 
 def static_residual(body: Body, pressure: Expr, rolling: Rolling) -> ufl.Form:
-    """The virtual work of everything but the road, as a UFL form in the body's displacement."""
+    """Virtual work of everything except the road, a UFL form in the body's displacement."""
     work = elastic_work(body, pressure)
     return work + _rolling_work(body, rolling) if rolling.speed else work
 
 
 def elastic_work(body: Body, pressure: Expr) -> ufl.Form:
-    """The virtual work of the stresses, of the cords and of the follower pressure.
+    """Virtual work of the stresses, the cords and the follower pressure.
 
-    The dilatation is integrated by one Gauss point a direction less than the rest. In full it locks:
-    first frequency of the clamped torus at Poisson's ratio 0.4995, order 2, 20 x 8 and 40 x 16
-    elements, 137 and 99 Hz against 94 and 88 Hz so (87 Hz with discontinuous pressures of order 1);
-    at 0.45 it is 104 and 87.1 against 91 and 85.6 (84.9 converged). No unknowns are added: every
-    one keeps a positive mass. Source: Malkus and Hughes 1978, doi 10.1016/0045-7825(78)90005-1.
+    Selective reduced integration: the dilatation has one Gauss point fewer per direction. Fully
+    integrated it locks: at Poisson's ratio 0.4995 the first frequency of the clamped torus (order
+    2, 20 x 8 and 40 x 16 elements) is 137 and 99 Hz, with this rule 94 and 88 Hz (discontinuous
+    pressures of order 1: 87 Hz). At 0.45 it is 104 and 87.1 Hz against 91 and 85.6 Hz (converged:
+    84.9 Hz). No unknowns are added, so all have a positive mass. Source: Malkus and Hughes 1978,
+    doi 10.1016/0045-7825(78)90005-1.
     """
     u, v = body.u, body.test
     F = ufl.variable(kinematics.deformation_gradient(u))
@@ -55,10 +57,10 @@ def elastic_work(body: Body, pressure: Expr) -> ufl.Form:
 
 
 def added_stress(body: Body, share: Expr, before: fem.Function) -> ufl.Form:
-    """int share (S(C) - S(C_0)) : delta E: virtual work of a share of the rubber's stress since the state `before`.
+    """int share (S(C) - S(C_0)) : delta E: work of a share of the stress added since `before`.
 
-    `share` a field of the cells. Its derivative there is that share of the material part of the tangent:
-    what turns the stresses, and pressure and cords, have no part in it.
+    `share` is constant in each cell. The derivative at `before` is that share of the material part
+    of the tangent, without geometric stiffness, pressure and cords.
     """
     u, v = body.u, body.test
     F, F0 = kinematics.deformation_gradient(u), kinematics.deformation_gradient(before)
@@ -84,20 +86,20 @@ def added_energy(body: Body, share: Expr, before: fem.Function) -> ufl.Form:
 
 
 def second_stress(body: Body, part: int, C: Expr) -> Expr:
-    """Second Piola-Kirchhoff stress of the rubber, Pa; part 0 of the distortion, 1 of the dilatation."""
+    """Second Piola-Kirchhoff stress of the rubber, Pa; part 0: distortion, 1: dilatation."""
     C = ufl.variable(C)
     return 2 * ufl.diff(body.wall.energy(C)[part], C)
 
 
 def _rolling_work(body: Body, rolling: Rolling) -> ufl.Form:
-    """The virtual work of inertia and of damping by the mass."""
+    """Virtual work of inertia and of mass-proportional damping."""
     u, v = body.u, body.test
     w = kinematics.wheel_velocity(body.mesh)
     if rolling.inertia == "full":
         rate, test_rate = w + kinematics.convective(u, w), kinematics.convective(v, w)
     else:
         rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
-    # Constants and not numbers: another speed compiles nothing.
+    # fem.Constant: another speed needs no recompilation.
     inertia = fem.Constant(body.mesh, float(rolling.speed**2))
     drag = fem.Constant(body.mesh, float(rolling.speed * rolling.damping))
     work = body.inertia(-inertia * ufl.inner(rate, test_rate))
@@ -105,7 +107,7 @@ def _rolling_work(body: Body, rolling: Rolling) -> ufl.Form:
 
 
 def convection_form(body: Body) -> ufl.Form:
-    """G: the skew part of int rho v . (grad u w), in trial and test functions."""
+    """G: skew part of int rho v . (grad u w), in trial and test functions."""
     u, v = body.trial, body.test
     w = kinematics.wheel_velocity(body.mesh)
     convect = kinematics.convective
@@ -126,19 +128,19 @@ def body_rate_form(body: Body) -> ufl.Form:
 
 
 def tangent(body: Body, residual: ufl.Form) -> ufl.Form:
-    """The derivative of a residual by the body's displacement."""
+    """Derivative of a residual with respect to the body's displacement."""
     return ufl.derivative(residual, body.u, body.trial)
 
 
 def stress_prediction(body: Body, before: fem.Function) -> ufl.Form:
-    """What makes of the tangent the one of a Newton method in displacements and stresses.
+    """Correction that turns the tangent into that of a mixed (displacement-stress) Newton method.
 
-    There the stresses S are unknowns of their own in each Gauss point, S = S(C(u)) is linearised
-    along with equilibrium, and both are condensed to the displacements: the residual is the same and
-    the geometric stiffness int S : sym(grad du^T grad v) takes S = S(C_0) + dS/dC [dC] predicted from
-    the last iterate `before` in place of S(C(u)). A thin or a nearly incompressible wall makes
-    S(C(u)) of an iterate meaningless: stretch is second order in the step, and is multiplied by the
-    largest stiffness. Source: Magisano, Leonetti, Garcea 2017, doi 10.1016/j.cma.2016.10.023.
+    There the stresses S at the Gauss points are independent unknowns; S = S(C(u)) is linearised
+    along with equilibrium and condensed. The residual is unchanged; the geometric stiffness int S :
+    sym(grad du^T grad v) takes S = S(C_0) + dS/dC [dC], predicted from the last iterate `before`,
+    instead of S(C(u)). In a thin or nearly incompressible wall S(C(u)) of an iterate is
+    meaningless, as stretch is of second order in the step and is multiplied by the largest
+    stiffness. Source: Magisano, Leonetti, Garcea 2017, doi 10.1016/j.cma.2016.10.023.
     """
     u, v, du = body.u, body.test, body.trial
     F, F0 = kinematics.deformation_gradient(u), kinematics.deformation_gradient(before)

@@ -1,1 +1,1 @@
-"""The tire as a body: section, mesh, wall, material, and its displacement."""
+"""The tire's finite-element body: mesh, wall, plies, materials and displacement."""

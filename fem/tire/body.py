@@ -1,4 +1,4 @@
-"""The tire as a discretised body: mesh, displacement field, clamped rim and integration measures."""
+"""The tire as a discretised body: mesh, displacement field, clamped rim, integration measures."""
 
 from __future__ import annotations
 
@@ -24,12 +24,13 @@ from tireroad.fem.tire.wall import Region, Wall, compounds
 
 
 class Body:
-    """A ring and what it is made of, with its displacement `u` about the undeformed shape.
+    """A ring of given materials and cords, with its displacement `u` from the undeformed shape.
 
-    A `Ring` comes with the materials of its section's regions by name; a `Torus` with the one of its
-    wall, and regions that have others; `cords` lie on its section's plies, by name. Collective to make. `ids` are the
-    lattice ids of this process's owned nodes; `rim` and `tread` its blocked dofs there (ghosts included in `rim`, as
-    boundary conditions want them); `beads` those of the outer face on the rim.
+    A `Ring` takes materials by name of its section's regions, a `Torus` one for the wall and
+    `regions` with others. `cords` lie on the section's plies of their names. Collective to make.
+    `ids`: lattice ids of this process's owned nodes; `rim` and `tread`: its blocked dofs there
+    (`rim` with ghosts, as boundary conditions need them); `beads`: those of the outer face on the
+    rim.
     """
 
     def __init__(
@@ -55,8 +56,8 @@ class Body:
         self.wall = Wall(self.tire, material)
         self.plies = Plies(self.mesh, order, cords, laid_on(self.tire, cords))
         self.u = fem.Function(self.space)
-        # One of each for all forms: UFL does not always take two of the same space for equal
-        # (seen with dolfinx 0.5.2, from one run to the next).
+        # One test and one trial function for all forms: UFL does not always treat two of the same
+        # space as equal (seen with dolfinx 0.5.2, varying between runs).
         self.test, self.trial = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
         self.nodes = self.space.dofmap.index_map.size_local
         self.ids = self.lattice.ids(self.space.tabulate_dof_coordinates()[: self.nodes])
@@ -64,14 +65,16 @@ class Body:
         tread = self._face_dofs(TREAD)
         self.tread = np.setdiff1d(tread[tread < self.nodes], self.rim)
         self.beads = np.intersect1d(tread, self.rim)
-        # 2 x order integrates the quadratic form of an affine element exactly: full integration.
+        # Degree 2 x order integrates the quadratic form of an affine element exactly: full
+        # integration.
         measure = {"metadata": {"quadrature_degree": 2 * order}}
         self.dx = ufl.Measure("dx", domain=self.mesh, **measure)
-        # One Gauss point a direction less: what the dilatation is integrated with (static_residual).
+        # One Gauss point fewer per direction, for the dilatation (static_residual).
         reduced = {"quadrature_degree": 2 * order - 1}
         self.reduced_dx = ufl.Measure("dx", domain=self.mesh, metadata=reduced)
-        # Two surface tangents and a test function: what exactly makes the pressure's stiffness
-        # symmetric. At order 3 with 2 x order, 7e-8 was left, and no mode was as soft as that.
+        # Two surface tangents and a test function: exact integration makes the pressure stiffness
+        # symmetric. At order 3, degree 2 x order left an asymmetry of 7e-8, more than the
+        # stiffness of the lowest modes.
         exact = {"quadrature_degree": 3 * order - 1}
         self.inner_ds = ufl.Measure(
             "ds", domain=self.mesh, subdomain_data=self.tire.facets, metadata=exact
@@ -88,9 +91,9 @@ class Body:
         return fem.dirichletbc(np.zeros(3), self.rim, self.space)
 
     def nodal_mass(self) -> np.ndarray:
-        """Owned entries (3 nodes,) of int rho phi_i . (1, 1, 1) by the rule whose points are the nodes, cords too.
+        """Lumped mass of the owned dofs (3 nodes,), kg, rim and cords included. Collective.
 
-        kg; positive, rim included. Collective.
+        int rho phi_i . (1, 1, 1) by the quadrature whose points are the nodes, so positive.
         """
         lobatto = {"quadrature_rule": "GLL", "quadrature_degree": 2 * self.ring.order - 1}
         dx = ufl.Measure("dx", domain=self.mesh, metadata=lobatto)
@@ -114,6 +117,6 @@ class Body:
         return self.everywhere(self.owned(self.u.x.array))
 
     def set_displacement(self, values: np.ndarray) -> None:
-        """Take the displacement of all lattice nodes (n, 3), m. Collective."""
+        """Set the displacement of all lattice nodes (n, 3), m. Collective."""
         self.owned(self.u.x.array)[:] = values[self.ids]
         self.u.x.scatter_forward()

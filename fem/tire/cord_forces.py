@@ -1,10 +1,11 @@
-"""The force of every cord at rest, on the grid of the points its ply is integrated at.
+"""Static force of every cord at the integration points of its ply.
 
-    f = E A_c (lambda - 1),  the modulus in compression below lambda = 1, N per cord.
+    f = E A_c (lambda - 1),  with the modulus in compression below lambda = 1, N per cord.
 
-Those points, one Gauss point a direction less than full integration, are where strains of the elements are best
-(Barlow 1976, doi 10.1002/nme.1620100202). The grid is (ring, along): ring angles ascending from the lowest point
-towards +x, then along the ply's line from its first end (lower y at its middle) to its last.
+With one Gauss point per direction fewer than full integration, these are the points where the
+elements' strains are most accurate (Barlow 1976, doi 10.1002/nme.1620100202). The grid is (ring,
+along): ring angles ascending from the lowest point towards +x, then along the ply's line from its
+first end (lower y at its middle) to its last.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from tireroad.fem.tire.plies import RULE, Sheet
 
 @dataclass(frozen=True)
 class CordForce:
-    """Of one ply: `points` (a, b, 3) m undeformed, `force` (a, b) N per cord, tension positive, `area` (a, b) m2 of
-    the undeformed ply that each point stands for.
+    """Cord force of one ply: undeformed `points` (a, b, 3) m, `force` (a, b) N per cord, tension
+    positive, and `area` (a, b) m2 of the undeformed ply associated with each point.
     """
 
     points: np.ndarray
@@ -35,12 +36,12 @@ class CordForce:
 
     @property
     def compressed(self) -> float:
-        """Share of the ply's area whose cords are compressed."""
+        """Fraction of the ply's area whose cords are in compression."""
         return float(self.area[self.force < 0].sum() / self.area.sum())
 
 
 def cord_forces(body: Body) -> dict[str, CordForce]:
-    """The forces of all plies at the body's displacement, on every process. Collective."""
+    """Cord forces by ply at the present displacement, on every process. Collective."""
     found = {}
     for number, one in enumerate(body.plies.cords):
         chain = body.ring.section.plies[one.name]
@@ -62,13 +63,13 @@ def _grid(body: Body, chain: np.ndarray) -> tuple[int, int]:
 
 
 def _ascends(body: Body, chain: np.ndarray) -> np.ndarray:
-    """Whether each edge's own coordinate runs along the chain."""
+    """Whether each edge's local coordinate runs along the chain."""
     section = body.ring.section
     return section.side(chain)[:, 0] == section.chain(chain)[:: section.order][:-1]
 
 
 def _read(body: Body, sheet: Sheet, number: int, chain: np.ndarray, values: np.ndarray) -> None:
-    """Put this process's part of force and area (2, a, b) where it belongs."""
+    """Write this process's part of force and area into `values` (2, a, b)."""
     tire, face = body.tire, sheet.face
     owned = tire.mesh.topology.index_map(3).size_local
     cells = np.flatnonzero(sheet.owner[:owned] == number)
@@ -83,7 +84,7 @@ def _read(body: Body, sheet: Sheet, number: int, chain: np.ndarray, values: np.n
     stretched = ufl.dot(kinematics.deformation_gradient(body.u), sheet.direction)
     stretch = ufl.sqrt(ufl.dot(stretched, stretched))
     cords = body.plies.cords[number]
-    # A face's area is |J^-T n| |det J| a unit of the reference face.
+    # A face's area is |J^-T n| |det J| per unit of the reference face.
     area = face.area * abs(ufl.det(ufl.Jacobian(tire.mesh)))
     stretch, area = (compat.evaluate(e, points, tire.mesh, cells) for e in (stretch, area))
     modulus = np.where(stretch < 1, cords.compression, 1.0) * cords.youngs_modulus

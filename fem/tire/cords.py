@@ -1,10 +1,10 @@
-"""Lines of cords in the wall: what they are made of, and the strain energy of the membrane they form.
+"""Cords of a ply or belt: their properties, and the strain energy of the membrane they form.
 
     W_c = k/2 (lambda - 1)^2 per undeformed area,  k = E A_c / s,  lambda = |F a|,
 
-a the unit direction of the cord in the ply's surface, a = cos(alpha) e_circ + sin(alpha) e_arc: e_circ around
-the axle towards growing ring angle, e_arc along the section from -y to +y. Below lambda = 1 the modulus
-is `compression` times as large: W_c and its slope stay continuous.
+a being the cord's unit direction in the surface of the ply, a = cos(alpha) e_circ + sin(alpha)
+e_arc: e_circ around the axle towards growing ring angle, e_arc along the section from -y to +y.
+Below lambda = 1 the modulus is multiplied by `compression`; W_c and its slope stay continuous.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from tireroad.fem.errors import InputError
 class Cords:
     """The cords of one ply or belt, by the `name` of its line in the section.
 
-    `angle` rad from the circumference (90 degrees: radial); `youngs_modulus` Pa, `area` m2 of one cord,
-    `spacing` m between cords, `density` kg/m3 of the cord, `compression` modulus in compression over that
-    in tension. `drum_radius` m: angle and spacing are those on the building drum, from where the ply was
-    lifted; None: they are those in the tire, everywhere.
+    `angle` rad from the circumference (90 degrees: radial); `youngs_modulus` Pa; `area` m2 of one
+    cord; `spacing` m between cords; `density` kg/m3 of the cord; `compression`: ratio of the moduli
+    in compression and tension. `drum_radius` m: angle and spacing are those on the building drum,
+    from which the ply is lifted; None: they hold everywhere in the tire.
     """
 
     name: str
@@ -46,15 +46,15 @@ class Cords:
 
     @property
     def stiffness(self) -> float:
-        """k = E A_c / s of the spacing given, N/m."""
+        """k = E A_c / s at the given spacing, N/m."""
         return self.youngs_modulus * self.area / self.spacing
 
     def at(self, radius: np.ndarray) -> Woven:
-        """The ply where it lies at a radius (n,) m from the axle.
+        """Properties of the ply at radii (n,) m from the axle.
 
-        Lifted from the drum, cos alpha = (r / r_0) cos alpha_0 and s = s_0 (r / r_0) sin alpha / sin alpha_0:
-        cords keep their length, and each its share of the circumference. Raises InputError where they
-        cannot reach.
+        After lifting from the drum cos alpha = (r / r_0) cos alpha_0 and s = s_0 (r / r_0) sin
+        alpha / sin alpha_0: cords keep their length and their share of the circumference. Raises
+        InputError where the cords cannot reach the radius.
         """
         exact = np.array([np.cos(self.angle), np.sin(self.angle)])
         exact[np.abs(exact) < np.finfo(float).eps] = 0.0  # at 90 and 0 degrees
@@ -75,8 +75,9 @@ class Cords:
 
 @dataclass(frozen=True)
 class Woven:
-    """A ply at n places: `stiffness` k = E A_c / s (n,) N/m, `mass` rho_c A_c / s (n,) kg/m2, and the cord's
-    components `cosine` and `sine` (n,) along e_circ and e_arc, exactly 0 at 90 and 0 degrees.
+    """A ply at n places: `stiffness` k = E A_c / s (n,) N/m, `mass` rho_c A_c / s (n,) kg/m2, and
+    the components `cosine` and `sine` (n,) of the cord along e_circ and e_arc, exactly 0 at 90 and
+    0 degrees.
     """
 
     stiffness: np.ndarray
@@ -97,13 +98,13 @@ def energy(stretch: Expr, stiffness: Expr, slack: Expr) -> Expr:
 
 
 def tension_over_stretch(square: Expr, stiffness: Expr, slack: Expr) -> Expr:
-    """(1/lambda) dW_c/dlambda as a function of lambda^2: the second Piola-Kirchhoff stress, N/m."""
+    """(1/lambda) dW_c/dlambda as a function of lambda^2: second Piola-Kirchhoff stress, N/m."""
     stretch = ufl.sqrt(square)
     return tension(stretch, stiffness, slack) / stretch
 
 
 def tension_over_stretch_rate(square: Expr, stiffness: Expr, slack: Expr) -> Expr:
-    """The derivative of `tension_over_stretch` by lambda^2, N/m."""
+    """Derivative of `tension_over_stretch` with respect to lambda^2, N/m."""
     stretch = ufl.sqrt(square)
     modulus = stiffness * ufl.conditional(ufl.lt(stretch, 1.0), slack, 1.0)
     return modulus / (2 * stretch**3)

@@ -1,10 +1,10 @@
-"""Integrals over one face of each cell, written as cell integrals: the rule's points lie on that face.
+"""Integrals over one face of each cell as cell integrals whose quadrature points lie on the face.
 
     int_face f dA = int_cell-rule f |J^-T n| |det J|,   n the reference normal (Nanson's formula)
 
-No facet integral is needed for a surface inside the body: that would couple the two cells on its sides in
-the sparsity pattern, count each facet's sides in an order of its own on each process, and need cells of other
-processes. Here each cell, and so each process, has the faces that are its own.
+Facet integrals on a surface inside the body would couple the two adjacent cells in the sparsity
+pattern, order each facet's sides differently on each process, and need cells of other processes.
+Here each cell, and thus each process, owns its faces.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ AXES = 3
 
 
 def edge_rule(order: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """Points and weights on [0, 1]: "reduced" `order` Gauss points, "full" one more, "nodes" Lobatto's."""
+    """Points and weights on [0, 1]: "reduced": `order` Gauss points, "full": one more, "nodes":
+    Lobatto's."""
     if kind == "nodes":
         nodes = compat.field_nodes(order)
         points = np.sort(nodes[(nodes[:, 1] == 0) & (nodes[:, 2] == 0), 0])
@@ -33,7 +34,7 @@ def edge_rule(order: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def face_points(axis: int, side: int, line: np.ndarray) -> np.ndarray:
-    """The tensor points (n^2, 3) of a line on a face; the earlier of the other two axes varies slowest."""
+    """Tensor points (n^2, 3) of a line on a face; the lower of the other axes varies slowest."""
     points = np.full((len(line) ** 2, AXES), float(side))
     first, second = (other for other in range(AXES) if other != axis)
     grid = np.array(list(itertools.product(line, line)))
@@ -53,19 +54,20 @@ class Face:
         self.normal = scaled / self.area
 
     def integral(self, integrand: Expr, kind: str) -> ufl.Form:
-        """The UFL form of an integral by area with the rule `kind` of `edge_rule`."""
+        """UFL form of the surface integral with the rule `kind` of `edge_rule`."""
         line, weights = edge_rule(self._order, kind)
         metadata = {
             "quadrature_rule": "custom",
-            "quadrature_degree": 2 * self._order,  # of no effect, but UFL asks for one
-            # Tuples: UFL writes them into the form's signature in full, arrays to eight digits.
+            "quadrature_degree": 2 * self._order,  # no effect, but UFL requires one
+            # Tuples: UFL writes them into the form's signature in full, but arrays only to eight
+            # digits.
             "quadrature_points": _nested(face_points(self.axis, self.side, line)),
             "quadrature_weights": _nested(np.outer(weights, weights).ravel()),
         }
         return self.area * integrand * ufl.Measure("dx", domain=self.mesh, metadata=metadata)
 
     def tangents(self) -> tuple[Expr, Expr]:
-        """(e_circ, e_across) in UFL: around the axle, and e_circ x normal, both in the face's surface."""
+        """(e_circ, e_across) in UFL: around the axle, and e_circ x normal, both in the face."""
         X = ufl.SpatialCoordinate(self.mesh)
         along = ufl.as_vector((-X[2], 0.0, X[0]))
         # The polynomial face is not exactly a surface of revolution.

@@ -1,4 +1,4 @@
-"""Invariants of the right Cauchy-Green tensor C in UFL, from which the material laws are written."""
+"""Invariants of the right Cauchy-Green tensor C in UFL, for the material laws."""
 
 from __future__ import annotations
 
@@ -15,5 +15,5 @@ def isochoric(C: Expr) -> tuple[Expr, Expr]:
 
 
 def dilatation(C: Expr, bulk: Expr) -> Expr:
-    """kappa/2 (J - 1)^2, the form that Abaqus and CalculiX use."""
+    """kappa/2 (J - 1)^2, the form of Abaqus and CalculiX."""
     return bulk / 2 * (ufl.sqrt(ufl.det(C)) - 1) ** 2

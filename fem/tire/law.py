@@ -1,8 +1,8 @@
-"""What a material law is: its parameters, and the strain energy that follows from them.
+"""Interface of a material law: its parameters and strain energy.
 
-A new law is one file in fem.tire.laws, or a class in a user's own script: parameters with unit and range,
-the energy, and the two moduli at zero strain. The scene's keys, `check`, the key reference and the range
-tests follow from it.
+A new law is one file in fem.tire.laws, or a class in a user's script, with its parameters (unit and
+range), the energy, and the two moduli at zero strain. The scene's keys, `check`, the key reference
+and the range tests follow from it.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 class MaterialLaw(Parameters):
     """Base of hyperelastic laws, each a function of the right Cauchy-Green tensor C alone.
 
-    `coefficients` names the attributes that `energy` takes, in that order; they become fields over the
-    mesh, so that another value compiles nothing.
+    `coefficients` names the attributes that `energy` takes, in order. They become fields on the
+    mesh, so that other values need no recompilation.
     """
 
     owner = "material"
@@ -48,8 +48,8 @@ class MaterialLaw(Parameters):
 
     @staticmethod
     def energy(C: Expr, *coefficients: Expr) -> tuple[Expr, Expr]:
-        """Energy per undeformed volume (J/m3) in UFL as (distortion, dilatation): the two are integrated by
-        different rules (fem.static.equilibrium)."""
+        """Energy per undeformed volume (J/m3) in UFL as (distortion, dilatation): the two are
+        integrated with different quadrature rules (fem.static.virtual_work)."""
         raise NotImplementedError
 
 

@@ -1,4 +1,4 @@
-"""A rubber: its strain energy, its density, and how it answers small motions."""
+"""A rubber: strain energy, density, and dynamic properties for small motions."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from tireroad.fem.tire.law import MATERIALS, MaterialLaw
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """A rubber of strain energy `law` and `density` (kg/m3).
+    """A rubber with strain energy `law` and `density` (kg/m3).
 
-    `dynamic`: modulus of small motions over that of the static state; `loss_factor` of small motions.
+    `dynamic`: ratio of the moduli for small motions and for the static state; `loss_factor` for
+    small motions.
     """
 
     law: MaterialLaw
@@ -34,8 +35,9 @@ def compound(
     loss_factor: float = 0.0,
     **parameters: float,
 ) -> Material:
-    """The material of the law named `model` (fem.tire.laws) with that law's parameters (Pa, -), those not
-    given at their defaults. Raises InputError for a value out of its range or of another law.
+    """Material of law `model` (fem.tire.laws); `parameters` (Pa, -) not given at their defaults.
+
+    Raises InputError for a value out of range or a parameter of another law.
     """
     law = MATERIALS[model]
     wrong = sorted(parameters.keys() - law.__dataclass_fields__.keys())

@@ -21,13 +21,13 @@ INNER, TREAD, RIM = 1, 2, 3  # facet tags
 
 
 class Lattice:
-    """The nodes of a ring as a product: angles around the axle times the nodes of the section.
+    """The nodes of a ring as a tensor product of angles around the axle and nodes of the section.
 
-    The id of a node, angle * section nodes + section node, is the same on any number of processes.
-    `edge` (order + 1,) are the nodes on one edge of the reference element, ascending, 0 and 1
-    included; `ring` (a,) rad the angles, `section` (s, 2) m the places (r, y), `cells_2d` (c, n) the
-    section's cells in tensor order. The outer face is a grid of `face_shape`, `ring` times `arc`, the
-    section angles (rad) of its nodes bead to bead.
+    The id of a node, angle * section nodes + section node, does not depend on the number of
+    processes. `edge` (order + 1,): nodes on an edge of the reference element, ascending from 0 to
+    1; `ring` (a,) rad: angles; `section` (s, 2) m: positions (r, y); `cells_2d` (c, n): the
+    section's cells in tensor order. The outer face is a grid of `face_shape`, `ring` times `arc`,
+    the section angles (rad) of its nodes from bead to bead.
     """
 
     def __init__(self, tire: Ring | Torus, edge: np.ndarray) -> None:
@@ -44,7 +44,7 @@ class Lattice:
 
     @cached_property
     def face(self) -> np.ndarray:
-        """Ids of the nodes of the outer face: around the axle, then bead to bead."""
+        """Ids of the nodes of the outer face: around the axle, then from bead to bead."""
         line = self.tire.section.chain(self.tire.section.outer)
         return (np.arange(self.shape[0])[:, None] * self.shape[1] + line).ravel()
 
@@ -54,7 +54,7 @@ class Lattice:
         return position(self.ring[i], self.section[node])
 
     def ids(self, points: np.ndarray) -> np.ndarray:
-        """Ids of the nodes at the given points (n, 3); the element's own map may be off by a little."""
+        """Ids of the nodes nearest to points (n, 3), as element maps deviate slightly."""
         x, y, z = points.T
         ring = np.arctan2(x, -z) % (2 * np.pi)
         i = _nearest(np.append(self.ring, 2 * np.pi), ring) % len(self.ring)
@@ -62,15 +62,15 @@ class Lattice:
         return i * self.shape[1] + node
 
     def circles(self, ids: np.ndarray) -> np.ndarray:
-        """Number of the circle about the axle that each node is on: its node of the section."""
+        """Index of each node's circle about the axle, which is its node of the section."""
         return ids % self.shape[1]
 
     def cells(self) -> np.ndarray:
-        """Ids of the nodes of all elements, (cells, nodes), in the order of the Lagrange element."""
+        """Ids of the nodes of all elements, (cells, nodes), in the Lagrange element's order."""
         return _cells(self, compat.field_nodes(self.tire.order), np.arange(self.tire.elements))
 
     def quads(self) -> np.ndarray:
-        """The outer face as quadrilaterals between neighbouring nodes, (q, 4) indices into it."""
+        """The outer face as quadrilaterals (q, 4) of neighbouring nodes, indices into it."""
         around, along = self.face_shape
         i, j = np.meshgrid(np.arange(around), np.arange(along - 1), indexing="ij")
         next_i = (i + 1) % around
@@ -79,34 +79,34 @@ class Lattice:
 
 
 def position(ring: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Cartesian position (n, 3) of angles around (n,) rad and places (r, y) (n, 2) m."""
+    """Cartesian positions (n, 3) from ring angles (n,) rad and section (r, y) (n, 2) m."""
     r, y = place[:, 0], place[:, 1]
     return np.stack([r * np.sin(ring), y, -r * np.cos(ring)], axis=-1)
 
 
 def _subdivide(corners: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Corner coordinates with the inner nodes of each element set between them."""
+    """Corner coordinates with each element's inner nodes inserted."""
     steps = np.diff(corners)[:, None] * nodes[None, :-1] + corners[:-1, None]
     return np.append(steps.ravel(), corners[-1])
 
 
 def _nearest(line: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Index of the entry of an ascending line next to each value."""
+    """Index of the entry of an ascending line nearest to each value."""
     return np.searchsorted((line[1:] + line[:-1]) / 2, values)
 
 
 def _edge(nodes: np.ndarray) -> np.ndarray:
-    """Nodes on one edge of the reference element, ascending, from its node coordinates."""
+    """Nodes on an edge of the reference element, ascending, from its node coordinates."""
     return np.sort(nodes[(nodes[:, 1] == 0) & (nodes[:, 2] == 0), 0])
 
 
 @dataclass(frozen=True)
 class TireMesh:
-    """The distributed mesh; `lattice` names the nodes of its displacement field.
+    """The distributed mesh; `lattice` numbers the nodes of its displacement field.
 
-    `facets` carries the tags INNER, TREAD and RIM. `section_cell` (cells of this process, ghosts too):
-    the cell of the section each hexahedron is made of. Its reference coordinates are (around, xi, eta):
-    side s of that cell is its face where coordinate 1 + s // 2 is s % 2.
+    `facets` carries the tags INNER, TREAD and RIM. `section_cell`: for each of this process's
+    cells, ghosts included, the section's cell it is made from. Reference coordinates are (around,
+    xi, eta): side s of that cell is the face where coordinate 1 + s // 2 equals s % 2.
     """
 
     ring: Ring
@@ -117,7 +117,7 @@ class TireMesh:
 
 
 def build(comm: MPI.Comm, ring: Ring) -> TireMesh:
-    """The ring of hexahedra. Each process hands in its share of cells and points. Collective."""
+    """The ring of hexahedra; each process passes its share of cells and points. Collective."""
     nodes = compat.geometry_nodes(ring.order)
     geometry = Lattice(ring, _edge(nodes))
     cells = _cells(geometry, nodes, np.arange(*_share(comm, ring.elements)))
@@ -147,13 +147,13 @@ def _cells(lattice: Lattice, nodes: np.ndarray, cells: np.ndarray) -> np.ndarray
 
 
 def _tag(mesh: dmesh.Mesh, ring: Ring, section_cell: np.ndarray) -> dmesh.MeshTags:
-    """Tags of the inner face, the tread and the rim, by the sides of the section's cells.
+    """Tags of inner face, tread and rim, from the sides of the section's cells.
 
-    Cells are numbered alike on all processes, so what a process needs to know lies in its own cells.
+    Cells are numbered alike on all processes, so each process's own cells suffice.
     """
     section, facet_of = ring.section, compat.cell_facets(mesh)
     found: dict[int, int] = {}
-    # Where an edge is in two sets, the later one here has it: what the wheel holds is no face.
+    # An edge in two sets belongs to the later one: a face held by the wheel is no free face.
     for tag, edges in ((INNER, section.inner), (TREAD, section.tread), (RIM, section.rim)):
         for side in range(len(reference.SIDES)):
             marked = np.zeros(len(section.cells), bool)
@@ -164,5 +164,6 @@ def _tag(mesh: dmesh.Mesh, ring: Ring, section_cell: np.ndarray) -> dmesh.MeshTa
     return compat.meshtags(mesh, 2, entities, np.array([found[e] for e in entities.tolist()], int))
 
 
-# Facet of the reference hexahedron where coordinate 0, 1, 2 is 0 or 1 (basix: z = 0, y = 0, x = 0, x = 1, ...).
+# Facet of the reference hexahedron where coordinate 0, 1, 2 is 0 or 1 (basix: z = 0, y = 0, x = 0,
+# x = 1, ...).
 _HEX_FACE = np.array([[2, 3], [1, 4], [0, 5]])

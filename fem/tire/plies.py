@@ -1,7 +1,7 @@
-"""The plies of a body: which face of which cell lies on which, and their forms.
+"""The plies of a body: the cell faces they lie on, and their forms.
 
-Like the coefficients of the wall, those of the cords are data of the compiled forms, one value a cell and 0
-where its face is on no ply: another angle, modulus or number of plies compiles nothing.
+As for the wall, the cords' coefficients are data of the compiled forms, one value per cell and 0
+where its face is on no ply. Another angle, modulus or number of plies needs no recompilation.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from tireroad.fem.tire.mesh import TireMesh
 
 @dataclass(frozen=True)
 class Laid:
-    """Cells (k,) of this process, ghosts included, that have a face on the ply `number`: the face where
-    the reference coordinate `axis` is `side`, 0 or 1. The normal that leaves the cell there is
-    e_arc x e_circ of the ply, or its opposite where `reverse`.
+    """Cells (k,) of this process, ghosts included, with a face on the ply `number`.
 
-    Of the two cells at a face one is named, by any rule that is the same on all processes. `radius` (k,)
-    m of each face from the axle: of use for lifted plies alone.
+    It is the face where the reference coordinate `axis` equals `side`, 0 or 1. The outward normal
+    of the cell there is e_arc x e_circ of the ply, or its opposite if `reverse`. Only one of the
+    two cells at a face is listed, by a rule that is the same on all processes. `radius` (k,) m of
+    each face from the axle, used for lifted plies only.
     """
 
     number: int
@@ -45,16 +45,16 @@ class Laid:
 
 
 class Sheet:
-    """One face of every cell with the cords on it, as fields that are constant in a cell.
+    """One face of every cell with the cords on it, as fields constant in each cell.
 
-    `owner` (cells,) is the number of the ply, or -1; no two of `laid` have a cell in common.
+    `owner` (cells,) is the number of the ply, or -1; no two of `laid` share a cell.
     """
 
     def __init__(
         self, face: Face, count: int, laid: Sequence[Laid], cords: Sequence[Cords]
     ) -> None:
         self.face, self.owner = face, np.full(count, -1)
-        # Where there is no ply: nothing, along a unit vector.
+        # Without a ply: zero stiffness and mass along a unit vector.
         values = dict.fromkeys(("stiffness", "mass", "slack", "sine"), 0.0) | {"cosine": 1.0}
         by_cell = {name: np.full(count, value) for name, value in values.items()}
         for one in laid:
@@ -64,7 +64,7 @@ class Sheet:
             by_cell["slack"][cells] = given.compression
             for name, part in vars(woven).items():
                 by_cell[name][cells] = part
-            # e_arc is e_circ x n or its opposite, n the normal that leaves the cell.
+            # e_arc is e_circ x n or its opposite, n being the cell's outward normal.
             by_cell["sine"][cells] *= -1.0 if one.reverse else 1.0
         space = compat.cell_space(face.mesh)
         fields = {name: fem.Function(space) for name in by_cell}
@@ -78,7 +78,7 @@ class Sheet:
 
 
 class Plies:
-    """All cords of a body, `order` that of its elements; without any, every form is 0. Collective to make."""
+    """All cords of a body; without any, every form is 0. Collective to make."""
 
     def __init__(
         self, mesh: Mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]
@@ -87,7 +87,7 @@ class Plies:
         self.sheets = _sheets(mesh, order, self.cords, laid)
 
     def work(self, u: Expr, v: Expr) -> ufl.Form | int:
-        """Virtual work of the cords' tension in UFL."""
+        """Virtual work of the cords' tension, in UFL."""
         return _sum(self._work(sheet, u, v) for sheet in self.sheets)
 
     def _work(self, sheet: Sheet, u: Expr, v: Expr) -> ufl.Form:
@@ -111,7 +111,7 @@ class Plies:
         return _sum(stored(sheet) for sheet in self.sheets)
 
     def stress_prediction(self, u: Expr, before: Expr, du: Expr, v: Expr) -> ufl.Form | int:
-        """As fem.static.virtual_work.stress_prediction, of the cords."""
+        """The cords' part of fem.static.virtual_work.stress_prediction."""
 
         def correction(sheet: Sheet) -> ufl.Form:
             line, last = self._lines(sheet, u, before)[0], self._lines(sheet, before, v)[0]
@@ -139,12 +139,12 @@ RULE = "reduced"
 
 
 def _sum(forms: Iterable[ufl.Form]) -> ufl.Form | int:
-    """The sum of UFL forms; 0 of none."""
+    """Sum of UFL forms; 0 if there are none."""
     return sum(forms)
 
 
 def _sheets(mesh: Mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]) -> list[Sheet]:
-    """As few sheets as hold all plies: one a face of the cells, and more where plies lie on each other."""
+    """The fewest sheets for all plies: one per cell face, more where plies coincide. Collective."""
     cells = mesh.topology.index_map(3)
     count = cells.size_local + cells.num_ghosts
     taken: dict[tuple[int, int, int], np.ndarray] = {}
@@ -162,8 +162,9 @@ def _sheets(mesh: Mesh, order: int, cords: Sequence[Cords], laid: Sequence[Laid]
 
 
 def laid_on(tire: TireMesh, cords: Sequence[Cords]) -> list[Laid]:
-    """Where the cords lie: on the section's plies of their names. Raises InputError where one has no ply, or a
-    ply no cords. Not collective.
+    """Assign cords to the section's plies of the same names. Not collective.
+
+    Raises InputError for cords without a ply or a ply without cords.
     """
     section = tire.ring.section
     names = [one.name for one in cords]
@@ -192,6 +193,6 @@ def _turned(section: SectionMesh, chain: np.ndarray) -> np.ndarray:
     """Whether e_arc x e_circ, e_arc along the chain, points into the cell of each edge (k,)."""
     start = section.chain(chain)[:: section.order][:-1]
     ascends = section.side(chain)[:, 0] == start
-    # (xi, eta) is right-handed in (r, y): the normal that leaves xi = 1 is eta's direction turned
-    # clockwise, as e_arc x e_circ is e_arc.
+    # (xi, eta) is right-handed in (r, y): the outward normal at xi = 1 is eta's direction turned
+    # clockwise, just as e_arc x e_circ is e_arc turned clockwise.
     return ascends != np.isin(chain[:, 1], (1, 2))

@@ -1,4 +1,4 @@
-"""What the wall is made of, region by region of the section: one value a cell of each coefficient."""
+"""Materials of the wall by region of the section: one value per cell for each coefficient."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from tireroad.fem.tire.mesh import TireMesh
 
 @dataclass(frozen=True, kw_only=True)
 class Region:
-    """A part of a torus's section with a material of its own; the mesh has element edges on its edges.
+    """A part of a torus's section with a material of its own; its boundary lies on element edges.
 
     `arc` (from, to) in rad from the crown, on the sides named: "both", "left" (y < 0) or "right";
-    `depth` (from, to) through the wall, 0 the inner and 1 the outer face.
+    `depth` (from, to) through the wall: 0 inner, 1 outer face.
     """
 
     material: Material
@@ -31,7 +31,7 @@ class Region:
     side: str = "both"
 
     def patch(self, number: int) -> Patch:
-        """The part of the section, named by its number in the scene."""
+        """The part of the section, named after its number in the scene."""
         low, high = self.arc
         right, left = (low, high), (-high, -low)
         arcs = {"both": (right, left), "left": (left,), "right": (right,)}[self.side]
@@ -39,16 +39,16 @@ class Region:
 
 
 def compounds(material: Material, regions: tuple[Region, ...]) -> dict[str, Material]:
-    """The materials of a torus by name of the region of its section."""
+    """The materials of a torus by the names of its section's regions."""
     return {"wall": material} | {r.patch(i).name: r.material for i, r in enumerate(regions)}
 
 
 class Wall:
-    """Density and the coefficients of all laws in use, as fields that are constant in a cell.
+    """Density and coefficients of all laws in use, as fields constant in each cell.
 
-    They are data of the compiled forms, not part of them: another modulus compiles nothing, and a
-    region costs nothing. `materials` by name of the section's regions. Collective to make; raises
-    InputError for a region without a material.
+    They are data of the compiled forms, so another modulus needs no recompilation and regions cost
+    nothing. `materials` by name of the section's regions. Raises InputError for a region without a
+    material. Collective to make.
     """
 
     def __init__(self, tire: TireMesh, materials: Mapping[str, Material]) -> None:
@@ -57,7 +57,7 @@ class Wall:
         missing = [name for name in section.regions if name not in materials]
         if missing:
             raise InputError(f"section: no material for region {missing[0]!r}")
-        self._owner = section.region[tire.section_cell]  # of each cell: the number of its region
+        self._owner = section.region[tire.section_cell]  # region number of each cell
         self._materials = [materials[name] for name in section.regions]
         self.density = self._by_cell([m.density for m in self._materials])
         self.stiffens = any(m.dynamic != 1 for m in self._materials)
@@ -79,11 +79,11 @@ class Wall:
         return field
 
     def stiffening(self) -> fem.Function:
-        """What small motions feel beside the static modulus, as a share of it: dynamic - 1."""
+        """Excess of the dynamic modulus over the static one, as a fraction of it: dynamic - 1."""
         return self._by_cell([m.dynamic - 1 for m in self._materials])
 
     def losses(self) -> fem.Function:
-        """Imaginary part of the modulus of small motions over the static modulus."""
+        """Loss modulus of small motions as a fraction of the static modulus."""
         return self._by_cell([m.dynamic * m.loss_factor for m in self._materials])
 
     def energy(self, C: Expr) -> tuple[Expr, Expr]:

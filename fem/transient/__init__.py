@@ -1,1 +1,1 @@
-"""Full finite elements in time: the reference that modal runs are held to."""
+"""Time integration of the full finite-element model: the reference for modal runs."""

@@ -2,11 +2,11 @@
 
     M u'' + (D + 2 Omega G) u' + K_Omega u = W^T f,   D = gamma1 M + gamma2 K,
 
-by the method of Wood, Bossak and Zienkiewicz (1980), M [(1 - a) u''_{n+1} + a u''_n] + ... = f_{n+1}:
-second order, unconditionally stable, damping what the step does not resolve down to a spectral
-radius rho: a = (rho - 1)/(rho + 1), gamma = 1/2 - a, beta = (1 - a)^2/4. rho = 1 is Newmark's average
-acceleration, which chatters in unilateral contact and does not converge there; rho = 0 is quiet.
-One factorisation, then one pair of triangular solves a step.
+integrated by the method of Wood, Bossak and Zienkiewicz (1980), M [(1 - a) u''_{n+1} + a u''_n] +
+... = f_{n+1}: second order, unconditionally stable, with spectral radius rho for frequencies that
+the step does not resolve: a = (rho - 1)/(rho + 1), gamma = 1/2 - a, beta = (1 - a)^2/4. rho = 1 is
+Newmark's average acceleration, which chatters in unilateral contact and does not converge there;
+rho = 0 does not chatter. One factorisation in total, and one pair of triangular solves per step.
 """
 
 from __future__ import annotations
@@ -27,19 +27,20 @@ from tireroad.fem.transient.air_step import AirStep
 from tireroad.fem.transient.modal_damping import ModalDamping
 from tireroad.fem.transient.wheel_step import Wheel, WheelStep
 
-# What a step needs of the one before; `balanced` is the mean of two accelerations that balances the
-# forces at the step's end.
+# State carried from step to step; `balanced` is the mean of two accelerations that satisfies
+# equilibrium at the end of the step.
 _STATE = ("displacement", "velocity", "acceleration", "balanced")
 
 
 class FullTire:
-    """All degrees of freedom of the tire between the patch's forces and displacements.
+    """All degrees of freedom of the tire, between forces and displacements of the patch.
 
-    The interface of greens.recursion.Recursion, so the same contact loop runs on it. `outputs` (r,
-    3 s) and `loads` (k, 3 s) weigh the nodes of the outer face; `air` is what fills the cavity, its
-    coordinates after the tire's; `corner`: what holds a wheel that moves, and what its motions meet in the tire, which then
-    has neither air nor `modal`; the unknowns are the tire's whole motion and, after it, the wheel's. `modal` damps mode by mode beside `damping`, (gamma1 1/s, gamma2 s).
-    All methods are collective.
+    The interface is that of greens.recursion.Recursion, so the same contact loop runs on it.
+    `outputs` (r, 3 s) and `loads` (k, 3 s) are weights of the outer face's nodes; `air`: the
+    cavity's air, whose coordinates follow the tire's; `corner`: suspension and rim coupling of a
+    moving wheel, without `air` and `modal`; the unknowns are then the tire's whole motion, followed
+    by the wheel's. `modal`: damping by modes in addition to `damping`, (gamma1 1/s, gamma2 s). All
+    methods are collective.
     """
 
     def __init__(
@@ -79,7 +80,8 @@ class FullTire:
         self._columns = on_own_rows(operators, loads).toarray()
         self._modal, self._system = modal, system
         self._joined = modal.joined(self._by_factors, share) if modal else None
-        # Full motion per unit force at the end of a step: the step's answer is then one product.
+        # Full motion per unit force at the end of a step: the response of a step is then one
+        # product.
         self._answer = self._solved_columns(self._columns)
         self._tire = len(self._mass)
         self.wheel, self._air = wheel, None
@@ -91,7 +93,7 @@ class FullTire:
         self._vectors = system.createVecs()
 
     def _with(self, air: Column | None, wheel: Wheel | None) -> AirStep | WheelStep:
-        """Let air or wheel take part: its unknowns are appended to all that has one row each. Collective."""
+        """Include air or wheel: append its unknowns to all arrays with one row each. Collective."""
         first = self._gamma / (self._beta * self._step)
         second = (1 - self._a) / (self._beta * self._step**2)
         part: AirStep | WheelStep
@@ -111,11 +113,11 @@ class FullTire:
         self._gamma, self._beta = 0.5 - self._a, (1 - self._a) ** 2 / 4
 
     def start(self, force: np.ndarray) -> None:
-        """Begin with a force (k,) N that is already there at t = 0, the tire still at rest."""
+        """Start from rest with a force (k,) N that is present at t = 0."""
         self.acceleration = self.balanced = self._columns @ force / self._mass
 
     def predict(self) -> np.ndarray:
-        """Displacement (r,) m at the end of the step with no new force."""
+        """Displacement (r,) m at the end of the step without new force."""
         h, a, beta, gamma = self._step, self._a, self._beta, self._gamma
         moved = self.displacement + h * self.velocity
         kept = (0.5 / beta - 1) * self.acceleration
@@ -130,11 +132,11 @@ class FullTire:
         return solve_columns(self._solver, self._system, right)
 
     def _solved_columns(self, right: np.ndarray) -> np.ndarray:
-        """The same with the damping mode by mode in the system."""
+        """As `_by_factors`, with the modal damping in the system."""
         return (self._joined or self._by_factors)(right)
 
     def _solved(self, right: np.ndarray) -> np.ndarray:
-        """The displacement (own rows) that balances forces (own rows) at the end of the step."""
+        """Displacement (own rows) in equilibrium with forces (own rows) at the end of the step."""
         own, air = np.split(right, [self._tire])
         if self._air:
             air = self._air.shared(air)
@@ -163,24 +165,25 @@ class FullTire:
         return np.concatenate([product + added, dragged])
 
     def advance(self, force: np.ndarray) -> None:
-        """Take the force (k,) N at the end of the step; after `predict`."""
+        """Apply the force (k,) N at the end of the step; call after `predict`."""
         h, beta, gamma = self._step, self._beta, self._gamma
         new = self._free + self._answer @ force
         moved = new - self.displacement - h * self.velocity
         acceleration = moved / (beta * h**2) - (0.5 / beta - 1) * self.acceleration
         self.velocity += h * ((1 - gamma) * self.acceleration + gamma * acceleration)
-        # The scheme's own unknown lags: this is the mean that balances the forces at the step's end.
+        # The scheme's own acceleration lags; this mean satisfies equilibrium at the end of the
+        # step.
         self.balanced = (1 - self._a) * acceleration + self._a * self.acceleration
         self.displacement, self.acceleration = new, acceleration
 
     def wheel_motion(self) -> np.ndarray:
-        """Of rim and body, (7,): three translations m, three rotations rad, the body's height m."""
+        """Motion (7,) of rim and body: three translations m, three rotations rad, height m."""
         assert self.wheel is not None and self._air is not None, "the wheel is held"
         return self.wheel.shown @ self._air.shared(self.displacement[self._tire :])
 
     def snapshot(self) -> dict[str, np.ndarray]:
-        """The state at all nodes of the lattice, (n, 3) each: m, m/s, m/s2, m/s2. On every process. The
-        air's (4, a) beside it.
+        """State at all lattice nodes, (n, 3) each: m, m/s, m/s2, m/s2, on every process; "air": (4,
+        a).
         """
         spread, everywhere = self._operators.spread, self._operators.body.everywhere
         states = {name: np.split(getattr(self, name), [self._tire]) for name in _STATE}
@@ -190,7 +193,7 @@ class FullTire:
         return kept
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from a snapshot, between `advance` and `predict`; written on any number of processes."""
+        """Continue from a snapshot, before `predict`; written by any number of processes."""
         for k, name in enumerate(_STATE):
             own = self._operators.restrict(kept[name][self._operators.body.ids])
             if self._air and self._air.mine:
@@ -198,5 +201,5 @@ class FullTire:
             setattr(self, name, own)
 
     def inertia_force(self) -> np.ndarray:
-        """Rate of the momentum (3,) of tire and air, N: the convective parts cancel around the ring."""
+        """Rate of momentum (3,) of tire and air, N; convective parts cancel around the ring."""
         return summed(self.comm, self._carried @ self.balanced)

@@ -1,9 +1,10 @@
-"""Damping mode by mode in full finite elements: a matrix of low rank beside the sparse ones.
+"""Modal damping in the full finite-element model: a low-rank matrix in addition to the sparse ones.
 
-    D_x = M Phi diag(e) Phi^T M,   and in the rolling pencil  K_x = Omega D_x M^-1 B = Omega M Phi diag(e) Phi^T B,
+    D_x = M Phi diag(e) Phi^T M,   and in the rolling pencil
+    K_x = Omega D_x M^-1 B = Omega M Phi diag(e) Phi^T B,
 
-e_k the rate of mode k beyond the uniform one of the sparse matrices. A system A + c D_x + K_x is solved by A's
-factors and a small matrix (Sherman, Morrison and Woodbury).
+e_k being the damping rate of mode k in excess of the sparse matrices' uniform one. A system A + c
+D_x + K_x is solved with A's factorisation and a small matrix (Sherman, Morrison and Woodbury).
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ from tireroad.fem.matrices.operators import Operators
 
 
 class ModalDamping:
-    """`fields` own rows (n, m) of M-orthonormal modes, kg^-1/2, and `excess` (m,) 1/s. Collective to make.
+    """`fields`: own rows (n, m) of M-orthonormal modes, kg^-1/2; `excess` (m,) 1/s. Collective.
 
-    `body`: the matrix B of a wheel that turns at `speed` (rad/s), None standing.
+    `body`: the matrix B of a wheel that rotates at `speed` (rad/s), None if standing.
     """
 
     def __init__(
@@ -39,13 +40,13 @@ class ModalDamping:
         self._turned = 0.0 if body is None else -speed * multiply(body, fields)
 
     def force(self, rate: np.ndarray) -> np.ndarray:
-        """D_x rate, own rows, N, of velocities (n,) m/s. Collective."""
+        """D_x rate, own rows, N, for velocities (n,) m/s. Collective."""
         return self._push @ summed(self._comm, self._weighted.T @ rate)
 
     def joined(
         self, solve: Callable[[np.ndarray], np.ndarray], share: float
     ) -> Callable[[np.ndarray], np.ndarray]:
-        """The solver of A + share D_x + K_x from that of A, `solve`: own rows (n, k) to own rows. Collective."""
+        """Solver of A + share D_x + K_x, own rows (n, k), from `solve`, that of A. Collective."""
         reading = share * self._weighted + self._turned
         through = solve(self._push)
         small = np.eye(through.shape[1]) + summed(self._comm, reading.T @ through)

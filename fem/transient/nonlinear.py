@@ -1,11 +1,13 @@
-"""Full finite elements in time with large motions, standing or rolling: what linearising leaves out.
+"""Full finite elements in time with large motions, standing or rolling.
 
     M u'' + (D + 2 Omega G) u' + F(u) = W^T f + f_static,   D = gamma1 M + gamma2 K,
 
-F the forces of the hyperelastic wall, of its cords and of the follower pressure at the total displacement, and of a wheel that
-turns those of steady rolling (fem.static.virtual_work), K their tangent at the static state, by the same method of Wood, Bossak and Zienkiewicz as `fem.transient.linear`: the
-two differ in F alone. Each step is solved by iterations on the one factorisation of the linear step,
-which inertia keeps near the true one; contact is solved anew in each.
+F being the internal forces of the hyperelastic wall and its cords, the follower pressure and, for a
+rotating wheel, the steady-rolling forces (fem.static.virtual_work) at the total displacement, K
+their tangent at the static state. The integration method is that of `fem.transient.linear` (Wood,
+Bossak and Zienkiewicz); the two differ in F only. Each step is solved by iterations with the
+factorisation of the linear step, to which inertia keeps the true tangent close; contact is solved
+in each iteration.
 """
 
 from __future__ import annotations
@@ -39,12 +41,12 @@ MOST_TURNS = 60
 
 
 class NonlinearTire(FullTire):
-    """The nonlinear tire between the patch's forces and displacements, about its static state.
+    """The nonlinear tire between forces and displacements of the patch, about its static state.
 
-    The interface of FullTire and one call more: after each contact solve `settle` says whether the
-    motion balances, or for which free displacement to solve the contact again. `operators` are those
-    of the static state, at `inflation` (Pa); `turning` the matrices of rotation and the rolling of that state, None: it stands.
-    `turns`: iterations so far. All methods are collective.
+    FullTire's interface plus `settle`: after each contact solve it tells whether the motion is in
+    equilibrium, or for which free displacement to solve the contact again. `operators` are those of
+    the static state at `inflation` (Pa); `turning`: rotation matrices and rolling of that state,
+    None: standing. `turns`: iterations so far. All methods are collective.
     """
 
     def __init__(
@@ -95,16 +97,16 @@ class NonlinearTire(FullTire):
         self.turns = 0
 
     def predict(self) -> np.ndarray:
-        """Displacement (r,) m at the end of the step with no new force, in a first approximation."""
+        """First estimate of the displacement (r,) m at the end of the step without new force."""
         self._tried = 0
         here = self.displacement
         return self._freed(here - self._solved(self._dynamic(here) + self._elastic))
 
     def settle(self, force: np.ndarray) -> np.ndarray | None:
-        """None when the motion under a force (k,) N balances, to TOLERANCE; then `advance` takes it.
+        """None if the motion under a force (k,) N is in equilibrium; then call `advance`.
 
-        Else a better displacement (r,) m with no new force, for which to solve the contact again.
-        ConvergenceError after MOST_TURNS of them.
+        Otherwise a better displacement (r,) m without new force, for which to solve the contact
+        again. Raises ConvergenceError after MOST_TURNS iterations.
         """
         new = self._free + self._answer @ force
         elastic = self._at(new, self._forces) - self._rest
@@ -130,7 +132,7 @@ class NonlinearTire(FullTire):
         return summed(self.comm, self._outputs @ free)
 
     def _dynamic(self, new: np.ndarray) -> np.ndarray:
-        """Forces of inertia and damping, N, when the step ends at a displacement (own rows)."""
+        """Inertia and damping forces, N, if the step ends at displacement `new` (own rows)."""
         h, a, beta, gamma = self._step, self._a, self._beta, self._gamma
         moved = new - self.displacement - h * self.velocity
         acceleration = moved / (beta * h**2) - (0.5 / beta - 1) * self.acceleration
@@ -139,7 +141,7 @@ class NonlinearTire(FullTire):
         return self._mass * balanced + self._product(rate)
 
     def _at(self, motion: np.ndarray, work: ufl.Form) -> np.ndarray:
-        """What `work()` says at the static state plus a motion; the body is put back."""
+        """Value of `work()` at the static state plus a motion; the body is restored."""
         field = self._body.u.x
         field.array[self._operators.unknowns.free] += motion
         field.scatter_forward()
@@ -159,18 +161,20 @@ class NonlinearTire(FullTire):
         return self.comm.allreduce(fem.assemble_scalar(self._potential_form))
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
-        """Go on from a snapshot, between `advance` and `predict`; written on any number of processes."""
+        """Continue from a snapshot, before `predict`; written by any number of processes."""
         super().restore(kept)
         self._elastic = self._at(self.displacement, self._forces) - self._rest
 
     def energy(self) -> float:
-        """Kinetic energy and what wall and inflation have stored since the static state, J, of a standing wheel."""
+        """Kinetic energy and energy stored since the static state, J; standing wheel only."""
         kinetic = self.comm.allreduce(self._mass @ self.velocity**2) / 2
         return kinetic + self._at(self.displacement, self._stored) - self._rest_potential
 
 
 def _potential(body: Body, pressure: Expr) -> ufl.Form:
-    """Strain energy of wall and cords and p V, J, in UFL; V(u) the volume behind the inner face, whose edges stand still."""
+    """Strain energy of wall and cords plus p V, J, in UFL.
+
+    V(u) is the volume enclosed by the inner face, whose edges are fixed."""
     F = kinematics.deformation_gradient(body.u)
     distortion, dilatation = body.wall.energy(F.T * F)
     place = ufl.SpatialCoordinate(body.mesh) + body.u

@@ -1,12 +1,13 @@
-"""A wheel that moves, in one implicit step of the full finite elements: its few unknowns, eliminated.
+"""A moving wheel in an implicit step of the full finite elements, eliminated.
 
-Small motions of the tire against its rim, w, and of rim and body, xi, have the blocks of modal.corner with the unit matrix for modes:
+Small motions w of the tire relative to its rim, and xi of rim and body, have the blocks of
+modal.corner with the unit matrix in place of modes:
 
     X_ww, X_wr = X R, X_rw = +-(X R)^T, X_rr    of mass, damping and stiffness.
 
-The unknowns here are the tire's whole motion u = w + R xi and x, xi = L^-T x, L L^T the inertia of rim, wheel and body alone: the
-mass is diagonal then, contact sees u and nothing else, and loads act on it alone. With T = (1, -R; 0, L^-T), X' = T^T X T, and a step
-solves
+The unknowns are the tire's whole motion u = w + R xi, and x with xi = L^-T x, L L^T being the
+inertia of rim, wheel and body alone. The mass is then diagonal, and contact and loads involve u
+only. With T = (1, -R; 0, L^-T), X' = T^T X T, a step solves
 
     [A   B] [u]   [r]
     [C^T Z] [x] = [s].
@@ -31,9 +32,12 @@ Array = np.ndarray
 
 
 class Wheel:
-    """Of `operators` whose rim is held, the `rim`'s motions and the `axle`: for damping (1) and stiffness (0) `columns` and
-    `rows` (n, c) of the tire's own unknowns and `own` (c, c); `carried` (3, c) kg^1/2; `shown` (7, c) motions of rim and body
-    per x. `drag` and `stiffness` are the tire's matrices as it rolls. Collective to make.
+    """Matrices of the moving wheel. Collective to make.
+
+    `operators` have a fixed rim; `rim`: products with the rim's motions; `axle`: suspension; `drag`
+    and `stiffness`: the tire's matrices as it rolls. For damping (1) and stiffness (0): `columns`
+    and `rows` (n, c) on the tire's own unknowns and `own` (c, c); `carried` (3, c) kg^1/2: momentum
+    per unit rate; `shown` (7, c): motions of rim and body per x.
     """
 
     def __init__(
@@ -86,7 +90,7 @@ def _transposed(matrix: PETSc.Mat, vectors: Array) -> Array:
 
 
 class WheelStep:
-    """As fem.transient.air_step.AirStep, of the `wheel`; `weights` (c1 1/s, c2 1/s2). Collective, as its methods are."""
+    """AirStep's counterpart for the `wheel`; `weights` (c1 1/s, c2 1/s2). All is collective."""
 
     def __init__(
         self, wheel: Wheel, solve: Callable[[Array], Array], weights: tuple[float, float]
@@ -103,29 +107,30 @@ class WheelStep:
 
     @property
     def rows(self) -> int:
-        """Unknowns of the wheel on this process."""
+        """Number of the wheel's unknowns on this process."""
         return self.count if self.mine else 0
 
     def shared(self, own: Array) -> Array:
-        """The wheel's values (c, ...) on every process, from those after the tire's own."""
+        """The wheel's values (c, ...) on every process, from the owner's."""
         return self._comm.bcast(own if self.mine else None, root=self._comm.size - 1)
 
     def right(self, own: Array, wheel: Array) -> Array:
-        """Own rows of the tire's right side: the wheel's own forces are not on it."""
+        """Own rows of the tire's right-hand side; forces on the wheel do not contribute."""
         return own
 
     def complete(self, free: Array, wheel: Array) -> Array:
-        """Own rows (n + rows, ...) of u and x, from A^-1 right (n, ...) and the wheel's forces (c, ...)."""
+        """Own rows (n + rows, ...) of u and x, from A^-1 right (n, ...), wheel forces (c, ...)."""
         x = self._inverse @ (wheel - summed(self._comm, self._rows.T @ free))
         u = free - self._columns @ x
         return np.concatenate([u, x]) if self.mine else u
 
     def dragged(self, tire: Array, rates: Array) -> tuple[Array, Array]:
-        """What damping couples: on the tire's own rows (n,), and on the wheel's (rows,), by velocities of both."""
+        """Damping forces on the tire's own rows (n,) and the wheel's (rows,), from the velocities
+        of both. On the tire only those due to the wheel's velocity."""
         x = self.shared(rates)
         back = summed(self._comm, self._wheel.rows[1].T @ tire) + self._wheel.own[1] @ x
         return self._wheel.columns[1] @ x, back if self.mine else rates
 
     def momentum(self) -> Array:
-        """(3, rows) kg^1/2 per rate."""
+        """Momentum (3, rows) kg^1/2 per unit rate."""
         return self._wheel.carried[:, : self.rows]

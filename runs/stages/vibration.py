@@ -10,6 +10,7 @@ import numpy as np
 
 from tireroad.contact.results.levels import a_weighting, band_sums
 from tireroad.contact.results.spectra import amplitudes
+from tireroad.fem.errors import InputError
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
 from tireroad.greens.vibration import Surface, coordinates, mean_square_velocity, radiated_power
@@ -90,6 +91,11 @@ class VibrationStage(WholeTire[Vibration]):
         frequency, amplitude = amplitudes(pushed, forces.step)
         top = self.spectra.product.limit.frequency if self.spectra else self.band
         below = (frequency > 0) & (frequency <= top)
+        if not below.any():
+            raise InputError(
+                f"output.vibration: {len(pushed) * forces.step:.3g} s of forces have no spectral line up to the "
+                f"{top:.4g} Hz to which the modes are an answer; raise time.duration or modal.count"
+            )
         return frequency[below], coordinates(basis.states, amplitude[below], frequency[below])
 
     def write(self, file: h5py.File, product: Vibration) -> None:

@@ -32,6 +32,8 @@ def attack(folder: Path, scenes: int, seed: int, limit: float = LIMIT) -> list[s
         status = _run(folder, changed, folder / "whole", limit)
         parts = sorted((folder / "whole").glob("*.h5")) if status == 0 else []
         print(f"  scene {number}: {name} {changed}: exit {status}, {len(parts)} files", flush=True)
+        if status not in (0, 2, 3, 4, None):
+            failures.append(f"{name} {changed}: exit {status}")
         whole = content(folder / "whole") if parts else {}
         for part in parts:
             shutil.rmtree(folder / "again", ignore_errors=True)

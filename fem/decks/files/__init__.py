@@ -1,1 +1,1 @@
-"""What a file says, read as data: Abaqus decks and Gmsh meshes."""
+"""File contents read as data: Abaqus decks and Gmsh meshes."""

@@ -1,4 +1,4 @@
-"""An Abaqus deck read into a `Deck`: keyword by keyword, and what is not used kept as a list."""
+"""Reader of Abaqus decks, keyword by keyword, with a list of what is not used."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from tireroad.fem.decks.files.lines import Card, Data, Place, cards
 from tireroad.fem.decks.files.numbers import LABEL, records, rows
 from tireroad.fem.errors import InputError
 
-# Keywords that describe an analysis and not the tire; anything else unknown is called so.
+# Keywords that describe an analysis and not the tire; all others not handled are reported as
+# unknown.
 _ANALYSIS = frozenset(
     """AMPLITUDE|ANALYTICAL SURFACE|ASSEMBLY|BOUNDARY|CHANGE FRICTION|CONSTRAINT CONTROLS|CONTACT|
 CONTACT PAIR|CONTROLS|CLOAD|CONTACT CONTROLS|CONTACT INCLUSIONS|CONTACT OUTPUT|CONTACT PRINT|CONTACT FILE|
@@ -35,7 +36,7 @@ CONTACT DAMPING|FASTENER|CONNECTOR SECTION|CONNECTOR BEHAVIOR|BEAM SECTION|RELEA
         "\n", ""
     ).split("|")
 )
-# Without these the tire would be another one than the deck's.
+# Ignoring these would give a different tire.
 _REFUSED = {
     "NMAP": "nodes are read as they are given, moved by no map: write their places out",
     "REBAR": "cords are read from *REBAR LAYER in *SURFACE SECTION or *MEMBRANE SECTION",
@@ -44,7 +45,7 @@ _REFUSED = {
 
 
 def read(path: Path) -> Deck:
-    """The deck of a file. Raises InputError with file and line for what is wrong in it."""
+    """The deck in a file. Raises InputError with file and line for errors in it."""
     reader = _Reader(path)
     for item in cards(path):
         if isinstance(item, Card):
@@ -55,7 +56,7 @@ def read(path: Path) -> Deck:
 
 
 class _Reader:
-    """Keeps the data of a keyword that is used until the next one begins, and then reads it."""
+    """Collects the data of a used keyword until the next keyword begins, then interprets it."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -82,7 +83,7 @@ class _Reader:
         }
 
     def begin(self, card: Card) -> None:
-        """A keyword begins: what the one before it held is read."""
+        """A keyword begins: interpret the data of the one before."""
         self._end()
         self.card = card
         structure = {
@@ -177,11 +178,11 @@ class _Reader:
             self.sets.add_nodes(card, np.unique(np.concatenate(nodes)))
 
     def _refuse(self, card: Card, lines: list[Data], _: int) -> None:
-        if card.keyword != "SYSTEM" or lines:  # *SYSTEM alone goes back to the global one
+        if card.keyword != "SYSTEM" or lines:  # *SYSTEM without data restores the global system
             raise card.place.error(f"*{card.keyword} is not read: {_REFUSED[card.keyword]}")
 
     def finish(self) -> Deck:
-        """The deck, once the file has ended."""
+        """The deck, once the file has ended. Raises InputError if it is incomplete."""
         self._end()
         open_ = self.step or self.part
         if open_:
@@ -212,14 +213,14 @@ class _Reader:
         )
 
     def _used(self) -> Iterator[str]:
-        """One line for each kind of thing that is read."""
+        """One line for each kind of item read."""
         yield f"{self.nodes.count} nodes in {self.nodes.blocks} blocks"
         for block in self.elements.blocks:
             yield f"{len(block.labels)} elements {block.type} ({block.place})"
         yield from self.sections.used()
 
     def _not_used(self) -> Iterator[str]:
-        """One line for each keyword that is not used, with the first line it stands in."""
+        """One line for each keyword not used, with its first place."""
         for name, places in self.unused.items():
             keyword = name.split(",")[0]
             known = keyword in _ANALYSIS or keyword in self.handlers or keyword == "INSTANCE"

@@ -10,7 +10,7 @@ from tireroad.fem.decks.files.abaqus_sets import data_lines
 from tireroad.fem.decks.files.lines import Card, Data, Place
 from tireroad.fem.decks.files.numbers import number
 
-# Suboptions of *MATERIAL that are read; others of a material are listed as not used by the reader.
+# Suboptions of *MATERIAL that are read; the reader lists all others as not used.
 SUBOPTIONS = (
     "HYPERELASTIC",
     "ELASTIC",
@@ -22,7 +22,7 @@ SUBOPTIONS = (
 
 
 class SectionReader:
-    """What the elements are made of, as the deck says it."""
+    """Collects what the elements consist of, as written in the deck."""
 
     def __init__(self) -> None:
         self.solids: list[Solid] = []
@@ -64,12 +64,12 @@ class SectionReader:
             )
 
     def _shell(self, card: Card, lines: list[Data], _: int) -> None:
-        """Not used: a road or a wheel. Its cords would be the tire's."""
+        """Not used: a road or a wheel. Its cords would be taken for the tire's."""
         self._membranes = None
         self.unused.append(f"*SHELL SECTION: not used ({card.place})")
 
     def _layer(self, card: Card, lines: list[Data], _: int) -> None:
-        """name, area, spacing, position, material, angle, direction, extension, radius."""
+        """Data: name, area, spacing, position, material, angle, direction, extension, radius."""
         if self._membranes is None:
             raise card.place.error(
                 "*REBAR LAYER belongs after a *SURFACE SECTION or *MEMBRANE SECTION; cords in shells are not read"

@@ -12,7 +12,7 @@ from tireroad.fem.decks.files.lines import Card, Data, Place
 from tireroad.fem.decks.files.numbers import fields, label, labels, rows, shown
 
 _FACE = re.compile(r"S([1-6])")
-_NAME = re.compile(r"[^\d\s+.-]")  # a field that is the name of a set and no number
+_NAME = re.compile(r"[^\d\s+.-]")  # marks a field as the name of a set, not a number
 
 
 def data_lines(lines: list[Data]) -> Iterator[tuple[Place, list[str]]]:
@@ -25,9 +25,9 @@ def data_lines(lines: list[Data]) -> Iterator[tuple[Place, list[str]]]:
 
 
 class SetReader:
-    """Collects sets as they are written; names are resolved when the deck is whole.
+    """Collects sets as written; names are resolved once the deck is complete.
 
-    `scopes` is the number of the part of each instance: sets of an assembly name their instance.
+    `scopes`: part number of each instance, since sets of an assembly name their instance.
     """
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class SetReader:
         self.unused: list[str] = []
         self.reflected: list[
             np.ndarray
-        ] = []  # elements whose faces have other numbers than their originals'
+        ] = []  # elements whose faces are numbered differently from their originals'
 
     def add_nodes(self, card: Card, labels: np.ndarray) -> None:
         """The NSET of a *NODE."""
@@ -50,7 +50,7 @@ class SetReader:
         self.into(self.element_sets, card.options.get("ELSET"), labels)
 
     def into(self, sets: dict[str, Members], name: str | None, labels: np.ndarray) -> None:
-        """Put labels into the set of a name, if there is one."""
+        """Add labels to the set of this name, if one is given."""
         if name:
             self._members(sets, name).labels.append(labels)
 
@@ -100,7 +100,7 @@ class SetReader:
             members.ranges.append((int(first) + offset, int(last) + offset, int(step)))
 
     def surface(self, card: Card, lines: list[Data], scope: int) -> None:
-        """A *SURFACE: (set or element, face) a line."""
+        """A *SURFACE: one (set or element, face) per line."""
         name = card.options.get("NAME", "").upper()
         sort = card.options.get("TYPE", "ELEMENT").upper()
         if not name:
@@ -132,13 +132,13 @@ class SetReader:
         return int(match[1]) - 1
 
     def pressure(self, card: Card, lines: list[Data], _: int) -> None:
-        """Surfaces with a pressure in a step: the inner face, most likely."""
+        """Record surfaces under pressure in a step: most likely the inner face."""
         for _place, parts in data_lines(lines):
             if len(parts) > 1 and parts[1].upper() == "P":
                 self.pressed.append(parts[0].upper())
 
     def resolved_surfaces(self, elements: np.ndarray) -> dict[str, np.ndarray]:
-        """name -> (k, 2) of (element, face). Raises InputError for a set that is not there."""
+        """name -> (k, 2) of (element, face). Raises InputError for an unknown set."""
         sets = Sets("element set", self.element_sets, elements)
         return {name: self._resolved(parts, sets) for name, parts in self.surfaces.items()}
 

@@ -1,4 +1,4 @@
-"""The element types of Abaqus that a tire's section or body is made of."""
+"""The Abaqus element types that can form a tire's section or body."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from tireroad.fem.decks.files.lines import Place
 
 @dataclass(frozen=True)
 class Kind:
-    """A shape: `role` solid or membrane, dimension of the deck, nodes, and nodes of each face.
+    """An element shape: `role` solid or membrane, dimension of the deck, nodes and faces.
 
-    A face is given by its corner nodes, in the order S1, S2, ... of the manual.
+    A face is given by its corner nodes, in the manual's order S1, S2, ...
     """
 
     role: str
@@ -24,7 +24,7 @@ class Kind:
     faces: tuple[tuple[int, ...], ...] = ()
 
     def reflected(self, asked: Place) -> list[int]:
-        """The nodes' order that gives the mirror image of an element a positive volume again."""
+        """Node order that gives the mirror image of an element a positive volume."""
         if self not in _REFLECTED:
             raise asked.error(f"*ELCOPY, REFLECT of elements of {self.nodes} nodes is not read")
         return _REFLECTED[self]
@@ -42,8 +42,8 @@ _HEXAHEDRON = (
     (3, 7, 4, 0),
 )
 
-# H hybrid, R reduced, I incompatible modes, T coupled temperature, M modified: ways to integrate, which
-# the program does in its own way.
+# H hybrid, R reduced, I incompatible modes, T coupled temperature, M modified: the program has its
+# own integration rules and ignores these.
 _FAMILIES = (
     (re.compile(r"(?:CGAX|CAX)([3468])[RHIMT]*"), "solid", 2),
     (re.compile(r"C3D(4|6|8|10|15|20|27)[RHIMST]*"), "solid", 3),
@@ -72,7 +72,7 @@ _MEMBRANES = {
     (3, 8): Kind("membrane", 3, 8, 4),
     (3, 9): Kind("membrane", 3, 9, 4),
 }
-# The first node stays, the rest go round the other way; bodies: end faces in turn.
+# The first node stays, the others are traversed in reverse; in solids this holds for each end face.
 _REFLECTED = {
     _SOLIDS[2, 3]: [0, 2, 1],
     _SOLIDS[2, 4]: [0, 3, 2, 1],
@@ -86,7 +86,7 @@ _REFLECTED = {
 
 
 def kind(name: str) -> Kind | None:
-    """The shape of an Abaqus type in capitals; None for one that is not used."""
+    """The shape of an Abaqus type in capitals; None for a type that is not used."""
     for pattern, role, dimension in _FAMILIES:
         match = pattern.fullmatch(name)
         if match:
@@ -96,7 +96,7 @@ def kind(name: str) -> Kind | None:
 
 
 def used_kind(name: str) -> Kind:
-    """The shape of a type that is known to be used."""
+    """The shape of a type known to be used."""
     found = kind(name)
     assert found is not None, f"{name} is not among the types that are used"
     return found
@@ -104,7 +104,7 @@ def used_kind(name: str) -> Kind:
 
 @dataclass(frozen=True)
 class Block:
-    """Elements of one type: labels (n,), nodes (n, k) by label, and the line that began them."""
+    """Elements of one type: labels (n,), nodes (n, k) by label, and the line where they begin."""
 
     type: str
     kind: Kind
@@ -113,5 +113,5 @@ class Block:
     place: Place
 
     def rows(self, rows: list[int] | np.ndarray) -> Block:
-        """Some of them."""
+        """The given rows of the block."""
         return Block(self.type, self.kind, self.labels[rows], self.nodes[rows], self.place)

@@ -1,7 +1,7 @@
-"""Nodes and elements that an Abaqus deck makes from others: *NGEN, *NFILL, *NCOPY, *ELGEN, *ELCOPY.
+"""Nodes and elements that an Abaqus deck generates: *NGEN, *NFILL, *NCOPY, *ELGEN, *ELCOPY.
 
-As in Abaqus a keyword sees the nodes, elements and sets that stand before it. Source: the Keywords Reference
-and "Node definition", "Element definition" of the Analysis User's Guide.
+As in Abaqus a keyword sees the nodes, elements and sets defined before it. Source: the Keywords
+Reference, and "Node definition" and "Element definition" in the Analysis User's Guide.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from tireroad.fem.decks.files.lines import Card, Data, Place
 from tireroad.fem.decks.files.numbers import LABEL, label, number
 from tireroad.fem.decks.files.placing import along_arc, along_line, copied
 
-MOST = 10**7  # nodes or elements that one deck makes
+MOST = 10**7  # limit of generated nodes and elements per deck
 
 Line = tuple[Place, list[str]]
 
 
 class Generator:
-    """Handlers of the keywords that make nodes and elements from those known so far."""
+    """Handlers of keywords that generate nodes and elements from those known so far."""
 
     def __init__(self, nodes: KnownNodes, elements: KnownElements, sets: SetReader) -> None:
         self._nodes, self._elements, self._sets = nodes, elements, sets
@@ -38,7 +38,8 @@ class Generator:
         }
 
     def _ngen(self, card: Card, lines: list[Data], scope: int) -> None:
-        """first, last, step of the labels, extra node or its coordinates, normal of the arc: a line of nodes."""
+        """A line of nodes; data: first, last, label increment, extra node or its coordinates,
+        normal of the arc."""
         sort = card.options.get("LINE", "").upper()
         if sort not in ("", "C"):
             raise card.place.error(f"*NGEN, LINE={sort} is not read: straight lines and LINE=C are")
@@ -68,7 +69,7 @@ class Generator:
         return np.arange(first, last + (1 if step > 0 else -1), step) + scope * SCOPE
 
     def _centre(self, parts: list[str], place: Place, scope: int) -> tuple[np.ndarray, np.ndarray]:
-        """Centre of an arc and the normal of its plane, 0 where none is given."""
+        """Centre of an arc and the normal of its plane, 0 if none is given."""
         parts = parts + [""] * (10 - len(parts))
         if parts[3] and label(parts[3], place):
             centre = self._nodes.points(np.array([label(parts[3], place)]) + scope * SCOPE, place)[
@@ -79,7 +80,7 @@ class Generator:
         return centre, np.array([number(part, place) for part in parts[7:10]])
 
     def _nfill(self, card: Card, lines: list[Data], scope: int) -> None:
-        """set, set, intervals, step of the labels: nodes on straight lines between those of two sets."""
+        """Nodes on straight lines between two sets; data: set, set, intervals, label increment."""
         if "SINGULAR" in card.options:
             raise card.place.error("*NFILL, SINGULAR is not read")
         bias = number(card.options.get("BIAS", "1"), card.place)
@@ -103,7 +104,7 @@ class Generator:
                 self._sets.add_nodes(card, made)
 
     def _ncopy(self, card: Card, lines: list[Data], scope: int) -> None:
-        """The nodes of a set again, moved, turned or mirrored, under labels that are larger by a number."""
+        """Copy the nodes of a set, shifted, rotated or reflected; labels grow by a number."""
         change = self._whole(card, "CHANGE NUMBER")
         old = self._ordered(card.options.get("OLD SET", ""), card.place)
         self._count(len(old), card.place)
@@ -113,7 +114,7 @@ class Generator:
         self._sets.into(self._sets.node_sets, card.options.get("NEW SET"), old + change)
 
     def _elgen(self, card: Card, lines: list[Data], scope: int) -> None:
-        """element, then for a row, rows of it and layers of those: number, step of nodes, step of elements."""
+        """Copies of an element in rows and layers; data: element, then counts and increments."""
         for place, parts in data_lines(lines):
             numbers = [label(part, place) if part else 1 for part in parts]
             numbers += [1] * (10 - len(numbers))
@@ -131,7 +132,7 @@ class Generator:
     def _more(
         self, card: Card, master: int, nodes: np.ndarray, elements: np.ndarray, place: Place
     ) -> None:
-        """Elements like a master, the first of them itself."""
+        """Copies of a master element, which is the first of them."""
         one = self._elements.one(master, place)
         if one is None:
             self._sets.add_elements(card, np.empty(0, np.int64))
@@ -141,7 +142,7 @@ class Generator:
         self._sets.add_elements(card, master + elements)
 
     def _elcopy(self, card: Card, lines: list[Data], scope: int) -> None:
-        """The elements of a set again, labels of elements and of nodes larger by two numbers."""
+        """Copy the elements of a set, with element and node labels increased by two numbers."""
         shift, nodes = self._whole(card, "ELEMENT SHIFT"), self._whole(card, "SHIFT NODES")
         name = card.options.get("OLD SET", card.options.get("OLDSET", ""))
         sets = Sets("element set", self._sets.element_sets, self._elements.labels())
@@ -159,7 +160,7 @@ class Generator:
         self._sets.into(self._sets.element_sets, card.options.get("NEW SET"), old + shift)
 
     def _ordered(self, name: str, place: Place) -> np.ndarray:
-        """The nodes of a set as far as they are known: ascending, or as an UNSORTED set has them."""
+        """The nodes of a set known so far: ascending, or in the order of an UNSORTED set."""
         sets = Sets("node set", self._sets.node_sets, self._nodes.labels(place.file))
         return sets.ordered(name.strip("\"'"), place)
 
@@ -176,9 +177,9 @@ class Generator:
 
 
 def _shares(intervals: int, bias: float, two_step: bool, place: Place) -> np.ndarray:
-    """Where the nodes between two ends stand, from 0 to 1: each interval is 1/bias times the one before it.
+    """Positions of nodes between two ends, 0 to 1; each interval is 1/bias times the last.
 
-    With two steps that is so of every two intervals, which are alike: elements of second order.
+    With `two_step` this holds for pairs of equal intervals, for second-order elements.
     """
     pairs = intervals // 2 if two_step else intervals
     if intervals < 1 or (two_step and intervals % 2):

@@ -1,8 +1,8 @@
-"""Gmsh meshes, .msh 2.2 and 4.1, text and binary, read into a `Deck`.
+"""Reader of Gmsh meshes, .msh 2.2 and 4.1, text and binary.
 
-Physical groups of the highest dimension are element sets, those of one dimension less surfaces. A section
-lies in the plane z = 0 with x the distance from the axle and y along it. Counts are held against what the
-file has before memory is taken.
+Physical groups of the highest dimension become element sets, those one dimension lower surfaces. A
+section lies in the plane z = 0, with x the distance from the axle and y along it. Counts are
+checked against the file's size before memory is allocated.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Elements = list[tuple[int, int, int, np.ndarray]]  # type, physical group, label
 
 
 def read(path: Path) -> Deck:
-    """The mesh of a file. Raises InputError with file and line for what is wrong in it."""
+    """The mesh in a file. Raises InputError with file and line for errors in it."""
     try:
         size = path.stat().st_size
         if size > LARGEST:
@@ -79,7 +79,7 @@ def _names(part: Part | None) -> dict[tuple[int, int], str]:
 
 
 def _entities(numbers: Numbers) -> dict[tuple[int, int], int]:
-    """(dimension, entity) -> physical group, the first where there are several."""
+    """(dimension, entity) -> physical group, the first if there are several."""
     groups = {}
     counts = numbers.sizes(4)
     for dimension, count in enumerate(counts):
@@ -234,7 +234,7 @@ def _groups(
 
 
 def _counter_clockwise(deck: Deck) -> Deck:
-    """Gmsh numbers nodes as each surface was drawn: those drawn the other way round are turned."""
+    """Reverse elements with clockwise nodes, since Gmsh follows the orientation of each surface."""
     for block in deck.blocks:
         count = block.kind.corners
         if block.kind.role != "solid":

@@ -1,4 +1,4 @@
-"""The parts of a Gmsh file, and their numbers from text or binary, never more than the file holds."""
+"""The parts of a Gmsh file and their numbers, text or binary, never read past their end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BEGIN = re.compile(rb"^\$([A-Za-z]+)[ \t\r]*\n", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Part:
-    """What stands between $Name and $EndName, and where it begins."""
+    """The content between $Name and $EndName, and where it begins."""
 
     text: bytes
     place: Place
@@ -27,7 +27,7 @@ class Part:
 
 
 def parts(data: bytes, name: str) -> dict[str, Part]:
-    """The parts of a file by name, the first of each. Raises InputError for one that does not end."""
+    """The parts of a file by name, the first of each. InputError for a part without end."""
     found: dict[str, Part] = {}
     at, line = 0, 1
     while match := _BEGIN.search(data, at):
@@ -43,7 +43,7 @@ def parts(data: bytes, name: str) -> dict[str, Part]:
 
 
 class _Numbers:
-    """Numbers of a part, taken one after the other. Raises InputError where there are too few."""
+    """Sequential reader of a part's numbers. Raises InputError if there are too few."""
 
     binary: bool
 
@@ -54,7 +54,7 @@ class _Numbers:
         return self.part.place.error(message)
 
     def fits(self, count: int, size: int) -> int:
-        """A count of things of at least `size` bytes (or characters), if the part can hold as many."""
+        """The count, if the part can hold that many items of `size` bytes (or characters)."""
         if not count >= 0 or count * (size if self.binary else 2) > len(self.part.text) + 64:
             raise self.error(f"{count} entries are announced and not there: is the file cut short?")
         return int(count)
@@ -91,7 +91,7 @@ class TextNumbers(_Numbers):
     sizes = ints
 
     def labelled_points(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Labels (n,) and points (n, 3), one after the other."""
+        """Labels (n,) and points (n, 3), stored node by node."""
         table = self.reals(4 * count).reshape(count, 4)
         if not (table[:, 0] == np.floor(table[:, 0])).all():
             raise self.error("a node's label is no whole number")
@@ -99,7 +99,7 @@ class TextNumbers(_Numbers):
 
 
 class BinaryNumbers(_Numbers):
-    """Numbers as Gmsh writes them to binary files: int32, uint64, float64."""
+    """Numbers in Gmsh's binary format: int32, uint64, float64."""
 
     binary = True
 
@@ -133,7 +133,7 @@ class BinaryNumbers(_Numbers):
         return values.astype(np.int64)
 
     def labelled_points(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Labels (n,) and points (n, 3), a record a node."""
+        """Labels (n,) and points (n, 3), one record per node."""
         table = self._take("<u1", 28 * count).reshape(count, 28)
         labels = np.ascontiguousarray(table[:, :4]).view("<i4")[:, 0].astype(np.int64)
         return labels, np.ascontiguousarray(table[:, 4:]).view("<f8").copy()

@@ -1,6 +1,6 @@
 """The element types of Gmsh and their Abaqus counterparts."""
 
-# Number of the type: dimension, nodes, Abaqus name, which of its nodes in Abaqus's order.
+# Type number: dimension, nodes, Abaqus name, indices of its nodes in Abaqus's order.
 _HEXAHEDRON = (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)
 
 

@@ -1,4 +1,4 @@
-"""The nodes and elements that a deck has defined so far, found by label."""
+"""The nodes and elements that a deck has defined so far, by label."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from tireroad.fem.decks.files.elements import Block
 from tireroad.fem.decks.files.lines import Place
 from tireroad.fem.errors import InputError
 
-_FEW = 64  # blocks that are searched one by one
-_APART = 1e-9  # of the deck's size: a node that is made again there stays where it is
+_FEW = 64  # blocks searched one by one; more are merged first
+_APART = 1e-9  # of the deck's size: tolerance for a node defined again at the same place
 
 
 class KnownNodes:
-    """Blocks of nodes in the order in which they came; where a node came twice, its last place."""
+    """Blocks of nodes in the order of definition; of repeated nodes the last one holds."""
 
     def __init__(self) -> None:
         self.blocks = self.count = 0
@@ -23,16 +23,16 @@ class KnownNodes:
         self._new: list[tuple[np.ndarray, np.ndarray]] = []
 
     def add(self, labels: np.ndarray, points: np.ndarray) -> None:
-        """Nodes of labels (n,) at points (n, 3)."""
+        """Add nodes with labels (n,) at points (n, 3)."""
         self.blocks, self.count = self.blocks + 1, self.count + len(labels)
         self._new.append((labels, points))
 
     def labels(self, file: str) -> np.ndarray:
-        """All of them, ascending."""
+        """All labels, ascending. Raises InputError as `table` does."""
         return self.table(file)[0]
 
     def points(self, labels: np.ndarray, asked: Place) -> np.ndarray:
-        """Places (n, 3) of nodes. InputError for one that is not known at the line that asks."""
+        """Positions (n, 3) of nodes. InputError for a node not yet defined at `asked`."""
         if len(self._new) > _FEW:
             self.table(asked.file)
         found = np.full((len(labels), 3), np.nan)
@@ -44,7 +44,7 @@ class KnownNodes:
         return found
 
     def table(self, file: str) -> tuple[np.ndarray, np.ndarray]:
-        """Labels ascending and their points; a node given twice must be at one place."""
+        """Labels, ascending, and points. InputError for a node defined at two places."""
         if self._new:
             parts = [(self._labels, self._points), *self._new]
             labels, points = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
@@ -54,7 +54,7 @@ class KnownNodes:
 
 
 def _look_up(known: np.ndarray, points: np.ndarray, labels: np.ndarray, found: np.ndarray) -> None:
-    """Fill in the places of the `labels` that are among the known."""
+    """Set `found` for those `labels` that are known."""
     if len(known) and (np.diff(known) < 0).any():
         order = np.argsort(known, kind="stable")
         known, points = known[order], points[order]
@@ -77,7 +77,7 @@ def _once(labels: np.ndarray, points: np.ndarray, file: str) -> tuple[np.ndarray
 
 
 class KnownElements:
-    """Blocks of the elements that are used. `others`: whether any of another type were met."""
+    """Blocks of used elements; `others`: whether elements of unused types occurred."""
 
     def __init__(self) -> None:
         self.blocks: list[Block] = []
@@ -86,7 +86,7 @@ class KnownElements:
         self._indexed = 0
 
     def add(self, block: Block) -> None:
-        """Elements of one type."""
+        """Add elements of one type."""
         self.blocks.append(block)
 
     def labels(self) -> np.ndarray:
@@ -94,7 +94,7 @@ class KnownElements:
         return np.sort(np.concatenate([np.empty(0, np.int64), *(b.labels for b in self.blocks)]))
 
     def one(self, label: int, asked: Place) -> Block | None:
-        """An element alone; None for one that may be of a type that is not used."""
+        """A single element; None if it may be of an unused type. InputError if undefined."""
         for number, block in enumerate(self.blocks[self._indexed :], self._indexed):
             self._place |= {name: (number, row) for row, name in enumerate(block.labels.tolist())}
         self._indexed = len(self.blocks)
@@ -106,12 +106,12 @@ class KnownElements:
         return self.blocks[number].rows([row])
 
     def within(self, labels: np.ndarray) -> list[Block]:
-        """The parts of the blocks that have one of the labels."""
+        """The parts of the blocks whose labels are among `labels`."""
         at = [np.flatnonzero(np.isin(block.labels, labels)) for block in self.blocks]
         return [block.rows(rows) for block, rows in zip(self.blocks, at, strict=True) if len(rows)]
 
     def check_once(self) -> None:
-        """InputError for an element that is defined twice."""
+        """Raise InputError for an element defined twice."""
         labels = self.labels()
         again = labels[1:][labels[1:] == labels[:-1]]
         if len(again):

@@ -1,7 +1,7 @@
-"""An Abaqus deck as a stream of keyword lines and the blocks of data between them.
+"""An Abaqus deck as a stream of keyword lines and the data blocks between them.
 
-Files are read in pieces, so what is not used takes no memory. Included files are read in place; they
-must lie in the deck's folder or below it. Nothing in a deck is executed.
+Files are read in pieces, so unused parts take no memory. Included files are read in place and must
+lie in the deck's folder or below it. Nothing in a deck is executed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import BinaryIO
 from tireroad.fem.errors import InputError
 
 PIECE = 1 << 22  # bytes read at once, and the longest line
-LARGEST = 1 << 30  # bytes of a deck with all that it includes
+LARGEST = 1 << 30  # bytes of a deck with all included files
 _KEYWORDS = 200_000
 _INCLUDES = 1000
 _COMMENT = re.compile(rb"^[ \t]*\*\*[^\n]*", re.MULTILINE)
@@ -48,7 +48,7 @@ class Card:
 
 @dataclass(frozen=True)
 class Data:
-    """Lines of data as they stand in the file; comments are blank lines."""
+    """Data lines as in the file; comments are replaced by blank lines."""
 
     text: bytes
     place: Place
@@ -56,7 +56,7 @@ class Data:
 
 @dataclass
 class _Reading:
-    """What has been read so far, against decks without end."""
+    """Counters of what has been read, to stop endless decks."""
 
     folder: Path
     size: int = 0
@@ -66,16 +66,16 @@ class _Reading:
 
 
 def cards(path: Path) -> Iterator[Card | Data]:
-    """The keywords and data of a deck in their order, included files in place.
+    """The keywords and data of a deck in order, included files in place.
 
-    Raises InputError with file and line for what cannot be read as a deck.
+    Raises InputError with file and line for anything that is not a deck.
     """
     reading = _Reading(path.resolve().parent)
     yield from _file(path.resolve(), None, reading)
 
 
 def _file(path: Path, asked: Place | None, reading: _Reading) -> Iterator[Card | Data]:
-    """The contents of one file, `asked` for by an include."""
+    """The contents of one file; `asked` is the place of its include."""
     if asked and path in reading.open:
         raise asked.error(
             f"{path.name} includes itself: {' > '.join(p.name for p in reading.open)}"
@@ -107,7 +107,7 @@ def _stream(file: BinaryIO, path: Path, reading: _Reading) -> Iterator[Card | Da
 
 
 def _pieces(file: BinaryIO, path: Path, reading: _Reading) -> Iterator[tuple[int, bytes]]:
-    """(number of the first line, text) of whole lines, no keyword line torn."""
+    """(first line number, text) of pieces of whole lines that do not split a keyword line."""
     left, number = b"", 1
     while True:
         new = file.read(PIECE)
@@ -134,7 +134,7 @@ def _pieces(file: BinaryIO, path: Path, reading: _Reading) -> Iterator[tuple[int
 
 
 def _whole_lines(text: bytes) -> int:
-    """Where the whole lines of a piece end, before a keyword that may go on in the next line."""
+    """End of the whole lines in a piece, before a keyword that may continue on the next line."""
     end = text.rfind(b"\n") + 1
     star = text.rfind(b"\n*", 0, end) + 1
     last = text[star:end]
@@ -152,7 +152,7 @@ def _data(text: bytes, place: Place) -> Iterator[Data]:
 
 
 def _keyword(raw: bytes, place: Place, reading: _Reading) -> Iterator[Card | Data]:
-    """A keyword, and after it what its INPUT file holds."""
+    """A keyword, followed by the contents of its INPUT file."""
     reading.keywords += 1
     if reading.keywords > _KEYWORDS:
         raise place.error(f"more than {_KEYWORDS} keywords: this is no deck")
@@ -167,7 +167,7 @@ def _keyword(raw: bytes, place: Place, reading: _Reading) -> Iterator[Card | Dat
 
 
 def _fields(line: str) -> list[str]:
-    """The parts between commas; a comma inside quotes is part of a name."""
+    """The parts between commas; a comma inside quotes belongs to a name."""
     return ["".join(part).strip() for part in _SPLIT.findall(line)]
 
 
@@ -181,7 +181,7 @@ def _options(parts: list[str]) -> dict[str, str]:
 
 
 def _beside(name: str, place: Place, reading: _Reading) -> Path:
-    """The file an include names: inside the deck's folder, or below it."""
+    """The path of an included file. Raises InputError unless it is in the deck's folder."""
     if not name or "\0" in name or len(name) > 1000:
         raise place.error("INPUT= names no file")
     path = (reading.folder / name.replace("\\", "/")).resolve()

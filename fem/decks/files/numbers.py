@@ -1,4 +1,4 @@
-"""Numbers of a deck's data lines: fast where the lines are regular, line by line where they are not."""
+"""Numbers of a deck's data lines: regular lines are read fast, others line by line."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import numpy as np
 
 from tireroad.fem.decks.files.lines import Data, Place
 
-# Fortran writes 1.0D-3; commas and tabs only separate.
+# Fortran writes 1.0D-3; commas and tabs are separators only.
 _CLEAN = bytes.maketrans(b",\tDd", b"  ee")
 _EMPTY_FIELD = re.compile(rb",[ \t]*(?=,)|,[ \t]*$", re.MULTILINE)
 LABEL = 10**9  # the largest label of a node or element
 
 
 def rows(data: list[Data], width: int, least: int = 1) -> np.ndarray:
-    """(lines, width) numbers, one row a line; fields left blank or out are 0.
+    """Numbers (lines, width), one row per line; blank or missing fields are 0.
 
-    Raises InputError with file and line for text, infinite numbers, fewer than `least` or more fields.
+    Raises InputError with file and line for text, infinite numbers, fewer than `least` or too many
+    fields.
     """
     return np.concatenate(
         [np.empty((0, width)), *(_rows_of(part, width, least) for part in data)], axis=0
@@ -37,7 +38,7 @@ def _rows_of(part: Data, width: int, least: int) -> np.ndarray:
 
 
 def fast(text: bytes) -> np.ndarray | None:
-    """All numbers of a text in their order, or None where it holds anything else."""
+    """All numbers of a text in order; None if it contains anything else."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -47,14 +48,14 @@ def fast(text: bytes) -> np.ndarray | None:
 
 
 def _regular(text: bytes, lines: list[bytes], width: int, least: int) -> np.ndarray | None:
-    """The table of lines that all have as many commas; None for others, and for text."""
+    """The table of lines with equal numbers of commas; None for other lines and for text."""
     counts = {line.count(b",") for line in lines if line.strip()}
     if len(counts) != 1:
         return None
     fields = counts.pop() + 1
     flat = fast(_EMPTY_FIELD.sub(b",0", text))
     rows = sum(1 for line in lines if line.strip())
-    # A comma at the end of the lines begins a field that is blank, and no field where there are too many.
+    # A trailing comma begins a blank field, or none if the line is full.
     if flat is None or len(flat) != fields * rows or not least <= fields <= width + 1:
         return None
     table = np.zeros((rows, max(width, fields)))
@@ -63,7 +64,7 @@ def _regular(text: bytes, lines: list[bytes], width: int, least: int) -> np.ndar
 
 
 def _ragged(lines: list[bytes], width: int, least: int) -> np.ndarray | None:
-    """The table of lines of different lengths; None where one is not plain numbers or blanks."""
+    """The table of lines of unequal length; None if one has more than plain numbers and blanks."""
     found = []
     for line in lines:
         if not line.strip():
@@ -99,14 +100,14 @@ def _first_line(part: Data) -> int:
 
 
 def fields(line: bytes | str) -> list[str]:
-    """The fields of a data line; a comma at its end begins no further one."""
+    """The fields of a data line; a trailing comma begins no further one."""
     text = line.decode("utf-8", "replace") if isinstance(line, bytes) else line
     parts = [part.strip() for part in text.strip().split(",")]
     return parts[:-1] if len(parts) > 1 and not parts[-1] else parts
 
 
 def number(text: str, place: Place) -> float:
-    """A finite number; a blank field is 0."""
+    """A finite number; a blank field is 0. Raises InputError otherwise."""
     if not text:
         return 0.0
     try:
@@ -126,9 +127,9 @@ def shown(text: bytes | str) -> str:
 
 
 def records(data: list[Data], width: int) -> np.ndarray:
-    """(records, width) whole numbers; a record may go on over several lines but begins a line.
+    """Whole numbers (records, width); a record may span several lines but starts a new one.
 
-    Raises InputError with file and line for other text and for records that are cut short.
+    Raises InputError with file and line for other text and for incomplete records.
     """
     return np.concatenate([np.empty((0, width), np.int64), *_joined_records(data, width)], axis=0)
 
@@ -151,7 +152,7 @@ def _whole(flat: np.ndarray) -> bool:
 def _slow_records(data: list[Data], width: int) -> Iterator[np.ndarray]:
     begun: list[int] = []
     found: list[list[int]] = []
-    where = Place("", 0)  # of the first line of the record that is being read
+    where = Place("", 0)  # of the first line of the current record
     for part in data:
         for offset, line in enumerate(part.text.split(b"\n")):
             if not line.strip():
@@ -174,7 +175,7 @@ def _slow_records(data: list[Data], width: int) -> Iterator[np.ndarray]:
 
 
 def labels(part: Data) -> np.ndarray | None:
-    """All labels in the lines of a set, or None where they hold anything but labels."""
+    """All labels in the lines of a set; None if they contain anything else."""
     flat = fast(part.text)
     if flat is None or not _whole(flat) or (flat < 0).any():
         return None
@@ -182,7 +183,7 @@ def labels(part: Data) -> np.ndarray | None:
 
 
 def label(text: str, place: Place) -> int:
-    """A label of a node or an element, a whole number from 0 to 10^9."""
+    """Label of a node or element, an integer from 0 to 10^9. Raises InputError otherwise."""
     value = number(text, place)
     if value != int(value) or not 0 <= value <= LABEL:
         raise place.error(f"{shown(text)} is no label of a node or element")

@@ -1,4 +1,4 @@
-"""Where nodes that are made from others stand: on lines and arcs, moved, turned, mirrored."""
+"""Positions of generated nodes: on lines and arcs, shifted, rotated, reflected."""
 
 from __future__ import annotations
 
@@ -6,20 +6,21 @@ import numpy as np
 
 from tireroad.fem.decks.files.lines import Card, Place
 
-_SAME = 1e-6  # of a radius: two ends of one arc
+_SAME = 1e-6  # of a radius: tolerance for the two ends of an arc
 
 
 def along_line(first: np.ndarray, last: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Points at shares (k,) of the way from `first` to `last`, arrays that broadcast to (..., k, 3)."""
+    """Points (..., k, 3) at fractions (k,) of the way from `first` to `last`."""
     return first + share[:, None] * (last - first)
 
 
 def along_arc(
     ends: np.ndarray, centre: np.ndarray, normal: np.ndarray, share: np.ndarray, place: Place
 ) -> np.ndarray:
-    """Points (k, 3) at shares of the arc between two ends (2, 3) about a centre.
+    """Points (k, 3) at fractions of the arc between two ends (2, 3) about a centre.
 
-    Right-handed about `normal`; without one (0) the smaller arc.
+    Right-handed about `normal`; without one (0) the smaller arc. Raises InputError for invalid
+    arcs.
     """
     start, end = ends - centre
     radius = np.linalg.norm(start)
@@ -36,14 +37,14 @@ def along_arc(
 
 
 def turned(points: np.ndarray, axis: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
-    """Points (k, 3) turned about a unit axis through the origin by angles (rad), right-handed: Rodrigues."""
+    """Points (k, 3) rotated about a unit axis through the origin by angles (rad): Rodrigues."""
     cosine, sine = (np.asarray(f(angle))[..., None] for f in (np.cos, np.sin))
     along = (points @ axis)[:, None] * axis
     return along + cosine * (points - along) + sine * np.cross(axis, points)
 
 
 def copied(points: np.ndarray, card: Card, table: list[list[float]]) -> np.ndarray:
-    """The points of an *NCOPY: shifted and turned, mirrored, or from a pole."""
+    """The points of an *NCOPY: shifted and rotated, or reflected. Raises InputError for POLE."""
     rows = [np.array((row + [0.0] * 7)[:7]) for row in table] + [np.zeros(7)] * 2
     mirror = card.options.get("REFLECT", "").upper()
     if "SHIFT" in card.options:
@@ -63,7 +64,7 @@ def copied(points: np.ndarray, card: Card, table: list[list[float]]) -> np.ndarr
 
 
 def _shifted(points: np.ndarray, card: Card, turn: np.ndarray) -> np.ndarray:
-    """Turned about the line through two points by an angle in degrees, MULTIPLE times."""
+    """Rotated about the line through two points by an angle in degrees, MULTIPLE times."""
     angle = np.radians(turn[6]) * float(card.options.get("MULTIPLE") or 1)
     if not angle:
         return points

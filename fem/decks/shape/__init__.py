@@ -1,1 +1,1 @@
-"""From elements to quadrilaterals that carry faces and lines of cords."""
+"""From elements to quadrilaterals with faces and cord lines."""

@@ -1,4 +1,4 @@
-"""Sides of cells put in order: chains from end to end, whatever order they were found in."""
+"""Ordering of cell sides into chains from end to end."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from tireroad.fem.decks.shape.quad_split import Quads
 
 
 def once(quads: Quads, edges: np.ndarray) -> np.ndarray:
-    """Sides (k, 2) with those of two cells named once."""
+    """Sides (k, 2), with those shared by two cells listed once."""
     middle = quads.sides()[edges[:, 0], edges[:, 1], 1]
     _, first = np.unique(middle, return_index=True)
     return edges[np.sort(first)]
 
 
 def with_origin(quads: Quads, numbers: np.ndarray) -> np.ndarray:
-    """Sides (k, 2) that lie on the given edges of the deck, each once."""
+    """Sides (k, 2) on the given edges of the deck, each listed once."""
     return once(quads, np.argwhere(np.isin(quads.origin, numbers) & (quads.origin >= 0)))
 
 
@@ -27,9 +27,9 @@ def ends(quads: Quads, edges: np.ndarray) -> np.ndarray:
 
 
 def strings(pairs: np.ndarray) -> tuple[list[np.ndarray], list[int]]:
-    """Line elements (k, 2) in order: the indices of each chain, and the nodes where three or more meet.
+    """Line elements (k, 2) in order: indices of each chain, and nodes where three or more meet.
 
-    A closed line is one chain. Chains that branch end at the branch.
+    A closed line is one chain. Chains end at branches.
     """
     at = defaultdict(list)
     for number, pair in enumerate(pairs.tolist()):
@@ -69,7 +69,7 @@ def along(pairs: np.ndarray) -> np.ndarray:
 
 
 def forward(quads: Quads, edges: np.ndarray) -> np.ndarray:
-    """An ordered chain turned so that it runs towards higher y at its middle (higher r where level)."""
+    """An ordered chain, running towards higher y at its middle (higher r where level)."""
     nodes = along(ends(quads, edges))
     middle = (len(nodes) - 1) // 2
     step = quads.points[nodes[middle + 1]] - quads.points[nodes[middle]]

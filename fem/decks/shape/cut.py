@@ -1,4 +1,4 @@
-"""Rows of cells cut along a line, so that element sides lie on it."""
+"""Splitting of rows of cells along a line, so that element sides lie on it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ import numpy as np
 
 from tireroad.fem.decks.shape.quad_split import SIDE_NODES, Quads, place, shape
 
-Marks = dict[
-    int, float
-]  # of a side, named by its middle node: where it is cut, from its lower end node
+Marks = dict[int, float]  # by a side's middle node: position of its cut from its lower end node
 
 
 class Origins:
-    """Numbers of edges: the deck's, and those made later. A part of an edge knows which it is part of."""
+    """Edge numbers: the deck's and new ones; a part of an edge knows its parent."""
 
     def __init__(self, count: int) -> None:
         self._first = count
@@ -37,7 +35,7 @@ class Origins:
 
 
 def oriented(side: np.ndarray, t: float) -> float:
-    """A place on a side from its first node, given from its lower node, or the other way round."""
+    """A position on a side from its first node, given that from its lower node, or vice versa."""
     return t if side[0] < side[2] else 1 - t
 
 
@@ -48,10 +46,10 @@ def cut(
     path: Mapping[int, float],
     fail: Callable[[str], Exception],
 ) -> Quads:
-    """The cells cut at the marked sides, and on in both directions to the boundary or round the section.
+    """Split the cells at the marked sides and onwards, to the boundary or round the section.
 
-    `path`: the cells in which the cut is part of the line, with its place half way through; sides made
-    there get `number`. `fail` makes the error for a cut that would cross itself.
+    `path`: the cells in which the cut is part of the line, with its position halfway through; sides
+    created there get `number`. `fail` creates the error for a cut that would cross itself.
     """
     marks, axis = _closed(quads, dict(marks), fail)
     points = list(quads.points)
@@ -106,7 +104,7 @@ def _closed(
 
 
 def _cut_sides(quads: Quads, marks: Marks, points: list) -> dict[int, tuple]:
-    """For each cut side, by its lower end node: (middle of the part there, cut, middle of the other)."""
+    """New points of each cut side from its lower end: first middle, cut, second middle."""
     found = {}
     sides = {int(side[1]): side for side in quads.sides().reshape(-1, 3)}
     for middle, t in marks.items():
@@ -130,13 +128,13 @@ def _halves(
     """Two cells (2, 9) in place of one, and the origin of their sides (2, 4); -2 on the cut."""
     grid = quads.cells[cell].reshape(3, 3)
     origin = quads.origin[cell]
-    if along == 0:  # as if eta were divided, and turned back at the end
+    if along == 0:  # treated as a division of eta, and transposed back at the end
         grid = grid.T
     first, last = (0, 1) if along == 1 else (2, 3)
     sides = quads.cells[cell][SIDE_NODES[[first, last]]]
     at = [oriented(side, marks[int(side[1])]) for side in sides]
     half = middle if middle is not None else (at[0] + at[1]) / 2
-    rows = np.empty((3, 5), np.int64)  # across the cut: five nodes where there were three
+    rows = np.empty((3, 5), np.int64)  # across the cut: five nodes instead of three
     rows[:, 0], rows[:, 4] = grid[:, 0], grid[:, 2]
     for row, side in zip((0, 2), sides, strict=True):
         new = side_points[int(side[1])]
@@ -154,6 +152,6 @@ def _halves(
 
 
 def _tidy(quads: Quads) -> Quads:
-    """Without the nodes that no cell has any more."""
+    """Remove nodes that no cell uses any more."""
     used, cells = np.unique(quads.cells, return_inverse=True)
     return replace(quads, points=quads.points[used], cells=cells.reshape(quads.cells.shape))

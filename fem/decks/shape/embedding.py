@@ -1,4 +1,4 @@
-"""All membranes with cords laid into the cells of a section."""
+"""Embedding of all membranes with cords in the cells of a section."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from tireroad.fem.decks.shape.quads import DeckEdges
 def lay_all(
     deck: Deck, quads: Quads, edges: DeckEdges, origins: Origins
 ) -> tuple[Quads, dict[str, Laid]]:
-    """The cells with sides along all membranes that carry cords, and where those of each set lie.
+    """The cells with sides along all membranes that carry cords, and the position of each set.
 
-    Membranes whose nodes are those of the solids lie on sides already; others are looked for by place.
+    Membranes that share the solids' nodes already lie on sides; others are located
+    geometrically.
     """
     done: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for layer in deck.layers:
@@ -36,7 +37,7 @@ def lay_all(
 
 
 def _elements(deck: Deck, layer: Layer) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """End nodes (k, 2), points (k, 3, 2) start, middle, end, and labels (k,) of a layer's membranes."""
+    """End nodes (k, 2), points (k, 3, 2) and labels (k,) of a layer's membranes."""
     wanted = deck.element_sets.labels(layer.elements, layer.place)
     ends, points, labels = [], [], []
     for block in deck.blocks:
@@ -69,7 +70,7 @@ def _embed(
     labels: np.ndarray,
     origins: Origins,
 ) -> tuple[Quads, np.ndarray]:
-    """The cells cut along membranes that lie inside them, and the numbers of the sides made."""
+    """The cells split along membranes inside them, and the numbers of the sides created."""
     hosts = _hosts(deck, layer, labels)
     numbers: list[int] = []
     for line in strings(ends)[0]:
@@ -101,7 +102,7 @@ def _turned(ends: np.ndarray) -> np.ndarray:
 
 
 def _hosts(deck: Deck, layer: Layer, labels: np.ndarray) -> frozenset | None:
-    """Elements in which the membranes must lie; None where the deck names no host for them."""
+    """Elements in which the membranes must lie; None if the deck names no host for them."""
     for embedded in deck.embedded:
         if embedded.host is None:
             continue

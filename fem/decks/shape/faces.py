@@ -1,4 +1,4 @@
-"""The faces of a section: what the wheel holds, where the air presses, what can touch the road."""
+"""The faces of a section: rim, inner face under pressure, outer face and tread."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tireroad.fem.errors import InputError
 
 @dataclass(frozen=True)
 class Faces:
-    """Sides (k, 2) of (cell, side); `outer` in order from the lower y to the higher. `notes`: guesses."""
+    """Sides (k, 2) of (cell, side); `outer` from lower to higher y. `notes`: guesses made."""
 
     outer: np.ndarray
     tread: np.ndarray
@@ -26,10 +26,10 @@ class Faces:
 def faces(
     quads: Quads, rim: np.ndarray, inner: np.ndarray | None, tread: np.ndarray | None
 ) -> Faces:
-    """The faces from the sides the deck names; inner face and tread from the outline where it does not.
+    """The faces from the sides that the deck names; unnamed inner face and tread from the outline.
 
-    Without the rim the outline falls apart into two lines or more: the outer face is the one that
-    reaches farthest out, the inner face of the others the one that does.
+    Without the rim the outline consists of two or more lines: the outer face reaches farthest from
+    the axle, the inner face farthest of the rest. Raises InputError if there are too few.
     """
     outline = quads.boundary()
     notes = []
@@ -69,7 +69,7 @@ def _without(quads: Quads, sides: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def on_outline(quads: Quads, sides: np.ndarray) -> np.ndarray:
-    """Those of the given sides that are on the boundary."""
+    """The given sides that are on the boundary."""
     middle = quads.sides()[:, :, 1]
     outline = quads.boundary()
     there = middle[outline[:, 0], outline[:, 1]]
@@ -77,7 +77,7 @@ def on_outline(quads: Quads, sides: np.ndarray) -> np.ndarray:
 
 
 def one_body(quads: Quads, name: Callable[[int], str]) -> None:
-    """That all cells hang together by sides. `name` makes a text of an element label."""
+    """Raise InputError unless all cells are connected by nodes; `name` formats an element label."""
     pairs = ends(quads, np.argwhere(np.ones((len(quads.cells), 4), bool)))
     group = np.arange(len(quads.points))
     while True:

@@ -1,4 +1,4 @@
-"""Where membranes lie in a section: on element sides, or inside elements that are then cut along them."""
+"""Membranes in a section: on element sides, or inside elements, which are split along them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from tireroad.fem.decks.shape.cut import Origins, cut, oriented
 from tireroad.fem.decks.shape.places import inverse, locate, rates
 from tireroad.fem.decks.shape.quad_split import Quads, shape
 
-SNAP = 0.01  # of a cell: nearer to a node or side than this is on it
-# A line that ends nearer than this to a side ends on it: a cell of a hundredth of its neighbours' length
-# left the modes no digits (relative residual 0.6), one of a twentieth does not.
+SNAP = 0.01  # of a cell: tolerance within which a point lies on a node or side
+# A line that ends nearer than this to a side ends on it: a cell of a hundredth of its neighbours'
+# length left no correct digits in the modes (relative residual 0.6), one of a twentieth does not.
 _SNAP_END = 0.05
-_LEAST_ANGLE = 0.1  # sine between a line and the sides it crosses; below it runs along them
+_LEAST_ANGLE = 0.1  # sine between a line and a side; below it the line runs along the side
 
 
 @dataclass(frozen=True)
 class Line:
-    """One chain of line elements: points (k, 3, 2) from its start, middle, end of each; for messages its
-    name and `fail`, which makes an error of a text. `hosts` are the elements it must lie in, None: any.
+    """One chain of line elements: points (k, 3, 2) at start, middle and end of each; `name` and
+    `fail`, which creates an error from a text, for messages; `hosts`: elements it must lie in,
+    None: any.
     """
 
     name: str
@@ -31,19 +32,20 @@ class Line:
     hosts: frozenset | None = None
 
     def at(self, s: np.ndarray) -> np.ndarray:
-        """Places (k, 2) at s, counted in elements from the start; beyond the ends the line goes on."""
+        """Positions (k, 2) at s, in elements from the start; extrapolated beyond the ends."""
         number = np.clip(np.floor(s).astype(int), 0, len(self.points) - 1)
         return np.einsum("ka,kax->kx", shape(s - number), self.points[number])
 
     def slope(self, s: float) -> np.ndarray:
-        """d at / ds at one place."""
+        """d at / ds at one position."""
         step = 1e-6
         return (self.at(np.array([s + step])) - self.at(np.array([s - step])))[0] / (2 * step)
 
 
 @dataclass(frozen=True)
 class _Station:
-    """Where a line meets the mesh: at a node, or on a side (named by its middle) at t from its lower end."""
+    """Where a line meets the mesh: at a node, or on a side (named by its middle) at t from its
+    lower end."""
 
     s: float
     node: int = -1
@@ -54,7 +56,7 @@ class _Station:
 def lay(quads: Quads, line: Line, origins: Origins) -> tuple[Quads, list[int]]:
     """The cells with sides all along a line, and the numbers of those sides.
 
-    Raises the line's error where it leaves the body or its hosts, or crosses cells slantwise.
+    Raises the line's error if it leaves the body or its hosts, or crosses cells obliquely.
     """
     _inside(quads, line)
     length = float(len(line.points))
@@ -77,7 +79,7 @@ def lay(quads: Quads, line: Line, origins: Origins) -> tuple[Quads, list[int]]:
 
 
 def _inside(quads: Quads, line: Line) -> None:
-    """That the line's ends and middles lie in the body, and in the hosts."""
+    """Check that ends and middles of the line's elements lie in the body and in the hosts."""
     points = line.points.reshape(-1, 2)
     cells, where, beyond = locate(quads, points)
     clear = ((where > 0.1) & (where < 0.9)).all(axis=1)
@@ -91,8 +93,9 @@ def _inside(quads: Quads, line: Line) -> None:
 
 
 def _cut_at_end(quads: Quads, line: Line, end: float) -> tuple[Quads, float]:
-    """The cell in which a line ends cut across it, unless it ends near a side or node; and how far (in s)
-    beyond the end the line is then to be followed.
+    """Split the cell in which a line ends across it, unless it ends near a side or node.
+
+    Also returns how far (in s) beyond the end the line must then be followed.
     """
     (cell,), where, _ = locate(quads, line.at(np.array([end])))
     matrix, slope = rates(quads.points[quads.cells[[cell]]], where)[0], line.slope(end)
@@ -107,7 +110,7 @@ def _cut_at_end(quads: Quads, line: Line, end: float) -> tuple[Quads, float]:
 
 
 def _stations(quads: Quads, line: Line, reach: tuple[float, float]) -> list[_Station]:
-    """All places where the line meets sides or nodes, for s within `reach`, in their order along it."""
+    """All points where the line meets sides or nodes, for s within `reach`, in order along it."""
     sides = np.unique(quads.sides().reshape(-1, 3), axis=0)
     _, first = np.unique(sides[:, 1], return_index=True)
     sides = sides[first]
@@ -125,7 +128,7 @@ def _stations(quads: Quads, line: Line, reach: tuple[float, float]) -> list[_Sta
 
 
 def _candidates(sides: np.ndarray, line: Line) -> Iterator[tuple[int, float]]:
-    """(side, s) near which a side (n, 3, 2) and the line may meet, by straight pieces of both."""
+    """(side, s) near which a side (n, 3, 2) and the line may meet, from straight pieces of both."""
     pieces = 4
     s = np.linspace(0, len(line.points), pieces * len(line.points) + 1)
     points = line.at(s)
@@ -138,14 +141,14 @@ def _candidates(sides: np.ndarray, line: Line) -> Iterator[tuple[int, float]]:
         off = b - a
         t = (off[:, 0] * e[1] - off[:, 1] * e[0]) / safe
         u = (off[:, 0] * d[:, 1] - off[:, 1] * d[:, 0]) / safe
-        over = 0.1 if 0 < k < len(s) - 2 else 3.0  # the ends may go on a little
+        over = 0.1 if 0 < k < len(s) - 2 else 3.0  # the ends may extend a little
         near = ok & (t > -0.1) & (t < 1.1) & (u > -over) & (u < 1 + over)
         for one in np.flatnonzero(near):
             yield one // 2, s[k] + u[one] * (s[k + 1] - s[k])
 
 
 def _meet(side: np.ndarray, line: Line, s: float) -> tuple[float, float] | None:
-    """(t, s) where a side (3, 2) meets the line, by Newton; None where it does not or runs along it."""
+    """(t, s) where a side (3, 2) meets the line; None if it does not or runs along it."""
     t, step = 0.5, 1e-6
     for _ in range(20):
         off = shape(np.array([t]))[0] @ side - line.at(np.array([s]))[0]
@@ -165,7 +168,7 @@ def _meet(side: np.ndarray, line: Line, s: float) -> tuple[float, float] | None:
 def _follow(
     quads: Quads, line: Line, stations: list[_Station]
 ) -> tuple[dict[int, float], dict[int, float], list[int]]:
-    """Sides to cut, the cells they are in (with the place half way), and whole sides on the line."""
+    """Sides to cut, the cells concerned (position halfway), and whole sides on the line."""
     if len(stations) < 2:
         raise line.fail("it crosses no element")
     at = defaultdict(set)
@@ -223,7 +226,7 @@ def _opposite(
 
 
 def _half_way(quads: Quads, path: dict, line: Line) -> dict[int, float]:
-    """Where the line is, across each cell, half way along: by the parabola through three of its points."""
+    """Position of the line halfway across each cell: parabola through three of its points."""
     cells = np.array(list(path), np.int64)
     middle = line.at(np.array([(a.s + b.s) / 2 for a, b in path.values()]))
     places = inverse(quads.points[quads.cells[cells]], middle)[0] if len(cells) else cells

@@ -9,7 +9,7 @@ import numpy as np
 from tireroad.fem.decks.shape.quad_split import Quads
 from tireroad.fem.errors import InputError
 
-_CLOSE = 1e-4  # of the section's size: a node is on the centre plane
+_CLOSE = 1e-4  # of the section's size: tolerance for nodes on the centre plane
 
 
 def on_centre(quads: Quads) -> np.ndarray:
@@ -26,7 +26,7 @@ def is_half(quads: Quads) -> bool:
 
 
 def mirrored(quads: Quads) -> Quads:
-    """Both halves, nodes on the centre plane shared. Raises InputError for what is no half section."""
+    """Both halves, sharing nodes on the centre plane. InputError if it is not a half section."""
     if not is_half(quads):
         low, high = quads.points[:, 1].min(), quads.points[:, 1].max()
         raise InputError(
@@ -38,7 +38,7 @@ def mirrored(quads: Quads) -> Quads:
     points[centre, 1] = 0.0
     image = np.arange(len(points))
     image[~centre] = len(points) + np.arange((~centre).sum())
-    turned = np.arange(9).reshape(3, 3)[::-1].ravel()  # xi runs the other way
+    turned = np.arange(9).reshape(3, 3)[::-1].ravel()  # xi is reversed
     return replace(
         quads,
         points=np.concatenate([points, points[~centre] * [1, -1]]),

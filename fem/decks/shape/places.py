@@ -1,4 +1,4 @@
-"""Where points lie in the cells of a section."""
+"""Location of points in the cells of a section."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def rate(t: np.ndarray) -> np.ndarray:
 
 
 def rates(nine: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """d(r, z)/d(xi, eta) (k, 2, 2) of cells (k, 9, 2) at one place (k, 2) each."""
+    """d(r, z)/d(xi, eta) (k, 2, 2) of cells (k, 9, 2) at one position (k, 2) each."""
     grid = nine.reshape(-1, 3, 3, 2)
     xi, eta = where.T
     along = [(rate(xi), shape(eta)), (shape(xi), rate(eta))]
@@ -26,9 +26,9 @@ def rates(nine: np.ndarray, where: np.ndarray) -> np.ndarray:
 def inverse(
     nine: np.ndarray, points: np.ndarray, limit: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Places (k, 2) of points (k, 2) in cells (k, 9, 2), and the distance that is left, by Newton.
+    """Coordinates (k, 2) of points (k, 2) in cells (k, 9, 2), and residual distances: Newton.
 
-    Places are kept within `limit` of the cell.
+    Coordinates are kept within `limit` of the cell.
     """
     where = np.full(points.shape, 0.5)
     grid = nine.reshape(-1, 3, 3, 2)
@@ -43,9 +43,9 @@ def inverse(
 
 
 def locate(quads: Quads, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cells (k,) that hold points (k, 2), places (k, 2) in them, and how far outside (k,), in cells.
+    """Cells (k,) containing points (k, 2), coordinates (k, 2), distance outside (k,) in cells.
 
-    A point that is near no cell has cell -1 and is infinitely far outside.
+    A point near no cell has cell -1 and an infinite distance.
     """
     nine = quads.points[quads.cells]
     low, high = nine.min(axis=1), nine.max(axis=1)

@@ -1,11 +1,11 @@
-"""The cords of a deck on the sides of a section's cells: where each ply runs, its angle and its data.
+"""The cords of a deck on the sides of a section's cells: course, angle and data of each ply.
 
-Abaqus gives the angle a of a cord in an axisymmetric membrane from the meridian, the direction t from
-the element's first node to its second, positive about the normal, which is t turned by 90 degrees in the
-(r, z) plane: the cord lies along cos a t + sin a e_theta, e_theta right-handed about z. Seen from the lowest
-point e_theta is -x, so to a chain that runs along s t (s = 1 or -1) the cord lies along
--sin a e_x + s cos a e_chain: the angle from the circumference is atan2(s cos a, -sin a). A line has no sense,
-so it is brought between -90 and 90 degrees.
+In an axisymmetric membrane Abaqus measures the cord angle a from the meridian, the direction t from
+the element's first node to its second, positive about the normal, which is t rotated by 90 degrees
+in the (r, z) plane: the cord lies along cos a t + sin a e_theta, e_theta right-handed about z. At
+the lowest point e_theta is -x, so relative to a chain that runs along s t (s = 1 or -1) the cord
+lies along -sin a e_x + s cos a e_chain: the angle from the circumference is atan2(s cos a, -sin a).
+A line has no sense of direction, so the angle is reduced to between -90 and 90 degrees.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from tireroad.fem.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class Ply:
-    """Cords on one chain of sides, SI: angle in rad from +x at the lowest point towards the chain's end;
-    the others as of `Cords`.
+    """Cords on one chain of sides, in SI: `angle` in rad from +x at the lowest point towards the
+    chain's end; the others as in `Cords`.
     """
 
     name: str
@@ -39,8 +39,8 @@ class Ply:
 
 @dataclass(frozen=True)
 class Laid:
-    """The membranes of a set: numbers of the deck's edges they lie on, middles (k, 2) and directions (k, 2)
-    of their elements from first to last node.
+    """The membranes of a set: numbers of the deck's edges they lie on, and middles (k, 2) and
+    directions (k, 2) of their elements from first to last node.
     """
 
     numbers: np.ndarray
@@ -48,7 +48,7 @@ class Laid:
     directions: np.ndarray
 
     def mirrored(self) -> Laid:
-        """With the other half: turned by half a turn about the vertical, so a cord's line goes on."""
+        """With the other half, turned by 180 deg about the vertical so that cords continue."""
         return Laid(
             self.numbers,
             np.concatenate([self.middles, self.middles * [1, -1]]),
@@ -59,7 +59,7 @@ class Laid:
 def plies(
     quads: Quads, laid: Laid, layer: Layer, material: CordMaterial, length: float
 ) -> list[Ply]:
-    """The plies of one layer of cords: one for each unbroken line, more where the angle changes on it."""
+    """The plies of one cord layer: one per unbroken line, more if the angle varies along it."""
     sides = with_origin(quads, laid.numbers)
     found, branches = strings(ends(quads, sides))
     if branches:
@@ -96,9 +96,9 @@ def _ply(
 
 
 def _geometry(layer: Layer, r: float) -> tuple[float, float]:
-    """(angle from the meridian in rad, spacing in the deck's length) at radius r.
+    """(angle from the meridian in rad, spacing in the deck's length unit) at radius r.
 
-    A lifted cord keeps its number around: with the angle b from the circumference and the
+    Lifting keeps the number of cords around: with the angle b from the circumference and the
     extension e, cos b = r / (r0 (1 + e)) cos b0 and s = s0 (r / r0) sin b / sin b0.
     """
     angle = np.radians(layer.angle)
@@ -120,14 +120,14 @@ def _geometry(layer: Layer, r: float) -> tuple[float, float]:
 
 
 def from_circumference(angle: float, sense: int) -> float:
-    """An angle from the meridian (rad) as one from the circumference, in (-pi/2, pi/2]."""
+    """Angle from the meridian (rad) converted to one from the circumference, (-pi/2, pi/2]."""
     turned = float(np.arctan2(sense * np.cos(angle), -np.sin(angle)))
     turned -= np.pi * np.ceil(turned / np.pi - 0.5)
     return 0.0 if abs(turned) < 1e-12 else turned
 
 
 def _sense(quads: Quads, chain: np.ndarray, laid: Laid, layer: Layer) -> int:
-    """1 where the membranes run with the chain, -1 where against it."""
+    """1 if the membranes run with the chain, -1 if against it."""
     points = quads.points[along(ends(quads, chain))]
     middles, steps = (points[1:] + points[:-1]) / 2, np.diff(points, axis=0)
     distance = np.linalg.norm(middles[:, None] - laid.middles, axis=2)

@@ -1,8 +1,8 @@
-"""Quadrilaterals of nine nodes, their shape, and how a section with triangles becomes one of quadrilaterals.
+"""Nine-node quadrilaterals, and the conversion of sections with triangles to quadrilaterals.
 
-Local node (i, j) of a cell is at 3 i + j, at xi = i/2, eta = j/2; sides 0 to 3 are xi = 0, xi = 1, eta = 0,
-eta = 1, as in tireroad.fem.sections. Every side carries the number of the deck's edge it is part of, so
-sets of the deck survive what is done to the cells.
+Local node (i, j) of a cell is at 3 i + j, at xi = i/2, eta = j/2; sides 0 to 3 are xi = 0, xi = 1,
+eta = 0, eta = 1, as in tireroad.fem.sections. Every side carries the number of the deck's edge it
+is part of, so that sets of the deck remain valid after cells are split.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ TENSOR = np.array([0, 7, 3, 4, 8, 6, 1, 5, 2])  # corners 0-3, middles 4-7, cent
 
 @dataclass(frozen=True, kw_only=True)
 class Quads:
-    """points (n, 2) r, y; cells (c, 9); region (c,); element (c,) the deck's label; origin (c, 4): number of
-    the deck's edge or of a line of cords on which a side lies, -1 for sides made inside an element.
+    """points (n, 2) r, y; cells (c, 9); region (c,); element (c,): the deck's label; origin (c, 4):
+    number of the deck's edge or cord line on which a side lies, -1 for sides created inside an
+    element.
     """
 
     points: np.ndarray
@@ -30,19 +31,19 @@ class Quads:
 
     @property
     def corners(self) -> np.ndarray:
-        """(c, 4) end nodes in the order (0, 0), (0, 1), (1, 0), (1, 1)."""
+        """Corner nodes (c, 4) in the order (0, 0), (0, 1), (1, 0), (1, 1)."""
         return self.cells[:, [0, 2, 6, 8]]
 
     def sides(self) -> np.ndarray:
-        """(c, 4, 3) nodes of all sides, in ascending xi or eta."""
+        """Nodes (c, 4, 3) of all sides, in ascending xi or eta."""
         return self.cells[:, SIDE_NODES]
 
     def sides_of(self, cell: int) -> np.ndarray:
-        """(4, 3) nodes of the sides of one cell."""
+        """Nodes (4, 3) of the sides of one cell."""
         return self.cells[cell][SIDE_NODES]
 
     def boundary(self) -> np.ndarray:
-        """(k, 2) of (cell, side): the sides of one cell only."""
+        """Boundary sides (k, 2) of (cell, side): those with one cell only."""
         middle = self.sides()[:, :, 1]
         count = np.bincount(middle.ravel(), minlength=len(self.points))
         return np.argwhere(count[middle] == 1)
@@ -50,7 +51,7 @@ class Quads:
 
 @dataclass(frozen=True)
 class Raw:
-    """Triangles or quadrilaterals of a deck: corners, middles (rows of points, -1: none)."""
+    """Triangles or quadrilaterals of a deck: corners, and middles (rows of points, -1: none)."""
 
     labels: np.ndarray
     corners: np.ndarray
@@ -59,28 +60,29 @@ class Raw:
 
 
 def shape(t: np.ndarray) -> np.ndarray:
-    """Quadratic functions (k, 3) of the nodes 0, 1/2 and 1 at places t (k,)."""
+    """Quadratic functions (k, 3) of the nodes 0, 1/2 and 1 at t (k,)."""
     t = np.asarray(t, float)
     return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
 
 
 def place(nine: np.ndarray, xi: np.ndarray, eta: np.ndarray) -> np.ndarray:
-    """Points (..., k, 2) at reference coordinates (k,) of cells given by their nine points (..., 9, 2)."""
+    """Points (..., k, 2) at reference coordinates (k,) of cells of nine points (..., 9, 2)."""
     both = (shape(xi)[:, :, None] * shape(eta)[:, None, :]).reshape(-1, 9)
     return np.einsum("ka,...ax->...kx", both, nine)
 
 
 def nine_points(nodes: np.ndarray, raw: Raw, edge: np.ndarray, middles: np.ndarray) -> np.ndarray:
-    """Nine points (c, 9, 2) of quadrilaterals; the centre of an eight-node one follows from the others."""
+    """Nine points (c, 9, 2) of quadrilaterals; a missing centre follows from the others."""
     corner, middle = nodes[raw.corners], middles[edge]
     centre = middle.sum(axis=1) / 2 - corner.sum(axis=1) / 4
     return np.concatenate([corner, middle, centre[:, None]], axis=1)[:, TENSOR]
 
 
 def split(nodes: np.ndarray, raws: dict, edges: tuple, middles: np.ndarray) -> Quads:
-    """Every triangle as three cells and every quadrilateral as four, so that whole sides meet.
+    """Split triangles into three cells, quadrilaterals into four, so that whole sides meet.
 
-    A point is named by (0, node, 0), (1, edge, quarter from its lower end) or (2, element, place in it).
+    Points are identified by (0, node, 0), (1, edge, quarter from its lower end) or (2, element,
+    position in it).
     """
     parts = [
         _thirds(nodes, raws[3], edges[0], middles),
@@ -98,7 +100,7 @@ def split(nodes: np.ndarray, raws: dict, edges: tuple, middles: np.ndarray) -> Q
 
 
 def _on_edge(edge: np.ndarray, quarter: int, forward: np.ndarray) -> np.ndarray:
-    """Names (c, 3) of points on edges, `quarter` counted along them as an element runs."""
+    """Identifiers (c, 3) of points on edges, `quarter` being counted in the element's direction."""
     return np.column_stack([np.full_like(edge, 1), edge, np.where(forward, quarter, 4 - quarter)])
 
 
@@ -109,7 +111,7 @@ def _named(sort: int, number: np.ndarray, place_in: int = 0) -> np.ndarray:
 def _quarters(
     nodes: np.ndarray, raw: Raw, edge: np.ndarray, middles: np.ndarray, first: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """points (4 c, 9, 2), origin (4 c, 4) and names (4 c, 9, 3) of the quarters of quadrilaterals."""
+    """points (4 c, 9, 2), origin (4 c, 4), identifiers (4 c, 9, 3) of quadrilaterals' quarters."""
     grid = np.linspace(0, 1, 5)
     xi, eta = (part.ravel() for part in np.meshgrid(grid, grid, indexing="ij"))
     points = place(nine_points(nodes, raw, edge, middles), xi, eta).reshape(-1, 5, 5, 2)
@@ -138,7 +140,7 @@ def _quarters(
 def _thirds(
     nodes: np.ndarray, raw: Raw, edge: np.ndarray, middles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """points (3 c, 9, 2), origin (3 c, 4) and names (3 c, 9, 3) of the thirds of triangles."""
+    """points (3 c, 9, 2), origin (3 c, 4), identifiers (3 c, 9, 3) of thirds of triangles."""
     six = np.concatenate([nodes[raw.corners], middles[edge]], axis=1)
     forward = raw.corners < np.roll(raw.corners, -1, axis=1)
     number = np.arange(len(edge))
@@ -173,7 +175,7 @@ def _thirds(
 
 
 def _third_middle(a: int, b: int) -> np.ndarray:
-    """Area coordinates of the middle between corners a and b of a triangle."""
+    """Area coordinates of the midpoint between corners a and b of a triangle."""
     return (np.eye(3)[a] + np.eye(3)[b]) / 2
 
 
@@ -182,7 +184,7 @@ def _edge_middle(k: int) -> np.ndarray:
 
 
 def _six(area: np.ndarray) -> np.ndarray:
-    """Quadratic functions (k, 6) of a triangle at area coordinates (k, 3): corners, then edges 12, 23, 31."""
+    """Quadratic functions (k, 6) of a triangle at area coordinates (k, 3); edges 12, 23, 31."""
     corner = area * (2 * area - 1)
     edge = 4 * area * np.roll(area, -1, axis=1)
     return np.concatenate([corner, edge], axis=1)

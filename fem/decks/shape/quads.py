@@ -1,9 +1,4 @@
-"""A section as quadrilaterals of nine nodes: made from a deck's elements, triangles split, shape kept.
-
-Local node (i, j) of a cell is at 3 i + j, at xi = i/2, eta = j/2; sides 0 to 3 are xi = 0, xi = 1, eta = 0,
-eta = 1, as in tireroad.fem.sections. Every side carries the number of the deck's edge it is part of, so
-sets of the deck survive what is done to the cells.
-"""
+"""A section as nine-node quadrilaterals, built from a deck's elements (see quad_split)."""
 
 from __future__ import annotations
 
@@ -21,8 +16,8 @@ _MOST = 50_000  # elements of a section
 
 @dataclass(frozen=True)
 class DeckEdges:
-    """The deck's edges: end nodes (e, 2) as rows of the deck's points, ascending, and for each element
-    label the numbers of its faces' edges, (n, 4), -1 where a triangle has none.
+    """The deck's edges: end nodes (e, 2) as rows of the deck's points, ascending; for each element
+    label the numbers of its faces' edges (n, 4), -1 for the missing one of a triangle.
     """
 
     ends: np.ndarray
@@ -34,7 +29,7 @@ class DeckEdges:
         return np.flatnonzero(np.isin(self.ends, nodes).all(axis=1))
 
     def numbers(self, pairs: np.ndarray) -> np.ndarray:
-        """Numbers (k,) of edges by their end nodes (k, 2); -1 where there is none."""
+        """Numbers (k,) of edges by their end nodes (k, 2); -1 if there is none."""
         size = max(self.ends.max(initial=0), pairs.max(initial=0)) + 1
         keys = self.ends[:, 0] * size + self.ends[:, 1]
         low = np.sort(pairs, axis=1)
@@ -44,10 +39,10 @@ class DeckEdges:
 
 
 def build(deck: Deck, region_of: dict[int, int]) -> tuple[Quads, DeckEdges, bool]:
-    """The cells of the solids of a two-dimensional deck, its edges, and whether triangles were split.
+    """The cells of a two-dimensional deck's solids, its edges, and whether elements were split.
 
-    `region_of` gives the number of the compound of each element label. Raises InputError, with file and
-    line, for elements that are inside out.
+    `region_of`: compound number of each element label. Raises InputError, with file and line, for
+    elements that are inside out.
     """
     blocks = [b for b in deck.blocks if b.kind.role == "solid" and b.kind.dimension == 2]
     if sum(len(b.labels) for b in blocks) > _MOST:
@@ -87,7 +82,7 @@ def _raw(deck: Deck, blocks: list[Block], corners: int, region_of: dict[int, int
 
 
 def _positive(deck: Deck, block: Block) -> None:
-    """That corners go round counter-clockwise in (r, z), and every corner has an angle below 180 degrees."""
+    """Check that corners run counter-clockwise in (r, z) with angles below 180 degrees."""
     count = block.kind.corners
     corners = deck.points[deck.rows(block.nodes[:, :count], block.place)][:, :, :2]
     after, before = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
@@ -115,7 +110,7 @@ def _pairs(raw: Raw) -> np.ndarray:
 def _middles(
     deck: Deck, ends: np.ndarray, parts: Sequence[tuple[np.ndarray, Raw]], blocks: list[Block]
 ) -> np.ndarray:
-    """The middle of each edge: the deck's node where an element has one, else between its ends."""
+    """The middle of each edge: the deck's node if there is one, else halfway between its ends."""
     nodes = deck.points[:, :2]
     middles = nodes[ends].mean(axis=1)
     node = np.full(len(ends), -1)

@@ -1,6 +1,6 @@
-"""Three-dimensional decks that are bodies of revolution, reduced to their section.
+"""Reduction of three-dimensional decks that are bodies of revolution to their section.
 
-The program's rolling states are those of a body that is undeformed the same at every angle, so any
+The program's rolling states require a body whose undeformed shape is the same at every angle; any
 other body is refused, with the reason.
 """
 
@@ -22,7 +22,7 @@ _NODES = 2_000_000
 
 @dataclass
 class _Section:
-    """The section so far: which of its elements each solid and membrane belongs to (`owner`), the corners of
+    """The section so far: the section element of each solid and membrane (`owner`), the corners of
     its cells (ring numbers), and the corners of all faces of every solid.
     """
 
@@ -33,7 +33,9 @@ class _Section:
 
 
 def reduced(deck: Deck) -> tuple[Deck, np.ndarray | None]:
-    """A two-dimensional deck as it is; a body of revolution as its section and its ring angles (rad)."""
+    """A two-dimensional deck as is; a body of revolution as section and ring angles (rad).
+
+    Raises InputError for any other body."""
     if deck.dimension == 2:
         return deck, None
     if len(deck.points) > _NODES:
@@ -69,7 +71,7 @@ def reduced(deck: Deck) -> tuple[Deck, np.ndarray | None]:
 
 
 def _positive(deck: Deck, block: Block, rows: np.ndarray) -> None:
-    """That the corner at the first node of every solid has a positive volume."""
+    """Check that the corner at the first node of every solid has a positive volume."""
     third, up = (3, 4) if block.kind.corners == 8 else (2, 3)
     at = deck.points[rows]
     edges = [at[:, k] - at[:, 0] for k in (1, third, up)]
@@ -82,7 +84,7 @@ def _positive(deck: Deck, block: Block, rows: np.ndarray) -> None:
 
 
 def _sections(deck: Deck, block: Block, rows: np.ndarray, section: _Section) -> list[Block]:
-    """The section cells of a block: the face of each solid that lies in a meridian plane, each once."""
+    """Section cells of a block: the meridian face of each solid, listed once."""
     shape, rings = block.kind, section.rings
     every = rings.ring[deck.rows(block.nodes, block.place)]
     start = _meridian_faces(rings, shape.faces, rows, block)
@@ -119,7 +121,7 @@ def _cell(ring: np.ndarray, face: tuple, middle: dict, rings: Rings) -> list[int
 def _meridian_faces(
     rings: Rings, faces: Sequence[tuple[int, ...]], rows: np.ndarray, block: Block
 ) -> np.ndarray:
-    """For each solid the number of its first face whose corners have one angle and different rings."""
+    """For each solid the index of its first face with one angle and distinct rings."""
     found = np.full(len(rows), -1)
     for number in reversed(range(len(faces))):
         angle, ring = rings.angle[rows[:, faces[number]]], rings.ring[rows[:, faces[number]]]
@@ -137,7 +139,7 @@ def _meridian_faces(
 
 
 def _middles(shape: Kind) -> dict[frozenset, int]:
-    """Local node between two corners, of quadratic solids, in Abaqus's order."""
+    """Local mid-edge node between two corners of quadratic solids, in Abaqus's order."""
     if shape.nodes in (6, 8):
         return {}
     count = shape.corners // 2
@@ -147,7 +149,7 @@ def _middles(shape: Kind) -> dict[frozenset, int]:
 
 
 def _same_all_round(section: _Section, deck: Deck) -> None:
-    """That every cell of the section is there once in each step around."""
+    """Check that every cell of the section occurs once in each step around."""
     solids = [section.owner[label] for label in section.faces]
     _, counts = np.unique(np.array(solids), return_counts=True)
     around = len(section.rings.angles)
@@ -159,8 +161,10 @@ def _same_all_round(section: _Section, deck: Deck) -> None:
 
 
 def _membranes(deck: Deck, section: _Section) -> tuple[list[Block], dict]:
-    """Membranes as lines of the section, towards the end farther along the axis, and for each label whether
-    its normal x that direction is the direction of growing angle (+1) or the other (-1).
+    """Membranes as lines of the section, directed towards larger axial coordinates.
+
+    Also, for each label, whether its normal x that direction points to growing angles (+1) or not
+    (-1).
     """
     rings, blocks, senses = section.rings, [], {}
     for block in deck.blocks:
@@ -221,7 +225,7 @@ def _element_sets(deck: Deck, owner: dict) -> Sets:
 
 
 def _surface(rows: np.ndarray, section: _Section) -> np.ndarray:
-    """(section label, face of its cell) of faces that reach around the axis; membranes as they are."""
+    """(section label, face of its cell) of faces around the axis; membranes unchanged."""
     found = set()
     for label, face in rows.tolist():
         cell = section.owner.get(label)

@@ -1,11 +1,11 @@
-"""Angles of cords in three-dimensional membranes, as angles from the meridian of the section.
+"""Cord angles in three-dimensional membranes, converted to angles from the section's meridian.
 
-In a membrane the angle counts from the local first direction 1 about the normal n: the cord lies along
-cos a e_1 + sin a (n x e_1). Two systems are the same at every angle around: the default one, where e_1 is the
-projection of global x, when x is the axle (e_1 is the meridian m towards larger x); and a cylindrical one
-about the axle with its first axis for normal, where e_1 is e_theta. With n x m = s e_theta, s = 1 or -1, the
-angle from m towards e_theta is s a in the first, and in the second, n x e_theta being -s m,
-atan2(cos a, -s sin a).
+In a membrane the angle is measured from the local first direction 1 about the normal n: the cord
+lies along cos a e_1 + sin a (n x e_1). Two systems are the same at every angle around: the default
+one if x is the axle, where e_1 is the projection of global x (the meridian m towards larger x), and
+a cylindrical one about the axle with its first axis as normal, where e_1 is e_theta. With n x m = s
+e_theta, s = 1 or -1, the angle from m towards e_theta is s a in the first; in the second, as n x
+e_theta = -s m, it is atan2(cos a, -s sin a).
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from tireroad.fem.decks.deck import Deck, Layer
 
 
 def meridian_layers(deck: Deck, senses: dict[int, int], axis: int) -> tuple[Layer, ...]:
-    """The layers with angles from the meridian, for lines that run to larger coordinates of the axis.
+    """The layers with angles from the meridian, for lines that run to larger axial coordinates.
 
-    `senses` is s for each membrane. Raises InputError for systems that are not the same at every angle.
+    `senses` is s for each membrane. Raises InputError for systems that vary around the axle.
     """
     return tuple(_layer(deck, layer, senses, axis) for layer in deck.layers)
 
@@ -49,7 +49,7 @@ def _layer(deck: Deck, layer: Layer, senses: dict[int, int], axis: int) -> Layer
 
 
 def _from_circumference(deck: Deck, layer: Layer, axis: int) -> int:
-    """0 for angles from the meridian; for a cylindrical system 1 or -1, whether its axis is the axle's."""
+    """0: angle from the meridian; 1 or -1: cylindrical system, axis along or against the axle."""
     if not layer.orientation:
         if axis == 0:
             return 0

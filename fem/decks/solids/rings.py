@@ -1,4 +1,4 @@
-"""The axis about which the nodes of a three-dimensional deck are rings."""
+"""The axis about which the nodes of a three-dimensional deck form rings."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ import numpy as np
 from tireroad.fem.decks.deck import Deck
 from tireroad.fem.errors import InputError
 
-_SAME = 1e-6  # of the body's size: two places, or (of a radian) two angles, are one
+_SAME = 1e-6  # of the body's size (positions) or of a radian (angles): tolerance for equality
 
 
 @dataclass(frozen=True)
 class Rings:
-    """The nodes of a body about an axis: for each row of the deck's points the number of its ring (its
-    place in the section) and of its angle; `places` (r, along) of the rings, `angles` ascending in rad.
+    """The nodes of a body about an axis.
+
+    For each row of the deck's points the numbers of its ring (its position in the section) and of
+    its angle; `places` (r, along) of the rings; `angles` ascending in rad.
     """
 
     axis: int
@@ -26,8 +28,8 @@ class Rings:
 
 
 def find_rings(deck: Deck, corners: np.ndarray) -> Rings:
-    """The axis about which the corner nodes are rings of equal angles."""
-    best: tuple[int, int, int] = (len(corners) + 1, 0, 0)  # more places than there can be
+    """The axis about which corner nodes form rings of equal angles. InputError if none."""
+    best: tuple[int, int, int] = (len(corners) + 1, 0, 0)  # more positions than possible
     for axis in (1, 2, 0):
         rings = _rings(deck.points, axis, corners)
         pairs = np.unique(rings.ring[corners] * len(rings.angles) + rings.angle[corners])
@@ -61,7 +63,7 @@ def _rings(points: np.ndarray, axis: int, corners: np.ndarray) -> Rings:
 
 
 def _clusters(values: np.ndarray, small: float) -> np.ndarray:
-    """Numbers of groups of values with no gap above `small`, ascending."""
+    """Group numbers of values, ascending; groups have no gap above `small`."""
     order = np.argsort(values)
     group = np.cumsum(np.diff(values[order], prepend=values[order[0]]) > small)
     out = np.empty(len(values), np.int64)

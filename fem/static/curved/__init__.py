@@ -1,1 +1,1 @@
-"""Roads that are no level plane: camber and drums."""
+"""Roads other than a level plane: camber and drums."""

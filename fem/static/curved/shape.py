@@ -1,14 +1,18 @@
-"""The road's own shape under the tire: a plane, tilted by the wheel's camber, or a drum.
+"""Shape of the road under the tire: a plane, inclined by the wheel's camber, or a drum.
 
-In the wheel's axes the surface is z = h + s(x, y), h its height under the axle. The wheel leans by the angle gamma about x
-(its top to the right, -y, for gamma > 0), so the road's normal is (0, sin gamma, cos gamma) there, and
+In the wheel's axes the surface is z = h + s(x, y), h being its height under the axle. The wheel is
+tilted by gamma about x (its top to the right, -y, for gamma > 0), so the road's normal is (0, sin
+gamma, cos gamma) there, and
 
-    s = -y tan gamma + d(x) / cos gamma,   d = sqrt(R^2 - x^2) - R on a drum, R - sqrt(R^2 - x^2) inside one,
+    s = -y tan gamma + d(x) / cos gamma,
+    d = sqrt(R^2 - x^2) - R on a drum, R - sqrt(R^2 - x^2) inside one,
 
-on a drum whose axis is level. Beyond 0.9 R a drum is continued by its tangent: nothing touches there.
+for a drum with a horizontal axis. Beyond 0.9 R a drum is continued by its tangent; there is no
+contact there.
 
-All of them roll out flat: a place on the road is told by xi = R asin(x/R) (x on a plane) along it and eta = y cos gamma - z sin
-gamma across it. A body on the road that moves up with it keeps both.
+All of these surfaces are developable. A point on the road has the coordinates xi = R asin(x/R) (x
+on a plane) along it and eta = y cos gamma - z sin gamma across it. A body on the road that moves up
+with it keeps both.
 """
 
 from __future__ import annotations
@@ -25,7 +29,7 @@ _REACH = 0.9  # of the drum's radius
 
 @dataclass(frozen=True, kw_only=True)
 class RoadShape:
-    """`camber` rad; `drum_radius` m, None of a flat road; `inside`: the tire runs inside the drum."""
+    """`camber` rad; `drum_radius` m, None: flat road; `inside`: the tire runs inside the drum."""
 
     camber: float = 0.0
     drum_radius: float | None = None
@@ -33,12 +37,12 @@ class RoadShape:
 
     @property
     def flat(self) -> bool:
-        """Whether it is a level plane."""
+        """Whether the road is a level plane."""
         return self.camber == 0.0 and self.drum_radius is None
 
     @property
     def upright(self) -> float:
-        """cos gamma: the road's normal along the wheel's z."""
+        """cos gamma: component of the road's normal along the wheel's z."""
         return math.cos(self.camber)
 
     def height(self, x: Array, y: Array) -> Array:
@@ -60,13 +64,13 @@ class RoadShape:
         return -self._sign * near / np.sqrt(self.drum_radius**2 - near**2) / self.upright, across
 
     def bending(self, x: Array) -> Array:
-        """How the direction along the road turns towards its normal, 1/m along it: -1/R on a drum, 1/R inside one."""
+        """Curvature along xi towards the road's normal, 1/m: -1/R on a drum, 1/R inside one."""
         if self.drum_radius is None:
             return np.zeros(np.shape(x))
         return np.where(self._near(x) == x, -self._sign / self.drum_radius, 0.0)
 
     def unrolled(self, places: Array) -> Array:
-        """xi, eta (n, 2) m of places (n, 3) m."""
+        """xi, eta (n, 2) m of positions (n, 3) m."""
         if self.flat:
             return places[:, :2]
         x, y, z = places.T
@@ -78,7 +82,7 @@ class RoadShape:
         return np.stack([along, y * self.upright - z * math.sin(self.camber)], axis=-1)
 
     def frames(self, x: Array, y: Array) -> Array:
-        """Unit vectors (n, 3, 3) in the wheel's axes: along the road, across it to the left, its normal."""
+        """Unit vectors (n, 3, 3) in the wheel's axes: along the road, to its left, normal to it."""
         along, across = self.slopes(x, y)
         one, nothing = np.ones(len(along)), np.zeros(len(along))
         left = _unit(np.stack([nothing, one, across], axis=-1))
@@ -88,11 +92,12 @@ class RoadShape:
 
     @property
     def up(self) -> Array:
-        """(3,): the road's normal under the axle, along which it is raised."""
+        """The road's normal (3,) under the axle, along which it is raised."""
         return np.array([0.0, math.sin(self.camber), self.upright])
 
     def stretch(self, x: Array, y: Array) -> Array:
-        """Normal force over its part along the wheel's z, and height over distance, at x, y (m)."""
+        """Ratio of the normal force to its component along the wheel's z, and of height to
+        distance, at x, y (m)."""
         along, across = self.slopes(x, y)
         return np.sqrt(1.0 + along**2 + across**2)
 

@@ -1,13 +1,15 @@
-"""The tread's nodes in the coordinates of a road that is no level plane.
+"""Tread nodes in the coordinates of a road that is not a level plane.
 
-Along the road, across it, and up, X = X(xi, eta, w): on the surface at xi, eta (fem.static.curved.shape), and w off it along the
-way the road is raised, cos gamma n_0 for each metre of its height, n_0 its normal under the axle. With B = dX/d(xi, eta, w),
-whose columns are e_xi, e_eta and cos gamma n_0, virtual work makes of forces out of balance and tangent
+X = X(xi, eta, w): the point of the surface at xi, eta along and across it
+(fem.static.curved.shape), displaced by w along the direction in which the road is raised, cos gamma
+n_0 per metre of height, n_0 being its normal under the axle. With B = dX/d(xi, eta, w), whose
+columns are e_xi, e_eta and cos gamma n_0, residual forces and tangent become
 
     B^T out,    B^T K B + out . d2X,    d2X/dxi2 = -n/R  on a drum, n/R inside one, all others 0,
 
-so that a node is held in w alone, or in all three where it sticks, as on a level road. A frictionless road pushes with a force
-f along the wheel's z, f = N n_z, N its normal force, which is the reaction at w.
+so that a node is held in w alone, or in all three coordinates if it sticks, as on a level road. A
+frictionless road exerts f = N n_z along the wheel's z, N being the normal force; f is the reaction
+at w.
 """
 
 from __future__ import annotations
@@ -23,8 +25,8 @@ Array = np.ndarray
 
 
 class Unrolled:
-    """Of the owned nodes that can meet a `road`, at their present places. All methods but `turn` and `spread` are
-    collective."""
+    """Road coordinates of the owned nodes that can touch a `road`, at their present positions. All
+    methods except `turn` and `spread` are collective."""
 
     def __init__(self, body: Body, road: Road) -> None:
         self._body, self._road = body, road
@@ -32,24 +34,24 @@ class Unrolled:
         self._tangent: PETSc.Mat | None = None
 
     def _basis(self) -> Array:
-        """B (n, 3, 3), its columns the last axis."""
+        """B (n, 3, 3), its columns along the last axis."""
         shape, places = self._road.shape, self._road.places()
         basis = shape.frames(*places.T[:2]).transpose(0, 2, 1)
         basis[:, :, 2] = shape.upright * shape.up
         return basis
 
     def turn(self, out: Array) -> None:
-        """B^T out in place, N, of the owned unknowns."""
+        """Replace the forces (N) of the owned unknowns by B^T out, in place."""
         out[self._blocks] = np.einsum("nij,ni->nj", self._basis(), out[self._blocks])
 
     def spread(self, change: Array) -> Array:
-        """Motion of the owned unknowns in the wheel's axes, m, from one in these coordinates."""
+        """Motion of the owned unknowns in the wheel's axes, m, from one in road coordinates."""
         change = change.copy()
         change[self._blocks] = np.einsum("nij,nj->ni", self._basis(), change[self._blocks])
         return change
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """B^T K B, and the turning of the road's normal forces: of use until the next one is made."""
+        """B^T K B plus the stiffness of the rotating normal forces; valid until the next call."""
         if self._tangent is not None:
             self._tangent.destroy()
         transform = self._transform(matrix)

@@ -1,1 +1,1 @@
-"""Coulomb friction of the static state: of the tire that stands, and of the one that rolls steadily."""
+"""Coulomb friction in the static state, of a standing and of a steadily rolling tire."""

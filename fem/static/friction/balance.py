@@ -1,4 +1,4 @@
-"""Equilibrium on a smooth road with Coulomb friction; Newton's method in one loop, sets of contact, stick and slip in it."""
+"""Equilibrium on a smooth road with Coulomb friction: contact, stick, slip in one Newton loop."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tireroad.fem.tire.body import Body
 
 
 class RubbingEquilibrium(Equilibrium):
-    """As `Equilibrium`, of nodes that slide as `sliding` says under the coefficient `friction`. Collective."""
+    """`Equilibrium` with coefficient `friction` and slip as in `sliding`. Collective."""
 
     road: RubbingRoad
 
@@ -30,18 +30,20 @@ class RubbingEquilibrium(Equilibrium):
         return RubbingSystem(self.body.comm, self.matrix, self.cost, self.road)
 
     def _make_contact(self) -> None:
-        """None: the tangent is not symmetric."""
+        """None: the tangent is unsymmetric."""
 
     def solve(
         self, road_height: float | None = None, load: float | None = None, allowed: float = 0.0
     ) -> Step:
-        """As of a road without friction."""
+        """As without friction."""
         self.road.search()
         return super().solve(road_height, load, allowed)
 
     def nudged(self, load: float) -> np.ndarray:
-        """Sum (2,) N of the forces along and across the road after one linearised step under that `load` (N), what sticks and
-        slips as it does; the state is put back. Collective."""
+        """Sum (2,) N of the forces along and across the road after one step under `load` (N).
+
+        The stick and slip sets are kept, and the state is restored. Raises ConvergenceError for a
+        singular tangent. Collective."""
         field = self.body.u.x
         kept, self._before.x.array[:] = (field.array.copy(), self.road.kept()), field.array
         self._out()

@@ -1,8 +1,9 @@
-"""Friction in the state of a tire that was found without: along the way to it, or as it rolls on.
+"""Friction added to a frictionless static state: along the load path, or in steady rolling.
 
-What sticks and slips under a tire that stands depends on how it came to stand: it is pressed on the road once more, from
-the inflated tire on, in equal steps. Under one that rolls steadily it does not: the frictionless state is the start of
-Newton's method, and the travel in a radian at which a free wheel's horizontal force vanishes is found by secants.
+Stick and slip under a standing tire depend on the load path: the inflated tire is pressed on the
+road again in equal steps. Under a steadily rolling tire they do not: Newton's method starts from
+the frictionless state, and the travel per radian at which a free-rolling wheel has no horizontal
+force is found by the secant method.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from tireroad.fem.static.path.step import Step
 from tireroad.fem.static.path.stepping import Show
 from tireroad.fem.static.state import static_state
 
-_NEAR, _CLOSE = 1e-4, 1e-8  # of the travel: the first other one tried, and where secants end
-_MOST = 40  # of them
+_NEAR, _CLOSE = 1e-4, 1e-8  # of the travel: first offset tried, and tolerance of the secant method
+_MOST = 40  # secant iterations
 _ADVICE = (
     "Take a smaller static.friction or slip, smaller elements at the footprint (tire.footprint_size), or more "
     "static.friction_steps"
@@ -31,9 +32,9 @@ _ADVICE = (
 
 @dataclass(frozen=True, kw_only=True)
 class Friction:
-    """`coefficient` mu; `steps` in which a standing tire is pressed on the road. Of one that rolls: its `slip` (s_x, s_y),
-    > 0 driving and drifting towards +y, and the `radius` (m) it travels in a radian without slip, None: at which no
-    horizontal force drags on it.
+    """`coefficient` mu; `steps` in which a standing tire is pressed on the road. For a rolling
+    tire: `slip` (s_x, s_y), > 0 driving and drifting towards +y, and `radius` (m), its travel per
+    radian without slip; None: that at which no horizontal drag acts.
     """
 
     coefficient: float
@@ -45,8 +46,10 @@ class Friction:
 def with_friction(
     loader: Loader, inflated: np.ndarray, load: float | None, friction: Friction
 ) -> Loader:
-    """The `loader`'s state on the road, with friction; `inflated` is its body's `u` before there was a road, `load` (N)
-    what the road has to carry along its normal under the axle, None: it stays where it is. Collective.
+    """The `loader`'s state on the road, with friction. Collective.
+
+    `inflated`: `u` of the body before it met the road; `load` (N) of the road along its normal
+    under the axle, None: its height is kept.
     """
     equilibrium = loader.equilibrium
     if load is not None:
@@ -70,7 +73,7 @@ def _on(
 def _pressed(
     loader: Loader, inflated: np.ndarray, load: float | None, friction: Friction
 ) -> Loader:
-    """Standing: each step slips as much as it does from the last on; the last one carries the load."""
+    """Standing: each step slips relative to the last one; the last one carries the load."""
     deflection, body = loader.deflection, loader.body
     body.u.x.array[:] = inflated
     sliding = Standing(body, loader.equilibrium.shape)
@@ -125,7 +128,7 @@ def _rolling(loader: Loader, load: float | None, friction: Friction) -> Loader:
 
 
 def _march(rubbing: Loader, attempt: Callable[[float], Step], end: float, show: Show) -> None:
-    """From nothing to `end` at once, or in as many steps as it takes. Collective."""
+    """From zero to `end` at once, or in as many steps as needed. Collective."""
     try:
         rubbing.march(attempt, end, end, show)
     except LoadingStopped as error:
@@ -133,7 +136,7 @@ def _march(rubbing: Loader, attempt: Callable[[float], Step], end: float, show: 
 
 
 def _free(drag: Callable[[float], float], radius: float, load: float) -> float:
-    """The travel (m) in a radian at which `drag` (N) vanishes."""
+    """Travel per radian (m) at which `drag` (N) vanishes."""
     near = radius * (1 - _NEAR)
     found = root_scalar(
         drag, method="secant", x0=radius, x1=near, xtol=_CLOSE * radius, maxiter=_MOST

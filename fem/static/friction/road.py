@@ -1,20 +1,21 @@
 """The smooth road under the tread nodes of one body, with Coulomb friction.
 
-At a node that touches, with f its normal force, t the road's horizontal force on it, g how far it slides and c its stiffness,
+For a node in contact with normal force f, horizontal road force t, slip distance g and stiffness c,
 
     t = P(t - c g),   P the projection on |t| <= mu f:
 
-it sticks, g = 0, or it slips, |t| = mu f against g. (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353.)
-Newton's method on that, node by node: with n the direction of t - c g, m at a right angle, b = mu f / |t - c g| < 1,
+it sticks, g = 0, or it slips, |t| = mu f against g (Alart and Curnier, Comput. Methods Appl. Mech.
+Eng. 92 (1991) 353). Newton's method node by node, with n along t - c g, m normal to n and
+b = mu f / |t - c g| < 1:
 
     t+ = mu f+ n - k m (m . g+),   k = b c / (1 - b),
 
-f+ and g+ of the linearised problem: no step of its own for t. k is |t| over |g| once it slips: a node that
-slides is led by its friction as by a spring across its way, and along it only by mu times its normal force.
+f+ and g+ being those of the linearised problem: t has no step of its own. Once a node slips, k is
+|t| / |g|: friction is a spring across its path, and along it only mu times the normal force.
 
-On a road that is no level plane t and g are counted along the road and across it (fem.static.curved). With l = -e_xi . cos
-gamma n_0 the force along which the road is raised is v = p - l t_xi, p the normal force's part along the wheel's z, and
-f = s p, s the surface's stretch: a node that slips knows p by v and the t_xi out of balance.
+Unless the road is a level plane, t and g are along and across it (fem.static.curved). With
+l = -e_xi . cos gamma n_0 the force conjugate to the road's height is v = p - l t_xi, p being the z
+component of the normal force f = s p, s the stretch. At slipping nodes v and t_xi give p.
 """
 
 from __future__ import annotations
@@ -34,8 +35,9 @@ Array = np.ndarray
 
 @dataclass(frozen=True, kw_only=True)
 class Couplings:
-    """Of `unknowns` (k, 2) along the road: the `shares` (k, 2, m) of the rows of other unknowns, `sources` (k, m), `own` (k, 2, 2)
-    N/m on themselves, and the `springs` (k, 2, 2) N/m to the nodes `ahead` (k,), numbers of blocks; -1: none."""
+    """Changes to the tangent's rows of slipping nodes: for `unknowns` (k, 2) along the road
+    `shares` (k, 2, m) of the rows of `sources` (k, m), `own` (k, 2, 2) N/m on themselves, and
+    `springs` (k, 2, 2) N/m to the nodes `ahead` (k,), block numbers, -1: none."""
 
     unknowns: Array
     sources: Array
@@ -45,14 +47,13 @@ class Couplings:
     ahead: Array
 
 
-_ROUNDING, _BRINK = 1e-9, 1e-7  # of a node's bound
-# k over c of a node on the brink of sticking: of 1e6 the rounding of g kept it off balance
+_ROUNDING, _BRINK = 1e-9, 1e-7  # of a node's friction bound
+# k over c of a node about to stick: with 1e6 the rounding of g prevented convergence
 _STIFFEST = 1e3
 
 
 class RubbingRoad(Road):
-    """As `Road`; `pull` (n, 2) N forces on the tire along and across the road, `sticks` (n,) which nodes do; `friction`
-    mu."""
+    """`Road` with friction: `pull` (n, 2) N along and across the road; `sticks` (n,) bool."""
 
     def __init__(self, body: Body, friction: float, sliding: Sliding) -> None:
         super().__init__(body, sliding.shape)
@@ -66,7 +67,7 @@ class RubbingRoad(Road):
         self._way, self._across, self._led = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
 
     def search(self) -> None:
-        """A search for another balance begins."""
+        """Begin the search for another equilibrium."""
         self._came[:] = False
 
     def weigh(self, diagonal: Array) -> None:
@@ -75,7 +76,7 @@ class RubbingRoad(Road):
 
     @property
     def held(self) -> Array:
-        """Owned unknowns that the road holds: the vertical ones, then x and y of each node that sticks."""
+        """Owned unknowns held by the road: the vertical ones, then x and y of sticking nodes."""
         return np.concatenate([super().held, self._along[self.sticks].ravel()])
 
     def steps(self) -> tuple[Array, Array]:
@@ -87,7 +88,7 @@ class RubbingRoad(Road):
         return np.append(down, back), np.append(rise, np.zeros(len(back)))
 
     def _lie(self) -> tuple[Array, Array]:
-        """s and l (n,) at the nodes' places."""
+        """s and l (n,) at the nodes' positions."""
         shape = self.shape
         if shape.flat:
             return np.ones(len(self.dofs)), np.zeros(len(self.dofs))
@@ -99,7 +100,7 @@ class RubbingRoad(Road):
         return self.force + self._lie()[1] * self.pull[:, 0]
 
     def forward(self) -> float:
-        """Of all forces on the tire, normal ones too, the sum along the wheel's x, N. Not collective."""
+        """Sum of all road forces, normal ones included, along the wheel's x, N. Not collective."""
         if self.shape.flat:
             return float(self.pull[:, 0].sum())
         x, y, _ = self.places().T
@@ -107,16 +108,17 @@ class RubbingRoad(Road):
         return float(pushed + (self.pull * self.shape.frames(x, y)[:, :2, 0]).sum())
 
     def _trial(self) -> tuple[Array, Array]:
-        """t - c g (n, 2) N and mu f (n,) N, f as Newton's method sees it. Collective."""
+        """t - c g (n, 2) N and mu f (n,) N, with f as in the active-set condition. Collective."""
         pressing = np.maximum(self.pressing() - self.stiffness * self.gap(), 0.0)
         bound = self.friction * self._lie()[0] * pressing
         return self.pull - self._softly[:, None] * self.sliding.slid(), bound
 
     def choose(self) -> bool:
-        """As of a road without friction; and which nodes stick. A node that does goes on to until its force is too large;
-        one that slips, until it would slip the other way: it never turns round at once. What touches
-        anew sticks first, and slips when it comes a second time in a search, which else had no end. (All by t - c g alone,
-        nodes slipped to and fro together, for ever.) Collective.
+        """Update the active set and the sticking nodes; True if either changed. Collective.
+
+        A node sticks until its force exceeds the bound; it slips until it would slip backwards, and
+        never reverses at once. A new contact sticks, but slips the second time in one search, which
+        would not end otherwise. (By t - c g alone, nodes slipped to and fro forever.)
         """
         touched, changed = self.active, super().choose()
         self.pull[~self.active] = 0.0
@@ -144,7 +146,7 @@ class RubbingRoad(Road):
         out[self._along] -= self.pull
 
     def linearise(self) -> None:
-        """Take n, m and k at the nodes that slip. Collective."""
+        """Set n, m and k at the slipping nodes. Collective."""
         trial, bound = self._trial()
         self._slips = np.flatnonzero(self.active & ~self.sticks)
         length = np.linalg.norm(trial[self._slips], axis=1)
@@ -157,7 +159,7 @@ class RubbingRoad(Road):
         )
 
     def _sources(self) -> tuple[Array, Array]:
-        """Of nodes that slip, the unknowns (k, m) whose forces tell mu f, and by which shares (k, m)."""
+        """At slipping nodes: unknowns (k, m) whose forces give mu f, and factors (k, m)."""
         stretch, lean = (part[self._slips] for part in self._lie())
         upright = self.dofs[self._slips, None]
         if self.shape.flat:
@@ -168,7 +170,7 @@ class RubbingRoad(Road):
         )
 
     def rows(self, out: Array) -> Array:
-        """At nodes that slip, the balance along the road with its friction eliminated. Collective."""
+        """At slipping nodes, the balance along the road with friction eliminated. Collective."""
         where = self._along[self._slips]
         sources, shares = self._sources()
         bound = (shares * out[sources]).sum(axis=1)
@@ -182,11 +184,11 @@ class RubbingRoad(Road):
         return (self._led * off)[:, None] * self._across
 
     def couplings(self) -> Couplings:
-        """What `rows` does to the tangent's rows. Not collective."""
+        """The change of the tangent's rows that corresponds to `rows`. Not collective."""
         sources, shares = self._sources()
         springs = self._led[:, None, None] * self._across[:, :, None] * self._across[:, None, :]
         own = springs.copy()
-        if not self.shape.flat:  # a node that moves on along a drum is pressed along another normal
+        if not self.shape.flat:  # along a drum the normal changes with position
             own[:, :, 0] += self._way * self._leaning()[:, None]
         return Couplings(
             unknowns=self._along[self._slips],
@@ -198,15 +200,15 @@ class RubbingRoad(Road):
         )
 
     def _leaning(self) -> Array:
-        """Of nodes that slip, mu b (f l s + t_xi), N/m: less mu f by a metre along the road, b its bending."""
+        """At slipping nodes mu b (f l s + t_xi), N/m, b the bending: loss of mu f per metre."""
         stretch, lean = (part[self._slips] for part in self._lie())
         normal = stretch * self.pressing()[self._slips]
         bending = self.shape.bending(self.places()[self._slips, 0])
         return self.friction * bending * (normal * stretch * lean + self.pull[self._slips, 0])
 
     def resume(self, pressing: Array, pull: Array, height: float) -> None:
-        """Start from a state: normal forces (nodes,) N by their part along the wheel's z, forces (nodes, 2) N along and across
-        the road at `height` (m). Collective."""
+        """Start from normal forces (nodes,) N, given by their component along the wheel's z, and
+        forces (nodes, 2) N along and across the road at `height` (m). Collective."""
         self.take(pressing, height)
         self.pull = pull[self._body.tread]
         stretch, lean = self._lie()

@@ -1,8 +1,9 @@
-"""Force over the way that the road slides under a tire with friction, up to where all of the footprint does.
+"""Force versus sliding distance of the road under a tire with friction, up to full sliding.
 
-Under a tire that stands the road is moved along or across by d, the load held, each step from the last one's stick and slip.
-A wheel that rolls is let slip instead, s_x = s driving, or s_y = -s drifting to the right, its travel in a radian kept: each
-state is steady. The force is the road's on the tire, its part along that way; it ends at mu times the normal force.
+Under a standing tire the road moves along or across by d at constant load; each step starts from
+the stick and slip of the last. A rolling wheel is given slip instead, s_x = s (driving) or s_y = -s
+(drifting to the right), at constant travel per radian; each state is steady. The force is that of
+the road on the tire in the direction of motion; its limit is mu times the normal force.
 """
 
 from __future__ import annotations
@@ -20,14 +21,16 @@ from tireroad.fem.static.path.stepping import Show, march
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.tire.body import Body
 
-_NUDGE = 1e-5  # of the last place of a curve: what a tangent is taken over
+_NUDGE = 1e-5  # of the last point of a curve: step of the tangent's difference quotient
 
 
 @dataclass(frozen=True)
 class Slid:
-    """At `moved` (m of the road; of a wheel that rolls its slip): `force` N that way, `tangent` N/m or N its rate there with
-    what sticks and slips as it does; `moment` N m of the road's forces about the vertical through the axle's centre;
-    `sticks` share of the load under nodes that stick."""
+    """State at `moved` (m of the road, or slip of a rolling wheel).
+
+    `force` N in that direction; `tangent` N/m (rolling: N), its derivative with the stick and slip
+    sets kept; `moment` N m of the road's forces about the vertical through the axle's centre;
+    `sticks`: share of the load on sticking nodes."""
 
     moved: float
     force: float
@@ -37,7 +40,8 @@ class Slid:
 
 
 class Slide:
-    """Of a `state` with friction, which the body is put in; `axis` 0 along the road, 1 across it. All methods are collective."""
+    """Sliding from a `state` with friction, to which the body is set; `axis` 0 along the road, 1
+    across it. All methods are collective."""
 
     def __init__(self, body: Body, state: StaticState, friction: float, axis: int) -> None:
         if state.pull is None or state.road_height is None:
@@ -51,7 +55,7 @@ class Slide:
             else Standing(body, state.road)
         )
         self._sliding, self.rolls = sliding, rolls
-        body.u.x.array[:] = 0.0  # by which the forces' scale is taken
+        body.u.x.array[:] = 0.0  # the force scale is that of the undeformed body
         self.problem = RubbingEquilibrium(body, state.rolling, friction, sliding)
         self.problem.pressure.value = state.inflation
         body.set_displacement(state.displacement)
@@ -61,8 +65,10 @@ class Slide:
         self._sliding.commit()
 
     def start(self, slip: tuple[float, float]) -> float:
-        """Go to where the curve begins, of a state of that `slip` of the wheel: to none along the axis. The force's rate there,
-        N/m, of a wheel that rolls N."""
+        """Go to the start of the curve, where the wheel's slip along the axis is zero.
+
+        Returns the slope of the force there, N/m, for a rolling wheel N. Raises ConvergenceError if
+        the state is not recovered."""
         sliding, own = self._sliding, slip[self._axis]
         if isinstance(sliding, Passing):
             sliding.slip = slip
@@ -77,7 +83,7 @@ class Slide:
         return self._rate(self._shift(0.0), 1e-6)
 
     def _shift(self, moved: float) -> Callable[[float], None]:
-        """What puts the road `more` beyond `moved`."""
+        """Function that sets the road to `more` beyond `moved`."""
         sliding, axis = self._sliding, self._axis
 
         def shift(more: float) -> None:
@@ -91,7 +97,7 @@ class Slide:
         return shift
 
     def curve(self, ends: Sequence[float]) -> Iterator[Slid]:
-        """At ascending `ends` in turn. ConvergenceError where no balance is found."""
+        """The states at ascending `ends`. Raises ConvergenceError if no equilibrium is found."""
         done = 0.0
         for end in ends:
             self._to(end, done, self._shift(0.0))
@@ -102,7 +108,7 @@ class Slide:
         at, begins = start, True
 
         def attempt(target: float) -> Step:
-            """Each part from the last one's stick and slip: what touches anew has slid since then, not before."""
+            """Each part starts from the last stick and slip; new contacts have slid since then."""
             nonlocal at, begins
             if begins:
                 self._sliding.commit()

@@ -1,14 +1,16 @@
-"""How far each node of the tread has slid on the road: since the last load step, or since the node ahead of it.
+"""Slip of each tread node on the road: since the last load step, or since the node ahead of it.
 
-A tire that stands slides by g = (x - d) - (x - d)_before from one load step to the next, x its place and d the road's.
-One that rolls steadily does so under nodes that stand still: the material at the angle theta comes from the node ahead,
-at theta + D, while the road passes by r D, r the wheel's travel in a radian. It slides meanwhile by
+A standing tire slips by g = (x - d) - (x - d)_before between load steps, x being the node's
+position and d the road's. For a steadily rolling tire the nodes are fixed in space: material at the
+angle theta comes from the node ahead, at theta + D, while the road passes by r D, r being the
+wheel's travel per radian. Meanwhile it slips by
 
     g = x(theta) - x(theta + D) + D r (1 - s_x, s_y),
 
-s_x > 0 of a wheel that drives, s_y > 0 of one that drifts towards +y (contact.tread.brush). Where it sticks, g = 0: the
-steps along a streamline add up to the convective rate of the stuck displacement, whatever their length. On a tilted road and on
-a drum x is the place on the road rolled out, xi and eta (fem.static.curved.shape).
+s_x > 0 for a driven wheel, s_y > 0 for one drifting towards +y (contact.tread.brush). Where it
+sticks, g = 0: the steps along a streamline add up to the convective rate of the stuck displacement
+for any step length. On an inclined road and on a drum x is the developed position on the road, xi
+and eta (fem.static.curved.shape).
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ Array = np.ndarray
 
 
 class Sliding(Protocol):
-    """On a road of a `shape`, of the owned tread nodes, n of them in the order of `body.tread`."""
+    """Slip of the n owned tread nodes, in the order of `body.tread`, on a road of given `shape`."""
 
     shape: RoadShape
 
@@ -33,22 +35,24 @@ class Sliding(Protocol):
         ...
 
     def commit(self) -> None:
-        """The present state is where the next load step begins. Collective."""
+        """Make the present state the start of the next load step. Collective."""
         ...
 
     def led(self, sticks: Array) -> tuple[Array, Array, Array]:
-        """Of the nodes that stick (n,) bool those that move with a node ahead of their own: numbers in n (k,), that node's
-        number among all blocks of three unknowns (k,), and how far each lags behind it, (k, 2) m: what g says
-        from node to node. Collective."""
+        """Sticking nodes that move with a node ahead of them. Collective.
+
+        `sticks` (n,) bool. Returns their indices in n (k,), the global block numbers (three
+        unknowns each) of the leading nodes (k,), and their lag (k, 2) m, the sum of g from node to
+        node."""
         ...
 
     def ahead(self, members: Array) -> Array:
-        """Numbers among all blocks of the nodes ahead of some (indices into n); -1: there is none. Not collective."""
+        """Global block numbers of the nodes ahead of `members`; -1: none. Not collective."""
         ...
 
 
 class Standing:
-    """`place` (2,) m: where the road has moved to, along and across."""
+    """Slip under a standing tire; `place` (2,) m: position of the road, along and across."""
 
     def __init__(self, body: Body, shape: RoadShape = FLAT) -> None:
         self._body, self.shape = body, shape
@@ -75,7 +79,7 @@ class Standing:
 
 
 class Passing:
-    """`radius` m: how far the wheel travels in a radian, along the road; `slip` (s_x, s_y)."""
+    """Slip in steady rolling: travel per radian `radius` m, and `slip` (s_x, s_y)."""
 
     def __init__(
         self,
@@ -108,7 +112,7 @@ class Passing:
         return self._steps()[self._own]
 
     def commit(self) -> None:
-        """Nothing: a steady state has no past."""
+        """No effect: a steady state has no history."""
 
     def led(self, sticks: Array) -> tuple[Array, Array, Array]:
         body = self._body
@@ -120,7 +124,7 @@ class Passing:
             raise AssertionError("a streamline sticks all round")
         lead = np.arange(stuck.size).reshape(stuck.shape)
         lag = np.zeros_like(steps)
-        # Against the way of the material, twice round: from each node to the first one ahead that is free.
+        # Against the flow of the material, twice round: from each node to the first free one ahead.
         for i in range(2 * self._around - 1, -1, -1):
             here, front = i % self._around, (i + 1) % self._around
             on = stuck[here]

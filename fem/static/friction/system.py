@@ -1,9 +1,10 @@
-"""The linearised equilibrium of a tire that sticks and slips: what `HeldSystem` is without friction.
+"""The linearised equilibrium of a tire with stick and slip: the counterpart of `HeldSystem`.
 
     (L K + S) P dv = L (- out) - springs,     du = P dv:
 
-L adds to the horizontal rows of nodes that slip -mu n times what of their rows is the normal force; S are the springs across their way; P
-takes nodes that stick along with the free one ahead of them on their streamline. None of it is symmetric.
+L adds to the horizontal rows of slipping nodes -mu n times the part of their rows that is the
+normal force; S are the springs across their path; P moves sticking nodes with the free node ahead
+of them on their streamline. None of these is symmetric.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ Array = np.ndarray
 
 
 class RubbingSystem:
-    """Of the `road`'s present sets at each `take`. All methods are collective."""
+    """Uses the `road`'s sets at the time of each `take`. All methods are collective."""
 
     def __init__(self, comm: MPI.Comm, matrix: PETSc.Mat, timing: Timing, road: RubbingRoad):
         self._comm, self._timing, self._road = comm, timing, road
@@ -30,16 +31,16 @@ class RubbingSystem:
 
     @property
     def closing(self) -> Moved:
-        """As of a HeldSystem, in dv."""
+        """As in HeldSystem, in dv."""
         return self._inner.closing
 
     @property
     def raising(self) -> Moved:
-        """As of a HeldSystem, in dv."""
+        """As in HeldSystem, in dv."""
         return self._inner.raising
 
     def take(self, matrix: PETSc.Mat, held: Array, closing: Array, raising: Array) -> bool:
-        """Factorise; `matrix` is of no use afterwards."""
+        """Factorise; `matrix` must not be used afterwards."""
         with self._timing("road"):
             system = self._joined(matrix)
         found = self._inner.take(system, held, closing, raising)
@@ -48,7 +49,7 @@ class RubbingSystem:
         return found
 
     def solve(self, right: Array, moved: Moved | None = None) -> tuple[Array, Array]:
-        """du (m) of the owned dofs, and forces (N) at the held ones; `right` is L's already (`RubbingRoad.rows`)."""
+        """du (m) of the owned dofs, forces (N) at held ones; `right` already includes L."""
         change, force = self._inner.solve(right, moved)
         if self._carried is None:
             return change, force
@@ -97,7 +98,7 @@ class RubbingSystem:
         )
 
     def _along(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
-        """P; None where nothing is taken along on any process."""
+        """P; None if no process has a node that moves with another."""
         road, first = self._road, matrix.getOwnershipRange()[0]
         members, lead, _ = road.sliding.led(road.sticks)
         if not self._comm.allreduce(len(members)):
@@ -112,7 +113,7 @@ class RubbingSystem:
 
 
 def _sparse(matrix: PETSc.Mat, rows: Array, columns: Array, values: Array) -> PETSc.Mat:
-    """A matrix of the shape of another one, from local rows and global columns; entries that meet add up."""
+    """A matrix shaped like another, from local rows and global columns; duplicates add up."""
     (count, whole), _ = matrix.getSizes()
     entries = np.ravel(values), (np.ravel(rows), np.ravel(columns))
     local = sparse.csr_matrix(entries, shape=(count, whole))

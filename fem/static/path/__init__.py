@@ -1,1 +1,1 @@
-"""The path of load steps to the wanted static state."""
+"""Load steps from the unloaded tire to the requested static state."""

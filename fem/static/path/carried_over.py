@@ -1,4 +1,4 @@
-"""A static state taken over to other elements of the same tire, as a start that is near."""
+"""Transfer of a static state to another mesh of the same tire, as a close start."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 def carried_over(
     state: StaticState, tire: TireModel, other: TireModel, load: float | None
 ) -> StaticState | None:
-    """The static state of the `other` elements of the same tire, by Newton's method from the `state` of these.
+    """Static state of the `other` mesh, by Newton's method from the `state` of this one.
 
-    Inflation, rolling and height of the road stay; with a `load` (N) the road carries that instead. The first
-    touch is not looked for: that of the state is kept. None where no balance is found. Collective.
+    Inflation, rolling and road height are kept; with a `load` (N) the road carries that instead.
+    The height of first touch is taken from the state. None if no equilibrium is found.
+    Collective.
     """
     body = other.body
     body.set_displacement(sampled(tire.lattice, state.displacement, body.lattice))
@@ -34,7 +35,7 @@ def carried_over(
 
 
 def sampled(lattice: Lattice, values: np.ndarray, target: Lattice) -> np.ndarray:
-    """Values (n, 3) of a lattice's nodes at the nodes of another one of the same tire."""
+    """Values (n, 3) of a lattice interpolated to another lattice of the same tire."""
     section = lattice.tire.section
     place = locate(section.nodes, section.cells, section.order, target.section)
     across = interpolation(lattice.cells_2d, lattice.edge, lattice.shape[1], place)

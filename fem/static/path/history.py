@@ -1,8 +1,9 @@
-"""The solutions that a way of load steps asks for, kept so that a way that was stopped is gone again without solving.
+"""Record of the solutions on a load path, so that an interrupted path is retraced without solving.
 
-A way is a function of what its solutions were, and of the states they left; so it is gone from its beginning, and each
-solution that is known is put in place. What follows the last one may use its tangent, which is not kept: the last
-solution of each problem is found once more, from where it began.
+The path is a function of the outcomes and states of its solutions. It is retraced from its start,
+and each recorded solution is put in place. The solution after the last recorded one may use its
+tangent, which is not stored; the last solution of each problem is therefore solved again, from
+where it began.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _ROAD = "active", "force", "height"
 
 
 class History:
-    """Of the equilibrium problems of one stage, in the order in which they are solved; without a `journal` of none."""
+    """Solutions of the equilibrium problems of one stage, in order; none without a `journal`."""
 
     def __init__(self, journal: Journal | None) -> None:
         self._journal = journal
@@ -34,7 +35,7 @@ class History:
         self._again = set(last.values())
 
     def solve(self, problem: Equilibrium, solve: Callable[[], Step]) -> Step:
-        """What `solve()` gives, the body and the road left as it leaves them. Collective."""
+        """Result of `solve()`, with body and road left as it leaves them. Collective."""
         if self._journal is None:
             return solve()
         number, comm = self._number(problem), problem.body.comm
@@ -55,7 +56,7 @@ class History:
         return problem.solved(_read(entry))
 
     def predict(self, predict: Callable[[], bool]) -> bool:
-        """What `predict()` gives; where the solution after it is known, what it gave then. Collective."""
+        """Result of `predict()`, or the recorded one if the next solution is known. Collective."""
         if self._journal is None:
             return predict()
         if self._journal.done < len(self._journal.found):
@@ -75,7 +76,7 @@ class History:
 
 
 def _mesh(problem: Equilibrium) -> np.ndarray:
-    """A digest of which nodes are this process's own."""
+    """Hash of the lattice ids of this process's own nodes."""
     return np.frombuffer(hashlib.sha256(problem.body.ids.tobytes()).digest(), np.uint8)
 
 

@@ -1,4 +1,4 @@
-"""What a long computation has found so far, so that one that was stopped goes on from there to the same bits."""
+"""Stored results of a long computation, so that an interrupted one resumes bit for bit."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ def _nothing(number: int, entry: Entry) -> None: ...
 
 
 class Journal:
-    """This process's own results of the steps of a computation, in their order: those `found` by an attempt before, which
-    need not be taken again, and those that are handed to `keep(number, entry)` as they come."""
+    """This process's own results of the steps of a computation, in order.
+
+    `found`: those of an earlier attempt, which need not be repeated; new ones are passed to
+    `keep(number, entry)`."""
 
     def __init__(
         self, found: Sequence[Entry] = (), keep: Callable[[int, Entry], None] = _nothing
@@ -24,13 +26,15 @@ class Journal:
         self._keep, self._next = keep, 0
 
     def agreed(self, comm: MPI.Comm) -> int:
-        """How many steps all processes have found; no more count from then on. Collective."""
+        """Number of steps that all processes have found; later ones are dropped. Collective."""
         del self.found[comm.allreduce(len(self.found), MPI.MIN) :]
         return len(self.found)
 
     def next(self, comm: MPI.Comm, serves: Callable[[Entry], bool] | None = None) -> Entry | None:
-        """The next step's result where all processes of `comm` have it, and it `serves` them all; else None, it is to be
-        `add`ed, and nothing that was found counts any more. Collective on comm."""
+        """The next step's stored result, if all processes have it and `serves` accepts it.
+
+        Otherwise None: the result must be passed to `add`, and the remaining stored ones are
+        dropped. Collective on comm."""
         here = self._next < len(self.found)
         if here and serves is not None:
             here = serves(self.found[self._next])
@@ -41,17 +45,17 @@ class Journal:
         return self.found[self._next - 1]
 
     def add(self, entry: Entry) -> None:
-        """The next step's result."""
+        """Store the next step's result."""
         self._keep(self._next, entry)
         self._next += 1
 
     @property
     def done(self) -> int:
-        """Steps taken, or found, so far."""
+        """Number of steps computed or found so far."""
         return self._next
 
     def step(self, comm: MPI.Comm, compute: Callable[[], Entry]) -> Entry:
-        """What the next step's `compute` gives, or has given before. Collective on comm."""
+        """Stored result of the next step, or that of `compute`. Collective on comm."""
         entry = self.next(comm)
         if entry is None:
             entry = compute()

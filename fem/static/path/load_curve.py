@@ -1,4 +1,4 @@
-"""Load over deflection: the road raised in steps, the footprint read at each."""
+"""Load-deflection curve: the road is raised in steps, with the footprint at each."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ from tireroad.fem.static.state import static_state
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """The tire at one `deflection` (m): `load` N, `tangent` N/m there while the same nodes touch: between two nodes
-    that come into contact it lags behind the slope of the curve, the less the finer the mesh;
-    `footprint`, `points` in contact, effective `rolling_radius` m.
+    """The tire at one `deflection` (m).
+
+    `load` N; `tangent` N/m, stiffness with the present nodes in contact: between two nodes coming
+    into contact it lags behind the slope of the curve, less so on finer meshes; `footprint`;
+    `points` in contact; effective `rolling_radius` m.
     """
 
     deflection: float
@@ -34,10 +36,10 @@ class CurvePoint:
 
 
 def load_curve(loader: Loader, deflections: Sequence[float]) -> list[CurvePoint]:
-    """The states at ascending deflections (m) of an inflated tire. Collective.
+    """States at ascending deflections (m) of an inflated tire. Collective.
 
-    Each step starts from a line through the two states before it; ConvergenceError where one does not
-    converge by halved steps either.
+    Each step starts from a linear extrapolation of the two previous states. Raises ConvergenceError
+    if a step does not converge even after halving.
     """
     upright = loader.equilibrium.shape.upright
     raised = loader.visit([deflection / upright for deflection in deflections])
@@ -45,7 +47,8 @@ def load_curve(loader: Loader, deflections: Sequence[float]) -> list[CurvePoint]
 
 
 def slopes(deflection: np.ndarray, load: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """dF/d(deflection), N/m, `at` deflections (k,) m, of a smooth curve from 0 through the points (n,)."""
+    """dF/d(deflection), N/m, at deflections `at` (k,) m, of a smooth curve from 0 through the
+    points (n,)."""
     x, y = np.concatenate([[0.0], deflection]), np.concatenate([[0.0], load])
     if len(x) < 4:
         return np.interp(at, x, np.gradient(y, x))

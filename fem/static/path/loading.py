@@ -1,4 +1,4 @@
-"""Load steps to a wanted state: inflation, then the road by height, deflection or load."""
+"""Load steps to a requested state: inflation, then the road by height, deflection or load."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tireroad.fem.static.tread_surface import TreadSurface
 
 @dataclass(frozen=True)
 class Progress:
-    """One load step done: what was stepped to, and the road's total force (N) on how many points."""
+    """A completed load step: quantity, value, unit, road force (N), points in contact."""
 
     what: str
     value: float
@@ -39,7 +39,7 @@ class _Half:
 
 
 class Loader:
-    """Brings the body of one equilibrium problem to the wanted state. All methods are collective."""
+    """Brings one equilibrium problem to the requested state. All methods are collective."""
 
     def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]) -> None:
         self.equilibrium = equilibrium
@@ -50,16 +50,16 @@ class Loader:
         self._half_ring: _Half | None = None
 
     def inflate(self, pressure: float) -> None:
-        """Inflation from 0 to `pressure` (Pa), without a road; also the steady-rolling loads alone.
+        """Inflate from 0 to `pressure` (Pa) without a road, with the steady-rolling loads.
 
-        By the round shape of one section, where that is near enough for Newton; else in steps.
+        With cords, from the axisymmetric shape of one section if close enough; else in steps.
         """
         if not (self.body.plies.cords and self._start_round(pressure)):
             self._inflate_in_steps(pressure)
         self._touch = self.lowest()
 
     def _start_round(self, pressure: float) -> bool:
-        """Whether equilibrium is found from the round shape. Collective."""
+        """Solve from the axisymmetric shape; on failure False and the old state. Collective."""
 
         def inflate(section: RoundEquilibrium) -> None:
             Loader(section, self.report)._inflate_in_steps(pressure)
@@ -70,7 +70,7 @@ class Loader:
         before = self.body.u.x.array.copy()
         self.body.set_displacement(on_root(self.body.comm, shape))
         half = self._half()
-        if half is not None:  # elements of several lengths are not round to rounding
+        if half is not None:  # elements of unequal length are axisymmetric only approximately
             half.loader.newton_steps += half.loader._solve_at(pressure).iterations
             self._count(half)
             self.body.set_displacement(half.equilibrium.on(self.body.lattice)[0])
@@ -83,7 +83,7 @@ class Loader:
         return step.converged
 
     def begin_at(self, other: Loader) -> None:
-        """Take another loader's first touch, and count its steps."""
+        """Take over another loader's height of first touch and its step count."""
         self._touch, self.newton_steps = other.touch, other.newton_steps
 
     def _inflate_in_steps(self, pressure: float) -> None:
@@ -99,7 +99,7 @@ class Loader:
         self.equilibrium.pressure.value = pressure
         step = self.equilibrium.solve()
         if not step.converged:
-            self.equilibrium.pressure.value = before  # as the displacement is put back
+            self.equilibrium.pressure.value = before  # as the displacement is restored
         return step
 
     @property
@@ -110,7 +110,7 @@ class Loader:
 
     @property
     def deflection(self) -> float:
-        """How far the road has been raised from first touch, m."""
+        """Rise of the road from first touch, m."""
         assert self.equilibrium.road_height is not None, "there is no road"
         return self.equilibrium.road_height - self.touch
 
@@ -124,7 +124,7 @@ class Loader:
 
     @property
     def farthest(self) -> float:
-        """Deflection at which the road reaches the rim where the outer face meets it, m. Collective."""
+        """Deflection at which the road reaches the outer face's edge on the rim, m. Collective."""
         places = self.body.space.tabulate_dof_coordinates()[self.body.beads]
         height = places[:, 2] - self.equilibrium.shape.height(*places[:, :2].T)
         lowest = self.body.comm.allreduce(float(height.min(initial=np.inf)), op=MPI.MIN)
@@ -144,7 +144,7 @@ class Loader:
             Way(self).climb(deflection)
 
     def visit(self, deflections: Sequence[float]) -> Iterator[float]:
-        """Raise the road to ascending deflections (m) in turn, from a line through the last two states."""
+        """Raise the road to ascending deflections (m), extrapolating from the last two states."""
         half, own = self._half(), Way(self)
         way = None if half is None else Way(half.loader)
         for deflection in deflections:
@@ -159,7 +159,7 @@ class Loader:
             yield deflection
 
     def _half(self) -> _Half | None:
-        """Half of the ring in the present state, where half a turn leaves tire and loads as they are. Collective."""
+        """Half ring in the present state; None if a half turn changes tire or loads. Collective."""
         rolling = self.equilibrium.rolling
         if not (self.equilibrium.shape.flat and looks_the_same(self.body.ring, rolling)):
             return None
@@ -173,24 +173,24 @@ class Loader:
 
     @property
     def halved(self) -> HalfTurnEquilibrium | None:
-        """Half of the ring, where a state was looked for by it; not always in that of the whole."""
+        """The half-ring problem, if one was used; its state may differ from that of the whole."""
         return None if self._half_ring is None else self._half_ring.equilibrium
 
     def _taken_over(self, half: _Half) -> bool:
-        """Put the state of half the ring on the whole; whether it is balance there too. Collective."""
+        """Transfer the half ring's state; whether it is in equilibrium on the whole. Collective."""
         self._count(half)
         other = half.equilibrium
         return self.equilibrium.resume(*other.on(self.body.lattice), other.road_height).converged
 
     def _count(self, half: _Half) -> None:
-        """Tangents and seconds of half the ring are the tire's."""
+        """Add the tangents and seconds of the half ring to the totals."""
         self.newton_steps += half.loader.newton_steps
         half.loader.newton_steps = 0
         self.equilibrium.cost.take(half.equilibrium.cost)
 
     def _by_half(self, press: Callable[[Loader], object]) -> bool:
-        """Press half of the ring, if that is of use; whether it was. An error leaves the whole in the last state of
-        the half. Collective.
+        """Press half of the ring if symmetry allows; whether that solved the whole. Collective.
+        After an error the whole is left in the half's last state.
         """
         half, start = self._half(), self.body.u.x.array.copy()
         if half is None:
@@ -206,9 +206,9 @@ class Loader:
         return found
 
     def carry(self, load: float) -> float:
-        """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket.
+        """Raise the road until it carries `load` (N) by bracketed secants; the deflection (m).
 
-        States on the way may be out of balance; the one that an error leaves is not.
+        Intermediate states may have a residual; the state that an error leaves has none.
         """
         if load <= 0:
             raise InputError(f"static.load = {load:g} N: a road carries a positive load")
@@ -229,7 +229,7 @@ class Loader:
         start: float = 0.0,
         fall: Attempt | None = None,
     ) -> None:
-        """As `path.stepping.march`, with every step counted and those that converge reported."""
+        """`path.stepping.march` that counts all steps and reports the converged ones."""
 
         def seen(attempt: Attempt) -> Attempt:
             def tried(target: float) -> Step:

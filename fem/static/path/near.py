@@ -1,10 +1,11 @@
-"""Balance from a state that other elements found, which is near in place but not in force.
+"""Equilibrium from a state of another mesh whose displacement is close but whose forces are not.
 
-Elements strain cords only where they integrate them: in between, the field of long ones stretches a belt that it bends.
-Other elements feel that (radial tire, 16 x 12 elements, 4000 N, elements half as long: 9 kN a node at the shoulder, all
-around), and so much stress makes the first tangent meaningless: its step moves a sidewall by 35 mm, and Newton's method
-never comes back. A drag (as in path.snap) holds the body in place while the cords slip by some 0.1 mm to where they are
-not strained,
+Elements control cord strain only at their integration points; in between, the displacement of long
+elements stretches a belt that it bends. On another mesh this appears as stress (radial tire, 16 x
+12 elements, 4000 N, elements half as long: 9 kN per node at the shoulder, all around), which makes
+the first tangent useless: its step moves a sidewall by 35 mm, and Newton's method does not recover.
+Springs to the current position (as in path.snap) hold the body while the cords relax by some 0.1
+mm,
 
     k (u - u_0) + F(u) = f,  k in proportion to the nodes' mass,
 
@@ -19,26 +20,28 @@ from tireroad.fem.static.drag import Drag
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.path.step import Step
 
-# Of the load, out of balance. The radial tire starts with 15 and 18 loads on 16 x 12 and 20 x 16 elements, where nothing
-# but a drag converges, with 8 on 30 x 26, where one costs two tangents for nothing. Rubber alone may be further out, and is near.
+# Residual over load. The radial tire starts with 15 and 18 on 16 x 12 and 20 x 16 elements, where
+# only springs converge, and with 8 on 30 x 26, where they cost two tangents in vain. Rubber alone
+# may start with more and still be close.
 _STRAINED = 10.0
-_DRAGGED = 1.0  # of the load: what the dragged steps leave
+_DRAGGED = 1.0  # of the load: residual after the steps with springs
 _FIRST = 1e-2  # of the typical stiffness of an unknown
 _EASED, _RAISED = 0.1, 10.0
-_MOST = 6  # dragged steps
+_MOST = 6  # steps with springs
 
 
 def cords_strained(equilibrium: Equilibrium, load: float) -> bool:
-    """Whether the present state strains cords so much, beside the `load` (N), that a tangent there tells nothing. Collective."""
+    """Whether strained cords leave a residual so far above `load` (N) that a tangent is useless.
+    Collective."""
     cords = equilibrium.body.plies.cords
     return bool(cords) and equilibrium.out_of_balance() > _STRAINED * load
 
 
 def balance_near(equilibrium: Equilibrium, road_height: float, load: float, allowed: float) -> Step:
-    """Balance but for `allowed` N on a road at `road_height` (m) that carries about `load` N, from the present state and
-    forces of the road. Collective.
+    """Equilibrium up to `allowed` N from the present state and road forces. Collective.
 
-    As `Equilibrium.solve`; where none is found the body, and the road, are put back.
+    The road is at `road_height` (m) and carries about `load` N. As `Equilibrium.solve`; on failure
+    body and road are restored.
     """
     if not cords_strained(equilibrium, load):
         step = equilibrium.solve(road_height, allowed=allowed)

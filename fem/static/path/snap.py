@@ -1,13 +1,15 @@
-"""Through a snap: where equilibrium jumps, the tire is let go against a drag until it rests.
+"""Through a snap: where equilibrium jumps, the tire moves against springs until it comes to rest.
 
-Where a wall folds, or a node that leaves the road takes others along, no state is near the last one, however small the load
-step: Newton's method circles between sets of contact or leaves. Pseudo-transient continuation (Kelley and Keyes 1998,
-doi 10.1137/S0036142996304796) falls from the last state to the next stable one,
+Where a wall folds, or a node that leaves the road takes others with it, no equilibrium is near the
+last one, however small the load step: Newton's method cycles between contact sets or diverges.
+Pseudo-transient continuation (Kelley and Keyes 1998, doi 10.1137/S0036142996304796) moves from the
+last state to the next stable one,
 
     k (u - u_n) + F(u) = f,  u_n the state before,  k in proportion to the nodes' mass,
 
-the road's conditions held in every step. k falls to a quarter where that converges, rises eightfold where it does not, and
-where next to nothing is left of it the state is solved for without.
+with the road's conditions satisfied in every step. k is reduced to a quarter after a step that
+converges and raised eightfold after one that does not. Once it is negligible, the state is solved
+for without it.
 """
 
 from __future__ import annotations
@@ -18,16 +20,16 @@ from tireroad.fem.static.drag import Drag
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.path.step import Step
 
-_FIRST = 1e-2  # of the typical stiffness of an unknown: a step then moves the tread by less than a millimetre
-_LAST = 1e-5  # of the first: the state rests
+_FIRST = 1e-2  # of an unknown's typical stiffness: a step then moves the tread by < 1 mm
+_LAST = 1e-5  # of the first: the tire is at rest
 _MOST = 80  # steps; a section that folds at a tenth of a metre takes 20 to 30
 _EASED, _RAISED = 0.25, 8.0
 
 
 def fall(equilibrium: Equilibrium, road_height: float, allowed: float = 0.0) -> Step:
-    """The stable state on a road at `road_height` (m) to which the present one falls. Collective.
+    """The stable state reached from the present one, on a road at `road_height` (m). Collective.
 
-    As `Equilibrium.solve`; where none is found the body, and the road, are put back.
+    As `Equilibrium.solve`; on failure body and road are restored.
     """
     field, road = equilibrium.body.u.x, equilibrium.road
     kept = field.array.copy(), road.kept(), equilibrium.road_height

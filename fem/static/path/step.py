@@ -1,11 +1,11 @@
-"""How one equilibrium solve ended."""
+"""Outcome of one equilibrium solve."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Step:
-    """How one equilibrium solve ended: `iterations` tangents, `residual` relative to the force scale."""
+    """Outcome of one solve: `iterations` tangents, `residual` relative to the force scale."""
 
     converged: bool
     iterations: int

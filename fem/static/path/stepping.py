@@ -1,6 +1,6 @@
-"""Load steps: cut back when Newton fails, grown again when it is easy.
+"""Adaptive load steps: halved when Newton's method fails, enlarged when it converges easily.
 
-A step that cannot be made small enough is an error that names the last good state.
+If the steps become too small, an error names the last converged state.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from tireroad.fem.errors import LoadingStopped
 from tireroad.fem.static.equilibrium import Step
 
-_SMALLEST = 1e-4  # of the first step: below it a load step is hopeless
+_SMALLEST = 1e-4  # of the first step: smaller load steps are abandoned
 _LARGEST = 4  # times the first step
-_STUCK = 3  # failures in a row after which a fall is tried, once
+_STUCK = 3  # consecutive failures after which a fall is tried, once
 _EASY = 6  # tangents up to which the next load step may grow
 
 Attempt = Callable[[float], Step]
@@ -21,7 +21,7 @@ Attempt = Callable[[float], Step]
 
 @dataclass(frozen=True)
 class Show:
-    """What is stepped, for people: its name, and `unit` of what is `scale` at 1."""
+    """What is stepped, for display: its name, and its value `scale` at 1 in `unit`."""
 
     what: str
     scale: float
@@ -36,10 +36,10 @@ def march(
     show: Show,
     fall: Attempt | None = None,
 ) -> None:
-    """From a converged `start` to `end` in steps from `first` on. Collective.
+    """From a converged `start` to `end` in steps, the first of size `first`. Collective.
 
-    Where steps keep failing, `fall` is to find a state that is not near the last one (path.snap). LoadingStopped
-    where a ten-thousandth of the first step does not converge either.
+    If steps keep failing, `fall` searches for a state not near the last one (path.snap). Raises
+    LoadingStopped if steps of a ten-thousandth of the first do not converge either.
     """
     done, size, failures = start, first, 0
     while True:

@@ -1,4 +1,4 @@
-"""The way to a load or a deflection: states that are known, and where to try next."""
+"""Path to a load or a deflection: known states and the choice of the next trial."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from tireroad.fem.static.path.stepping import Show
 if TYPE_CHECKING:
     from tireroad.fem.static.path.loading import Loader
 
-LOAD_TOLERANCE = 1e-9  # of the wanted load; a tenth of what other quantities are compared to
-_REACH = 2.2  # times the largest deflection so far: no state is sought further away
-_NEAR = 0.1  # of a wanted load: what may be out of balance on the way to it
+LOAD_TOLERANCE = 1e-9  # of the requested load; a tenth of the tolerance of other comparisons
+_REACH = 2.2  # times the largest deflection so far: limit of the next trial
+_NEAR = 0.1  # of a requested load: residual allowed in intermediate states
 
 
 @dataclass(frozen=True)
@@ -30,21 +30,21 @@ class _Known:
 
 
 class Way:
-    """Of a loader's inflated body, from the present state, on which there is no road. All methods are collective."""
+    """Path of a loader's body from a state without a road. All methods are collective."""
 
     def __init__(self, loader: Loader) -> None:
         self._loader, self._equilibrium, self._body = loader, loader.equilibrium, loader.body
         self._known = [_Known(0.0, 0.0, self._body.u.x.array.copy())]
 
     def climb(self, deflection: float) -> None:
-        """Raise the road to `deflection` (m) from first touch in steps."""
+        """Raise the road in steps to `deflection` (m) from first touch."""
         self._body.u.x.array[:] = self._known[0].displacement
         self._raise_road(0.0, deflection, 0.0)
 
     def carry(self, load: float) -> float:
-        """Raise the road until it carries `load` (N); the deflection (m). Secant within a bracket.
+        """Raise the road until it carries `load` (N) by bracketed secants; the deflection (m).
 
-        States on the way may be out of balance; the one that an error leaves is not.
+        Intermediate states may have a residual; the state that an error leaves has none.
         """
         try:
             return self._seek(load, _NEAR * load)
@@ -54,7 +54,7 @@ class Way:
             return self._seek(load, 0.0)
 
     def _seek(self, load: float, allowed: float) -> float:
-        """That deflection, with states on the way `allowed` (N) out of balance."""
+        """Deflection (m) for `load`; intermediate states may have `allowed` (N) of residual."""
         self._known = self._known[:1]
         self._body.u.x.array[:] = self._known[0].displacement
         trial = 0.4 * self._body.ring.thickness
@@ -69,7 +69,7 @@ class Way:
             if trial < 0.99 * _REACH * max(k.deflection for k in self._known):
                 if self._meet(load, trial):
                     return self._loader.deflection
-                if allowed:  # from here on a bracket has to close
+                if allowed:  # from here on the bracket must close
                     self._known, allowed = self._known[:1], 0.0
         nearest = min(self._known, key=lambda k: abs(k.load - load))
         raise ConvergenceError(
@@ -78,7 +78,7 @@ class Way:
         )
 
     def _meet(self, load: float, trial: float) -> bool:
-        """Solve for the load and the road's height at once, from the state guessed at a deflection."""
+        """Solve for state and road height at the given load, from the estimate at `trial`."""
         self._near(trial)
         step = self._equilibrium.solve(self._loader.touch + trial, load)
         self._loader.newton_steps += step.iterations
@@ -87,11 +87,11 @@ class Way:
         return step.converged
 
     def _near(self, trial: float) -> bool:
-        """Put the body near the state at a deflection, by the last tangent or else by known states; whether it is."""
+        """Estimate the state at a deflection, by the last tangent or known states; success."""
         return self._equilibrium.predict(self._loader.touch + trial) or self._guess(trial)
 
     def _guess(self, trial: float) -> bool:
-        """Put the body on a line through the two states nearest to a deflection, if there are two."""
+        """Extrapolate from the two known states nearest to a deflection; False without two."""
         near = sorted(self._known, key=lambda k: abs(k.deflection - trial))[:2]
         if len(near) < 2:
             return False
@@ -101,9 +101,9 @@ class Way:
         return True
 
     def to(self, trial: float, allowed: float = 0.0) -> None:
-        """Solve at the trial deflection from near it, else by steps.
+        """Solve at the trial deflection from the estimate, otherwise in steps.
 
-        What converges on the way is known from then on, `allowed` (N) out of balance.
+        Converged states, with up to `allowed` (N) of residual, are recorded as known.
         """
         if self._near(trial):
             step = self._equilibrium.solve(self._loader.touch + trial, allowed=allowed)
@@ -116,7 +116,8 @@ class Way:
         self._raise_road(below.deflection, trial, allowed)
 
     def _next_deflection(self, load: float) -> float:
-        """Secant through the two loads nearest to the wanted one, kept inside the bracket."""
+        """Next trial: secant through the two loads nearest to the requested one, kept inside the
+        bracket."""
         below = max((k for k in self._known if k.load <= load), key=lambda k: k.deflection)
         above = [k.deflection for k in self._known if k.load > load]
         far, near = sorted(self._known, key=lambda k: -abs(k.load - load))[-2:]
@@ -132,19 +133,19 @@ class Way:
                 f"static: the tire carries {below.load:.4g} N at {below.deflection:.4g} m of deflection, where the "
                 f"road reaches the rim; {load:g} N is out of reach. Lower static.load or raise static.inflation."
             )
-        # Beyond what was tried the curve is not known.
+        # Beyond the deflections tried the curve is unknown.
         least, most = np.minimum(np.array([1.01, _REACH]) * below.deflection, farthest)
         return float(np.clip(secant, least, most))
 
     def _learnt(self, step: Step, deflection: float) -> Step:
-        """The step; where it converged, its state is known from then on. Collective."""
+        """The step itself; if it converged, its state is recorded as known. Collective."""
         if step.converged:
             load, field = self._loader.load(), self._body.u.x.array
             self._known.append(_Known(deflection, load, field.copy()))
         return step
 
     def _raise_road(self, start: float, end: float, allowed: float) -> None:
-        """In steps, each of which is known from then on."""
+        """Raise the road in steps and record each state."""
 
         field, road = self._body.u.x, self._equilibrium.road
 
@@ -153,7 +154,7 @@ class Way:
             kept = field.array.copy(), road.kept()
             self._equilibrium.predict(height)
             step = self._equilibrium.solve(height, allowed=allowed)
-            if not step.converged:  # put back to where it was predicted
+            if not step.converged:  # restore the state before the prediction
                 field.array[:] = kept[0]
                 road.put_back(kept[1])
             return self._learnt(step, deflection)

@@ -1,1 +1,1 @@
-"""Static states by what the tire's symmetry leaves of it: one section, half a ring."""
+"""Static states reduced by symmetry: one section, or half of the ring."""

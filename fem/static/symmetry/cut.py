@@ -1,4 +1,4 @@
-"""The two faces at which half a ring is cut, and what a half turn says about their nodes."""
+"""The two cut faces of a half ring, and the coupling of their nodes by the half turn."""
 
 from __future__ import annotations
 
@@ -10,15 +10,18 @@ from scipy.spatial import cKDTree
 
 from tireroad.fem.tire.body import Body
 
-TURN = np.array([-1.0, -1.0, 1.0])  # of x, y, z by half a turn about the vertical
+TURN = np.array([-1.0, -1.0, 1.0])  # of x, y, z under a half turn about the vertical
 
 
 @dataclass(frozen=True)
 class Cut:
-    """The cut faces of a half ring. Of pairs of their nodes one at lower y follows the other: the pairs (k,) whose
-    `follower` or `leader` this process owns are `followed` and `led`; `axis` own nodes on the vertical through the
-    centre. Of all processes, in their global numbers: `lead` and `sign`, the unknown that each one moves with and how,
-    -1 for one that does not move. Of the section: `image`, `low` and `middle` nodes; `ends`, the angles cut.
+    """The cut faces of a half ring. In each pair of their nodes the one at lower y follows the
+    other.
+
+    `follower`, `leader`: own nodes of pairs, whose pair numbers (k,) are `followed` and `led`;
+    `axis`: own nodes on the vertical through the centre. Over all processes, in global numbering:
+    `lead` and `sign`, the unknown with which each one moves and its sign, -1 for a fixed one. Of
+    the section: `image`, `low` and `middle` nodes; `ends`: the angles of the cuts.
     """
 
     comm: MPI.Comm
@@ -37,7 +40,7 @@ class Cut:
 
     @staticmethod
     def of(body: Body) -> Cut:
-        """Of a body that is half a ring. Collective."""
+        """Cut faces of a body that is half a ring. Collective."""
         lattice = body.lattice
         places, (around, count) = lattice.section, lattice.shape
         image = cKDTree(places).query(places * [1, -1])[1]
@@ -72,7 +75,7 @@ class Cut:
         )
 
     def fold(self, forces: np.ndarray) -> None:
-        """P^T: forces (3 own nodes,) that act on followers act on their leaders. Collective."""
+        """P^T: move forces (3 own nodes,) from followers to their leaders. Collective."""
         forces = forces.reshape(-1, 3)
         forces[self.leader] += self._exchanged(TURN * forces[self.follower], self.followed)[
             self.led
@@ -81,7 +84,7 @@ class Cut:
         forces[self.axis, :2] = 0.0
 
     def unfold(self, motion: np.ndarray) -> None:
-        """P: followers move (3 own nodes,) as their leaders do. Collective."""
+        """P: set the motion (3 own nodes,) of followers from their leaders. Collective."""
         motion = motion.reshape(-1, 3)
         motion[self.follower] = TURN * self._exchanged(motion[self.leader], self.led)[self.followed]
 
@@ -93,7 +96,7 @@ class Cut:
 
 
 def _global_numbers(body: Body) -> np.ndarray:
-    """Number of each lattice node among the nodes of all processes. Collective."""
+    """Global number of each lattice node. Collective."""
     number = np.zeros(body.lattice.size, dtype=np.int64)
     number[body.ids] = body.space.dofmap.index_map.local_range[0] + np.arange(body.nodes)
     body.comm.Allreduce(MPI.IN_PLACE, number)
@@ -101,7 +104,7 @@ def _global_numbers(body: Body) -> np.ndarray:
 
 
 def _found(ids: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where `ids` has those `wanted`, and which of them."""
+    """Positions of `wanted` entries in `ids`, and their indices in `wanted`."""
     order = np.argsort(wanted)
     own = np.flatnonzero(np.isin(ids, wanted))
     return own, order[np.searchsorted(wanted, ids[own], sorter=order)]

@@ -1,4 +1,4 @@
-"""The linearised equilibrium of half a ring whose cut faces move with each other."""
+"""The linearised equilibrium of half a ring with coupled cut faces."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tireroad.fem.timing import Timing
 
 
 class FoldedSystem:
-    """P^T K P: what a `HeldSystem` is to the whole ring. Followers keep a row of their own, of 1."""
+    """P^T K P: a `HeldSystem` of half a ring. Followers keep a unit diagonal row."""
 
     def __init__(
         self, comm: MPI.Comm, matrix: PETSc.Mat, kind: str, timing: Timing, cut: Cut
@@ -32,13 +32,13 @@ class FoldedSystem:
     def take(
         self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
     ) -> bool:
-        """Fold and factorise; `matrix` stays as it is. Collective."""
+        """Fold and factorise; `matrix` stays unchanged. Collective."""
         with self._timing("assembly"):
             self._folding.fill(matrix)
         return self._inner.take(self._folding.matrix, held, closing, raising)
 
     def solve(self, right: np.ndarray, moved: Moved | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Motion (m) of all owned dofs under folded forces (N), and force (N) at the held ones. Collective."""
+        """Motion (m) of owned dofs under folded forces (N), force (N) at held ones. Collective."""
         change, force = self._inner.solve(right, moved)
         self._cut.unfold(change)
         return change, force
@@ -46,17 +46,17 @@ class FoldedSystem:
     def columns(
         self, numbers: np.ndarray, dofs: np.ndarray, count: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As of a HeldSystem, without the motion of followers. Collective."""
+        """As in HeldSystem, without the motion of followers. Collective."""
         return self._inner.columns(numbers, dofs, count)
 
     def spread(self, motion: np.ndarray) -> np.ndarray:
-        """The motion with that of followers. Collective."""
+        """Add the motion of the followers, in place. Collective."""
         self._cut.unfold(motion)
         return motion
 
 
 class _Folding:
-    """`matrix`, P^T K P, and how its entries add up from those of K: the pattern once, the values at each `fill`."""
+    """`matrix` P^T K P, its pattern made once and its values summed from K in `fill`."""
 
     def __init__(self, matrix: PETSc.Mat, cut: Cut) -> None:
         comm, size = matrix.comm.tompi4py(), matrix.getSize()[0]
@@ -89,7 +89,7 @@ class _Folding:
         self.matrix = PETSc.Mat().createAIJ(matrix.getSizes(), csr=csr, comm=comm)
 
     def fill(self, matrix: PETSc.Mat) -> None:
-        """Take the values of K. Collective."""
+        """Set the values from K. Collective."""
         values = matrix.getValuesCSR()[2]
         come = np.concatenate(self._comm.allgather(self._sent_sign * values[self._goes]))
         given = np.concatenate([self._sign * values[self._stays], come[self._comes], self._ones])

@@ -1,13 +1,13 @@
-"""The inflated tire without a road is round: its fields are those of one section, turned about the axle.
+"""Axisymmetric state of the inflated tire without a road, from one section.
 
-With P from the motion of the section's nodes, along the ring, along the axle and outwards, to all nodes
-of a sector of one element around,
+With P from the motion of the section's nodes, in circumferential, axial and radial directions, to
+all nodes of a sector of one element around,
 
     P^T (F_int(P v) + p F_pressure(P v) + Omega^2 S (X + P v)) = 0.
 
-Both cut faces drop out: a round motion does no work there that the other does not take back. Belts at
-an angle may turn the crown against the beads; that is round too. Damping by the mass or the stiffness does
-nothing in a round shape.
+The boundary terms of the two cut faces cancel in an axisymmetric motion. Angled belts may rotate
+the crown relative to the beads; that is axisymmetric too. Damping by mass or stiffness has no
+effect in an axisymmetric shape.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from tireroad.fem.tire.mesh import Lattice
 
 
 class RoundEquilibrium(Equilibrium):
-    """Equilibrium of the round shape of a body's ring, on the smallest of its elements around.
+    """Equilibrium of a ring's axisymmetric shape, on the shortest of its elements around.
 
-    On the calling process alone. The state is `body.u` of its own `body`, a sector.
+    On the calling process only. The state is `body.u` of its own `body`, a sector.
     """
 
     def __init__(self, whole: Body, rolling: Rolling) -> None:
@@ -48,7 +48,7 @@ class RoundEquilibrium(Equilibrium):
         return RoundSystem(self._turned, self.cost)
 
     def _assemble_residual(self) -> np.ndarray:
-        """The round part of the forces out of balance, N."""
+        """The axisymmetric part of the residual forces, N."""
         copies = self.body.lattice.shape[0]
         return self._turned @ (self._turned.T @ super()._assemble_residual()) / copies
 
@@ -66,11 +66,12 @@ class RoundEquilibrium(Equilibrium):
 def inflated(
     whole: Body, rolling: Rolling, inflate: Callable[[RoundEquilibrium], None]
 ) -> RoundEquilibrium:
-    """The round shape in the state that `inflate` brings it to; where it stops while turning, from that at rest.
+    """The axisymmetric shape inflated by `inflate`; if rotation prevents it, via that at rest.
 
-    Cords that no pressure stretches yet give way under centrifugal forces. The radial tire's section of 34 elements from
-    bead to bead at 71.9 rad/s stops at 13 Pa, and turns from the inflated state at rest in two tangents. On the calling
-    process alone; LoadingStopped where there is none from rest either.
+    Cords not yet tensioned by the pressure give way under centrifugal forces. The radial tire's
+    section of 34 elements from bead to bead at 71.9 rad/s stops at 13 Pa, but converges in two
+    tangents from the inflated state at rest. On the calling process only. Raises LoadingStopped if
+    the state at rest does not help either.
     """
     section = RoundEquilibrium(whole, rolling)
     try:
@@ -86,7 +87,7 @@ def inflated(
 
 
 class RoundSystem:
-    """P^T K P of the sector: what a `HeldSystem` is to the whole ring; nothing is held."""
+    """P^T K P of the sector, the counterpart of `HeldSystem`; no dof is held."""
 
     def __init__(self, turned: sparse.csr_matrix, timing: Timing) -> None:
         self._turned, self._timing = turned, timing
@@ -96,7 +97,7 @@ class RoundSystem:
     def take(
         self, matrix: PETSc.Mat, held: np.ndarray, closing: np.ndarray, raising: np.ndarray
     ) -> bool:
-        """Factorise; False when the matrix is singular."""
+        """Factorise; False if the matrix is singular."""
         rows, columns, values = matrix.getValuesCSR()
         whole = sparse.csr_matrix((values, columns, rows), matrix.getSize())
         with self._timing("factorisation"):

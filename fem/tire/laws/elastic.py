@@ -1,4 +1,4 @@
-"""Laws of Young's modulus and Poisson's ratio: Hooke's, and neo-Hooke's."""
+"""Laws with Young's modulus and Poisson's ratio: Hookean and neo-Hookean."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from tireroad.fem.tire.law import MaterialLaw, material_law
 
 @dataclass(frozen=True, kw_only=True)
 class Elastic(MaterialLaw):
-    """The two moduli."""
+    """Base of laws with these two parameters."""
 
     youngs_modulus: float = number(
         4.8e8, "Pa", "Young's modulus at small strain", least=1e3, most=1e13
@@ -36,7 +36,7 @@ class Elastic(MaterialLaw):
     "linear", "Hooke's law between Green-Lagrange strain and second Piola-Kirchhoff stress"
 )
 class Linear(Elastic):
-    """For small strains in large rotations."""
+    """For small strains and large rotations."""
 
     @staticmethod
     def energy(C: Expr, shear: Expr, bulk: Expr) -> tuple[Expr, Expr]:
@@ -49,7 +49,7 @@ class Linear(Elastic):
 
 @material_law("neo-hookean", "neo-Hookean rubber")
 class NeoHookean(Elastic):
-    """The simplest rubber."""
+    """The simplest rubber law."""
 
     @staticmethod
     def energy(C: Expr, shear: Expr, bulk: Expr) -> tuple[Expr, Expr]:

@@ -1,4 +1,4 @@
-"""Laws that are polynomials of the invariants: Mooney and Rivlin's, and Yeoh's."""
+"""Laws polynomial in the invariants: Mooney-Rivlin and Yeoh."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from tireroad.fem.tire.law import MaterialLaw, material_law
 
 @dataclass(frozen=True, kw_only=True)
 class Polynomial(MaterialLaw):
-    """What both have."""
+    """Base with the common parameters."""
 
     c10: float = number(6.6e7, "Pa", "coefficient of the first invariant", least=1e2, most=1e13)
     bulk_modulus: float = number(1.6e9, "Pa", "bulk modulus", least=1e3, most=1e15)

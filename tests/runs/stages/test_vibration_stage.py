@@ -93,6 +93,13 @@ def test_the_field_in_time_is_the_response_in_time(tmp_path: Path) -> None:
     assert len(time) == 400 and time[-1] == pytest.approx(0.4)
 
 
+def test_a_record_without_a_line_in_the_band_is_refused(tmp_path: Path) -> None:
+    """Found by a random run: no field of no line can be shaped."""
+    with pytest.raises(InputError, match="no spectral line up to .* raise time.duration"):
+        run(tmp_path, FORCE.replace("0.4", "0.004"))
+    assert (tmp_path / "response.h5").exists()
+
+
 def test_a_rolling_tire_vibrates_as_its_road_passes(tmp_path: Path) -> None:
     results = run(tmp_path, ROLLING)
     frequency = results["vibration/frequency"]
