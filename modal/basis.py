@@ -171,7 +171,7 @@ class ModalBasis:
     """The standing modes in the form that all later steps use: M-orthonormal fields.
 
     `frequency` (m,) Hz; `shape` kg^-1/2 of the outer face (3 s, m + k), with six more rows for a
-    free rim, where k is the number of static shapes that joined the m modes (modal.turning_shapes);
+    free rim, where k is the number of static shapes that joined the m modes (modal.rotation_shapes);
     `projection`: the small matrices on these same fields. `modes`: the fields on all unknowns, if
     this process solved for them instead of reading a file; `labels` of an axisymmetric tire;
     `column`: the air that joined the modes, if this process made it. The signs of eigenvectors, and

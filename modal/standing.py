@@ -16,7 +16,7 @@ from tireroad.modal.joined import with_air, with_corner
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.symmetry import Sites
-from tireroad.modal.turning_shapes import with_turning
+from tireroad.modal.rotation_shapes import with_rotation_shapes
 
 _SAME = 1e-6  # relative difference of the frequencies of one mode in two solutions
 
@@ -35,7 +35,7 @@ def standing_modes(
 
     `rotation`: also project the matrices of the rotating frame, without which the wheel can only
     stand. `turning`: how the wheel rotates, so that rotation shapes join the modes
-    (modal.turning_shapes); belts need them. `air`: the air in the cavity joins the projected
+    (modal.rotation_shapes); belts need them. `air`: the air in the cavity joins the projected
     problem, and so does the wheel of an `axle` that moves. ConvergenceError if a mode is missing,
     inaccurate or unstable. Collective.
     """
@@ -97,7 +97,7 @@ def projected(
     comm, loss = operators.body.comm, operators.loss_stiffness()
     projection = project(modes, matrices, operators.carried, comm, loss=loss)
     if turning is not None and turning.speed:
-        modes = with_turning(modes, projection, operators, matrices, turning)
+        modes = with_rotation_shapes(modes, projection, operators, matrices, turning)
         projection = project(modes, matrices, operators.carried, comm, projection, loss)
     if loss is not None:
         loss.destroy()

@@ -134,7 +134,7 @@ def modes(
 
     `rim` "fixed" or "free". `road` "forces": the road is replaced by its contact forces; "held":
     the touching nodes are held in height. `turning`: how the wheel will rotate; the shapes that
-    belts couple to then join the modes (modal.turning_shapes), as in a run.
+    belts couple to then join the modes (modal.rotation_shapes), as in a run.
     """
     motions = SmallMotions(tire, static, rim=rim, road=road)
     basis = standing_modes(motions, count=count, up_to=up_to, turning=turning)

@@ -15,7 +15,7 @@ from tireroad.modal.damping import Damping, StrainEnergy
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.team import how_many
 from tireroad.modal.standing import projected, solved, with_fields
-from tireroad.modal.turning_shapes import up_to
+from tireroad.modal.rotation_shapes import up_to
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import available_memory
@@ -85,13 +85,13 @@ class ModesStage(Computed[ModalBasis]):
             )
         with record.timing("air"):
             air = cavity.make_air(self.job, motions, float(modes.frequency[-1]))
-        with record.timing("projection and shapes of turning"):
+        with record.timing("projection and rotation shapes"):
             given = air, self.job.axle, shapes_of(self.job)
             basis = projected(motions, modes, self.job.speed != 0, *given)
             labels = _labels(motions, modes.vectors)
         _describe(record, modes)
         if self._shapes:
-            record.headline["shapes of turning that join them"] = (basis.projection.shapes, "-")
+            record.headline["rotation shapes that join them"] = (basis.projection.shapes, "-")
         record.headline["damping"] = (_damping(damping_of(self.job), basis.projection), "-")
         if air is not None:
             cavity.describe_air(record, basis.projection.air)

@@ -17,7 +17,7 @@ from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.scene import Scene
 
 TURN = 0.3  # radians of the fastest mode per automatic step (stages.build.rolling.stepping)
-SHAPES = 0.7, 0.1  # rotation shapes per mode: with cords, and without (modal.turning_shapes)
+SHAPES = 0.7, 0.1  # rotation shapes per mode: with cords, and without (modal.rotation_shapes)
 MARGIN = 5e-3  # m: reach of the patch beyond the road's height (stages.greens)
 
 

@@ -220,7 +220,7 @@ class Scene:
 
     @property
     def joins_shapes(self) -> bool:
-        """Whether rotation shapes join the modes of a rotating wheel (modal.turning_shapes)."""
+        """Whether rotation shapes join the modes of a rotating wheel (modal.rotation_shapes)."""
         rotation = self.rotation
         if rotation is None or self.modal.rim == "free":
             return False

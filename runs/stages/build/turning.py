@@ -55,5 +55,5 @@ def turning_of(job: Job) -> Turning:
 
 
 def shapes_of(job: Job) -> Turning | None:
-    """The wheel's rotation if rotation shapes join its modes (modal.turning_shapes), else None."""
+    """The wheel's rotation if rotation shapes join its modes (modal.rotation_shapes), else None."""
     return turning_of(job) if job.speed and job.scene.joins_shapes else None

@@ -1,4 +1,4 @@
-"""Shapes of turning: found all, of a small belted tire against its full matrices, and where there are none."""
+"""Rotation shapes: found all, of a small belted tire against its full matrices, and where there are none."""
 
 from functools import lru_cache
 
@@ -27,7 +27,7 @@ from tireroad.modal.rolling import rolling_modes
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.standing import fewer, projected, solved, standing_modes
-from tireroad.modal.turning_shapes import TOLERANCE, up_to, with_turning
+from tireroad.modal.rotation_shapes import TOLERANCE, up_to, with_rotation_shapes
 from tireroad.runs.measure.torus import thesis_torus
 
 SOFT = compound("neo-hookean", 1200.0, youngs_modulus=6e6, poisson_ratio=0.45)
@@ -93,7 +93,7 @@ def test_what_belts_couple_as_they_roll_is_in_the_states(option) -> None:
 
 @pytest.mark.slow
 def test_attachment_modes_that_join_them_hold_the_static_answer() -> None:
-    """Of six loads the exact answers are in the basis: nothing is left. K knows shapes of turning and attachment modes from each
+    """Of six loads the exact answers are in the basis: nothing is left. K knows rotation shapes and attachment modes from each
     other, M does not: taken for orthogonal in both, they left answers of either sign, and contact that pulls."""
     made = motions()
     loads = loads_of(made)
@@ -154,7 +154,7 @@ def test_a_basis_of_one_mode_and_one_of_all() -> None:
     for count in (1, free):
         modes = undamped.solve(operators.stiffness, operators.mass, count)
         projection = project(modes, rotation, operators.carried, body.comm)
-        grown = with_turning(modes, projection, operators, rotation, ROLLING)
+        grown = with_rotation_shapes(modes, projection, operators, rotation, ROLLING)
         assert grown.vectors.shape[1] <= (3 if count == 1 else free)
 
 

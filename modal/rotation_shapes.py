@@ -49,7 +49,7 @@ def up_to(speed: float) -> float:
     return float(2.0 ** np.ceil(np.log2(abs(speed)))) if speed else 0.0
 
 
-def with_turning(
+def with_rotation_shapes(
     modes: Modes,
     projection: Projection,
     operators: Operators,
