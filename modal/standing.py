@@ -13,10 +13,10 @@ from tireroad.fem.static.path.journal import Journal
 from tireroad.fem.turning import Turning
 from tireroad.modal.basis import ModalBasis, project
 from tireroad.modal.joined import with_air, with_corner
+from tireroad.modal.rotation_shapes import with_rotation_shapes
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.symmetry import Sites
-from tireroad.modal.rotation_shapes import with_rotation_shapes
 
 _SAME = 1e-6  # relative difference of the frequencies of one mode in two solutions
 

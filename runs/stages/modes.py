@@ -12,10 +12,10 @@ from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.basis import ModalBasis, Projection
 from tireroad.modal.damping import Damping, StrainEnergy
+from tireroad.modal.rotation_shapes import up_to
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.team import how_many
 from tireroad.modal.standing import projected, solved, with_fields
-from tireroad.modal.rotation_shapes import up_to
 from tireroad.modal.waves import Labels, label
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import available_memory

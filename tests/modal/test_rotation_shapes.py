@@ -24,10 +24,10 @@ from tireroad.greens.basis import Basis
 from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import project
 from tireroad.modal.rolling import rolling_modes
+from tireroad.modal.rotation_shapes import TOLERANCE, up_to, with_rotation_shapes
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.standing import fewer, projected, solved, standing_modes
-from tireroad.modal.rotation_shapes import TOLERANCE, up_to, with_rotation_shapes
 from tireroad.runs.measure.torus import thesis_torus
 
 SOFT = compound("neo-hookean", 1200.0, youngs_modulus=6e6, poisson_ratio=0.45)
