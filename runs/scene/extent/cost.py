@@ -3,14 +3,21 @@
 from tireroad.runs.scene.extent.sizes import Sizes
 from tireroad.runs.scene.tables.scene import Scene
 
+# Error bars, of the time of all else: 0.49 in quickstart.toml and 0.35 in passenger.toml
+# (2026-11-24); the stage bounds its window to keep them below a half.
+_BARS = 0.42
 
-def seconds(work: dict[str, float], size: Sizes, column: int) -> dict[str, float]:
+
+def seconds(
+    work: dict[str, float], size: Sizes, column: int, bars: bool = False
+) -> dict[str, float]:
     """CPU time (s) of `operations` by stage; `column`: unknowns in a column through the wall.
 
     On a core of a shared server (Intel Xeon), one BLAS thread, 2026-11-23; from 7,020 to 98,100
     unknowns (static state: 224,100) within a factor of 1.6
     (tests/runs/scenes/test_estimated_time.py). Operations through the wall are done in blocks,
     which are faster the thicker the wall; those on modes too, in larger blocks on larger meshes.
+    `bars`: with error bars, by companion runs.
     """
     thicker, larger = column / 9, size.free / 27_900
     share = {
@@ -18,7 +25,8 @@ def seconds(work: dict[str, float], size: Sizes, column: int) -> dict[str, float
         "modes": 1.4 / (thicker**0.5 * larger**0.2),
         "greens": 1.1 / thicker**0.5,
     }
-    return {name: share.get(name, 1.0) * each for name, each in work.items()}
+    found = {name: share.get(name, 1.0) * each for name, each in work.items()}
+    return found | ({"error bars": _BARS * sum(found.values())} if bars else {})
 
 
 def operations(

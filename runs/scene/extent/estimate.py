@@ -65,6 +65,7 @@ KEYS = {
     "contact.h5": "time.duration, time.step, contact.points",
     "contact loop": "time.duration, time.step, contact.points",
     "modes.h5": "modal.count, and the mesh",
+    "error bars": "accuracy.estimate",
 }
 
 
@@ -95,7 +96,7 @@ def estimate(scene: Scene, until: str | None = None) -> Estimate:
         memory=_memory(scene, size, left_out),
         disk=_disk(scene, size, left_out),
         work=work,
-        seconds=seconds(work, size, column),
+        seconds=seconds(work, size, column, bars="accuracy" not in left_out),
     )
 
 

@@ -33,6 +33,15 @@ def test_seconds_are_as_measured(root: Path, scene: str, settings: list[str], ta
         assert measured / 1.6 < seconds[stage] < 1.6 * measured, stage
 
 
+@pytest.mark.parametrize(("scene", "share"), [("quickstart", 0.49), ("passenger", 0.35)])
+def test_error_bars_count(root: Path, scene: str, share: float) -> None:
+    """Their time over that of all other stages as measured, one BLAS thread, 2026-11-24."""
+    seconds = told(root, scene, []).seconds
+    bars = seconds.pop("error bars")
+    assert bars == pytest.approx(share * sum(seconds.values()), rel=0.25)
+    assert "error bars" not in told(root, scene, ["accuracy.estimate=false"]).seconds
+
+
 @pytest.mark.parametrize(
     ("settings", "stages"),
     [
