@@ -11,7 +11,7 @@ from tireroad.contact.results.levels import nominal
 from tireroad.contact.results.spectra import deviation
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.read import Absent, Results
-from tireroad.runs.report.quantities import digits, quantity
+from tireroad.runs.report.quantities import bounded, digits, quantity
 
 Fact = tuple[str, str]
 _MODES = 4
@@ -54,7 +54,8 @@ def _standing(results: Results, given: Given) -> list[Fact]:
     found: list[Fact] = []
     if load and results.optional("static.h5", "contact/force") is not None:
         error = given("static", "estimated error of the load")
-        found.append(("load at rest", quantity(load, "N") + _plus_minus(error, "%")))
+        about = f" ± {quantity(float(f'{error:.2g}'), '%')}" if error else ""
+        found.append(("load at rest", quantity(load, "N") + about))
         found.append(("deflection", quantity(sunk, "m")))
     if length and width:
         found.append(("footprint at rest", f"{digits(1e3 * length)} × {digits(1e3 * width)} mm"))
@@ -72,10 +73,10 @@ def _rolling(results: Results, given: Given) -> list[Fact]:
     )
     end, step = results.attribute("spectra.h5", "limit"), results.attribute("contact.h5", "step")
     varies = deviation(force[:, None], float(step or 1.0), float(end or np.inf))[0]
-    what = f"it varies up to {quantity(end, 'Hz')} by (rms)" if end else "it varies by (rms)"
+    what = "its standard deviation" + (f" up to {quantity(end, 'Hz')}" if end else "")
     return [
-        ("vertical force, rolling", quantity(float(force.mean()), "N") + _plus_minus(mean, "N")),
-        (what, quantity(float(varies), "N") + _plus_minus(spread, "N")),
+        ("vertical force, rolling (mean)", bounded(float(force.mean()), mean, "N")),
+        (what, bounded(float(varies), spread, "N")),
     ]
 
 
@@ -125,7 +126,3 @@ def _modes(results: Results, _: Given) -> list[Fact]:
     lowest = results.array("modes.h5", "frequency")[:_MODES]
     named = ", ".join(f"{value:.4g}" for value in lowest)
     return [("lowest modes, undamped", f"{named} Hz")] if len(lowest) else []
-
-
-def _plus_minus(error: float | None, unit: str) -> str:
-    return f" ± {quantity(float(f'{error:.2g}'), unit)}" if error else ""

@@ -22,12 +22,24 @@ def quantity(value: object, unit: str = "") -> str:
         return ", ".join(quantity(part, unit) for part in value)
     if not isinstance(value, (int, float)):
         return str(value)
-    symbol = SYMBOLS.get(unit, unit)
+    factor, symbol = _prefix(value, unit)
+    return f"{digits(value / factor)} {symbol}".rstrip()
+
+
+def bounded(value: float, error: float | None, unit: str) -> str:
+    """`value` and its `error` to two digits in the value's own unit: "60.37 ± 0.67 N"."""
+    if not error:
+        return quantity(value, unit)
+    factor, symbol = _prefix(value, unit)
+    return f"{digits(value / factor)} ± {digits(float(f'{error / factor:.2g}'))} {symbol}".rstrip()
+
+
+def _prefix(value: float, unit: str) -> tuple[float, str]:
+    """The unit with a prefix that suits `value`, and how many of `unit` it has."""
     for threshold, name, *factor in PREFIXES.get(unit, ()):
         if isfinite(value) and abs(value) >= threshold:
-            value, symbol = value / (factor[0] if factor else threshold), name
-            break
-    return f"{digits(value)} {symbol}".rstrip()
+            return (factor[0] if factor else threshold), name
+    return 1.0, SYMBOLS.get(unit, unit)
 
 
 def digits(value: float) -> str:

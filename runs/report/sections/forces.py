@@ -112,7 +112,9 @@ def histories(
     ]
     if active is not None:
         curves = {"points in contact": active}
-        made.append(live.chart(time, curves, ("time in s", "number"), ("#52606d",), height=150))
+        made.append(
+            live.chart(time, curves, ("time in s", "points in contact"), ("#52606d",), height=150)
+        )
     return live.charts(*made)
 
 

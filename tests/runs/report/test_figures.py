@@ -9,7 +9,7 @@ from matplotlib import image
 from synthetic_results import lattice
 
 from tireroad.runs.report import figures, surface_figures, thinned
-from tireroad.runs.report.quantities import quantity
+from tireroad.runs.report.quantities import bounded, quantity
 from tireroad.runs.report.verdicts import verdict
 
 
@@ -125,3 +125,9 @@ def test_bars_that_differ_little_do_not_look_as_if_they_differed_much(levels: li
 def test_a_count_of_residual_states_is_no_residual() -> None:
     assert verdict("worst residual", 1e-3) == "poor" and verdict("worst residual", 1e-9) == "good"
     assert verdict("residual states faster than 3 times the highest mode, made static", 115) == ""
+
+
+def test_an_error_has_the_unit_of_its_value() -> None:
+    assert bounded(60.37, 0.6665, "N") == "60.37 ± 0.67 N"
+    assert bounded(0.003752, 2.04e-5, "m") == "3.752 ± 0.02 mm"
+    assert bounded(598.0, None, "N") == "598 N"
