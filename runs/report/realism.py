@@ -24,7 +24,7 @@ def unusual(results: Results) -> str | None:
     found = [text for check in _CHECKS for text in _asked(check, results)]
     if not found:
         return None
-    return "figures that no tire has, and what is usual: " + "; ".join(found)
+    return "outside the usual range of tires (in brackets): " + "; ".join(found)
 
 
 def _asked(check: Callable[[Results], Iterator[str]], results: Results) -> list[str]:

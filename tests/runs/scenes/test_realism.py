@@ -56,7 +56,7 @@ def test_each_figure_is_told_with_its_range(folder: Path, change: dict, said: st
         file.attrs.update(change)
     text = told(folder).replace("\u202f", " ")
     assert said in text
-    assert text.startswith("figures that no tire has")
+    assert text.startswith("outside the usual range of tires")
 
 
 def test_the_tread_the_road_and_the_damping(folder: Path) -> None:
