@@ -183,4 +183,4 @@ def test_hours_are_said(quickstart: Path, monkeypatch, tmp_path: Path) -> None:
     monkeypatch.setattr(demand.shutil, "disk_usage", lambda _: usage._replace(free=10**13))
     wanted = estimate(load(quickstart, ["time.duration=100", "time.step=1e-5"]))
     (warning,) = demand.check_demand(wanted, tmp_path)
-    assert "2 hours of one core" in warning and "contact loop (time.duration" in warning
+    assert "3 hours of one core" in warning and "contact loop (time.duration" in warning
