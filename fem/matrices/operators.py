@@ -22,6 +22,7 @@ from scipy import sparse
 from ufl.core.expr import Expr
 
 from tireroad.fem import compat, kinematics
+from tireroad.fem.matrices.local_rows import from_local_rows
 from tireroad.fem.matrices.support import FIXED, Rim, Support, Unknowns
 from tireroad.fem.static.virtual_work import (
     AT_REST,
@@ -183,4 +184,4 @@ def _without_zeros(matrix: PETSc.Mat) -> PETSc.Mat:
     matrix.destroy()
     own = sparse.csr_matrix((values, indices, indptr), sizes[0])
     own.eliminate_zeros()
-    return PETSc.Mat().createAIJ(sizes, csr=(own.indptr, own.indices, own.data), comm=comm)
+    return from_local_rows(own, sizes, comm)

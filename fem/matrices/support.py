@@ -24,6 +24,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.collective import summed
+from tireroad.fem.matrices.local_rows import from_local_rows
 from tireroad.fem.tire.body import Body
 
 TURN = 3  # components 3, 4, 5 of an unknown: rotations about x, y, z
@@ -87,9 +88,8 @@ class Unknowns:
         columns = np.tile(np.arange(last - 6, last), len(rim.dofs))
         values = (rim.shape.ravel(), (np.repeat(rim.dofs, 6), columns))
         csr = sparse.csr_matrix(unit + sparse.csr_matrix(values, (rows, last)))
-        index = [part.astype(PETSc.IntType) for part in (csr.indptr, csr.indices)]
         sizes = ((rows, PETSc.DETERMINE), (own, PETSc.DETERMINE))
-        return PETSc.Mat().createAIJ(sizes, csr=(*index, csr.data), comm=comm)
+        return from_local_rows(csr, sizes, comm)
 
     def reduced(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """T^T X T for a matrix X over all dofs of the body. Collective."""

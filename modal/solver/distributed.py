@@ -7,6 +7,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.matrices.local_rows import from_local_rows
+
 
 def congruent(matrix: PETSc.Mat, basis: sparse.csr_matrix) -> PETSc.Mat:
     """B^T A B, distributed by rows, for a real B (n, d) whole on every process. Collective."""
@@ -14,11 +16,7 @@ def congruent(matrix: PETSc.Mat, basis: sparse.csr_matrix) -> PETSc.Mat:
     start, end = matrix.getOwnershipRange()
     own = basis[start:end]
     across = end - start if columns == size else PETSc.DECIDE  # distributed as A, where possible
-    spread = PETSc.Mat().createAIJ(
-        ((end - start, size), (across, columns)),
-        csr=(_index(own.indptr), _index(own.indices), own.data),
-        comm=matrix.comm,
-    )
+    spread = from_local_rows(own, ((end - start, size), (across, columns)), matrix.comm)
     product = matrix.ptap(spread)
     spread.destroy()
     return product
@@ -28,7 +26,8 @@ def rows_of(matrix: PETSc.Mat, wanted: np.ndarray) -> sparse.csr_matrix:
     """Rows (k, n) of the matrix at the ascending indices `wanted`, which differ by process.
     Collective.
     """
-    rows = PETSc.IS().createGeneral(_index(np.asarray(wanted)), comm=PETSc.COMM_SELF)
+    indices = np.asarray(wanted).astype(PETSc.IntType, copy=False)
+    rows = PETSc.IS().createGeneral(indices, comm=PETSc.COMM_SELF)
     every = PETSc.IS().createStride(matrix.getSize()[1], first=0, step=1, comm=PETSc.COMM_SELF)
     (found,) = matrix.createSubMatrices(rows, every)
     indptr, indices, values = found.getValuesCSR()
@@ -56,7 +55,3 @@ def less(matrix: PETSc.Mat, other: PETSc.Mat) -> PETSc.Mat:
     difference = matrix.copy()
     difference.axpy(-1.0, other, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
     return difference
-
-
-def _index(values: np.ndarray) -> np.ndarray:
-    return values.astype(PETSc.IntType, copy=False)

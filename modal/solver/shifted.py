@@ -7,6 +7,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.matrices.local_rows import from_local_rows
 from tireroad.modal.solver.team import ALONE, Team
 
 
@@ -22,9 +23,8 @@ class Shifted:
     def __init__(self, matrix: sparse.csr_matrix, shift: float, team: Team = ALONE) -> None:
         self.rows, self.size = matrix.shape
         self.shift, self.team = shift, team
-        csr = (_index(matrix.indptr), _index(matrix.indices), matrix.data)
         sizes = ((self.rows, self.size), (self.rows, self.size))
-        shifted = PETSc.Mat().createAIJ(sizes, csr=csr, comm=team.comm)
+        shifted = from_local_rows(matrix, sizes, team.comm)
         shifted.shift(-shift)
         shifted.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self._pc = PETSc.PC().create(team.comm)
@@ -68,7 +68,3 @@ class Shifted:
         """Free the factor, the eigensolver's largest memory, which petsc4py does not."""
         self._factor.destroy()
         self._pc.destroy()
-
-
-def _index(values: np.ndarray) -> np.ndarray:
-    return values.astype(PETSc.IntType, copy=False)

@@ -18,6 +18,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.matrices.local_rows import from_local_rows
 from tireroad.fem.static.road import Road
 from tireroad.fem.tire.body import Body
 
@@ -76,5 +77,4 @@ class Unrolled:
         entries = np.concatenate([np.ones(len(others)), self._basis().ravel()])
         places = np.concatenate([others, rows]), np.concatenate([others, columns]) + first
         local = sparse.csr_matrix((entries, places), shape=(count, whole))
-        parts = (part.astype(PETSc.IntType) for part in (local.indptr, local.indices))
-        return PETSc.Mat().createAIJ(sizes, csr=(*parts, local.data), comm=self._body.comm)
+        return from_local_rows(local, sizes, self._body.comm)

@@ -14,6 +14,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
+from tireroad.fem.matrices.local_rows import from_local_rows
 from tireroad.fem.static.friction.road import RubbingRoad
 from tireroad.fem.static.held_system import HeldSystem, Moved
 from tireroad.fem.timing import Timing
@@ -117,5 +118,4 @@ def _sparse(matrix: PETSc.Mat, rows: Array, columns: Array, values: Array) -> PE
     (count, whole), _ = matrix.getSizes()
     entries = np.ravel(values), (np.ravel(rows), np.ravel(columns))
     local = sparse.csr_matrix(entries, shape=(count, whole))
-    parts = (part.astype(PETSc.IntType) for part in (local.indptr, local.indices))
-    return PETSc.Mat().createAIJ(matrix.getSizes(), csr=(*parts, local.data), comm=matrix.comm)
+    return from_local_rows(local, matrix.getSizes(), matrix.comm)
