@@ -61,7 +61,6 @@ def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
     workers: list[_Worker] = []
     started = 0
     ended: list[Ended] = []
-    threads = max((os.cpu_count() or 1) // (at_a_time * sweep.processes), 1)
     try:
         while waiting or any(one.member for one in workers):
             for one in [one for one in workers if one.crashed]:
@@ -69,7 +68,7 @@ def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
                 one.close()
             while waiting and len(workers) < at_a_time:
                 started += 1
-                workers.append(_Worker(sweep, folder, threads, started))
+                workers.append(_Worker(sweep, folder, started))
             for one in workers:
                 if not one.member and waiting:
                     one.take(waiting.pop(0))
@@ -90,14 +89,14 @@ def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
 class _Worker:
     """A process, or mpirun with several, that computes one `member` at a time; None when idle."""
 
-    def __init__(self, sweep: Sweep, folder: Path, threads: int, number: int) -> None:
+    def __init__(self, sweep: Sweep, folder: Path, number: int) -> None:
         self.member: Member | None = None
         self._sweep, self._folder, self._logs = sweep, folder, folder / "logs"
         self._logs.mkdir(parents=True, exist_ok=True)
         settings = {
             "TIREROAD_CACHE": str((folder / "cache").resolve()),
-            "OPENBLAS_NUM_THREADS": str(threads),
-            "OMP_NUM_THREADS": str(threads),
+            "OPENBLAS_NUM_THREADS": "1",  # as a run alone: runs.start
+            "OMP_NUM_THREADS": "1",
         }
         self._own = self._logs / f"worker-{number}.txt"  # output outside members
         with self._own.open("wb") as own:
