@@ -101,7 +101,7 @@ class Axle:
 
     @property
     def adrift(self) -> np.ndarray:
-        """Motions (7, r) of wheel and body, one per column, that no spring resists.
+        """Motions (7, r) of wheel and body, one per column, that neither spring nor damper resists.
 
         Translations without spring and damper; with a body, wheel and body together in height.
         """

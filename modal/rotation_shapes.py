@@ -117,8 +117,10 @@ class _Found:
         vectors, comm, ops = self._modes.vectors, self._comm, self._operators
         for _ in range(2):  # the second pass removes the rounding of the first
             take_off(more, vectors, gram(comm, vectors, ops.mass[:, None] * more))
-            take_off(more, self._fields, gram(comm, self._fields, multiply(ops.stiffness, more)))
-        sizes, turn = np.linalg.eigh(gram(comm, more, multiply(ops.stiffness, more)))
+            stretched = multiply(ops.stiffness, more)
+            take_off(more, self._fields, gram(comm, self._fields, stretched))
+        # What was taken off last is K-orthogonal to `more`.
+        sizes, turn = np.linalg.eigh(gram(comm, more, stretched))
         kept = sizes > max(_NOTHING * TOLERANCE, _ROUNDING * sizes.max())
         new = more @ (turn[:, kept] / np.sqrt(sizes[kept]))
         # Q^T K X = Q^T L, with L the forces; for one matrix and one direction q it is G^T q . phi.

@@ -18,7 +18,7 @@ from tireroad.runs.bench.parts.corner_step import corner
 from tireroad.runs.bench.parts.shear_step import STEP, on_a_grid, parts_of, shearing, wavy
 from tireroad.runs.measure.tabulate import Table
 
-ABOUT = "the contact loop: cost of a step, friction, convolution, many points; asked and measured"
+ABOUT = "the contact loop: cost of a step, friction, convolution, many points; targets and measured figures"
 BLOCK = 20  # steps between two measurements of the lower bound
 
 
@@ -52,8 +52,15 @@ def _asked(step, friction, convolved, order, many, static, moving) -> Table:
         rows.append(["128 x 128 points, time over tamaas's", "at most", 1.0, ratio, ""])
     for row in rows:
         row.append(row[3] <= row[2] if row[1] == "at most" else row[3] >= row[2])
-    columns = [("what", ""), ("", ""), ("asked", ""), ("measured", ""), ("in", ""), ("reached", "")]
-    return Table("The contact loop: asked and measured", columns, rows, static.notes)
+    columns = [
+        ("what", ""),
+        ("", ""),
+        ("target", ""),
+        ("measured", ""),
+        ("in", ""),
+        ("reached", ""),
+    ]
+    return Table("The contact loop: targets and measured figures", columns, rows, static.notes)
 
 
 def _loop(shape, modes: int, height, brush: float | None = None, steps: int = 1000):

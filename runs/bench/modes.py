@@ -50,7 +50,7 @@ def _asked(standing, exponent: float, plain, rolling, biorthogonality: float) ->
     ]
     return Table(
         "Asked and measured",
-        [("figure", ""), ("unit", ""), ("asked", ""), ("measured", "-"), ("met", "")],
+        [("figure", ""), ("unit", ""), ("target", ""), ("measured", "-"), ("met", "")],
         rows,
         [
             f"On {MPI.COMM_WORLD.size} process(es). Endo's ring: tests/verification/test_endo_ring.py."

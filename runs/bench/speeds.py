@@ -21,7 +21,7 @@ SHAPE = "static.steady_rolling=false"  # otherwise each speed has its own static
 NOTE = (
     f"{MEMBERS} speeds from {LOWEST:g} rad/s on, {STEP:g} rad/s apart, about the shape of the tire at rest "
     f"(static.steady_rolling = false), with error bars and pages. Separate runs: {MEMBERS} times the mean of {ALONE}, "
-    "the slowest and the fastest. Processor time of all processes, one BLAS thread each; asked: 35 %."
+    "the slowest and the fastest. Processor time of all processes, one BLAS thread each; target: 35 %."
 )
 
 

@@ -110,4 +110,4 @@ def _run(mesh: dict[str, int]) -> list[Table]:
         "Damping by modal strain energy in both: the full finite elements damp each of these modes as the "
         "modal run does, and what lies beyond at the rate of the highest."
     )
-    return [*tables, verdicts("A belted tire at 80 rad/s: what was asked for", rows, [note])]
+    return [*tables, verdicts("A belted tire at 80 rad/s: targets", rows, [note])]

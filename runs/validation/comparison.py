@@ -135,8 +135,8 @@ def verdicts(title: str, rows: list[list], notes: list[str]) -> Table:
     """The table of targets."""
     columns = [
         ("case", ""),
-        ("error asked", "%"),
-        ("ratio asked", "-"),
+        ("target error", "%"),
+        ("target ratio", "-"),
         ("fastest run within it, or best", ""),
         ("its error", "%"),
         ("full FE within it, or finest", ""),

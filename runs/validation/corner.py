@@ -73,5 +73,5 @@ def run() -> list[Table]:
             found = compare(tires, STEPS, CHOICES, ("contact force", "axle force"))
             tables.append(found.table(f"{name}: {tires.setting}"))
             rows.append(found.verdict(name, WITHIN, 1.0, tires.modes_seconds))
-    asked = verdicts("Wheel on its corner: what was asked for", rows, [])
+    asked = verdicts("Wheel on its corner: targets", rows, [])
     return [*tables, asked, corner_limits.table()]

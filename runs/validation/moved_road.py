@@ -64,7 +64,7 @@ def run() -> list[Table]:
             name = f"flat road moved by {1e3 * amplitude:g} mm at 50 Hz"
             tables.append(found.table(f"Standing, {name}: {tires.setting}"))
             rows.append(found.verdict(name, 0.005, 1.0, tires.modes_seconds))
-    return [*tables, verdicts("Moved flat road: what was asked for", rows, []), _linearised()]
+    return [*tables, verdicts("Moved flat road: targets", rows, []), _linearised()]
 
 
 def _linearised() -> Table:

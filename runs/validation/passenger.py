@@ -78,7 +78,7 @@ def compared_table(title: str, compared: dict[str, History], exact: History) -> 
     seconds = ", ".join(f"{name} {_seconds(history):.3g}" for name, history in compared.items())
     notes = [
         "Less the full finite elements at a step of "
-        f"{1e3 * exact.step:g} ms, of the same mesh, points, road and air; asked: {ASKED:g} dB at most. Modes with attachment, "
+        f"{1e3 * exact.step:g} ms, of the same mesh, points, road and air; target: {ASKED:g} dB at most. Modes with attachment, "
         f"at {1e3 * STEPS[0]:g} ms. What the reference's own last halving of the step changes stands in the column of the full "
         "finite elements.",
         f"A simulated second of the loop, in processor seconds of one thread: {seconds}, the reference {_seconds(exact):.3g}.",

@@ -69,7 +69,7 @@ def run() -> list[Table]:
         what = f"Point force of 1 N at {frequency:g} Hz ({name})"
         tables.append(found.table(f"{what}: {tires.setting}"))
         rows.append(found.verdict(what, 0.005, 1.0, tires.modes_seconds))
-    return [*tables, verdicts("Point force: what was asked for", rows, [])]
+    return [*tables, verdicts("Point force: targets", rows, [])]
 
 
 def _history(tire, step: float, setup: float, frequency: float) -> History:

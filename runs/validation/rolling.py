@@ -95,7 +95,7 @@ def _run(mesh: dict[str, int], steps: Sequence[float], roads: dict[str, str]) ->
             tables.append(found.table(f"{name}: {points} contact points, {tires.setting}"))
             tables[-1].notes.append(_beyond(found))
             rows += [found.verdict(name, *target, tires.modes_seconds) for target in TARGETS]
-    return [*tables, verdicts("Rolling at 100 rad/s: what was asked for", rows, [])]
+    return [*tables, verdicts("Rolling at 100 rad/s: targets", rows, [])]
 
 
 def _beyond(found: Comparison) -> str:

@@ -215,7 +215,7 @@ def _summary(found: list[Outcome], failed: Sequence[str] = ()) -> Table:
     ]
     return Table(
         "Accuracy on demand",
-        [("what", ""), ("found", ""), ("asked", ""), ("unit", "")],
+        [("what", ""), ("found", ""), ("target", ""), ("unit", "")],
         rows,
         notes,
         failed=list(failed),

@@ -94,8 +94,8 @@ def _told(exact: Rolled, rows: list[list], finest: float) -> Table:
         "y": ["error of contact force", "error of axle force"],
         "log": "xy",
         "by": None,
-        "targets": [(TARGET, f"asked: {TARGET:g} %")],
-        "limits": [(1.0, "asked: 1 s")],
+        "targets": [(TARGET, f"target: {TARGET:g} %")],
+        "limits": [(1.0, "target: 1 s")],
     }
     title = f"One simulated second of rolling on a rough road, up to {BAND:g} Hz"
     return Table(title, columns, rows, notes, plot)

@@ -147,7 +147,7 @@ def front(choices: list[Choice]) -> list[Choice]:
     return best
 
 
-_GUIDES = [(target, f"asked: {target:g} %") for target in TARGETS]
+_GUIDES = [(target, f"target: {target:g} %") for target in TARGETS]
 _COLUMNS = [
     ("mesh", ""),
     ("modes", "-"),

@@ -72,7 +72,7 @@ def shares(found: list[Effectivity], note: str, failed: Sequence[str] = ()) -> T
         [("figure", ""), *_JUDGED],
         [*rows, ["all", *_judgement(some)]],
         [
-            f"{len({one.case for one in found})} cases; asked: {ASKED:g} % within. {note} Where both are below {SMALL['mean']:g} of the load, {SMALL['deviation']:g} of the "
+            f"{len({one.case for one in found})} cases; target: {ASKED:g} % within. {note} Where both are below {SMALL['mean']:g} of the load, {SMALL['deviation']:g} of the "
             f"deviation, {SMALL['history']:g} % of the history or {SMALL['level']:g} dB a figure counts as good.",
         ],
         failed=list(failed),

@@ -69,7 +69,7 @@ def table() -> Table:
         ["the same, on the corner", "none",
          float(corner["total_force"][:, 2].mean() / 500.0 - 1)],
     ]  # fmt: skip
-    columns = [("limit", ""), ("asked", "-"), ("found", "-")]
+    columns = [("limit", ""), ("target", "-"), ("found", "-")]
     notes = ["Soft torus of 20 x 6 elements, 60 modes, 50 rad/s over waves of 0.5 mm, 0.04 s."]
     return Table("Wheel on its corner: limits", columns, rows, notes)
 
