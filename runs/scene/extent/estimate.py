@@ -12,10 +12,10 @@ from tireroad.runs.scene.tables.scene import Scene
 
 PROGRAM = 2.1e8
 """Bytes of one process with all libraries loaded and the mesh made (measured)."""
-MATRICES = 6
+MATRICES = 5
 """Sparse matrices held at peak: K, its scaled copy and parts, those of rotation (measured,
-including the rest: 0.92 GB for the quickstart, 2.3 to 2.8 GB for a passenger tire of 102,060
-unknowns on one process, 1.6 GB on each of two)."""
+including the rest: 0.6 to 0.83 GB for the quickstart, 1.1 to 1.4 GB for passenger.toml, 2.3 to 2.8
+GB for a passenger tire of 102,060 unknowns on one process, 1.6 to 1.8 GB on each of two)."""
 TANGENTS = 4
 """Matrices held in the static state: the whole ring's tangent, half of it folded, index maps."""
 COLUMNS = 250
