@@ -141,6 +141,9 @@ def settle(
     """
     load = float(nodal_force.sum())
     flat = patch.gap - patch.at_points(flexibility @ nodal_force)
+    if load == 0.0:  # clear of the road
+        rise = max(0.0, -float(flat.min()))
+        return replace(patch, force=np.zeros_like(flat), gap=flat + rise), rise
 
     def excess(rise: float) -> float:
         return float(solver.solve(flat + rise).sum()) / load - 1.0
@@ -168,9 +171,10 @@ def spread_pull(patch: Patch, pull: np.ndarray, force: np.ndarray) -> np.ndarray
     near = patch.at_points(touching)
     share = patch.at_points(ratio * touching[:, None]) / np.maximum(near, 1e-12)[:, None]
     found = patch.force[:, None] * share
-    return (
-        found + (pull.sum(axis=0) - found.sum(axis=0)) * (patch.force / patch.force.sum())[:, None]
-    )
+    whole = float(patch.force.sum())
+    if whole == 0.0:
+        return found
+    return found + (pull.sum(axis=0) - found.sum(axis=0)) * (patch.force / whole)[:, None]
 
 
 def _bracket(excess: Callable[[float], float], step: float) -> tuple[float, float]:

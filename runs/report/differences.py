@@ -98,7 +98,7 @@ def _bands(runs: Sequence[RunResults], quantity: str, path: str, unit: str) -> l
     for run in runs:
         own: dict[tuple[int, float], float] = {}
         centre = path.rpartition("/")[0] + "/centre"
-        if path in run and centre in run:
+        if path in run and centre in run and len(run[centre]):
             level = run[path].reshape(len(run[centre]), -1)  # some have components
             for band, parts in zip(nominal(run[centre]), level, strict=True):
                 own |= {(axis, float(band)): float(v) for axis, v in enumerate(parts)}

@@ -5,6 +5,7 @@ If the steps become too small, an error names the last converged state.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -43,7 +44,8 @@ def march(
     """
     done, size, failures = start, first, 0
     while True:
-        target = end if abs(end - done) <= size * (1 + 1e-12) else done + size
+        left = end - done
+        target = end if abs(left) <= size * (1 + 1e-12) else done + math.copysign(size, left)
         step = attempt(target)
         failures = 0 if step.converged else failures + 1
         if fall is not None and failures == _STUCK:
