@@ -67,7 +67,7 @@ class Totals:
             least=min(old.least, float(load.min())),
             most=max(old.most, float(load.max())),
             most_active=max(old.most_active, int(steps["active"].max())),
-            excursion=max(old.excursion, float(np.abs(self._beside_wheel(steps)).max())),
+            excursion=max(old.excursion, float(np.abs(self._beside_wheel(steps)).max(initial=0.0))),
         )
 
     def finish(self) -> None:

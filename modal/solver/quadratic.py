@@ -22,6 +22,7 @@ from tireroad.modal.solver.fields import gram, multiply
 
 Array = np.ndarray
 RESIDUAL_TOLERANCE = 1e-8
+TOLERANCE, ITERATIONS = 1e-11, 200  # of the solver: relative residual, restarts
 _EXTRA = 10  # states beyond the wanted ones, to end in a gap and not inside a cluster
 _SAME = 1e-6  # relative distance of the right and left eigenvalue of one state
 # Two equal states have 7e5 to 1.3e6 by rounding, depending on the number of processes.
@@ -158,7 +159,7 @@ def _states(
     pep.setOptionsPrefix("rotating_")
     pep.setOperators([stiffness, drag, inertia])
     pep.setDimensions(min(wanted + _EXTRA, 2 * stiffness.getSize()[0]))
-    pep.setTolerances(1e-11, 200)
+    pep.setTolerances(TOLERANCE, ITERATIONS)
     pep.setWhichEigenpairs(SLEPc.PEP.Which.TARGET_MAGNITUDE)
     pep.setTarget(0.0)
     transform = pep.getST()

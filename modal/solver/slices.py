@@ -23,7 +23,7 @@ from tireroad.modal.solver.team import ALONE, Team
 
 # Residual of a Ritz pair relative to theta: as small as the vectors of neighbouring slices must be
 # orthogonal to each other, a few digits above rounding.
-_TOLERANCE = 1e-12
+TOLERANCE = 1e-12
 # With deflation: each search finds at least a block of each repeated eigenvalue.
 _SEARCHES = 40
 _SOFT = 1e-3  # of the matrix norm: noise of a hundred roundings is 1e-11 of an eigenvalue there
@@ -84,7 +84,7 @@ def _search(shifted: Shifted, interval: Interval) -> tuple[np.ndarray, np.ndarra
     values, vectors = np.zeros(0), np.zeros((shifted.rows, 0))
     for _ in range(_SEARCHES):
         missing = interval.count - len(values)
-        more = nearest(shifted, interval.low, interval.high, missing, vectors, _TOLERANCE)
+        more = nearest(shifted, interval.low, interval.high, missing, vectors, TOLERANCE)
         values, vectors = np.append(values, more[0]), np.hstack([vectors, more[1]])
         if len(values) >= interval.count or not len(more[0]):
             break

@@ -1,11 +1,13 @@
 """Points on a regular grid of the deformed tread: interpolation, places, the state they settle in."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from tireroad.contact import grid_patch, model
-from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle
+from tireroad.contact.grid_patch import OnPoints, make_grid_patch, settle, spread_pull
 from tireroad.contact.model import step_solver
 from tireroad.contact.patch import make_patch
 from tireroad.contact.respaced import halved, thinned
@@ -107,6 +109,20 @@ def test_settled_state_keeps_the_load(tread, pitch: float) -> None:
     solver = step_solver(spec, settled, flexibility)
     again = solver.solve(settled.gap, settled.force > 0, reference=settled.force)
     assert np.array_equal(again, settled.force)
+
+
+def test_a_patch_clear_of_the_road_settles_without_force(tread) -> None:
+    """A grid point may lie a little below the nodes around it: no point is left inside the road."""
+    force, _, patch = patches(tread, 3e-3, 0.004)
+    flexibility = 1e-5 * np.eye(len(patch.index))
+    spec = Contact(law=HalfSpace(youngs_modulus=5e6), points=Pitch(0.004, 0.004))
+    patch = replace(patch, gap=patch.gap - 1e-5)
+    free = np.zeros_like(force[patch.index])
+    settled, rise = settle(patch, step_solver(spec, patch, flexibility), flexibility, free)
+    assert not settled.force.any() and settled.gap.min() == 0.0
+    assert rise == pytest.approx(-patch.gap.min())
+    pull = spread_pull(settled, np.zeros((len(free), 2)), free)
+    assert not pull.any() and pull.shape == (len(settled.force), 2)
 
 
 @pytest.mark.parametrize("most", [0, 100_000])  # a product, a matrix

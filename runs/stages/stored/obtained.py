@@ -11,6 +11,7 @@ from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.base.solver_settings import solver_settings
 from tireroad.runs.stages.base.stage import Done, Stage
 
 
@@ -38,6 +39,8 @@ def obtained(stage: Stage) -> Obtained:
             return Obtained(done=Done(key, stage.stored), reused=source, known=known)
         if reason != "absent":
             observe.say(f"{name:9s} computed anew: {path.name} exists, but {reason}")
+        if settings := solver_settings(name, job.scene):
+            observe.log(settings)
         record = Record()
         product = stage.produce(key, record)
         collect(job.comm)

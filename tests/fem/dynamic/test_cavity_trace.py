@@ -1,12 +1,15 @@
 """The inner face's traces against closed forms, finite differences, and Gauss's theorem."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from tireroad.fem.cavity import duct
 from tireroad.fem.cavity.gas import inflated
-from tireroad.fem.cavity.trace import CavityTrace, rim_cone
+from tireroad.fem.cavity.trace import CavityTrace, _bead_ends, rim_cone
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.support import Support, rigid_motions
 
@@ -27,6 +30,19 @@ def test_round_cavity_has_the_area_and_volume_of_its_closed_form(make_body):
     assert found.area[0] / (2 * np.pi) == pytest.approx(area, rel=1e-4)
     assert found.volume[0] / (2 * np.pi) == pytest.approx(moment, rel=1e-4)
     assert np.abs(found.area[1:]).max() < 1e-6 * found.area[0]
+
+
+def test_ends_of_the_inner_face_do_not_depend_on_the_order_of_its_edges(make_body):
+    """A deck lists its elements as it likes."""
+    body = make_body(segments=16, arc=6)
+    ends = _bead_ends(body)
+    inner = body.lattice.tire.section.inner
+    turned = np.random.default_rng(1).permutation(inner)
+    assert np.abs(turned - inner).any()
+    section = replace(body.lattice.tire.section, inner=turned)
+    tire = SimpleNamespace(section=section)
+    lattice = SimpleNamespace(tire=tire, section=body.lattice.section)
+    assert _bead_ends(SimpleNamespace(lattice=lattice)) == ends
 
 
 def bend(body, size=0.01):

@@ -72,6 +72,18 @@ def test_a_march_falls_where_small_steps_fail_and_goes_on_by_steps():
     assert asked[-1] == 1.0 and max(asked[: asked.index(fallen[0])]) >= 0.4
 
 
+def test_a_march_goes_either_way():
+    """A road below the first touch: steps lead down to it, not up through the tire."""
+    asked = []
+
+    def attempt(target):
+        asked.append(target)
+        return Step(True, 30, 0.0, "converged")
+
+    march(attempt, 0.0, -1.0, 0.3, Show("deflection", 1.0, "m"))
+    assert asked == pytest.approx([-0.3, -0.6, -0.9, -1.0])
+
+
 @pytest.mark.slow
 @pytest.mark.mpi
 def test_a_load_that_is_not_met_leaves_the_road_where_it_was(loader):

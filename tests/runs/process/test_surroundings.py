@@ -67,6 +67,7 @@ def test_a_run_goes_on_without_its_streams(scene: Path, closed: str) -> None:
     assert done.returncode == 0
     log = (out / "log.txt").read_text()
     assert "static    done" in log and "modes     done" in log and "report    done" in log
+    assert "static    solver: Newton's method" in log and "modes     solver: block Lanczos" in log
 
 
 def test_a_run_goes_on_when_its_reader_has_gone(scene: Path) -> None:

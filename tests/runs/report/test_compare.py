@@ -67,6 +67,16 @@ def test_what_is_missing_is_said(pair: list[Path], tmp_path: Path) -> None:
     assert "b has no spectra.h5" in compare(pair, tmp_path / "out").read_text()
 
 
+def test_a_run_too_short_for_any_band_is_compared(pair: list[Path], tmp_path: Path) -> None:
+    with h5py.File(pair[1] / "spectra.h5", "w") as file:
+        file["third_octave/centre"] = np.zeros(0)
+        file["third_octave/level"] = np.zeros((0, 3))
+    compare(pair, tmp_path / "out")
+    with (tmp_path / "out" / "compare.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["b"] for row in rows if row["a"] == "10.0"] == [""]
+
+
 def test_folders_without_results_are_refused(pair: list[Path], tmp_path: Path) -> None:
     with pytest.raises(InputError, match="2 to 12"):
         compare(pair[:1], tmp_path / "out")

@@ -105,3 +105,11 @@ def test_a_stiff_tread_on_long_steps_chatters_where_forces_are_linear(run, schem
         assert not failed
         assert abs(found["energy that the scheme takes"]) > 1e-3 * moved
     assert ("open and close" in found["reason for the scheme"]) == (scheme == "auto")
+
+
+@pytest.mark.long
+def test_a_tire_clear_of_the_road_at_rest_is_hit_by_it(run) -> None:
+    """Then the contact points settle without force."""
+    clear = ("static.load=", "static.road_height=-0.327", "road.motion.amplitude=8e-3")
+    found, _ = run("clear", "[rotation]\nspeed = 40.0\n", *clear)
+    assert found["work of contact on the tire"] > 0.0
