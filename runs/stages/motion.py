@@ -69,14 +69,17 @@ class MotionStage(WholeTire[Motion]):
 
 
 def _replayed(basis: Basis, forces: Forces, top: float) -> tuple[np.ndarray, np.ndarray]:
-    """Instants (g,) s, and the modal coordinates (g, m) at them."""
+    """Instants (g,) s, and the modal coordinates (g, m) at them, by the run's own scheme."""
     unit = np.eye(basis.coordinates)
     response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
-    tire = Recursion(response=response, step=forces.step, scheme="linear", comm=MPI.COMM_SELF)
+    # The rectangles of a convolution have no states to replay: it approximates the linear scheme.
+    scheme = "constant" if forces.scheme == "constant" else "linear"
+    tire = Recursion(response=response, step=forces.step, scheme=scheme, comm=MPI.COMM_SELF)
+    tire.start(forces.begun)
     stride = max(int(1 / (_PER_PERIOD * top * forces.step)), 1)
     kept = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS]
     wanted, found, number = set(kept), [], 0
-    for block in forces.pushes(still=True):
+    for block in forces.pushes():
         for push in block:
             q = tire.predict() + tire.same_step @ push if number in wanted else tire.predict()
             tire.advance(push)
