@@ -24,8 +24,8 @@ _PER_PERIOD = 8  # of the band's upper frequency
 class Motion:
     """Motion of the outer face at the instants `time` (g,) s.
 
-    `displacement` (g, s, 3) m from the static state, of the nodes at `points` (s, 3) m. From the
-    modes only: the residual flexibility is not included.
+    `displacement` (g, s, 3) m from the static state, of the nodes at `points` (s, 3) m, with the
+    motion of the wheel. From the modes only: the residual flexibility is not included.
     """
 
     time: np.ndarray
@@ -50,8 +50,7 @@ class MotionStage(WholeTire[Motion]):
         """The outer face at the stored instants. Root process only."""
         points = self.static.product.points
         time, q = _replayed(basis, forces, self.band)
-        shape = basis.shape[: 3 * len(points)]
-        field = (q[:, : shape.shape[1]] @ shape.T).reshape(len(time), -1, 3)
+        field = (q @ basis.face(len(points)).T).reshape(len(time), -1, 3)
         size = float(np.linalg.norm(field, axis=2).max(initial=0.0))
         return Motion(time=time, displacement=field.astype("f4"), points=points), {
             "instants": (len(time), "-"),

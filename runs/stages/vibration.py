@@ -27,7 +27,7 @@ HANN = 1.5  # noise bandwidth of the window in lines: mean of w^2 over the squar
 
 @dataclass(frozen=True, kw_only=True)
 class Vibration:
-    """Vibration of the outer face, up to the model's frequency limit.
+    """Vibration of the outer face with the wheel, up to the model's frequency limit.
 
     `frequency` (f,) Hz; `velocity` (f,) m2/s2: mean square normal velocity per line; `centre` (b,)
     Hz with the third-octave `velocity_level` dB re 1 nm/s and `power_level` dB re 1 pW, and both
@@ -79,7 +79,7 @@ class VibrationStage(WholeTire[Vibration]):
         left_out = self.spectra.product.left_out if self.spectra else 0.0
         frequency, a = self._coordinates(basis, forces, left_out)
         surface = Surface.of(state.points, self.job.tire.lattice.quads())
-        found = _seen(basis.shape[: 3 * len(state.points)], surface, state, frequency, a)
+        found = _seen(basis.face(len(state.points)), surface, state, frequency, a)
         return found, _headline(found, surface)
 
     def _coordinates(
@@ -111,9 +111,9 @@ class VibrationStage(WholeTire[Vibration]):
 def _seen(
     shape: np.ndarray, surface: Surface, state: StaticState, frequency: np.ndarray, a: np.ndarray
 ) -> Vibration:
-    """The vibration of the outer face for coordinates `a` (f, m) on the shapes (3 s, m)."""
-    own = a[:, : shape.shape[1]]
-    velocity = mean_square_velocity(own, surface.gram(shape), surface.area, frequency)
+    """The vibration of the outer face for coordinates `a` (f, m), its motion with which is `shape`
+    (3 s, m)."""
+    velocity = mean_square_velocity(a, surface.gram(shape), surface.area, frequency)
     # Amplitudes are scaled to show a sine in full; summed over a band, each line counts HANN times.
     lines = velocity / HANN
     centre, square = band_sums(frequency, lines)
@@ -130,7 +130,7 @@ def _seen(
         weighted=_level(heard, POWER),
         velocity_weighted=_level(weighted, VELOCITY**2),
         shapes_at=frequency[kept],
-        displacement=(own[kept] @ shape.T).reshape(len(kept), -1, 3),
+        displacement=(a[kept] @ shape.T).reshape(len(kept), -1, 3),
         points=state.points,
     )
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 import tireroad
+from tireroad.contact.results.spectra import amplitudes
+from tireroad.greens.vibration import Surface
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
@@ -110,3 +113,63 @@ def test_the_field_is_that_of_the_loop(folder: Path, changes: tuple[str, ...]) -
     field, loop, node = both(run(folder, SINE, *changes, "greens.residual=none"))
     assert node == 113 and np.abs(loop).max() > 1e-5
     np.testing.assert_allclose(field, loop, rtol=0, atol=1e-6 * np.abs(loop).max())
+
+
+CORNER = """
+[axle]
+kind = "corner"
+wheel_mass = 8.0
+stiffness = [1e6, 1e6, 2e5, 1e4, 1e4, 1e4]
+damping = [1000.0, 1000.0, 2400.0, 10.0, 10.0, 10.0]
+locked = []
+"""
+FREE = """
+[axle]
+kind = "free"
+wheel_mass = 8.0
+"""
+
+
+@pytest.mark.parametrize("axle", [CORNER, FREE], ids=["corner", "free"])
+@pytest.mark.parametrize("points", [GRID, NODES])
+def test_the_field_moves_with_the_wheel(folder: Path, axle: str, points: str) -> None:
+    """Phi eta + R xi, as the loop reads it, not Phi q."""
+    results = run(folder, SINE + axle, points, "greens.residual=none")
+    field, loop, node = both(results)
+    assert node == 113
+    assert np.abs(results["contact/wheel/translation"]).max() > 1e-5
+    np.testing.assert_allclose(field, loop, rtol=0, atol=1e-6 * np.abs(loop).max())
+
+
+@pytest.mark.parametrize("axle", ["", CORNER], ids=["held", "corner"])
+def test_the_vibration_is_that_of_the_loop(folder: Path, axle: str) -> None:
+    """By line: spectra of the same record, after the run-in; and the power is that of this motion."""
+    results = run(
+        folder,
+        SINE + axle,
+        NODES,
+        "greens.residual=none",
+        "output.vibration=true",
+        "time.duration=0.3",
+    )
+    frequency, field = (results[f"vibration/surface/{k}"] for k in ("frequency", "displacement"))
+    start = round(results.attributes("spectra")["left_out"] / 2e-4)
+    _, lines = amplitudes(results["contact/driven_displacement"][start:, 0], 2e-4)
+    loop = lines[1 : len(frequency) + 1]
+    strongest = np.linalg.norm(loop, axis=1).argmax()
+    np.testing.assert_allclose(
+        field[strongest, 113], loop[strongest], rtol=0, atol=0.08 * np.abs(loop[strongest]).max()
+    )
+    velocity = results["vibration/mean_square_velocity"]
+    normal, around = normals(folder)
+    seen = np.abs(np.einsum("sk,fsk->fs", normal, field)) ** 2 / np.linalg.norm(normal, axis=1)
+    known = (2 * np.pi * frequency) ** 2 * seen.sum(axis=1) / (2 * around)
+    np.testing.assert_allclose(velocity, known, rtol=1e-9)
+
+
+def normals(folder: Path) -> tuple[np.ndarray, float]:
+    """Normals (s, 3) m2 times the area of each node of the outer face, and the whole area, m2."""
+    with h5py.File(folder / "static.h5") as file:
+        points, quads = file["surface/points"][:], file["surface/quads"][:]
+    surface = Surface.of(points, quads)
+    return surface.normal, surface.area
