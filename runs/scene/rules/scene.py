@@ -196,7 +196,10 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("modal", "static", "rotation", "contact", "damping", "greens"), _modal),
     (("damping", "rotation", "output"), full_matrices),
     (("contact", "road", "time", "static", "rotation"), _contact),
-    (("output", "force", "modal", "axle", "tire", "damping", "contact"), check_outputs),
+    (
+        ("output", "force", "modal", "axle", "tire", "damping", "contact", "static"),
+        check_outputs,
+    ),
     (("rotation",), check_campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),
