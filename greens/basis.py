@@ -99,6 +99,13 @@ class Basis:
         """What the probes read of all coordinates, (k, m + a + c) (modal.basis.Projection.seen)."""
         return self.projection.seen(self._of_modes(probes), probes)
 
+    def face(self, nodes: int) -> np.ndarray:
+        """Motion of the `nodes` of the outer face with all coordinates, (3 s, m + a + c).
+
+        That of a wheel that moves is part of it: Phi eta + R xi (modal.corner), not Phi q.
+        """
+        return self.seen(sparse.identity(3 * nodes, format="csr"))
+
     def _of_modes(self, probes: sparse.csr_matrix) -> np.ndarray:
         """What the probes read of the modes (k, m); columns of a corner's motions are skipped."""
         width = min(probes.shape[1], len(self.shape))

@@ -24,8 +24,8 @@ _PER_PERIOD = 8  # of the band's upper frequency
 class Motion:
     """Motion of the outer face at the instants `time` (g,) s.
 
-    `displacement` (g, s, 3) m from the static state, of the nodes at `points` (s, 3) m. From the
-    modes only: the residual flexibility is not included.
+    `displacement` (g, s, 3) m from the static state, of the nodes at `points` (s, 3) m, with the
+    motion of the wheel. From the modes only: the residual flexibility is not included.
     """
 
     time: np.ndarray
@@ -50,8 +50,7 @@ class MotionStage(WholeTire[Motion]):
         """The outer face at the stored instants. Root process only."""
         points = self.static.product.points
         time, q = _replayed(basis, forces, self.band)
-        shape = basis.shape[: 3 * len(points)]
-        field = (q[:, : shape.shape[1]] @ shape.T).reshape(len(time), -1, 3)
+        field = (q @ basis.face(len(points)).T).reshape(len(time), -1, 3)
         size = float(np.linalg.norm(field, axis=2).max(initial=0.0))
         return Motion(time=time, displacement=field.astype("f4"), points=points), {
             "instants": (len(time), "-"),
@@ -69,14 +68,17 @@ class MotionStage(WholeTire[Motion]):
 
 
 def _replayed(basis: Basis, forces: Forces, top: float) -> tuple[np.ndarray, np.ndarray]:
-    """Instants (g,) s, and the modal coordinates (g, m) at them."""
+    """Instants (g,) s, and the modal coordinates (g, m) at them, by the run's own scheme."""
     unit = np.eye(basis.coordinates)
     response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
-    tire = Recursion(response=response, step=forces.step, scheme="linear", comm=MPI.COMM_SELF)
+    # The rectangles of a convolution have no states to replay: it approximates the linear scheme.
+    scheme = "constant" if forces.scheme == "constant" else "linear"
+    tire = Recursion(response=response, step=forces.step, scheme=scheme, comm=MPI.COMM_SELF)
+    tire.start(forces.begun)
     stride = max(int(1 / (_PER_PERIOD * top * forces.step)), 1)
     kept = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS]
     wanted, found, number = set(kept), [], 0
-    for block in forces.pushes(still=True):
+    for block in forces.pushes():
         for push in block:
             q = tire.predict() + tire.same_step @ push if number in wanted else tire.predict()
             tire.advance(push)

@@ -17,6 +17,7 @@ from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build.driven import Driven
 from tireroad.runs.stages.build.point_forces import directions, histories, shortest_period
+from tireroad.runs.stages.build.rolling.scheme import of_given_forces
 from tireroad.runs.stages.build.rolling.stepping import Integration, integration, planned
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.stored.contact_file import ContactHistory
@@ -103,10 +104,7 @@ class ResponseStage(Computed[PointResponse]):
         """Step and scheme for prescribed forces. Collective."""
         scene = self.job.scene
         plan = planned(self.job, record, seen.whole, shortest_period(scene.force))
-        # Prescribed forces have no contact that could chatter: linear over the step has the higher
-        # order.
-        scheme = "linear" if scene.time.scheme == "auto" else scene.time.scheme
-        return integration(self.job, plan, scheme)
+        return integration(self.job, plan, of_given_forces(scene))
 
     def _in_time(self, record: Record, seen: Driven) -> Curves:
         """Displacements and axle force under the prescribed forces. Collective."""

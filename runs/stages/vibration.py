@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import h5py
 import numpy as np
@@ -27,11 +27,12 @@ HANN = 1.5  # noise bandwidth of the window in lines: mean of w^2 over the squar
 
 @dataclass(frozen=True, kw_only=True)
 class Vibration:
-    """Vibration of the outer face, up to the model's frequency limit.
+    """Vibration of the outer face with the wheel, up to the model's frequency limit.
 
     `frequency` (f,) Hz; `velocity` (f,) m2/s2: mean square normal velocity per line; `centre` (b,)
     Hz with the third-octave `velocity_level` dB re 1 nm/s and `power_level` dB re 1 pW, and both
-    A-weighted, `velocity_weighted` and `weighted` (b,). `shapes_at` (g,) Hz: the lines whose
+    A-weighted, `velocity_weighted` and `weighted` (b,); `total_velocity`, `total_power` and
+    `total_weighted`, the same of all lines together, also of those in no band. `shapes_at` (g,) Hz: the lines whose
     `displacement` (g, s, 3) m, complex amplitudes at the `points` (s, 3) m, is stored: all lines,
     or the strongest that fit in 200 MB.
     """
@@ -46,6 +47,9 @@ class Vibration:
     shapes_at: np.ndarray
     displacement: np.ndarray
     points: np.ndarray
+    total_velocity: float
+    total_power: float
+    total_weighted: float
 
 
 _UNITS = {
@@ -60,6 +64,11 @@ _UNITS = {
     "displacement": ("surface/displacement", "m"),
     "points": ("surface/points", "m"),
 }
+_TOTALS = {
+    "total_velocity": "velocity_level",
+    "total_power": "radiated_power_level",
+    "total_weighted": "radiated_power_level_a_weighted",
+}  # attributes, in dB as the bands
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +88,7 @@ class VibrationStage(WholeTire[Vibration]):
         left_out = self.spectra.product.left_out if self.spectra else 0.0
         frequency, a = self._coordinates(basis, forces, left_out)
         surface = Surface.of(state.points, self.job.tire.lattice.quads())
-        found = _seen(basis.shape[: 3 * len(state.points)], surface, state, frequency, a)
+        found = _seen(basis.face(len(state.points)), surface, state, frequency, a)
         return found, _headline(found, surface)
 
     def _coordinates(
@@ -102,23 +111,27 @@ class VibrationStage(WholeTire[Vibration]):
         """All fields of the product."""
         for name, (stored, unit) in _UNITS.items():
             put(file, stored, getattr(product, name), unit)
+        for name, stored in _TOTALS.items():
+            file.attrs[stored] = getattr(product, name)
 
     def read(self, file: h5py.File) -> Vibration:
         """The same, read back."""
-        return Vibration(**{name: file[stored][:] for name, (stored, _) in _UNITS.items()})
+        kept: dict[str, Any] = {name: file[stored][:] for name, (stored, _) in _UNITS.items()}
+        kept |= {name: float(file.attrs[stored]) for name, stored in _TOTALS.items()}
+        return Vibration(**kept)
 
 
 def _seen(
     shape: np.ndarray, surface: Surface, state: StaticState, frequency: np.ndarray, a: np.ndarray
 ) -> Vibration:
-    """The vibration of the outer face for coordinates `a` (f, m) on the shapes (3 s, m)."""
-    own = a[:, : shape.shape[1]]
-    velocity = mean_square_velocity(own, surface.gram(shape), surface.area, frequency)
+    """The vibration of the outer face for coordinates `a` (f, m), its motion with which is `shape`
+    (3 s, m)."""
+    velocity = mean_square_velocity(a, surface.gram(shape), surface.area, frequency)
     # Amplitudes are scaled to show a sine in full; summed over a band, each line counts HANN times.
     lines = velocity / HANN
     centre, square = band_sums(frequency, lines)
-    _, weighted = band_sums(frequency, lines * 10 ** (a_weighting(frequency) / 10))
-    power, heard = (radiated_power(part, surface.area) for part in (square, weighted))
+    heard = lines * 10 ** (a_weighting(frequency) / 10)
+    _, weighted = band_sums(frequency, heard)
     fits = max(int(_LARGEST // (16 * shape.shape[0])), 1)
     kept = np.sort(np.argsort(-velocity)[:fits])
     return Vibration(
@@ -126,31 +139,34 @@ def _seen(
         velocity=velocity,
         centre=centre,
         velocity_level=_level(square, VELOCITY**2),
-        power_level=_level(power, POWER),
-        weighted=_level(heard, POWER),
+        power_level=_level(radiated_power(square, surface.area), POWER),
+        weighted=_level(radiated_power(weighted, surface.area), POWER),
         velocity_weighted=_level(weighted, VELOCITY**2),
         shapes_at=frequency[kept],
-        displacement=(own[kept] @ shape.T).reshape(len(kept), -1, 3),
+        displacement=(a[kept] @ shape.T).reshape(len(kept), -1, 3),
         points=state.points,
+        total_velocity=_total(lines, VELOCITY**2),
+        total_power=_total(radiated_power(lines, surface.area), POWER),
+        total_weighted=_total(radiated_power(heard, surface.area), POWER),
     )
 
 
-def _level(square: np.ndarray, reference: float) -> np.ndarray:
+def _level(square: np.ndarray | float, reference: float) -> np.ndarray:
     """Level in dB."""
     return 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference)
 
 
+def _total(square: np.ndarray, reference: float) -> float:
+    """Level in dB of all lines together: bands too narrow for a level count as well."""
+    return float(_level(square.sum(), reference))
+
+
 def _headline(found: Vibration, surface: Surface) -> dict[str, tuple[float, str]]:
-    """Totals over all bands."""
-
-    def total(level: np.ndarray) -> float:
-        return float(10 * np.log10((10 ** (level / 10)).sum())) if len(level) else -np.inf
-
-    strongest = int(found.velocity.argmax()) if len(found.velocity) else 0
+    """Totals over all lines."""
     return {
         "area of the outer face": (surface.area, "m2"),
-        "velocity level": (total(found.velocity_level), "dB re 1 nm/s"),
-        "equivalent radiated power": (total(found.power_level), "dB re 1 pW"),
-        "A-weighted": (total(found.weighted), "dB(A) re 1 pW"),
-        "strongest line": (float(found.frequency[strongest]), "Hz"),
+        "velocity level": (found.total_velocity, "dB re 1 nm/s"),
+        "equivalent radiated power": (found.total_power, "dB re 1 pW"),
+        "A-weighted": (found.total_weighted, "dB(A) re 1 pW"),
+        "strongest line": (float(found.frequency[found.velocity.argmax()]), "Hz"),
     }

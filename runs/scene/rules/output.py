@@ -1,10 +1,10 @@
 """Requirements and limits of a scene's outputs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.scene.outputs import check_steps
+from tireroad.runs.scene.outputs import Output, check_steps
 from tireroad.runs.scene.tables.scene import Scene
 
 Where = Callable[[tuple[str, ...], str], InputError]
@@ -12,20 +12,26 @@ Where = Callable[[tuple[str, ...], str], InputError]
 MOST_SPEEDS = 10_000
 
 
-def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    """Check each kind of output at the driven points against the scene."""
+def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
+    """The error of each kind of output at the driven points, checked against the scene."""
     for name, kind in scene.output.kinds:
-        path = "output", name
-        if scene.contact is not None and not kind.in_contact:
-            raise error(
-                path,
-                "is not available in scenes with [contact]: leave it out, or take out [contact]",
-            )
-        if kind.of == "points" and not scene.force:
-            raise error(path, "is of driven points: add a [[force]]")
-        if kind.of == "contact" and scene.contact is None:
-            raise error(path, "is of the forces of the road: add [contact]")
-        kind.check(scene, path, error)
+        try:
+            _check_kind(scene, kind, ("output", name), error)
+        except InputError as found:
+            yield found
+
+
+def _check_kind(scene: Scene, kind: Output, path: tuple[str, ...], error: Where) -> None:
+    if scene.contact is not None and not kind.in_contact:
+        raise error(
+            path,
+            "is not available in scenes with [contact]: leave it out, or take out [contact]",
+        )
+    if kind.of == "points" and not scene.force:
+        raise error(path, "is of driven points: add a [[force]]")
+    if kind.of == "contact" and scene.contact is None:
+        raise error(path, "is of the forces of the road: add [contact]")
+    kind.check(scene, path, error)
 
 
 def check_campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:
@@ -36,21 +42,19 @@ def check_campbell(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         check_steps(path, "speeds", campbell.to, campbell.step, "rad/s", error, most=MOST_SPEEDS)
 
 
-def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
     """Check what the motion of the whole tire needs, in frequency and in time."""
-    output = scene.output
+    output, rotation = scene.output, scene.rotation
+    full = rotation is not None and rotation.speed and rotation.method == "full"
     for key in ("vibration", "fields"):
+        path = "output", key
         if not getattr(output, key):
             continue
         if scene.time is None or not (scene.force or scene.contact):
-            raise error(
-                ("output", key), "needs forces in time: add [time] with [contact] or a [[force]]"
-            )
-        if scene.rotation is not None and scene.rotation.speed and scene.rotation.method == "full":
-            raise error(
-                ("output", key), 'is seen through the modes: take rotation.method = "projected"'
-            )
+            yield error(path, "needs forces in time: add [time] with [contact] or a [[force]]")
+        if full:
+            yield error(path, 'is seen through the modes: take rotation.method = "projected"')
     if output.vibration and scene.contact is not None and not output.spectra:
-        raise error(
+        yield error(
             ("output", "vibration"), "needs output.spectra, which find the run-in and the limit"
         )

@@ -1,6 +1,6 @@
 """Rules beyond single keys: contradictions between tables, and combinations not supported."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import fields
 from typing import Any
 
@@ -25,16 +25,18 @@ Where = Callable[[tuple[str, ...], str], InputError]
 
 
 def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
-    """Note contradictions between keys or tables, at most one per rule.
+    """Note contradictions between keys or tables.
 
     A rule is skipped if a table that it reads has a problem: what it found might be a consequence.
+    It yields errors that do not depend on each other, and raises one that ends it.
     """
     broken = source.broken()
     for tables, rule in RULES:
         if broken & set(tables):
             continue
         try:
-            rule(scene, raw, source.error)
+            for error in rule(scene, raw, source.error) or ():
+                source.problems.append(((), str(error)))
         except InputError as error:
             source.problems.append(((), str(error)))
 
@@ -114,15 +116,15 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         )
 
 
-def _force(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def _force(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
     sought = any(fields(kind) for _, kind in scene.output.kinds)
     if scene.force and scene.time is None and not sought:
-        raise error(("force",), "has nothing to drive: add [time] or output.receptance")
+        yield error(("force",), "has nothing to drive: add [time] or output.receptance")
     for number, force in enumerate(scene.force):
         if not any(force.direction):
-            raise error(("force", str(number), "direction"), "must not be all zeros")
+            yield error(("force", str(number), "direction"), "must not be all zeros")
         if abs(force.arc) >= scene.tire.proportions().half_angle:
-            raise error(
+            yield error(
                 ("force", str(number), "arc"),
                 f"= {force.arc:g} deg lies beyond the bead at {scene.tire.proportions().half_angle:g} deg",
             )
@@ -138,17 +140,21 @@ def _greens(scene: Scene, raw: dict[str, Any], error: Where) -> None:
         )
 
 
-def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+def _contact_needs(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
     if scene.contact is None:
         return
-    static = scene.static
     if scene.road is None:
-        raise error(("contact",), 'needs a road: add [road], e.g. kind = "flat"')
+        yield error(("contact",), 'needs a road: add [road], e.g. kind = "flat"')
     if scene.time is None:
-        raise error(("contact",), "needs a time to run: add [time] with duration")
-    if not static.on_road:
-        raise error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
-    contact = scene.contact
+        yield error(("contact",), "needs a time to run: add [time] with duration")
+    if not scene.static.on_road:
+        yield error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
+
+
+def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
+    contact, static = scene.contact, scene.static
+    if contact is None:
+        return
     if static.friction is not None and contact.rubs:
         raise error(
             ("static", "friction"),
@@ -195,8 +201,12 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("rotation",), _rotation),
     (("modal", "static", "rotation", "contact", "damping", "greens"), _modal),
     (("damping", "rotation", "output"), full_matrices),
+    (("contact", "road", "time", "static"), _contact_needs),
     (("contact", "road", "time", "static", "rotation"), _contact),
-    (("output", "force", "modal", "axle", "tire", "damping", "contact"), check_outputs),
+    (
+        ("output", "force", "modal", "axle", "tire", "damping", "contact", "static"),
+        check_outputs,
+    ),
     (("rotation",), check_campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),

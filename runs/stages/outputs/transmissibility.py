@@ -40,13 +40,13 @@ class Transmissibility(Output):
     step: float = number(2.0, "Hz", "step between two frequencies", least=1e-4, most=1e6)
     free_rim: int = integer(
         0,
-        "number of modes of the tire with a free rim, by which it is computed a second time; 0: by momentum alone",
+        "number of modes of the tire with a free rim, by which it is computed a second time; only without a road: under its load a free rim topples and has no modes. 0: by momentum alone",
         least=0,
         most=100000,
     )
 
     def check(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
-        """Check that the axle is held, that a free rim has no air, and the steps."""
+        """Check that the axle is held, that a free rim has no air and no road, and the steps."""
         if scene.modal.rim == "free" or scene.axle.kind != "fixed":
             raise error(
                 path, 'is the force on a held axle: take modal.rim = "fixed", axle.kind = "fixed"'
@@ -54,6 +54,12 @@ class Transmissibility(Output):
         if self.free_rim and has_air(scene):
             raise error(
                 (*path, "free_rim"), "has no air in the tire: take 0, or take out [tire.cavity]"
+            )
+        if self.free_rim and scene.static.on_road:
+            raise error(
+                (*path, "free_rim"),
+                f"= {self.free_rim} needs a tire on no road: under dead forces of road and axle a free rim topples. Take "
+                "0, by momentum alone, or take out what places the road in [static] (load, deflection, road_height)",
             )
         check_steps(
             (*path, "step"), "frequencies", self.to, self.step, "Hz", error, most=MOST_FREQUENCIES

@@ -146,6 +146,7 @@ class ContactFile:
         c = len(patch.points)
         store.put(self._file, "points", patch.points, "m")
         store.put(self._file, "area", patch.area, "m2")
+        store.put(self._file, "static_force", patch.force, "N")
         pattern.fill(self._file, self._setup)
         road_file.fill(self._file, self._setup)
         forces = len(self._job.scene.force)

@@ -46,6 +46,18 @@ def test_refused_where_no_axle_is_held_or_nothing_drives(tmp_path, changed: str)
         load(tmp_path / "a.toml", [changed])
 
 
+@pytest.mark.parametrize("road", ["load=500.0", "deflection=0.002", "road_height=-0.31"])
+def test_a_free_rim_under_a_load_is_refused_before_anything_is_solved(tmp_path, road: str) -> None:
+    """It topples, so its modes were refused late, by a message that named no key."""
+    (tmp_path / "a.toml").write_text(SCENE)
+    with pytest.raises(
+        InputError, match=r"output\.transmissibility\.free_rim = 30 .*topples.*Take 0"
+    ):
+        load(tmp_path / "a.toml", [f"static.{road}"])
+    alone = load(tmp_path / "a.toml", [f"static.{road}", "output.transmissibility.free_rim=0"])
+    assert alone.static.on_road
+
+
 @pytest.mark.slow
 def test_both_ways_agree_and_slow_forces_pass(tmp_path) -> None:
     """Two modal bases of one mesh, 1 % at most below 150 Hz (8 segments: rolling also by the lumped mass)."""

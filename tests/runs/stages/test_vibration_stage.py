@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from mpi4py import MPI
 
 import tireroad
 from tireroad.fem.errors import InputError
+from tireroad.greens.vibration import Surface
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.pipeline import run_scene
 
@@ -112,6 +114,37 @@ def test_a_rolling_tire_vibrates_as_its_road_passes(tmp_path: Path) -> None:
     # The points of contact move as the loop said, but for the residual flexibility at them.
     time, moved = results["motion/time"], results["motion/displacement"]
     assert len(time) > 200 and np.isfinite(moved).all() and np.abs(moved).max() > 1e-6
+
+
+def test_totals_count_lines_in_bands_too_narrow_for_a_level(tmp_path: Path) -> None:
+    """0.04 s have lines 25 Hz apart, and no band of three up to 200 Hz: levels were -inf, and null."""
+    results = run(tmp_path, FORCE.replace("0.4", "0.04"))
+    square = results["vibration/mean_square_velocity"]
+    assert len(square) > 2 and not len(results["vibration/third_octave/centre"])
+    stage = json.loads((tmp_path / "summary.json").read_text())["stages"]["vibration"]
+    level = stage["headline"]["velocity level"]["value"]
+    assert level == pytest.approx(10 * np.log10(square.sum() / 1.5 / 1e-18), abs=1e-9)
+    area = stage["headline"]["area of the outer face"]["value"]
+    power = stage["headline"]["equivalent radiated power"]["value"]
+    known = 10 * np.log10(413.3 * area * square.sum() / 1.5 / 1e-12)  # rho c S <v2>
+    assert power == pytest.approx(known, abs=1e-9)
+    heard = stage["headline"]["A-weighted"]["value"]
+    assert power - 40 < heard < power - 15  # from 25 to 200 Hz, mostly at 50 Hz: -30 dB
+    assert results.attributes("vibration")["radiated_power_level_a_weighted"] == heard
+
+
+def test_the_total_is_the_mean_square_over_time(tmp_path: Path) -> None:
+    """In 0.8 s the band at 10 Hz has fewer than three lines: the bands alone miss the force's own."""
+    results = run(tmp_path, FORCE.replace("0.4", "0.8").replace("50.0", "10.0"))
+    bands = 10 * np.log10((10 ** (results["vibration/third_octave/velocity_level"] / 10)).sum())
+    surface = Surface.of(results["static/surface/points"], results["static/surface/quads"])
+    size = np.linalg.norm(surface.normal, axis=1)
+    motion = np.einsum("sk,nsk->ns", surface.normal, results["motion/displacement"])
+    speed = np.gradient(motion, 1e-3, axis=0)[1:-1]
+    square = (speed**2 / size).sum(axis=1).mean() / surface.area
+    total = results.attributes("vibration")["velocity_level"]
+    assert total == pytest.approx(10 * np.log10(square / 1e-18), abs=0.5)
+    assert bands < total - 10
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import math
 from tireroad.contact.results.chatter import Chosen, choose, oscillation
 from tireroad.contact.setup import ContactSetup
 from tireroad.runs.process import observe
+from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.build.rolling.loop import bristles
@@ -34,3 +35,11 @@ def reported(record: Record, chosen: Chosen) -> Chosen:
     observe.say(f"  scheme {chosen.scheme}: {chosen.reason}")
     record.indicators["reason for the scheme"] = (chosen.reason, "-")
     return chosen
+
+
+def of_given_forces(scene: Scene) -> str:
+    """The scheme for prescribed forces without contact.
+
+    They cannot chatter, and linear over the step has the higher order.
+    """
+    return "linear" if scene.time.scheme == "auto" else scene.time.scheme
