@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.contact.roads.kind import RoadKind
+from tireroad.contact.roads.placement import begun_at, moved_start, shown
 from tireroad.contact.roads.under_tire import Road
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables.scene import Scene
@@ -50,6 +51,15 @@ def check_road(scene: Scene) -> None:
         _check_extent(scene, road)
 
 
+def remarks(scene: Scene) -> list[str]:
+    """What `check` says of a road that can be driven on."""
+    if scene.road is None or scene.contact is None:
+        return []
+    road = made(scene.road.surface)
+    start = begun_at(road, scene.road.start)
+    return [f"road: {moved_start(start)}"] if start != (scene.road.start or 0.0) else []
+
+
 _MADE: dict[tuple, Road] = {}  # only the last road
 
 
@@ -82,12 +92,13 @@ def _check_extent(scene: Scene, road: Road) -> None:
             f"{source}: road.lateral = {placed.lateral:g} m lies beside the road, which has y from "
             f"{y0:.4g} to {y1:.4g} m"
         )
-    travel = least_travel(scene)
-    if placed.start + travel > x1 or placed.start + travel + AHEAD < x0:
+    start, travel = begun_at(road, placed.start), least_travel(scene)
+    # The first place needed is under the front of the patch.
+    if start + travel > x1 or start + AHEAD < x0:
         raise InputError(
-            f"{source}: the run needs the road from {placed.start:.4g} to about "
-            f"{placed.start + travel:.4g} m (rotation.speed, tire.outer_radius, time.duration), and it "
-            f"has {x0:.4g} to {x1:.4g} m; change [road] start, shorten [time] duration, or continue it "
+            f"{source}: the run needs the road from x = {shown(start)} to about "
+            f"{shown(start + travel)} m (rotation.speed, tire.outer_radius, time.duration), and it "
+            f"has {shown(x0)} to {shown(x1)} m; change [road] start, shorten [time] duration, or continue it "
             'by end = "mirror"'
         )
 
