@@ -25,7 +25,13 @@ class Edges(RoadKind):
     ramp: float = number(
         0.005, "m", "length over which an edge rises; 0: a jump", least=0, most=1e4
     )
-    angle: float = number(0.0, "deg", "angle between the edge and the axle", least=-89, most=89)
+    angle: float = number(
+        0.0,
+        "deg",
+        "angle between the edge and the axle; positive: the left side (y > 0) is met first",
+        least=-89,
+        most=89,
+    )
 
 
 @road_kind("step", "a step up or down")
@@ -56,7 +62,7 @@ class Cleat(Edges):
 
 
 class Obstacle:
-    """z = h [s(xi/r) - s((xi - l)/r)], xi = x cos(a) + y sin(a) - position.
+    """z = h [s(xi/r) - s((xi - l)/r)], xi = (x - position) cos(a) + y sin(a).
 
     h, r, a, position: `height`, `ramp`, `angle` and `position` of `edges`; l = `length` (m) from
     edge to edge, infinite for a step; s(t) = 3 t^2 - 2 t^3 on [0, 1], constant outside (a jump for
@@ -74,7 +80,7 @@ class Obstacle:
 
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m) at x, y (m) of equal shape."""
-        xi = np.asarray(x) * self._along + np.asarray(y) * self._across - self._position
+        xi = (np.asarray(x) - self._position) * self._along + np.asarray(y) * self._across
         rise = self._edge(xi)
         if np.isfinite(self._length):
             rise = rise - self._edge(xi - self._length)

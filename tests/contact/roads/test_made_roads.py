@@ -19,14 +19,26 @@ def test_cleat_and_step() -> None:
     cleat = make_road(kind="cleat", position=0.3, height=0.01, length=0.1, ramp=0.02, angle=0.0)
     assert np.allclose(cleat.road.height(x, zero), [0, 0.005, 0.01, 0.01, 0.01, 0.005, 0])
     step = make_road(kind="step", position=0.3, height=-0.02, ramp=0.0, angle=30.0)
-    assert np.allclose(step.road.height(x, zero) / -0.02, [0, 0, 0, 1, 1, 1, 1])
+    assert np.allclose(step.road.height(x, zero) / -0.02, [0, 1, 1, 1, 1, 1, 1])
     # At 30 degrees the edge is met 0.1 tan(30) later 0.1 m to the right.
-    edge = 0.3 / np.cos(np.pi / 6) + 0.1 * np.tan(np.pi / 6)
+    edge = 0.3 + 0.1 * np.tan(np.pi / 6)
     side = np.array([-0.1, -0.1])
     assert np.array_equal(step.road.height(edge + np.array([-1e-9, 1e-9]), side), [0.0, -0.02])
     assert (step.road.highest(0, 1, 0, 1), step.road.lowest(0, 1, 0, 1)) == (0.0, -0.02)
     with pytest.raises(InputError, match="ramp"):
         Cleat(length=0.02, ramp=0.03)
+
+
+@pytest.mark.parametrize("kind", ["step", "cleat"])
+@pytest.mark.parametrize("angle", [-60.0, 0.0, 45.0])
+def test_an_oblique_edge_begins_at_its_position(kind: str, angle: float) -> None:
+    road = make_road(kind=kind, position=0.5, height=0.01, ramp=1e-4, angle=angle).road
+    x = np.linspace(0.3, 0.7, 40001)
+    begun = [float(x[road.height(x, np.full(len(x), y)).argmax()]) for y in (-0.05, 0.0, 0.05)]
+    right, middle, left = begun
+    assert middle == pytest.approx(0.5, abs=3e-4)
+    # Positive angles: the left side is met first.
+    assert right - left == pytest.approx(0.1 * np.tan(np.radians(angle)), abs=3e-5)
 
 
 @pytest.mark.slow
