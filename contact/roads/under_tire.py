@@ -170,13 +170,23 @@ class PreparedRoad:
         s = np.minimum(np.maximum(ahead / self._run_in, 0.0), 1.0)
         return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
+    @property
+    def grown(self) -> float:
+        """x (m) from which on the heights are whole, behind the run-in."""
+        return self._lead + self._run_in
+
+    @property
+    def passed(self) -> tuple[float, float]:
+        """First and last x (m) of the road itself that the front of the patch passes over."""
+        return self._lead + self._shift[0], self.end + self._shift[0]
+
     @cached_property
     def texture(self) -> Texture | None:
         """Texture of the middle line after the run-in, over at most 20 m.
 
         None for a road without resolution (flat), or too short for an evaluation.
         """
-        first = self._lead + self._run_in
+        first = self.grown
         length = min(self.end - first, _SEEN)
         if not (np.isfinite(self.spacing) and length >= _LEAST_SEEN):
             return None

@@ -80,11 +80,18 @@ class Obstacle:
 
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m) at x, y (m) of equal shape."""
-        xi = (np.asarray(x) - self._position) * self._along + np.asarray(y) * self._across
+        return self._height * self._share(self._distance(np.asarray(x), np.asarray(y)))
+
+    def _distance(self, x: Array, y: Array) -> Array:
+        """xi, m."""
+        return (x - self._position) * self._along + y * self._across
+
+    def _share(self, xi: Array) -> Array:
+        """Height over h at xi, m."""
         rise = self._edge(xi)
         if np.isfinite(self._length):
             rise = rise - self._edge(xi - self._length)
-        return self._height * rise
+        return rise
 
     def _edge(self, xi: Array) -> Array:
         if self._ramp == 0.0:
@@ -93,12 +100,19 @@ class Obstacle:
         return s * s * (3.0 - 2.0 * s)
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Upper bound of any strip, m."""
-        return max(self._height, 0.0)
+        """Upper bound of a strip, m."""
+        return max(self._height * share for share in self._shares(x0, x1, y0, y1))
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Lower bound of any strip, m."""
-        return min(self._height, 0.0)
+        """Lower bound of a strip, m."""
+        return min(self._height * share for share in self._shares(x0, x1, y0, y1))
+
+    def _shares(self, x0: float, x1: float, y0: float, y1: float) -> tuple[float, float]:
+        """Least and greatest share of the height in a strip: it rises, stays, then falls."""
+        xi = self._distance(np.array([x0, x0, x1, x1]), np.array([y0, y1, y0, y1]))
+        ends = self._share(np.array([xi.min(), xi.max()]))
+        whole = xi.min() <= self._length and xi.max() >= self._ramp
+        return float(ends.min()), 1.0 if whole else float(ends.max())
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Obstacle":
         """Nothing to prepare."""

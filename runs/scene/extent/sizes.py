@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tireroad.contact.roads.kinds.obstacle import Edges
 from tireroad.contact.roads.placement import begun_at
 from tireroad.contact.spacing import ON_A_NODE
 from tireroad.fem.errors import InputError
@@ -136,7 +137,10 @@ def road_height(scene: Scene) -> float:
     try:
         road = made(surface)
         start = begun_at(road, scene.road.start)
-        strip = start, start + min(least_travel(scene), 2.0) + 0.1, -side, side
+        # Bounds of a long texture take time; those of a single obstacle do not.
+        travel = least_travel(scene)
+        travel = travel if isinstance(surface, Edges) else min(travel, 2.0)
+        strip = start, start + travel + 0.1, -side, side
         high, low = road.highest(*strip), road.lowest(*strip)
     except InputError:
         return lift

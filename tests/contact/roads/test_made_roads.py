@@ -41,6 +41,22 @@ def test_an_oblique_edge_begins_at_its_position(kind: str, angle: float) -> None
     assert right - left == pytest.approx(0.1 * np.tan(np.radians(angle)), abs=3e-5)
 
 
+@pytest.mark.parametrize("ramp", [0.0, 0.01])
+@pytest.mark.parametrize("length", [0.05, None])
+@pytest.mark.parametrize("height", [0.01, -0.02])
+def test_bounds_of_an_obstacle_are_those_of_the_strip(ramp, length, height) -> None:
+    kind = {"kind": "step"} if length is None else {"kind": "cleat", "length": length}
+    road = make_road(**kind, position=0.5, height=height, ramp=ramp, angle=30.0).road
+    for x0 in np.arange(0.3, 0.7, 0.013):
+        for long in (0.004, 0.1):
+            strip = x0, x0 + long, -0.05, 0.05
+            x, y = np.meshgrid(np.linspace(*strip[:2], 201), np.linspace(*strip[2:], 101))
+            z, bounds = road.height(x, y), (road.lowest(*strip), road.highest(*strip))
+            assert bounds[0] <= z.min() + 1e-12 and z.max() - 1e-12 <= bounds[1]
+            assert np.ptp(bounds) < 1e-12 or np.ptp(z) > 0.0
+    assert road.highest(0.0, 0.4, -0.05, 0.05) == road.lowest(0.0, 0.4, -0.05, 0.05) == 0.0
+
+
 @pytest.mark.slow
 def test_iso8608_has_its_class_spectrum() -> None:
     pitch = 0.05

@@ -64,6 +64,23 @@ def test_check_says_where_a_file_without_x_zero_is_begun(scene: Path, end: str) 
     assert told not in explain(load(scene, [*override, "road.start=100.1"]))
 
 
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["position=3.0"], True),
+        (["position=1.0"], False),
+        (["position=3.0", "start=2.0"], False),
+        (["position=3.0", "drum_radius=1.0"], False),  # met in every turn of 6.28 m
+        (["position=30.0", "start=5.0"], True),
+    ],
+)
+def test_check_says_that_a_cleat_is_out_of_reach(scene: Path, more: list[str], said: bool) -> None:
+    text = SCENE.replace('"grid"', '"cleat"').replace('file = "road.npz"\n', "")
+    scene.write_text(text.replace("speed = 50", "speed = 50\nrolling_radius = 0.3"))
+    told = explain(load(scene, [f"road.{one}" for one in more]))
+    assert ('warning: the road (kind = "cleat") has no relief under the run' in told) == said
+
+
 def test_check_opens_the_file(scene: Path) -> None:
     (scene.parent / "road.npz").write_bytes(b"PK\x03\x04 no more")
     with pytest.raises(InputError, match=r"road\.npz: cannot be read"):
