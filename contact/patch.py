@@ -10,6 +10,9 @@ from scipy import sparse
 from tireroad.contact.tread.kernel import GridPlaces
 from tireroad.fem.errors import ConvergenceError
 
+# Allowance for the tire's own motion beyond the road's height, m: the smallest reach by default.
+LEAST_REACH = 5e-3
+
 
 @dataclass(frozen=True, kw_only=True)
 class Patch:
@@ -85,7 +88,7 @@ class Patch:
                 f"contact: at t = {time[when[0]]:.6g} s the road touches the edge of the patch at "
                 f"x = {x:.4g} m, y = {y:.4g} m; points beyond it were left out because their static "
                 f"gap is more than {reach:.4g} m. Give contact.reach a larger value, "
-                f"e.g. {2 * reach:.2g}."
+                f"e.g. {max(2 * reach, LEAST_REACH):.2g}."
             )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tireroad.contact.grid_patch import Surface, make_grid_patch, settle, spread_pull
 from tireroad.contact.model import Spec, static_solver
-from tireroad.contact.patch import Patch, make_patch
+from tireroad.contact.patch import LEAST_REACH, Patch, make_patch
 from tireroad.contact.roads.cell_mean import CellMean
 from tireroad.contact.roads.kinds.flat import Flat
 from tireroad.contact.roads.under_tire import PreparedRoad, RoadUnderTire
@@ -19,8 +19,6 @@ from tireroad.contact.tread.pattern import Pattern
 from tireroad.fem.static.curved.shape import RoadShape
 from tireroad.greens.response import Response
 
-# Allowance for the tire's own motion beyond the road's height, m: the smallest reach.
-_MARGIN = 5e-3
 _RUNG = 1.1
 
 
@@ -231,11 +229,11 @@ def _reach(face: OuterFace, road: RoadUnderTire, rolled: Rolled) -> float:
     Rounded up to a power of `_RUNG` margins, so that similar roads have the same patch and share
     its Green's functions.
     """
-    reach = rolled.lift + _MARGIN
+    reach = rolled.lift + LEAST_REACH
     for _ in range(2):
         patch = nodes_within(face, reach)
         strip = _under(road, patch, rolled)
         x0, x1, y0, y1 = patch.extent
         highest = max(strip.highest(x0, x1 + rolled.travel, y0, y1), 0.0)
-        reach = 1.5 * (highest + rolled.lift) + _MARGIN
-    return _MARGIN * _RUNG ** np.ceil(np.log(reach / _MARGIN) / np.log(_RUNG) - 1e-9)
+        reach = 1.5 * (highest + rolled.lift) + LEAST_REACH
+    return LEAST_REACH * _RUNG ** np.ceil(np.log(reach / LEAST_REACH) / np.log(_RUNG) - 1e-9)

@@ -8,9 +8,11 @@ import numpy as np
 
 from tireroad.contact.results.chatter import Alternation, Chatter
 from tireroad.contact.results.energy import Work
-from tireroad.contact.patch import Patch
+from tireroad.contact.patch import LEAST_REACH, Patch
 
-RUNAWAY = 100.0  # times the patch's reach, hence at least half a metre
+# Times the patch's reach, or the smallest default reach: a scene may give one that is far smaller
+# than what the tire moves.
+RUNAWAY = 100.0
 
 
 @dataclass
@@ -83,12 +85,13 @@ class Totals:
     def _check_bounded(self, steps: dict[str, np.ndarray]) -> None:
         """Raise Chatter if a point moved by much more than the road could move it."""
         far = np.abs(steps["displacement"]).max(axis=1)
-        when = np.flatnonzero(~(far <= RUNAWAY * self.reach))
+        bound = RUNAWAY * max(self.reach, LEAST_REACH)
+        when = np.flatnonzero(~(far <= bound))
         if len(when):
             raise Chatter(
                 f"contact: at t = {steps['time'][when[0]]:.6g} s a contact point of the tire has moved by "
-                f"{far[when[0]]:.3g} m, {RUNAWAY:g} times the gap within which points take part: the motion grows "
-                'without bound. Take a smaller time.step, or time.scheme = "constant" or "auto"'
+                f"{far[when[0]]:.3g} m, more than {bound:.3g} m: the motion grows without bound. Take a smaller "
+                'time.step, or time.scheme = "constant" or "auto"'
             )
 
     def state(self) -> dict[str, np.ndarray]:

@@ -5,6 +5,7 @@ import copy
 import numpy as np
 from numpy.typing import NDArray
 
+from tireroad.contact.roads.placement import shown
 from tireroad.contact.roads.rows import ArrayRows, Rows
 from tireroad.contact.roads.window import Window
 from tireroad.fem.errors import InputError
@@ -50,7 +51,7 @@ class Axis:
 
 
 class Grid:
-    """Heights z (nx, ny) at ascending x (nx,) and y (ny,), all in m; x counts from its first value.
+    """Heights z (nx, ny) at ascending x (nx,) and y (ny,), all in m: z(x, y) at the file's own x.
 
     z may be rows in a file (contact.roads.rows), read as the road rolls by, 32 MB at a time.
     `holes`: treatment of missing heights (NaN) in the strip given to `prepare`: "refuse", or "fill"
@@ -75,10 +76,10 @@ class Grid:
         _check_choice("holes", holes, ("refuse", "fill"))
         _check_choice("end", end, ("refuse", "mirror"))
         self._holes, self._end, self.source = holes, end, source
-        self._x, self._y = Axis(x - x[0]), Axis(y)
+        self._x, self._y = Axis(x), Axis(y)
         self._rows = rows
         self._window = self._over(slice(0, len(x)), slice(0, len(y)))
-        self._length = float(x[-1] - x[0])
+        self.measured = float(x[0]), float(x[-1])  # the first and the last x, m
         self._sides = float(y[0]), float(y[-1])
         self.filled = 0
         self.notes: tuple[str, ...] = ()  # how the measurement was processed, for the user
@@ -92,13 +93,13 @@ class Grid:
     @property
     def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """((x0, x1), (y0, y1)) in m; a mirrored road is endless along x."""
-        reach = (-np.inf, np.inf) if self._end == "mirror" else (0.0, self._length)
+        reach = (-np.inf, np.inf) if self._end == "mirror" else self.measured
         return reach, self._sides
 
     @property
     def extent_of_file(self) -> tuple[float, float]:
         """Length and width of the measurement, m."""
-        return self._length, self._sides[1] - self._sides[0]
+        return self.measured[1] - self.measured[0], self._sides[1] - self._sides[0]
 
     @property
     def steps(self) -> tuple[float, float]:
@@ -120,8 +121,9 @@ class Grid:
         return self._window.bilinear(i, s, j, t)
 
     def _reflect(self, x: Array) -> Array:
-        """x folded into [0, length], with mirrors at 0 and at the length."""
-        return self._length - np.abs(self._length - np.mod(x, 2.0 * self._length))
+        """x folded into what was measured, with mirrors at both of its ends."""
+        first, length = self.measured[0], self.extent_of_file[0]
+        return first + (length - np.abs(length - np.mod(x - first, 2.0 * length)))
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """The highest grid height around the strip (m), which bilinear heights cannot exceed."""
@@ -135,7 +137,8 @@ class Grid:
         """Grid points of all cells in the strip; all rows if it leaves a mirrored road."""
         (i0, i1), _ = self._x.locate(np.array([x0, x1]))
         (j0, j1), _ = self._y.locate(np.array([y0, y1]))
-        if self._end == "mirror" and (x0 < 0.0 or x1 > self._length):
+        first, last = self.measured
+        if self._end == "mirror" and (x0 < first or x1 > last):
             i0, i1 = 0, len(self._x.positions) - 2
         return slice(int(i0), int(i1) + 2), slice(int(j0), int(j1) + 2)
 
@@ -163,11 +166,12 @@ class Grid:
                 f"{self.source}: the tire needs y from {y0:.4g} to {y1:.4g} m, the road has "
                 f"{left:.4g} to {right:.4g} m; change [road] lateral"
             )
-        if self._end == "refuse" and (x0 < -slack or x1 > self._length + slack):
+        first, last = self.measured
+        if self._end == "refuse" and (x0 < first - slack or x1 > last + slack):
             raise InputError(
-                f"{self.source}: the run needs the road from {x0:.4g} to {x1:.4g} m, and it has 0 "
-                f"to {self._length:.4g} m; change [road] start, shorten [time] duration, or "
-                'continue it by end = "mirror"'
+                f"{self.source}: the run needs the road from x = {shown(x0)} to {shown(x1)} m, and "
+                f"it has {shown(first)} to {shown(last)} m; change [road] start, shorten [time] "
+                'duration, or continue it by end = "mirror"'
             )
 
     def _refuse_holes(self, window: Window, row: int, column: int) -> None:
@@ -175,7 +179,7 @@ class Grid:
         i, j = window.hole
         raise InputError(
             f"{self.source}: {window.missing} heights are missing in the strip driven over, "
-            f"the first at {self._x.positions[row + i]:.4g} m along and y = "
+            f"the first at x = {shown(self._x.positions[row + i])} m and y = "
             f"{self._y.positions[column + j]:.4g} m; choose another [road] lateral or start, or "
             'fill them by holes = "fill"'
         )

@@ -4,7 +4,8 @@ from dataclasses import fields
 from typing import Any
 
 from tireroad.contact.roads.kind import ROADS, RoadKind
-from tireroad.contact.roads.under_tire import Placement, Road, RoadUnderTire
+from tireroad.contact.roads.placement import Placement
+from tireroad.contact.roads.under_tire import Road, RoadUnderTire
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import ParameterError
 

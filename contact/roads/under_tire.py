@@ -1,7 +1,6 @@
 """A road placed under the tire: the strip of a run, with run-in and levelling."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -9,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.roads.levelling import Level, mean_level, wave_level
+from tireroad.contact.roads.placement import begun_at, moved_start
 from tireroad.contact.roads.texture.levels import Texture, texture_of
 from tireroad.contact.roads.texture.repeated import Repeated
 from tireroad.fem.errors import InputError
-from tireroad.fem.parameters import Parameters, choice, number
 
 Array = NDArray[np.float64]
 
@@ -25,7 +24,7 @@ _SEEN, _LEAST_SEEN, _MOST_SEEN, _COARSEST = 20.0, 0.1, 100_000, 1e-3
 
 
 class Road(Protocol):
-    """Heights (m) at x in rolling direction from the road's beginning and y to the left (m).
+    """Heights (m) at x in rolling direction and y to the left (m).
 
     `extent` ((x0, x1), (y0, y1)) in m, may be infinite; `spacing` (m) the shortest length resolved.
     """
@@ -45,40 +44,6 @@ class Road(Protocol):
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Road": ...
 
 
-@dataclass(frozen=True, kw_only=True)
-class Placement(Parameters):
-    """Where a road lies under the tire."""
-
-    owner = "road"
-
-    run_in: float = number(
-        0.1,
-        "m",
-        "length over which the heights grow from flat: the run starts at rest",
-        least=0,
-        most=1e4,
-    )
-    lateral: float = number(
-        0.0,
-        "m",
-        "y of the road under the tire's middle, positive to the left",
-        least=-1e4,
-        most=1e4,
-    )
-    start: float = number(0.0, "m", "x of the road under the axle at t = 0", least=-1e6, most=1e6)
-    offset: float = number(
-        0.0, "m", "height added to the whole road, positive up", least=-10, most=10
-    )
-    drum_radius: float | None = number(
-        None,
-        "m",
-        "the road lies on a drum of this radius, and repeats after its circumference; absent: a plane",
-        least=0.1,
-        most=1e4,
-    )
-    drum: str = choice("outside", ("outside", "inside"), "side of the drum that the tire runs on")
-
-
 class RoadUnderTire:
     """A road placed under the axle; `prepare` cuts out the strip that a run passes over.
 
@@ -91,7 +56,7 @@ class RoadUnderTire:
         self,
         road: Road,
         *,
-        start: float = 0.0,
+        start: float | None = None,
         lateral: float = 0.0,
         run_in: float = 0.1,
         offset: float = 0.0,
@@ -104,10 +69,12 @@ class RoadUnderTire:
             raise InputError(f'road: datum = "{datum}" is unknown: take "mean" or "zero"')
         if not run_in >= 0.0:
             raise InputError(f"road: run_in {run_in:g} m must not be negative")
+        self._start = begun_at(road, start)
+        self._moved = start is None and self._start != 0.0
         if drum_radius is not None and np.isfinite(road.spacing):
             road = Repeated(road, 2 * np.pi * drum_radius)
         self.road, self._datum, self.drum = road, datum, drum
-        self._start, self._lateral, self._run_in, self._offset = start, lateral, run_in, offset
+        self._lateral, self._run_in, self._offset = lateral, run_in, offset
         self._longest_wave = longest_wave
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "PreparedRoad":
@@ -127,7 +94,7 @@ class RoadUnderTire:
             y1 + self._lateral,
         )
         road = self.road.prepare(*strip)
-        return PreparedRoad(
+        prepared = PreparedRoad(
             road,
             shift=(self._start, self._lateral),
             level=self._level(road, strip),
@@ -135,6 +102,9 @@ class RoadUnderTire:
             reach=(x0, x1),
             run_in=self._run_in,
         )
+        if self._moved:
+            prepared.notes += (moved_start(self._start),)
+        return prepared
 
     def _level(self, road: Road, strip: tuple[float, float, float, float]) -> Level | None:
         if self._longest_wave is not None:
@@ -200,13 +170,23 @@ class PreparedRoad:
         s = np.minimum(np.maximum(ahead / self._run_in, 0.0), 1.0)
         return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
+    @property
+    def grown(self) -> float:
+        """x (m) from which on the heights are whole, behind the run-in."""
+        return self._lead + self._run_in
+
+    @property
+    def passed(self) -> tuple[float, float]:
+        """First and last x (m) of the road itself that the front of the patch passes over."""
+        return self._lead + self._shift[0], self.end + self._shift[0]
+
     @cached_property
     def texture(self) -> Texture | None:
         """Texture of the middle line after the run-in, over at most 20 m.
 
         None for a road without resolution (flat), or too short for an evaluation.
         """
-        first = self._lead + self._run_in
+        first = self.grown
         length = min(self.end - first, _SEEN)
         if not (np.isfinite(self.spacing) and length >= _LEAST_SEEN):
             return None

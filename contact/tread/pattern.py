@@ -24,7 +24,10 @@ _LEAST_LAND = 1e-3
 
 
 class GrooveLike(Protocol):
-    """A groove (runs.scene.tables.pattern): lengths in m, `angle` in degrees from the axle."""
+    """A groove (runs.scene.tables.pattern): lengths in m.
+
+    `angle` a in degrees from the axle: the middle of a lateral groove is at s = s_0 + y tan(a).
+    """
 
     @property
     def direction(self) -> str: ...

@@ -7,7 +7,7 @@ from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of,
 from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.scene.plan import STAGES, skipped
 from tireroad.runs.scene.resolved import literal
-from tireroad.runs.scene.rules.road import check_road
+from tireroad.runs.scene.rules.road import check_road, remarks
 from tireroad.runs.scene.schema import key_of, table_of
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.walk import applies, entries
@@ -63,7 +63,7 @@ def explain(scene: Scene, processes: int = 1) -> str:
         lines.append(
             f"  {stage:10}" + (f"skipped: {reasons[stage]}" if stage in reasons else "runs")
         )
-    described = scene.tire.shape.described(scene.tire)
+    described = [*scene.tire.shape.described(scene.tire), *remarks(scene)]
     lines += ["", *described] if described else []
     if scene.accuracy.searches:
         lines += ["", *bounds(scene)]

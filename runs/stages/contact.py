@@ -154,11 +154,13 @@ class ContactStage(Stage[ContactHistory]):
         contact_figures.points(record, setup.patch, self.static.product.footprint(), setup.relief)
         contact_figures.excursion(record, totals.figures.excursion, self.static.product.deflection)
         pattern.describe(record, setup)
-        road_file.describe(record, setup)
+        road_file.describe(record, setup, self.job.scene.road)
         if chosen.scheme != "convolution":
             work = works(chosen.scheme, totals.work, driven if self.job.scene.force else None)
             given = self.rotating.product, response, loop.tire.snapshot(), work
-            describe_energy(record, *given, losses, chosen.step)
+            state = self.static.product
+            pressed = float(state.normal_force.sum()) * (state.deflection or 0.0)
+            describe_energy(record, *given, losses, chosen.step, pressed)
 
     def _shortest_period(self) -> float:
         """Shortest period of all excitation, s."""

@@ -23,10 +23,11 @@ _EVEN = 0.02  # of a step: tolerance of even positions
 
 @dataclass(frozen=True)
 class _Line:
-    """Heights (n,) m every `pitch` m."""
+    """Heights (n,) m every `pitch` m from x = `first` m on."""
 
     profile: Array
     pitch: float
+    first: float = 0.0
 
 
 @road_kind("laser", "heights measured along one line by a laser, cleaned and widened to the tire")
@@ -89,7 +90,7 @@ class LaserFile(Levelled):
             self._check_size(len(profile), pitch)
             y, z = widened(profile, pitch, self.width, self.seed)
             how = f"across an isotropic random surface as rough as the line, which is its middle (seed {self.seed})"
-        x: Array = np.float64(pitch) * np.arange(len(profile))
+        x: Array = np.float64(line.first) + np.float64(pitch) * np.arange(len(profile))
         road = Grid(x, y, z, end=self.end, source=source)
         road.making = 0.0 if self.across == "ruts" else memory(len(profile), pitch, self.width)
         road.notes = (sound.summary, f"extended to {self.width:g} m: {how}")
@@ -131,7 +132,7 @@ class LaserFile(Levelled):
             np.isfinite(x).all() and pitch > 0 and np.abs(np.diff(x) / pitch - 1).max() < _EVEN
         ):
             raise InputError(f"{source}: x must ascend in even steps, within {100 * _EVEN:g} %")
-        return _Line(profile, float(pitch))
+        return _Line(profile, float(pitch), float(x[0]))
 
     def _resampled(self, profile: Array, pitch: float, source: str) -> tuple[Array, float]:
         """Without waves shorter than `shortest_wave` (ISO 16610-21), sampled at a quarter of it."""

@@ -25,7 +25,13 @@ class Edges(RoadKind):
     ramp: float = number(
         0.005, "m", "length over which an edge rises; 0: a jump", least=0, most=1e4
     )
-    angle: float = number(0.0, "deg", "angle between the edge and the axle", least=-89, most=89)
+    angle: float = number(
+        0.0,
+        "deg",
+        "angle between the edge and the axle; positive: the left side (y > 0) is met first",
+        least=-89,
+        most=89,
+    )
 
 
 @road_kind("step", "a step up or down")
@@ -56,7 +62,7 @@ class Cleat(Edges):
 
 
 class Obstacle:
-    """z = h [s(xi/r) - s((xi - l)/r)], xi = x cos(a) + y sin(a) - position.
+    """z = h [s(xi/r) - s((xi - l)/r)], xi = (x - position) cos(a) + y sin(a).
 
     h, r, a, position: `height`, `ramp`, `angle` and `position` of `edges`; l = `length` (m) from
     edge to edge, infinite for a step; s(t) = 3 t^2 - 2 t^3 on [0, 1], constant outside (a jump for
@@ -74,11 +80,18 @@ class Obstacle:
 
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m) at x, y (m) of equal shape."""
-        xi = np.asarray(x) * self._along + np.asarray(y) * self._across - self._position
+        return self._height * self._share(self._distance(np.asarray(x), np.asarray(y)))
+
+    def _distance(self, x: Array, y: Array) -> Array:
+        """xi, m."""
+        return (x - self._position) * self._along + y * self._across
+
+    def _share(self, xi: Array) -> Array:
+        """Height over h at xi, m."""
         rise = self._edge(xi)
         if np.isfinite(self._length):
             rise = rise - self._edge(xi - self._length)
-        return self._height * rise
+        return rise
 
     def _edge(self, xi: Array) -> Array:
         if self._ramp == 0.0:
@@ -87,12 +100,19 @@ class Obstacle:
         return s * s * (3.0 - 2.0 * s)
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Upper bound of any strip, m."""
-        return max(self._height, 0.0)
+        """Upper bound of a strip, m."""
+        return max(self._height * share for share in self._shares(x0, x1, y0, y1))
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
-        """Lower bound of any strip, m."""
-        return min(self._height, 0.0)
+        """Lower bound of a strip, m."""
+        return min(self._height * share for share in self._shares(x0, x1, y0, y1))
+
+    def _shares(self, x0: float, x1: float, y0: float, y1: float) -> tuple[float, float]:
+        """Least and greatest share of the height in a strip: it rises, stays, then falls."""
+        xi = self._distance(np.array([x0, x0, x1, x1]), np.array([y0, y1, y0, y1]))
+        ends = self._share(np.array([xi.min(), xi.max()]))
+        whole = xi.min() <= self._length and xi.max() >= self._ramp
+        return float(ends.min()), 1.0 if whole else float(ends.max())
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Obstacle":
         """Nothing to prepare."""

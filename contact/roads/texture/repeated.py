@@ -20,12 +20,13 @@ class Repeated:
 
         z = (1 - w) h(x) + w h(L - x),   w from 0 to 1 over L - b < x < L.
 
-    So z is continuous and only its slope jumps, and the road is needed only from 0 to its `length`
-    L (m).
+    So z is continuous and only its slope jumps, and the road is needed only over its `length` L
+    (m). x counts from the first x of a measured road, and from 0 on others.
     """
 
     def __init__(self, road: Road, length: float) -> None:
         self._road, self._length = road, length
+        self._first: float = getattr(road, "measured", (0.0, 0.0))[0]
         self._seam = min(_SEAM * length, _LONGEST)
         self.spacing = road.spacing
         self.filled: int = getattr(road, "filled", 0)
@@ -39,27 +40,33 @@ class Repeated:
         """Endless along x, as wide as the road, m."""
         return (-np.inf, np.inf), self._road.extent[1]
 
+    @property
+    def _period(self) -> tuple[float, float]:
+        """The part of the road that is needed, m."""
+        return self._first, self._first + self._length
+
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m) at x, y (m) of equal shape."""
-        place = np.mod(x, self._length)
-        z = self._road.height(place, y)
+        place = np.mod(x - self._first, self._length)
+        z = self._road.height(self._first + place, y)
         share = (place - (self._length - self._seam)) / self._seam
         late = share > 0
         if late.any():
             w = share[late] ** 2 * (3.0 - 2.0 * share[late])
-            mirrored = self._road.height(self._length - place[late], np.asarray(y)[late])
+            back = self._first + (self._length - place[late])
+            mirrored = self._road.height(back, np.asarray(y)[late])
             z = np.array(z)
             z[late] = (1.0 - w) * z[late] + w * mirrored
         return z
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """Upper bound of the heights anywhere along x, m."""
-        return self._road.highest(0.0, self._length, y0, y1)
+        return self._road.highest(*self._period, y0, y1)
 
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """Lower bound of the heights anywhere along x, m."""
-        return self._road.lowest(0.0, self._length, y0, y1)
+        return self._road.lowest(*self._period, y0, y1)
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> Repeated:
         """The repeated road, with one period prepared. InputError if the road is shorter."""
-        return Repeated(self._road.prepare(0.0, self._length, y0, y1), self._length)
+        return Repeated(self._road.prepare(*self._period, y0, y1), self._length)

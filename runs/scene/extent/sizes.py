@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tireroad.contact.roads.kinds.obstacle import Edges
+from tireroad.contact.roads.placement import begun_at
 from tireroad.contact.spacing import ON_A_NODE
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import SectionMesh
@@ -131,11 +133,14 @@ def road_height(scene: Scene) -> float:
     """Height (m) of the road above its datum in the first metres, plus its motion's amplitude."""
     motion = scene.road.motion
     lift = abs(motion.amplitude) if motion.kind != "none" else 0.0
-    surface, start = scene.road.surface, scene.road.start
-    side = 0.1 + abs(scene.road.lateral)
-    strip = start, start + min(least_travel(scene), 2.0) + 0.1, -side, side
+    surface, side = scene.road.surface, 0.1 + abs(scene.road.lateral)
     try:
         road = made(surface)
+        start = begun_at(road, scene.road.start)
+        # Bounds of a long texture take time; those of a single obstacle do not.
+        travel = least_travel(scene)
+        travel = travel if isinstance(surface, Edges) else min(travel, 2.0)
+        strip = start, start + travel + 0.1, -side, side
         high, low = road.highest(*strip), road.lowest(*strip)
     except InputError:
         return lift

@@ -5,14 +5,20 @@ from collections.abc import Callable
 from typing import Any
 
 from tireroad.contact.roads.kind import RoadKind
+from tireroad.contact.roads.kinds.obstacle import Edges
+from tireroad.contact.roads.placement import begun_at, moved_start, shown
+from tireroad.contact.roads.road import placed
 from tireroad.contact.roads.under_tire import Road
 from tireroad.fem.errors import InputError
+from tireroad.runs.scene.tables.road import Road as Table
 from tireroad.runs.scene.tables.scene import Scene
 
 # Least ratio of a pressed tire's effective rolling radius to its outer radius, and farthest reach
 # of the patch ahead of the axle, m: only what a run would certainly refuse is refused here.
 LEAST_RADIUS = 0.85
 AHEAD = 0.5
+# Half the width of road, and length, that `check` looks at for relief, m; less relief is rounding.
+BESIDE, LOOKED, NOTHING = 0.5, 20.0, 1e-9
 Where = Callable[[tuple[str, ...], str], InputError]
 
 
@@ -50,6 +56,43 @@ def check_road(scene: Scene) -> None:
         _check_extent(scene, road)
 
 
+def remarks(scene: Scene) -> list[str]:
+    """What `check` says of a road that can be driven on."""
+    if scene.road is None or scene.contact is None:
+        return []
+    road = made(scene.road.surface)
+    start = begun_at(road, scene.road.start)
+    notes = [f"road: {moved_start(start)}"] if start != (scene.road.start or 0.0) else []
+    end = start + AHEAD + least_travel(scene) / LEAST_RADIUS
+    if scene.road.kind != "flat" and _level(scene.road, road, start, end):
+        notes.append(f"warning: {without_relief(scene.road, start, end)}")
+    return notes
+
+
+def _level(table: Table, road: Road, start: float, end: float) -> bool:
+    """Whether a road has one height from `start` to `end` (m), on both sides of the tire's path.
+
+    Of a long road only `LOOKED` m are looked at: bounds of files and textures take time.
+    """
+    if end - start > LOOKED and not isinstance(table.surface, Edges):
+        return False
+    whole = placed(road, table.surface, table).road  # on a drum it repeats
+    for last in (min(start + 2.0, end), end):
+        strip = start, last, table.lateral - BESIDE, table.lateral + BESIDE
+        if not 0.0 <= whole.highest(*strip) - whole.lowest(*strip) < NOTHING:
+            return False
+    return True
+
+
+def without_relief(road: Table, first: float, last: float) -> str:
+    """A warning of a road that has the same height all over the run, from `first` to `last` (m)."""
+    key = "road.position, road.start" if hasattr(road.surface, "position") else "road.start"
+    return (
+        f'the road (kind = "{road.kind}") has no relief under the run, which passes over x = {shown(first)} to '
+        f"{shown(last)} m: nothing on it moves the tire; change {key} or time.duration"
+    )
+
+
 _MADE: dict[tuple, Road] = {}  # only the last road
 
 
@@ -75,19 +118,20 @@ def _which(surface: RoadKind) -> tuple:
 
 
 def _check_extent(scene: Scene, road: Road) -> None:
-    placed, source = scene.road, getattr(road, "source", "road")
+    table, source = scene.road, getattr(road, "source", "road")
     (x0, x1), (y0, y1) = road.extent
-    if not y0 <= placed.lateral <= y1:
+    if not y0 <= table.lateral <= y1:
         raise InputError(
-            f"{source}: road.lateral = {placed.lateral:g} m lies beside the road, which has y from "
+            f"{source}: road.lateral = {table.lateral:g} m lies beside the road, which has y from "
             f"{y0:.4g} to {y1:.4g} m"
         )
-    travel = least_travel(scene)
-    if placed.start + travel > x1 or placed.start + travel + AHEAD < x0:
+    start, travel = begun_at(road, table.start), least_travel(scene)
+    # The first place needed is under the front of the patch.
+    if start + travel > x1 or start + AHEAD < x0:
         raise InputError(
-            f"{source}: the run needs the road from {placed.start:.4g} to about "
-            f"{placed.start + travel:.4g} m (rotation.speed, tire.outer_radius, time.duration), and it "
-            f"has {x0:.4g} to {x1:.4g} m; change [road] start, shorten [time] duration, or continue it "
+            f"{source}: the run needs the road from x = {shown(start)} to about "
+            f"{shown(start + travel)} m (rotation.speed, tire.outer_radius, time.duration), and it "
+            f"has {shown(x0)} to {shown(x1)} m; change [road] start, shorten [time] duration, or continue it "
             'by end = "mirror"'
         )
 

@@ -41,7 +41,12 @@ class Groove:
         most=0.1,
     )
     angle: float = number(
-        0.0, "deg", "angle of a lateral groove to the direction of the axle", least=-80, most=80
+        0.0,
+        "deg",
+        "angle of a lateral groove to the direction of the axle; positive: its right side (y < 0) enters the "
+        "footprint first",
+        least=-80,
+        most=80,
     )
     span: tuple[float, float] = vector(
         (-1.0, 1.0), "m", "range of y covered by a lateral groove", least=-10, most=10

@@ -21,6 +21,9 @@ from tireroad.runs.stages.base.record import Record
 _UNBALANCED = 0.02
 _TAKEN = 0.1  # share of the energy exchanged that constant forces over a step may dissipate
 _LEAST = 1e-9  # J: below is rounding
+# Share of the energy of the static contact (load times deflection), below which no error matters:
+# a run on a road of 1 um moved 1e-7 of it.
+_SLIGHT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,11 @@ class Losses:
             self._circulation.set_state(kept)
 
 
+def negligible(pressed: float) -> float:
+    """Energy (J) below which no error matters, for load times deflection `pressed` (J) at rest."""
+    return max(_LEAST, _SLIGHT * pressed)
+
+
 def describe_energy(
     record: Record,
     rolling: RollingModes,
@@ -100,11 +108,13 @@ def describe_energy(
     work: Works,
     losses: Losses,
     step: float,
+    pressed: float = 0.0,
 ) -> None:
     """Record work of forces and drive, energy in the tire, energy lost, and the imbalance.
 
-    `kept`: the tire's snapshot.
+    `kept`: the tire's snapshot; `pressed`: load times deflection of the static state, J.
     """
+    slight = negligible(pressed)
     total = work.total
     record.indicators["work of contact on the tire"] = (work.contact, "J")
     if work.driven is not None:
@@ -120,22 +130,24 @@ def describe_energy(
         "energy left in the residual flexibility": (elastic, "J"),
     }
     if losses.found is None:
-        _standing(record, rolling, total, left + elastic)
+        _standing(record, rolling, total, left + elastic, slight)
     else:
         lost, drive, beyond, springs_lead = losses.found
         taken = springs_lead - work.lead if work.lead else 0.0
-        _rolling(record, total, left + elastic, lost, drive, beyond, taken)
+        _rolling(record, total, left + elastic, lost, drive, beyond, taken, slight)
 
 
-def _standing(record: Record, rolling: RollingModes, work: float, left: float) -> None:
-    """Energy lost, by difference; it must not be negative for a tire at rest."""
+def _standing(
+    record: Record, rolling: RollingModes, work: float, left: float, slight: float
+) -> None:
+    """Energy lost, by difference; it must not be negative for a tire at rest beyond `slight` J."""
     turns = rolling.turning.speed > 0
     record.indicators["lost, less the work of the drive" if turns else "lost"] = (work - left, "J")
     observe.say(
         f"  energy: {work:.4g} J came into the tire, {left:.4g} J are left in it, "
         f"{work - left:.4g} J were lost{' less what the drive put in' if turns else ''}"
     )
-    if not turns and left > work + 1e-3 * abs(work) + _LEAST:
+    if not turns and left > work + 1e-3 * abs(work) + slight:
         record.warnings.append(
             "the standing tire holds more energy than was put in: take a smaller time.step, or "
             'time.scheme = "constant"'
@@ -150,8 +162,9 @@ def _rolling(
     drive: float,
     beyond: float,
     taken: float,
+    slight: float,
 ) -> None:
-    """All terms are known: the imbalance is the error of the time steps."""
+    """All terms are known: the imbalance is the error of the time steps; `slight` J are none."""
     off = work + drive - left - lost - beyond - taken
     moved = max(abs(work), abs(drive), abs(left), abs(lost))
     record.indicators |= {
@@ -166,12 +179,12 @@ def _rolling(
         f"{lost:.4g} J + lost in truncated modes {beyond:.2g} J + dissipated by the scheme {taken:.2g} J; "
         f"imbalance {off:.2g} J"
     )
-    if abs(off) > _UNBALANCED * moved + _LEAST:
+    if abs(off) > _UNBALANCED * moved + slight:
         record.warnings.append(
             f"the energy of the rolling tire does not add up by {100 * abs(off) / moved:.2g} %: take a "
             "smaller time.step"
         )
-    if abs(taken) > _TAKEN * moved + _LEAST:
+    if abs(taken) > _TAKEN * moved + slight:
         record.warnings.append(
             f"forces constant over the step took {100 * abs(taken) / moved:.2g} % of the energy that moved: what "
             "bounces on the tread is damped by them; take a smaller time.step to see it"

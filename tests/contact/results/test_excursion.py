@@ -3,8 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from tireroad.contact.results.chatter import Chatter
 from tireroad.contact.results.totals import Totals
+from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.static.footprint import Footprint
 from tireroad.runs.measure.synthetic import oval_patch
 from tireroad.runs.stages.base.record import Record
@@ -34,6 +37,19 @@ def test_points_that_touch_at_rest_count_less_the_wheel() -> None:
     assert totals.figures.excursion == 4e-3  # nothing but the wheel's own motion, or 1 mm of it
 
 
+def test_a_small_reach_is_named_and_no_motion_of_millimetres_is_called_growth() -> None:
+    """Reach 1 um: 0.5 mm of motion is none without bound; a point at the edge that touches is said."""
+    patch = oval_patch((5, 4), (0.015, 0.02), 500.0)
+    totals, still = Totals(patch, 1e-6), np.zeros((2, 20))
+    totals.add(block(still + 5e-4))
+    touching = still.copy()
+    touching[1, np.flatnonzero(patch.edge)[0]] = 1.0
+    with pytest.raises(ConvergenceError, match=r"contact\.reach a larger value, e\.g\. 0\.005"):
+        totals.add(block(still + 5e-4, normal_force=touching))
+    with pytest.raises(Chatter, match=r"moved by 0\.6 m, more than 0\.5 m: .*grows without bound"):
+        totals.add(block(still + 0.6))
+
+
 def test_beyond_a_third_of_the_deflection_it_is_said() -> None:
     record = Record()
     excursion(record, 2e-3, 0.01)
@@ -48,11 +64,11 @@ def test_a_footprint_of_few_points_is_told_where_the_road_has_heights() -> None:
     """Points 15 x 20 mm apart."""
     patch, record = oval_patch((9, 5), (0.015, 0.02), 500.0), Record()
     assert patch.touching.tolist() == [5, 3]
-    few, many = (Footprint(0.08, width, 1e-3) for width in (0.04, 0.05))
+    few, many = (Footprint(0.08, width, 1e-3) for width in (0.059, 0.061))
     points(record, patch, few, 0.0)
     points(record, patch, many, 1e-3)
     assert not record.warnings
     points(record, patch, few, 1e-3)
-    assert "15 × 20 mm apart on a footprint of 80 × 40 mm" in record.warnings[0]
+    assert "15 × 20 mm apart on a footprint of 80 × 59 mm" in record.warnings[0]
     points(record, replace(patch, force=0 * patch.force), few, 1e-3)
     assert len(record.warnings) == 1

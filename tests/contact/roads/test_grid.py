@@ -21,8 +21,8 @@ Z = 0.1 * np.random.default_rng(2).standard_normal((31, 11))
 def test_bilinear_against_scipy(y: np.ndarray) -> None:
     rng = np.random.default_rng(3)
     z = rng.standard_normal((31, len(y)))
-    px, py = rng.uniform(0.0, 3.0, 1000), rng.uniform(-0.5, 0.5, 1000)
-    expected = RegularGridInterpolator((X - X[0], y), z)(np.column_stack((px, py)))
+    px, py = rng.uniform(5.0, 8.0, 1000), rng.uniform(-0.5, 0.5, 1000)
+    expected = RegularGridInterpolator((X, y), z)(np.column_stack((px, py)))
     road = Grid(X, y, z)
     assert np.allclose(road.height(px, py), expected, atol=1e-12)
     strip = px.min(), px.max(), py.min(), py.max()
@@ -31,25 +31,29 @@ def test_bilinear_against_scipy(y: np.ndarray) -> None:
 
 def test_grid_points_and_borders_are_exact() -> None:
     road = Grid(X, Y, Z)
-    px, py = (c.ravel() for c in np.meshgrid(X - X[0], Y, indexing="ij"))
+    px, py = (c.ravel() for c in np.meshgrid(X, Y, indexing="ij"))
     assert np.allclose(road.height(px, py), Z.ravel(), atol=1e-12)
 
 
 def test_road_that_ends_too_early_is_refused_with_both_lengths() -> None:
-    with pytest.raises(InputError, match=r"from 1 to 4 m, and it has 0 to 3 m.*mirror"):
-        Grid(X, Y, Z).prepare(1.0, 4.0, -0.1, 0.1)
+    with pytest.raises(InputError, match=r"from x = 6 to 9 m, and it has 5 to 8 m.*mirror"):
+        Grid(X, Y, Z).prepare(6.0, 9.0, -0.1, 0.1)
+    with pytest.raises(InputError, match=r"from x = 4 to 7 m, and it has 5 to 8 m"):
+        Grid(X, Y, Z).prepare(4.0, 7.0, -0.1, 0.1)
     with pytest.raises(InputError, match="lateral"):
-        Grid(X, Y, Z, end="mirror").prepare(1.0, 4.0, 0.0, 0.6)
+        Grid(X, Y, Z, end="mirror").prepare(6.0, 9.0, 0.0, 0.6)
 
 
 def test_mirrored_road_is_continuous_and_reflected() -> None:
-    road = Grid(X, Y, Z, end="mirror").prepare(-1.0, 8.0, -0.1, 0.1)
+    road = Grid(X, Y, Z, end="mirror").prepare(4.0, 13.0, -0.1, 0.1)
+    inside = np.linspace(5.0, 8.0, 50)
+    assert np.allclose(road.height(inside, 0 * inside), Grid(X, Y, Z).height(inside, 0 * inside))
     s = np.linspace(0.0, 2.0, 50)
-    for mirror in (0.0, 3.0, 6.0):
+    for mirror in (5.0, 8.0, 11.0):
         before, after = road.height(mirror - s, 0 * s), road.height(mirror + s, 0 * s)
         assert np.allclose(before, after, atol=1e-12)
-    bounds = road.lowest(-1.0, 8.0, -0.1, 0.1), road.highest(-1.0, 8.0, -0.1, 0.1)
-    z = road.height(np.linspace(-1, 8, 500), np.zeros(500))
+    bounds = road.lowest(4.0, 13.0, -0.1, 0.1), road.highest(4.0, 13.0, -0.1, 0.1)
+    z = road.height(np.linspace(4, 13, 500), np.zeros(500))
     assert bounds[0] <= z.min() and z.max() <= bounds[1]
 
 
@@ -57,9 +61,9 @@ def test_holes_in_the_strip_are_refused_with_count_and_place() -> None:
     z = Z.copy()
     z[12:14, 3] = np.nan
     z[0, 10] = np.nan
-    with pytest.raises(InputError, match=r"2 heights .* at 1.2 m along and y = -0.2 m"):
-        Grid(X, Y, z).prepare(0.5, 2.0, -0.3, 0.1)
-    road = Grid(X, Y, z).prepare(0.5, 2.0, 0.0, 0.2)
+    with pytest.raises(InputError, match=r"2 heights .* at x = 6.2 m and y = -0.2 m"):
+        Grid(X, Y, z).prepare(5.5, 7.0, -0.3, 0.1)
+    road = Grid(X, Y, z).prepare(5.5, 7.0, 0.0, 0.2)
     assert road.filled == 0
 
 
@@ -68,9 +72,9 @@ def test_filled_holes_follow_a_plane_and_are_counted() -> None:
     z = plane.copy()
     z[3, 4:7] = np.nan
     z[8, :] = np.nan
-    road = Grid(X, Y, z, holes="fill").prepare(0.0, 3.0, -0.5, 0.5)
-    px, py = np.random.default_rng(4).uniform([0.0, -0.5], [3.0, 0.5], (500, 2)).T
-    assert np.allclose(road.height(px, py), 0.3 * (px + 5.0) + 0.7 * py, atol=1e-12)
+    road = Grid(X, Y, z, holes="fill").prepare(5.0, 8.0, -0.5, 0.5)
+    px, py = np.random.default_rng(4).uniform([5.0, -0.5], [8.0, 0.5], (500, 2)).T
+    assert np.allclose(road.height(px, py), 0.3 * px + 0.7 * py, atol=1e-12)
     assert road.filled == 3 + 11
 
 
@@ -126,7 +130,7 @@ def write(file: Path) -> None:
 @pytest.mark.parametrize("name", ["road.npz", "road.h5", "points.csv", "matrix.csv"])
 def test_files_hold_the_same_road(tmp_path: Path, name: str) -> None:
     write(tmp_path / name)
-    px, py = np.random.default_rng(5).uniform([0.0, -0.5], [3.0, 0.5], (200, 2)).T
+    px, py = np.random.default_rng(5).uniform([5.0, -0.5], [8.0, 0.5], (200, 2)).T
     road = read_grid(tmp_path / name)
     assert np.allclose(road.height(px, py), Grid(X, Y, Z).height(px, py), atol=1e-12)
 

@@ -122,8 +122,18 @@ def test_files_that_are_no_line(tmp_path, content, message) -> None:
         LaserFile()
 
 
+def test_positions_in_the_file_are_those_of_the_road(tmp_path) -> None:
+    x = 250.0 + 0.1 * np.arange(4000)  # mm
+    z = np.exp(-(((x - 400.0) / 20.0) ** 2))
+    np.savetxt(tmp_path / "line.csv", np.column_stack([x, z]), delimiter=",")
+    road = LaserFile(file=str(tmp_path / "line.csv"), across="ruts").make()
+    assert road.measured[0] == pytest.approx(0.25)
+    along = np.linspace(0.26, 0.6, 1000)
+    assert along[road.height(along, 0 * along).argmax()] == pytest.approx(0.4, abs=1e-3)
+
+
 def test_a_measured_road_shorter_than_the_drum_is_refused(tmp_path) -> None:
     file, _, _ = measured(tmp_path, length=1.0)
     road = make_road(kind="laser", file=file, across="ruts", drum_radius=0.5)
-    with pytest.raises(InputError, match="the run needs the road from 0 to 3.142 m"):
+    with pytest.raises(InputError, match="the run needs the road from x = 0 to 3.142 m"):
         road.prepare(0.0, 2.0, -0.1, 0.1)

@@ -19,14 +19,42 @@ def test_cleat_and_step() -> None:
     cleat = make_road(kind="cleat", position=0.3, height=0.01, length=0.1, ramp=0.02, angle=0.0)
     assert np.allclose(cleat.road.height(x, zero), [0, 0.005, 0.01, 0.01, 0.01, 0.005, 0])
     step = make_road(kind="step", position=0.3, height=-0.02, ramp=0.0, angle=30.0)
-    assert np.allclose(step.road.height(x, zero) / -0.02, [0, 0, 0, 1, 1, 1, 1])
+    assert np.allclose(step.road.height(x, zero) / -0.02, [0, 1, 1, 1, 1, 1, 1])
     # At 30 degrees the edge is met 0.1 tan(30) later 0.1 m to the right.
-    edge = 0.3 / np.cos(np.pi / 6) + 0.1 * np.tan(np.pi / 6)
+    edge = 0.3 + 0.1 * np.tan(np.pi / 6)
     side = np.array([-0.1, -0.1])
     assert np.array_equal(step.road.height(edge + np.array([-1e-9, 1e-9]), side), [0.0, -0.02])
     assert (step.road.highest(0, 1, 0, 1), step.road.lowest(0, 1, 0, 1)) == (0.0, -0.02)
     with pytest.raises(InputError, match="ramp"):
         Cleat(length=0.02, ramp=0.03)
+
+
+@pytest.mark.parametrize("kind", ["step", "cleat"])
+@pytest.mark.parametrize("angle", [-60.0, 0.0, 45.0])
+def test_an_oblique_edge_begins_at_its_position(kind: str, angle: float) -> None:
+    road = make_road(kind=kind, position=0.5, height=0.01, ramp=1e-4, angle=angle).road
+    x = np.linspace(0.3, 0.7, 40001)
+    begun = [float(x[road.height(x, np.full(len(x), y)).argmax()]) for y in (-0.05, 0.0, 0.05)]
+    right, middle, left = begun
+    assert middle == pytest.approx(0.5, abs=3e-4)
+    # Positive angles: the left side is met first.
+    assert right - left == pytest.approx(0.1 * np.tan(np.radians(angle)), abs=3e-5)
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.01])
+@pytest.mark.parametrize("length", [0.05, None])
+@pytest.mark.parametrize("height", [0.01, -0.02])
+def test_bounds_of_an_obstacle_are_those_of_the_strip(ramp, length, height) -> None:
+    kind = {"kind": "step"} if length is None else {"kind": "cleat", "length": length}
+    road = make_road(**kind, position=0.5, height=height, ramp=ramp, angle=30.0).road
+    for x0 in np.arange(0.3, 0.7, 0.013):
+        for long in (0.004, 0.1):
+            strip = x0, x0 + long, -0.05, 0.05
+            x, y = np.meshgrid(np.linspace(*strip[:2], 201), np.linspace(*strip[2:], 101))
+            z, bounds = road.height(x, y), (road.lowest(*strip), road.highest(*strip))
+            assert bounds[0] <= z.min() + 1e-12 and z.max() - 1e-12 <= bounds[1]
+            assert np.ptp(bounds) < 1e-12 or np.ptp(z) > 0.0
+    assert road.highest(0.0, 0.4, -0.05, 0.05) == road.lowest(0.0, 0.4, -0.05, 0.05) == 0.0
 
 
 @pytest.mark.slow

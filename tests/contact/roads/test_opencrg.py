@@ -88,7 +88,7 @@ def test_holes_survive(tmp_path: Path, code: str) -> None:
     file, z = tmp_path / "road.crg", Z.copy()
     z[4, :2] = np.nan
     file.write_bytes(crg(code, z))
-    with pytest.raises(InputError, match=r"2 heights .* at 2 m along and y = -1.25 m"):
+    with pytest.raises(InputError, match=r"2 heights .* at x = 2 m and y = -1.25 m"):
         read_opencrg(file).prepare(0.0, 4.0, -1.25, 1.0)
     assert read_opencrg(file, holes="fill").prepare(0.0, 4.0, -1.25, 1.0).filled == 2
 

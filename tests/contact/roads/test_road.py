@@ -46,6 +46,54 @@ def test_start_lateral_and_offset_shift_the_road() -> None:
     assert np.allclose(road.extent, ((-2.0, 8.0), (-2.5, 1.5)))
 
 
+def bump_at(place: float, first: float, **keys: object) -> RoadUnderTire:
+    """A file's road over 4 m from `first` with a bump of 10 mm at x = place, without a run-in."""
+    x = first + 0.01 * np.arange(401)
+    z = 0.01 * np.exp(-(((x - place) / 0.03) ** 2))[:, None] * np.ones(2)
+    return RoadUnderTire(Grid(x, np.array([-0.5, 0.5]), z), run_in=0.0, **keys)
+
+
+def highest_at(road: PreparedRoad) -> float:
+    """Distance (m) from the axle's start to the highest place of a strip."""
+    x = np.linspace(0.05, road.end, 4001)
+    return float(x[road.height(x, 0 * x).argmax()])
+
+
+@pytest.mark.parametrize(
+    ("first", "start", "found"),
+    [
+        (-1.0, None, 0.4),  # the file contains 0
+        (0.0, None, 0.4),
+        (-1.0, 0.0, 0.4),
+        (-1.0, -0.8, 1.2),
+        (0.2, None, 0.2),  # from its first x on
+        (0.2, 0.1, 0.3),
+    ],
+)
+def test_a_file_lies_at_its_own_x(first: float, start: float | None, found: float) -> None:
+    road = bump_at(0.4, first, start=start).prepare(0.1, 1.5, -0.1, 0.1)
+    assert highest_at(road) == pytest.approx(found, abs=2e-3)
+    assert [n for n in road.notes if "starts at x = 0.2 m" in n] == list(road.notes)
+    assert bool(road.notes) == (first > 0 and start is None)
+
+
+def test_a_file_far_from_zero_starts_where_it_is_told() -> None:
+    road = bump_at(101.4, 100.0, start=101.0).prepare(0.1, 1.5, -0.1, 0.1)
+    assert highest_at(road) == pytest.approx(0.4, abs=2e-3)
+    with pytest.raises(InputError, match=r"from x = 0\.1 to 1\.5 m, and it has 100 to 104 m"):
+        bump_at(101.4, 100.0, start=0.0).prepare(0.1, 1.5, -0.1, 0.1)
+
+
+@pytest.mark.parametrize("first", [-1.0, 0.0, 50.0])
+def test_a_drum_repeats_a_file_from_its_first_x(first: float) -> None:
+    keys = {"drum_radius": 0.5, "start": first + 0.2}
+    road = bump_at(first + 1.0, first, **keys).prepare(0.1, 9.5, -0.1, 0.1)
+    once = np.linspace(0.1, 3.0, 2901)
+    for turn in (0.0, np.pi, 2 * np.pi):
+        z = road.height(once + turn, 0 * once)
+        assert once[z.argmax()] == pytest.approx(0.8, abs=2e-3)
+
+
 def test_mean_datum_takes_the_strips_mean_and_nothing_else() -> None:
     x, y = np.linspace(0.0, 10.0, 11), np.linspace(-2.0, 2.0, 9)
     heights = 1.0 + 0.3 * x[:, None] + 0.7 * y[None, :]

@@ -41,7 +41,8 @@ def test_a_road_that_is_long_enough_passes(scene: Path) -> None:
     ("override", "words"),
     [
         ("time.duration=0.2", ["2.72 m", "1.99 m", "mirror"]),
-        ("road.start=1.0", ["from 1 to", "[road] start"]),
+        ("road.start=1.0", ["x = 1 to", "[road] start"]),
+        ("road.start=-0.6", ["x = -0.6 to", "has 0 to 1.99 m"]),
         ("road.lateral=0.5", ["road.lateral = 0.5 m", "-0.2 to 0.19"]),
     ],
 )
@@ -50,6 +51,34 @@ def test_a_road_that_is_too_short_is_said_by_check(scene: Path, override, words)
         explain(load(scene, [override]))
     for word in words:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("end", ["refuse", "mirror"])
+def test_check_says_where_a_file_without_x_zero_is_begun(scene: Path, end: str) -> None:
+    told = "road: the axle starts at x = 100 m"
+    override = [f"road.end={end}"]
+    assert told not in explain(load(scene, override))
+    x, y = np.arange(100.0, 102.0, 0.01), np.arange(-0.2, 0.2, 0.01)
+    np.savez(scene.parent / "road.npz", x=x, y=y, z=np.zeros((len(x), len(y))))
+    assert told in explain(load(scene, override))
+    assert told not in explain(load(scene, [*override, "road.start=100.1"]))
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["position=3.0"], True),
+        (["position=1.0"], False),
+        (["position=3.0", "start=2.0"], False),
+        (["position=3.0", "drum_radius=1.0"], False),  # met in every turn of 6.28 m
+        (["position=30.0", "start=5.0"], True),
+    ],
+)
+def test_check_says_that_a_cleat_is_out_of_reach(scene: Path, more: list[str], said: bool) -> None:
+    text = SCENE.replace('"grid"', '"cleat"').replace('file = "road.npz"\n', "")
+    scene.write_text(text.replace("speed = 50", "speed = 50\nrolling_radius = 0.3"))
+    told = explain(load(scene, [f"road.{one}" for one in more]))
+    assert ('warning: the road (kind = "cleat") has no relief under the run' in told) == said
 
 
 def test_check_opens_the_file(scene: Path) -> None:

@@ -2,6 +2,9 @@
 
 import pytest
 
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.build.energy import _rolling, negligible
+
 SCENE = """
 name = "energy"
 [tire]
@@ -74,6 +77,15 @@ def test_a_rolling_tire_loses_what_contact_and_drive_put_in(run) -> None:
     assert abs(off) < 0.002 * lost
     assert abs(off) < 0.2 * abs(beyond)  # without that term it would not add up
     assert not any("add up" in text for text in warnings)
+
+
+@pytest.mark.parametrize(("scale", "said"), [(1.0, True), (1e-6, False)])
+def test_an_imbalance_is_told_where_the_energy_matters(scale: float, said: bool) -> None:
+    """Of 500 N on 4 mm, 2 J, a millionth is nothing: 5 % of 0.2 J are told, of 0.2 uJ are not."""
+    record = Record()
+    slight = negligible(500.0 * 0.004)
+    _rolling(record, 0.2 * scale, 0.0, 0.19 * scale, 0.0, 0.0, 0.0, slight)
+    assert any("does not add up by 5 %" in text for text in record.warnings) == said
 
 
 STIFF = (
