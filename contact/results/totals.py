@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tireroad.contact.patch import LEAST_REACH, Patch
 from tireroad.contact.results.chatter import Alternation, Chatter
 from tireroad.contact.results.energy import Work
-from tireroad.contact.patch import LEAST_REACH, Patch
 
 # Times the patch's reach, or the smallest default reach: a scene may give one that is far smaller
 # than what the tire moves.

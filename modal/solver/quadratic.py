@@ -21,8 +21,7 @@ from tireroad.fem.errors import ConvergenceError
 from tireroad.modal.solver.fields import gram, multiply
 
 Array = np.ndarray
-RESIDUAL_TOLERANCE = 1e-8
-TOLERANCE, ITERATIONS = 1e-11, 200  # of the solver: relative residual, restarts
+RESIDUAL_TOLERANCE, TOLERANCE, ITERATIONS = 1e-8, 1e-11, 200  # accepted; of the solver, restarts
 _EXTRA = 10  # states beyond the wanted ones, to end in a gap and not inside a cluster
 _SAME = 1e-6  # relative distance of the right and left eigenvalue of one state
 # Two equal states have 7e5 to 1.3e6 by rounding, depending on the number of processes.

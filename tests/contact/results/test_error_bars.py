@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.results.error_bars import Bars, Measured, bars, random_share, measured, total
+from tireroad.contact.results.error_bars import Bars, Measured, bars, measured, random_share, total
 
 
 def at(size: float, rate: float) -> Measured:
