@@ -55,7 +55,8 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
     _check_processes(args, comm.size)
     if getattr(args, "resumed", False):
         check_kept_scene(args.out)
-    scene = load(args.scene, args.set)
+    remarks: list[str] = []
+    scene = load(args.scene, args.set, remarks.append)
     directory = args.out if args.out is not None else Path("results") / scene.name
     mpi.start_petsc(petsc_options)
     form_cache.announce = observe.say
@@ -66,6 +67,8 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
 
         mpi.on_root(comm, claim)
         stack.enter_context(observe.log_to(directory / "log.txt"))
+        for remark in remarks:
+            observe.say(f"note: {remark}")
         from tireroad.runs.search.search import run
 
         try:
@@ -114,7 +117,7 @@ def _check(args: argparse.Namespace) -> None:
     from tireroad.runs.scene.check import explain
     from tireroad.runs.scene.load import load
 
-    scene = load(args.scene, args.set)
+    scene = load(args.scene, args.set, lambda remark: print(f"note: {remark}"))
     print(explain(scene, args.processes))
     print(write_section(scene, Path("results") / scene.name))
 

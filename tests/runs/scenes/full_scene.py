@@ -1,4 +1,4 @@
-"""A scene with every table a road needs, and what the reader says of a scene it refuses."""
+"""Scenes with every table a road needs, and what the reader says of a scene it refuses."""
 
 from pathlib import Path
 
@@ -20,6 +20,77 @@ kind = "cobblestones"
 [time]
 duration = 0.1
 """
+
+
+CONTRACT = """
+name = "rolling-torus"
+[tire]
+section = "torus"
+outer_radius = 0.32
+minor_radius = 0.10
+thickness = 0.012
+half_angle = 120.0
+segments = 100
+elements_arc = 16
+elements_thickness = 1
+order = 2
+[tire.material]
+model = "neo-hookean"
+youngs_modulus = 4.8e8
+poisson_ratio = 0.45
+density = 1200.0
+[static]
+inflation = 2.0e5
+load = 500.0
+steady_rolling = true
+[modal]
+count = 500
+rim = "fixed"
+road = "forces"
+[damping]
+mass = 500.0
+stiffness = 0.0
+[rotation]
+speed = 100.0
+inertia = "full"
+method = "projected"
+count = 40
+[greens]
+residual = "static"
+[[force]]
+angle = 0.0
+arc = 0.0
+spread = [0.0, 0.0]
+direction = [0.0, 0.0, 1.0]
+amplitude = 1.0
+frequency = 5.0
+[contact]
+tread = "half-space"
+youngs_modulus = 3.4e8
+poisson_ratio = 0.49
+points = "nodes"
+brush_stiffness = 199620.0
+friction = 0.8
+solver = "active-set"
+[road]
+kind = "flat"
+[road.motion]
+kind = "sine"
+amplitude = 1.0e-3
+frequency = 50.0
+[time]
+duration = 0.1
+step = 2.5e-5
+scheme = "auto"
+checkpoint = 60.0
+[output]
+spectra = true
+axle_force = true
+receptance = { to = 500.0, step = 2.0 }
+vibration = false
+fields = false
+"""
+"""The scene of the interface's description (README: Scene), with the keys that select written out."""
 
 
 def refused(path: Path, *overrides: str) -> str:

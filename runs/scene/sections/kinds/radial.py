@@ -40,6 +40,7 @@ class RadialSection(SectionKind):
     # With fewer, modes from 150 Hz up are too low (docs/verification.md, Frequencies of the default
     # mesh).
     segments = 40
+    without = ("material",)
 
     size: str = text("205/60 R15", "size of the built-in passenger tire (docs/radial-tire.md)")
     elements_arc: int | None = integer(
