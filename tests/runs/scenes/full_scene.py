@@ -92,6 +92,53 @@ fields = false
 """
 """The scene of the interface's description (README: Scene), with the keys that select written out."""
 
+REAL_TIRE = """
+[tire]
+section = "radial"
+size = "205/60 R15"
+segments = 60
+[[tire.region]]
+dynamic = 1.4
+loss_factor = 0.1
+[[tire.cords]]
+name = "belt 1"
+depth = 0.006
+arc = [-45.0, 45.0]
+angle = 20.0
+youngs_modulus = 172.2e9
+area = 2.118e-7
+spacing = 1.16e-3
+density = 0.0
+compression = 1.0
+[tire.cavity]
+temperature = 293.15
+[axle]
+kind = "corner"
+wheel_mass = 15.0
+wheel_inertia = [0.4, 0.8, 0.4]
+stiffness = [0.0, 0.0, 25e3, 0.0, 0.0, 0.0]
+damping = [0.0, 0.0, 2.4e3, 0.0, 0.0, 0.0]
+body_mass = 400.0
+locked = ["x", "y", "rx", "ry", "rz"]
+[accuracy]
+estimate = true
+target = 0.05
+of = "axle_force"
+up_to = 400.0
+[static]
+load = 4000.0
+[modal]
+up_to = 400.0
+[rotation]
+speed = 60.0
+[contact]
+[road]
+kind = "cobblestones"
+[time]
+duration = 0.1
+"""
+"""The keys of a real tire in the interface's description, and a run on a road to check them in."""
+
 
 def refused(path: Path, *overrides: str) -> str:
     with pytest.raises(InputError) as caught:
