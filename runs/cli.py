@@ -56,7 +56,7 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
     if getattr(args, "resumed", False):
         check_kept_scene(args.out)
     remarks: list[str] = []
-    scene = load(args.scene, args.set, remarks.append)
+    scene = load(args.scene, args.set, remarks.append, args.until)
     directory = args.out if args.out is not None else Path("results") / scene.name
     mpi.start_petsc(petsc_options)
     form_cache.announce = observe.say

@@ -79,8 +79,10 @@ def _demand(scene: Scene, processes: int) -> list[str]:
     wanted = estimate(scene)
     on_disk = out_of_core(wanted, processes)
     size, parts = wanted.sizes, memory_of(wanted, processes, on_disk)
-    counts = [f"{size.free} unknowns not held by the rim", f"{size.modes} modes"]
-    if scene.contact is not None:
+    counts = [f"{size.free} unknowns not held by the rim"]
+    if scene.modal is not None:
+        counts.append(f"{size.modes} modes")
+    if scene.in_contact:
         counts.append(f"about {size.points} contact points")
     if scene.time is not None:
         about = "about " if scene.time.step == "auto" else ""

@@ -15,8 +15,8 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.fem.keys import Key, described
 from tireroad.fem.parameters import ParameterError
+from tireroad.runs.scene import derived
 from tireroad.runs.scene.chosen import drop_unused
-from tireroad.runs.scene.derived import by_section, with_damping, with_speed
 from tireroad.runs.scene.raw import override, read_text
 from tireroad.runs.scene.rules import scene as rules
 from tireroad.runs.scene.schema import Table, fields_of, gathered, key_of, table_of, variant_of
@@ -32,10 +32,12 @@ def load(
     path: Path | str,
     overrides: Sequence[str] = (),
     say: Callable[[str], object] = lambda remark: None,
+    until: str | None = None,
 ) -> Scene:
     """The scene of a file, with `overrides` ("table.key=value", as for --set) applied.
 
-    `say` gets a line for each thing in the file that the scene does not have as it stands there.
+    `say` gets a line for each thing in the file that the scene does not have as it stands there;
+    `until`: the last stage that is to run.
     Raises InputError with all problems. Reads one file. Not collective.
     """
     path = Path(path)
@@ -50,7 +52,7 @@ def load(
     source = Source(path, text, changed)
     raw.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "-", path.stem).lstrip(".-") or "scene")
     drop_unused(Scene, raw, changed, say)
-    by_section(raw)
+    derived.by_section(raw)
     scene = _table(Scene, raw, (), source)
     if not NAME.fullmatch(scene.name):
         source.add(
@@ -61,7 +63,10 @@ def load(
     if "tire" not in source.broken():
         scene.tire.shape.check(scene.tire, source)
     if "tire" not in source.broken():
-        scene = with_speed(with_damping(scene))
+        scene = derived.with_speed(derived.with_damping(scene))
+    scene = derived.with_modal(derived.with_road(scene, say), until)
+    if not source.broken() & {"tire", "modal"}:
+        scene = derived.with_count(scene, raw, until, source, say)
     rules.check(scene, raw, source)
     source.refuse()
     return scene

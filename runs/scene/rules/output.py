@@ -16,15 +16,18 @@ def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     """Check each kind of output at the driven points against the scene."""
     for name, kind in scene.output.kinds:
         path = "output", name
-        if scene.contact is not None and not kind.in_contact:
+        if scene.in_contact and not kind.in_contact:
             raise error(
                 path,
                 "is not available in scenes with [contact]: leave it out, or take out [contact]",
             )
         if kind.of == "points" and not scene.force:
             raise error(path, "is of driven points: add a [[force]]")
-        if kind.of == "contact" and scene.contact is None:
-            raise error(path, "is of the forces of the road: add [contact]")
+        if kind.of == "contact" and not scene.in_contact:
+            raise error(
+                path,
+                "is of the forces of the road: add [contact], [time], and load (N) to [static]",
+            )
         kind.check(scene, path, error)
 
 
@@ -42,7 +45,7 @@ def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     for key in ("vibration", "fields"):
         if not getattr(output, key):
             continue
-        if scene.time is None or not (scene.force or scene.contact):
+        if scene.time is None or not (scene.force or scene.in_contact):
             raise error(
                 ("output", key), "needs forces in time: add [time] with [contact] or a [[force]]"
             )
@@ -50,7 +53,7 @@ def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             raise error(
                 ("output", key), 'is seen through the modes: take rotation.method = "projected"'
             )
-    if output.vibration and scene.contact is not None and not output.spectra:
+    if output.vibration and scene.in_contact and not output.spectra:
         raise error(
             ("output", "vibration"), "needs output.spectra, which find the run-in and the limit"
         )

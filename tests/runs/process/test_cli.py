@@ -131,6 +131,9 @@ def test_version_is_that_of_the_package(root: Path) -> None:
     assert f'version = "{VERSION}"' in (root / "pyproject.toml").read_text()
 
 
+STILL = {"rotating", "response", "contact", "spectra", "greens", "stiffness"}
+
+
 @pytest.mark.parametrize(
     ("overrides", "until", "expected"),
     [
@@ -138,16 +141,27 @@ def test_version_is_that_of_the_package(root: Path) -> None:
         (
             ["rotation.speed=0"],
             None,
-            {"rotating", "response", "contact", "spectra", "greens", "stiffness"},
+            STILL,
         ),
         (["force=[{}]", "time={}"], None, {"contact", "spectra", "stiffness"}),
         (["contact={}", "road={}", "time={}"], None, {"response", "stiffness"}),
         (["contact={}", "road={}", "time={}", "output.spectra=false"], None, None),
         ([], "modes", set(STAGES) - {"static", "modes"}),
+        (["rotation="], None, STILL | {"modes"}),
+        (["rotation=", "modal={}"], None, STILL),
+        (["rotation="], "modes", set(STAGES) - {"static", "modes"}),
+        (["contact={}"], None, {"response", "contact", "spectra", "greens", "stiffness"}),
+        (["contact={}", "force=[{}]"], None, {"response", "contact", "spectra", "stiffness"}),
+        (["contact={}", "time={}"], None, {"response", "stiffness"}),
+        (
+            ["contact={}", "time={}", "static.load="],
+            None,
+            {"response", "contact", "spectra", "greens", "stiffness"},
+        ),
     ],
 )
 def test_stages_follow_from_the_scene(scene: Path, overrides, until, expected) -> None:
-    reasons = skipped(load(scene, overrides), until)
+    reasons = skipped(load(scene, overrides, until=until), until)
     wanted = expected if expected is not None else {"response", "spectra", "stiffness"}
     bars = {"accuracy"} if "contact" in wanted else set()
     assert set(reasons) == wanted | {"vibration", "motion"} | bars
