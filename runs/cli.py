@@ -14,8 +14,8 @@ from tireroad.fem import form_cache
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.arguments import parser
 from tireroad.runs.process import mpi, observe, signals
-from tireroad.runs.process.statuses import DONE, handed_over, rank_before_mpi
-from tireroad.runs.process.surroundings import check_surroundings
+from tireroad.runs.process.statuses import DONE, handed_over, processes_here, rank_before_mpi
+from tireroad.runs.process.surroundings import check_surroundings, crowded
 
 
 def _together(function: Callable[[Any], None]) -> int:
@@ -25,6 +25,10 @@ def _together(function: Callable[[Any], None]) -> int:
         if rank_before_mpi() == 0:
             print(message, file=sys.stderr)
         return status
+    if rank_before_mpi() == 0:
+        # Before MPI starts, which with far too many processes takes minutes by itself.
+        for text in crowded(processes_here()):
+            print(f"warning: {text}", file=sys.stderr, flush=True)
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from tireroad.runs.process.surroundings import crowded
 from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
 from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.scene.plan import STAGES, skipped
@@ -100,7 +101,8 @@ def _demand(scene: Scene, processes: int) -> list[str]:
         + (", factors on disk" if on_disk else ""),
         *(f"  {name:26}{part / processes / 1e9:6.2f} GB" for name, part in parts.items()),
     ]
-    return lines + [f"warning: {text}" for text in check_demand(wanted, Path.cwd(), processes)]
+    warnings = [*check_demand(wanted, Path.cwd(), processes), *crowded(processes)]
+    return lines + [f"warning: {text}" for text in warnings]
 
 
 def _each(processes: int) -> str:

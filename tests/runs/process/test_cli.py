@@ -98,6 +98,25 @@ def test_wrong_process_count_is_explained(launch, scene: Path) -> None:
     assert done.returncode == 2 and "mpirun -n 5" in done.stderr
 
 
+@pytest.mark.parametrize(("processes", "warned"), [(5, 1), (4, 0)])
+def test_more_processes_than_the_cores_serve_are_warned_of(
+    scene: Path, monkeypatch, capsys, processes: int, warned: int
+) -> None:
+    """By `check` for the processes it is told of, by `run` before MPI starts."""
+    monkeypatch.chdir(scene.parent)
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    words = f"warning: {processes} processes on the 2 core(s) of this machine"
+    assert cli.main(["check", str(scene), "-n", str(processes)]) == 0
+    assert capsys.readouterr().out.count(words) == warned
+    for name in ("OMPI_COMM_WORLD_LOCAL_SIZE", "OMPI_COMM_WORLD_SIZE"):
+        monkeypatch.setenv(name, str(processes))
+    assert cli.main(["run", "nowhere.toml"]) == 2
+    assert capsys.readouterr().err.count(words) == warned
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", str(2 * processes))
+    assert cli.main(["run", "nowhere.toml"]) == 2
+    assert "core(s)" not in capsys.readouterr().err
+
+
 def test_folder_of_another_scene_is_left_alone(launch, scene: Path, tmp_path: Path) -> None:
     from tireroad.runs.files.folder import Summary
 
