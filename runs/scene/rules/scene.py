@@ -176,7 +176,10 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("modal", "static", "rotation", "contact", "time", "damping", "greens"), _modal),
     (("damping", "rotation", "output"), full_matrices),
     (("contact", "static", "rotation"), _contact),
-    (("output", "force", "modal", "axle", "tire", "damping", "contact"), check_outputs),
+    (
+        ("output", "force", "modal", "axle", "tire", "damping", "contact", "time", "static"),
+        check_outputs,
+    ),
     (("rotation",), check_campbell),
     (("force", "output", "contact", "time", "tire"), _force),
     (("greens", "rotation"), _greens),
@@ -184,8 +187,8 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("tire", "rotation", "modal", "greens"), check_cavity),
     (("pattern", "contact"), check_pattern),
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
-    (("output", "time", "contact", "force", "rotation"), check_vibration),
+    (("output", "time", "contact", "static", "force", "rotation"), check_vibration),
     (("static", "road", "modal", "tire"), check_shape),
     (("time",), _time),
-    (("accuracy", "contact", "road", "time", "output", "force"), check_accuracy),
+    (("accuracy", "contact", "road", "time", "static", "output", "force"), check_accuracy),
 )
