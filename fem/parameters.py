@@ -201,8 +201,9 @@ def vector(
     *,
     least: float | None = None,
     most: float | None = None,
+    absent: bool = False,
 ) -> Any:
-    """A list of finite numbers, as many as the default has."""
+    """A list of finite numbers, as many as the default has; `absent`: None is what it has instead."""
     size = len(default)
     limits = Limits(least=least, most=most)
 
@@ -215,4 +216,5 @@ def vector(
         return result
 
     allowed = f"{size} numbers, {limits}"
-    return parameter(Key(read=read, unit=unit, doc=doc, values=allowed, limits=limits), default)
+    key = Key(read=read, unit=unit, doc=doc, values=allowed, limits=limits, optional=absent)
+    return parameter(key, None if absent else default)

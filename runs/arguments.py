@@ -34,7 +34,8 @@ figure-C.1, figure-C.2, figure-D.1, table-B.1 to table-B.4. Figures that differ 
 """
 SET_HELP = (
     "override a value of the scene, in TOML or as a bare word: static.load=400, road.kind=flat,"
-    " force.0.amplitude=2; an empty value removes the key: static.load=. May be repeated"
+    " force.0.amplitude=2; an empty value removes the key: static.load=. Where it chooses a kind, keys"
+    " of the file that only other kinds have are dropped. May be repeated"
 )
 
 

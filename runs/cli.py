@@ -14,8 +14,8 @@ from tireroad.fem import form_cache
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.arguments import parser
 from tireroad.runs.process import mpi, observe, signals
-from tireroad.runs.process.statuses import DONE, handed_over, rank_before_mpi
-from tireroad.runs.process.surroundings import check_surroundings
+from tireroad.runs.process.statuses import DONE, handed_over, processes_here, rank_before_mpi
+from tireroad.runs.process.surroundings import check_surroundings, crowded
 
 
 def _together(function: Callable[[Any], None]) -> int:
@@ -25,6 +25,10 @@ def _together(function: Callable[[Any], None]) -> int:
         if rank_before_mpi() == 0:
             print(message, file=sys.stderr)
         return status
+    if rank_before_mpi() == 0:
+        # Before MPI starts, which with far too many processes takes minutes by itself.
+        for text in crowded(processes_here()):
+            print(f"warning: {text}", file=sys.stderr, flush=True)
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
@@ -55,7 +59,8 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
     _check_processes(args, comm.size)
     if getattr(args, "resumed", False):
         check_kept_scene(args.out)
-    scene = load(args.scene, args.set)
+    remarks: list[str] = []
+    scene = load(args.scene, args.set, remarks.append, args.until)
     directory = args.out if args.out is not None else Path("results") / scene.name
     mpi.start_petsc(petsc_options)
     form_cache.announce = observe.say
@@ -66,6 +71,8 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
 
         mpi.on_root(comm, claim)
         stack.enter_context(observe.log_to(directory / "log.txt"))
+        for remark in remarks:
+            observe.say(f"note: {remark}")
         from tireroad.runs.search.search import run
 
         try:
@@ -114,7 +121,7 @@ def _check(args: argparse.Namespace) -> None:
     from tireroad.runs.scene.check import explain
     from tireroad.runs.scene.load import load
 
-    scene = load(args.scene, args.set)
+    scene = load(args.scene, args.set, lambda remark: print(f"note: {remark}"))
     print(explain(scene, args.processes))
     print(write_section(scene, Path("results") / scene.name))
 

@@ -77,18 +77,19 @@ def drive(
     duration: float,
     step: float | None = None,
     tread: TreadLaw | None = None,
-    spacing: tuple[float, float] | None = None,
+    spacing: float | tuple[float, float] | None = None,
     residual: str = "static",
 ) -> History:
     """Roll the tire over the road for `duration` s.
 
     `step` s: time step, by default small enough for the fastest mode. `tread`: a law of
-    contact.tread.laws, by default a half-space of 10 MPa. `spacing` (m, m) of a grid of contact
-    points, by default the nodes of the mesh. Frictionless. Raises ConvergenceError if the road
+    contact.tread.laws, by default a half-space of 10 MPa. `spacing` (m, or m, m along and across) of
+    a grid of contact points, by default the nodes of the mesh. Frictionless. Raises ConvergenceError if the road
     touches the tire outside the patch of contact points. Collective.
     """
     if duration <= 0:
         raise InputError(f"drive: duration = {duration:g} s must be above 0")
+    law, pitches = _law(tread), _pitches(spacing)
     motions, turning = tire.standing.motions, tire.states.turning
     static = motions.static
     if static.road_height is None:
@@ -96,10 +97,10 @@ def drive(
     rolled = Rolled(
         speed=turning.speed * static.rolling_radius(), duration=duration, motion=lambda t: 0.0
     )
-    setup = contact_setup(static, motions.lattice, road, rolled, spacing=spacing)
+    setup = contact_setup(static, motions.lattice, road, rolled, spacing=pitches)
     loads = probe.nodes(setup.patch.index, len(static.points), 2)
     response = tire.respond(loads, loads, residual)
-    spec = _Spec(law=tread or TREADS.make("half-space", youngs_modulus=1e7))
+    spec = _Spec(law=law)
     setup, _ = setup.settled(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
     chosen = equal_steps(duration, step or min(duration / _LEAST_STEPS, _TURN / fastest))
@@ -107,6 +108,33 @@ def drive(
     highest = tire.states.highest / (2 * np.pi)
     bounds = limits(step=chosen.size, highest=highest, pitch=pitch(setup.patch), speed=rolled.speed)
     return _history(setup.patch, instants, lowest(bounds))
+
+
+def _law(tread: TreadLaw | None) -> TreadLaw:
+    """The tread law, by default a half-space of 10 MPa."""
+    if tread is None:
+        return TREADS.make("half-space", youngs_modulus=1e7)
+    if isinstance(tread, TreadLaw):
+        return tread
+    raise InputError(
+        f"drive: tread = {tread!r} is no tread law: take an object of contact.tread.laws, such as "
+        "HalfSpace(youngs_modulus=1e7)"
+    )
+
+
+def _pitches(spacing: float | tuple[float, float] | None) -> tuple[float, float] | None:
+    """Distances (m) of the contact points along and across; one number is both."""
+    if spacing is None:
+        return None
+    try:
+        along, across = np.broadcast_to(np.asarray(spacing, dtype=float), 2)
+    except (TypeError, ValueError):
+        along = across = np.nan
+    if not (0 < along < np.inf and 0 < across < np.inf):
+        raise InputError(
+            f"drive: spacing = {spacing!r} must be one length or two (along, across) above 0 m, such as 0.005"
+        )
+    return float(along), float(across)
 
 
 def _instants(

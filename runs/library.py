@@ -22,6 +22,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
+from tireroad.fem.errors import InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.model import SmallMotions, TireModel
 from tireroad.fem.sections.torus import Torus
@@ -134,11 +135,29 @@ def modes(
 
     `rim` "fixed" or "free". `road` "forces": the road is replaced by its contact forces; "held":
     the touching nodes are held in height. `turning`: how the wheel will rotate; the shapes that
-    belts couple to then join the modes (modal.rotation_shapes), as in a run.
+    belts couple to then join the modes (modal.rotation_shapes), as in a run. Raises InputError for
+    a static state of another tire.
     """
+    _check_state(tire, static)
     motions = SmallMotions(tire, static, rim=rim, road=road)
     basis = standing_modes(motions, count=count, up_to=up_to, turning=turning)
     return Standing(motions=motions, basis=basis)
+
+
+def _check_state(tire: TireModel, static: StaticState) -> None:
+    """Raise InputError if a static state is not that of the tire. Collective."""
+    lattice, found = tire.lattice, len(static.displacement)
+    why = ""
+    if found != lattice.size:
+        why = f"it has {found} nodes, and the tire {lattice.size}"
+    elif not np.allclose(static.points, lattice.points(lattice.face), rtol=0, atol=1e-9):
+        why = "its nodes lie elsewhere"
+    elif static.materials and static.materials != tire.body.materials:
+        why = "its tire is of other materials"
+    if why:
+        raise InputError(
+            f"modes: static is the state of another tire ({why}): press this one, and give the result"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,7 @@ from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint, footprint, nodal_area
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.tire.cord_forces import CordForce, cord_forces
+from tireroad.fem.tire.material import Material
 from tireroad.fem.tire.mesh import Lattice
 
 
@@ -26,8 +27,9 @@ class StaticState:
     deformed x with respect to the ring angle.
 
     `road_height` (m) is None without a road; `inflation` (Pa) and the steady `rolling` are the
-    loads of this state. `cords` by name of the ply; `mass` (kg) of wall and cords; `fine_extent`:
-    contact extent on finer elements if known (fem.static.load_error).
+    loads of this state. `cords` by name of the ply; `mass` (kg) of wall and cords; `materials` of
+    the tire by region, empty for a state from a file; `fine_extent`: contact extent on finer
+    elements if known (fem.static.load_error).
 
     With friction: `pull` (s, 2) N, force of the road on the tire along and across it, and for a
     rolling tire `travel`, m per radian along the road without the wheel's slip.
@@ -47,6 +49,7 @@ class StaticState:
     rolling: Rolling = AT_REST
     cords: Mapping[str, CordForce] = field(default_factory=dict)
     mass: float = 0.0
+    materials: Mapping[str, Material] = field(default_factory=dict)
     road: RoadShape = FLAT
     fine_extent: Footprint | None = None
     pull: np.ndarray | None = None
@@ -180,6 +183,7 @@ def static_state(equilibrium: Equilibrium, touch_height: float) -> StaticState:
         travel=equilibrium.road.travel,
         cords=cord_forces(body),
         mass=body.comm.allreduce(float(body.nodal_mass()[::3].sum())),
+        materials=body.materials,
     )
 
 

@@ -23,6 +23,8 @@ def describe(file: Path, as_json: bool = False) -> str:
     described too. Control characters are shown as escapes. Not collective. Raises InputError if the
     file is absent, not HDF5, or damaged.
     """
+    if file.is_dir():
+        raise InputError(f"{file} is a folder: {_candidates(file)}")
     if not file.is_file():
         raise InputError(f"{file}: there is no such file")
     try:
@@ -45,6 +47,14 @@ def describe(file: Path, as_json: bool = False) -> str:
             return "\n".join(_printable(line) for line in lines)
     except Exception as error:  # HDF5 and h5py raise all kinds of errors on a damaged foreign file
         raise InputError(f"{file} is damaged: {type(error).__name__}: {error}") from error
+
+
+def _candidates(folder: Path) -> str:
+    """What to give instead of a folder."""
+    found = [str(one) for one in sorted(folder.glob("*.h5"))]
+    if not found:
+        return "it holds no .h5 file; give a result file of a run, such as static.h5"
+    return f"give a file in it, {found[0]}" if not found[1:] else f"give one of {', '.join(found)}"
 
 
 def _held(path: Path, file: h5py.File, checksum_is: str) -> dict:

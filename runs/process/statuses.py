@@ -13,6 +13,18 @@ def rank_before_mpi() -> int:
     return 0
 
 
+def processes_here() -> int:
+    """Number of processes according to the process manager if all are on this machine, else 1."""
+    here, whole = (
+        next((int(found) for name in names if (found := os.environ.get(name, "")).isdigit()), 1)
+        for names in (
+            ("OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS"),
+            ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE"),
+        )
+    )
+    return whole if here == whole else 1
+
+
 def in_parallel() -> bool:
     """Whether the process manager has started more than one process."""
     for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"):

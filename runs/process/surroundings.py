@@ -31,6 +31,20 @@ def check_surroundings() -> None:
     _check_temporary()
 
 
+def crowded(processes: int) -> list[str]:
+    """A warning if this machine has less than half a core for each process.
+
+    Twice as many as cores are nothing unusual: hyperthreads, and the tests.
+    """
+    cores = os.cpu_count() or 1
+    if processes <= 2 * cores:
+        return []
+    return [
+        f"{processes} processes on the {cores} core(s) of this machine: they wait for one another, and a run takes "
+        f"longer than with -n {cores}"
+    ]
+
+
 def _check_temporary() -> None:
     try:
         folder = Path(tempfile.gettempdir())

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from tireroad.runs.process.surroundings import crowded
 from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
 from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.scene.plan import STAGES, skipped
@@ -79,8 +80,10 @@ def _demand(scene: Scene, processes: int) -> list[str]:
     wanted = estimate(scene)
     on_disk = out_of_core(wanted, processes)
     size, parts = wanted.sizes, memory_of(wanted, processes, on_disk)
-    counts = [f"{size.free} unknowns not held by the rim", f"{size.modes} modes"]
-    if scene.contact is not None:
+    counts = [f"{size.free} unknowns not held by the rim"]
+    if scene.modal is not None:
+        counts.append(f"{size.modes} modes")
+    if scene.in_contact:
         counts.append(f"about {size.points} contact points")
     if scene.time is not None:
         about = "about " if scene.time.step == "auto" else ""
@@ -98,7 +101,8 @@ def _demand(scene: Scene, processes: int) -> list[str]:
         + (", factors on disk" if on_disk else ""),
         *(f"  {name:26}{part / processes / 1e9:6.2f} GB" for name, part in parts.items()),
     ]
-    return lines + [f"warning: {text}" for text in check_demand(wanted, Path.cwd(), processes)]
+    warnings = [*check_demand(wanted, Path.cwd(), processes), *crowded(processes)]
+    return lines + [f"warning: {text}" for text in warnings]
 
 
 def _each(processes: int) -> str:

@@ -7,7 +7,7 @@ each other, or raises one InputError that lists all problems: the key, its place
 import difflib
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -15,21 +15,29 @@ from typing import Any
 from tireroad.fem.errors import InputError
 from tireroad.fem.keys import Key, described
 from tireroad.fem.parameters import ParameterError
+from tireroad.runs.scene import derived
+from tireroad.runs.scene.chosen import drop_unused
 from tireroad.runs.scene.raw import override, read_text
 from tireroad.runs.scene.rules import scene as rules
 from tireroad.runs.scene.schema import Table, fields_of, gathered, key_of, table_of, variant_of
-from tireroad.runs.scene.sections.kind import SECTIONS
 from tireroad.runs.scene.source import Source, shortened
 from tireroad.runs.scene.tables.cavity import filled
-from tireroad.runs.scene.tables.scene import Damping, Scene
+from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.scene.walk import applies, every_field, names, owners
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}")
 
 
-def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
+def load(
+    path: Path | str,
+    overrides: Sequence[str] = (),
+    say: Callable[[str], object] = lambda remark: None,
+    until: str | None = None,
+) -> Scene:
     """The scene of a file, with `overrides` ("table.key=value", as for --set) applied.
 
+    `say` gets a line for each thing in the file that the scene does not have as it stands there;
+    `until`: the last stage that is to run.
     Raises InputError with all problems. Reads one file. Not collective.
     """
     path = Path(path)
@@ -43,7 +51,8 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     changed = frozenset(override(raw, item) for item in overrides)
     source = Source(path, text, changed)
     raw.setdefault("name", re.sub(r"[^A-Za-z0-9._-]", "-", path.stem).lstrip(".-") or "scene")
-    _by_section(raw)
+    drop_unused(Scene, raw, changed, say)
+    derived.by_section(raw)
     scene = _table(Scene, raw, (), source)
     if not NAME.fullmatch(scene.name):
         source.add(
@@ -54,39 +63,13 @@ def load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     if "tire" not in source.broken():
         scene.tire.shape.check(scene.tire, source)
     if "tire" not in source.broken():
-        scene = _with_speed(_with_damping(scene))
+        scene = derived.with_speed(derived.with_damping(scene))
+    scene = derived.with_modal(derived.with_road(scene, say), until)
+    if not source.broken() & {"tire", "modal"}:
+        scene = derived.with_count(scene, raw, until, source, say)
     rules.check(scene, raw, source)
     source.refuse()
     return scene
-
-
-def _by_section(raw: dict[str, Any]) -> None:
-    """Set defaults that follow from another table: a mesh's section, a section's tread."""
-    tire, contact = raw.get("tire"), raw.get("contact")
-    if not isinstance(tire, dict):
-        return
-    if "mesh" in tire:
-        tire.setdefault("section", "file")
-    kind = tire.get("section")
-    if isinstance(contact, dict) and isinstance(kind, str) and kind in SECTIONS:
-        contact.setdefault("tread", SECTIONS[kind].tread_law)
-
-
-def _with_speed(scene: Scene) -> Scene:
-    """Set the wheel's speed for a travel speed until the static state gives its rolling radius."""
-    rotation = scene.rotation
-    if rotation is None or rotation.travel_speed is None:
-        return scene
-    speed = rotation.travel_speed / (
-        rotation.rolling_radius or scene.tire.proportions().outer_radius
-    )
-    return replace(scene, rotation=replace(rotation, speed=speed))
-
-
-def _with_damping(scene: Scene) -> Scene:
-    """Set the default proportional damping if neither it nor a compound's loss factor is given."""
-    loses = scene.tire.shape.has_losses(scene.tire)
-    return replace(scene, damping=Damping()) if scene.damping is None and not loses else scene
 
 
 def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:

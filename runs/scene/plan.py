@@ -1,5 +1,7 @@
 """Which stages a scene needs, and why the others are skipped."""
 
+from dataclasses import fields
+
 from tireroad.runs.scene.tables.scene import Scene
 
 STAGES = (
@@ -27,13 +29,15 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
         reasons["rotating"] = "no [rotation]: the wheel stands"
     elif scene.rotation.speed == 0:
         reasons["rotating"] = "rotation.speed is 0: the wheel stands"
-    if not scene.force and not any(kind.of == "contact" for _, kind in scene.output.kinds):
-        reasons["response"] = "no [[force]]"
-    if scene.contact is None:
-        reasons["contact"] = "no [contact]"
-        reasons["accuracy"] = reasons["spectra"] = "no [contact], hence no contact forces"
+    if scene.modal is None:
+        reasons["modes"] = "no [modal], and nothing that needs modes"
+    if (idle := _no_response(scene)) is not None:
+        reasons["response"] = idle
+    if not scene.in_contact:
+        reasons["contact"] = why = _no_contact(scene)
+        reasons["accuracy"] = reasons["spectra"] = f"{why}, hence no contact forces"
         if not scene.force:
-            reasons["greens"] = "neither [[force]] nor [contact]"
+            reasons["greens"] = f"no [[force]], and {why}"
     elif not scene.output.spectra:
         reasons["spectra"] = "output.spectra is false"
     if "accuracy" not in reasons and not scene.accuracy.estimate:
@@ -46,3 +50,21 @@ def skipped(scene: Scene, until: str | None = None) -> dict[str, str]:
         for stage in STAGES[STAGES.index(until) + 1 :]:
             reasons.setdefault(stage, f"--until {until}")
     return reasons
+
+
+def _no_contact(scene: Scene) -> str:
+    """Why the contact is not followed in time."""
+    if scene.contact is None:
+        return "no [contact]"
+    return "no [time]" if scene.time is None else "no road in [static]: it has no load (N)"
+
+
+def _no_response(scene: Scene) -> str | None:
+    """Why there is no response to the prescribed forces; None if there is one."""
+    if not scene.force:
+        of_contact = any(kind.of == "contact" for _, kind in scene.output.kinds)
+        return None if of_contact and scene.in_contact else "no [[force]]"
+    in_frequency = any(fields(kind) for _, kind in scene.output.kinds)
+    if scene.time is None and not in_frequency:
+        return "no [time], and no output.receptance"
+    return None

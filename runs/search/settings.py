@@ -167,7 +167,7 @@ def applied(scene: Scene, settings: Settings, *, search: bool = False) -> Scene:
         ),
         # The mesh companion estimates that error, and for the forces of interest.
         static=replace(scene.static, error_estimate=False),
-        modal=replace(scene.modal, up_to=settings.up_to),
+        modal=replace(scene.modes, up_to=settings.up_to),
         greens=replace(scene.greens, residual=settings.residual, dynamic=None, band=None),
         contact=replace(scene.contact, points=Pitch(settings.pitch, settings.pitch)),
         time=replace(scene.time, step=settings.step, scheme="auto"),

@@ -40,7 +40,7 @@ class Motions(Shared[SmallMotions]):
 
     def make(self) -> SmallMotions:
         """No matrices yet: each is assembled when first used."""
-        tire, static, modal = self.job.tire, self.static.product, self.job.scene.modal
+        tire, static, modal = self.job.tire, self.static.product, self.job.scene.modes
         rim, road = modal.rim, modal.road
         key = self.static.key, rim, road
         return kept.once("matrices", key, lambda: SmallMotions(tire, static, rim=rim, road=road))
@@ -58,7 +58,7 @@ class ModesStage(Computed[ModalBasis]):
         """The static state and the modal table; rotation matrices only if the wheel turns."""
         return {
             "static": self.static.key,
-            "modal": asdict(self.job.scene.modal),
+            "modal": asdict(self.job.scene.modes),
             "rotating": self.job.speed != 0,
             "shapes": self._shapes,
             "cavity": cavity.inputs(self.job),
@@ -72,7 +72,7 @@ class ModesStage(Computed[ModalBasis]):
 
     def compute(self, record: Record) -> ModalBasis:
         """Solve and project. Collective."""
-        motions, wanted = self.motions.product, self.job.scene.modal
+        motions, wanted = self.motions.product, self.job.scene.modes
         with record.timing("matrices"):
             operators = motions.operators
         with (
@@ -143,7 +143,7 @@ class Fields(Shared[ModalBasis]):
 
     def make(self) -> ModalBasis:
         """The basis with fields. Collective."""
-        wanted, basis = self.job.scene.modal, self.modes.product
+        wanted, basis = self.job.scene.modes, self.modes.product
         if basis.modes is not None:
             return basis
         motions, air = self.motions.product, self.air.product

@@ -23,6 +23,7 @@ from tireroad.runs.files.folder import Summary, make_folder
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import factors_on_disk, forget_peak, peak_memory
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.scene.derived import with_modal
 from tireroad.runs.scene.extent.demand import check_demand, duration, memory_of, out_of_core
 from tireroad.runs.scene.extent.estimate import Estimate, estimate
 from tireroad.runs.scene.plan import skipped
@@ -94,6 +95,7 @@ def run_scene(
 
     `cache`: finished stages shared with other runs, by default none.
     """
+    scene = with_modal(scene, until)
     forget_peak()  # of an earlier member of a sweep in the same process
     job = Job(scene, directory, comm, fresh, cache)
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))

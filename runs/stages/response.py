@@ -120,7 +120,7 @@ class ResponseStage(Computed[PointResponse]):
             "force": (force, "N"),
             "displacement": (displacement.reshape(len(force), -1, 3), "m"),
         }
-        if scene.output.axle_force and scene.modal.rim != "free":  # a free axle carries no force
+        if scene.output.axle_force and scene.modes.rim != "free":  # a free axle carries no force
             curves["axle_force"] = axle, "N"
             curves |= {"hub_moment": (moment, "N m")} if moment.size else {}
         return curves

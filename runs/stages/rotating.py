@@ -87,7 +87,7 @@ class RotatingStage(Computed[RollingModes]):
         if job.scene.rotation.method == "full":
             rolling = self._full(record, rolling)
         speed = rolling.turning.speed
-        free_at = speed if job.scene.modal.rim == "free" else None
+        free_at = speed if job.scene.modes.rim == "free" else None
         critical = critical_speed(basis.projection, rolling.turning.inertia, free_at)
         _describe(record, rolling, critical)
         if speed > critical:

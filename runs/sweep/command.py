@@ -89,4 +89,4 @@ def _group(scene: Scene) -> str:
     from tireroad.runs.stages.static import StaticStage
 
     static = StaticStage(job=Job(scene, Path("."), MPI.COMM_SELF))
-    return stage_hash({"static": static.inputs(), "modal": asdict(scene.modal)})
+    return stage_hash({"static": static.inputs(), "modal": asdict(scene.modes)})

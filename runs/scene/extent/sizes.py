@@ -112,9 +112,9 @@ def _wall(scene: Scene) -> _Wall:
 
 def _modes(scene: Scene, free: int) -> int:
     """Number of modes."""
-    if scene.modal.up_to is None:
-        return scene.modal.count
-    return max(min(int(_wall(scene).modes_below(scene.modal.up_to)), free // 3), 1)
+    if scene.modes.up_to is None:
+        return scene.modes.count
+    return max(min(int(_wall(scene).modes_below(scene.modes.up_to)), free // 3), 1)
 
 
 def _shapes(scene: Scene, modes: int) -> int:
@@ -126,7 +126,7 @@ def _shapes(scene: Scene, modes: int) -> int:
 
 def highest_frequency(scene: Scene, modes: int) -> float:
     """Frequency (Hz) of the highest mode, from the same mode density."""
-    return scene.modal.up_to or _wall(scene).frequency_of(modes)
+    return scene.modes.up_to or _wall(scene).frequency_of(modes)
 
 
 def road_height(scene: Scene) -> float:
@@ -159,7 +159,7 @@ def road_memory(scene: Scene) -> dict[str, float]:
 
 def _points(scene: Scene, free: int) -> tuple[int, int]:
     """Nodes and points of the patch, where the tire is within reach of the road."""
-    if scene.contact is None:
+    if not scene.in_contact:
         return 0, 0
     static, contact, mesh = scene.static, scene.contact, scene.tire
     tire = mesh.proportions()
@@ -201,7 +201,7 @@ def _steps(scene: Scene, modes: int) -> int:
         return math.ceil(time.duration / time.step)
     step = min(time.duration / 200, TURN / (2 * math.pi * highest_frequency(scene, modes)))
     travel = least_travel(scene)
-    if scene.contact is not None and travel > 0:
+    if scene.in_contact and travel > 0:
         spacing, points = made(scene.road.surface).spacing, scene.contact.points
         spacing = max(spacing, points.dx) if isinstance(points, Pitch) else spacing
         step = min(step, spacing / 8 / (travel / time.duration))

@@ -22,15 +22,17 @@ def check_outputs(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[I
 
 
 def _check_kind(scene: Scene, kind: Output, path: tuple[str, ...], error: Where) -> None:
-    if scene.contact is not None and not kind.in_contact:
+    if scene.in_contact and not kind.in_contact:
         raise error(
             path,
             "is not available in scenes with [contact]: leave it out, or take out [contact]",
         )
     if kind.of == "points" and not scene.force:
         raise error(path, "is of driven points: add a [[force]]")
-    if kind.of == "contact" and scene.contact is None:
-        raise error(path, "is of the forces of the road: add [contact]")
+    if kind.of == "contact" and not scene.in_contact:
+        raise error(
+            path, "is of the forces of the road: add [contact], [time], and load (N) to [static]"
+        )
     kind.check(scene, path, error)
 
 
@@ -50,11 +52,11 @@ def check_vibration(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator
         path = "output", key
         if not getattr(output, key):
             continue
-        if scene.time is None or not (scene.force or scene.contact):
+        if scene.time is None or not (scene.force or scene.in_contact):
             yield error(path, "needs forces in time: add [time] with [contact] or a [[force]]")
         if full:
             yield error(path, 'is seen through the modes: take rotation.method = "projected"')
-    if output.vibration and scene.contact is not None and not output.spectra:
+    if output.vibration and scene.in_contact and not output.spectra:
         yield error(
             ("output", "vibration"), "needs output.spectra, which find the run-in and the limit"
         )

@@ -36,7 +36,7 @@ def check_shape(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             ("road", "drum_radius"),
             f"= {drum:g} m leaves no room inside for a tire of {outer:g} m: at least {_ROOM * outer:.3g} m",
         )
-    if scene.modal.road == "held" and (drum is not None or camber):
+    if scene.modes.road == "held" and (drum is not None or camber):
         raise error(
             ("modal", "road"),
             '= "held" holds the nodes in height, on a level road: take "forces", or static.camber = 0 deg '

@@ -1,7 +1,6 @@
 """Rules beyond single keys: contradictions between tables, and combinations not supported."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import fields
 from typing import Any
 
 from tireroad.fem.errors import InputError
@@ -41,15 +40,6 @@ def check(scene: Scene, raw: dict[str, Any], source: Source) -> None:
             source.problems.append(((), str(error)))
 
 
-def _modes(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    free = scene.tire.free_unknowns()
-    if scene.modal.up_to is None and scene.modal.count >= free:
-        raise error(
-            ("modal", "count"),
-            f"= {scene.modal.count} must be less than the {free} free unknowns of the mesh",
-        )
-
-
 def _static(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     given = [key for key in ("load", "deflection", "road_height") if key in raw.get("static", {})]
     if len(given) > 1:
@@ -77,15 +67,15 @@ def _rotation(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 
 def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
-    modal, static, rotation = scene.modal, scene.static, scene.rotation
+    modal, static, rotation = scene.modes, scene.static, scene.rotation
     if modal.road == "held" and not static.on_road:
         raise error(("modal", "road"), '= "held" needs a road: add load (N) to [static]')
-    if scene.contact is not None and modal.road == "held":
+    if scene.in_contact and modal.road == "held":
         raise error(
             ("modal", "road"),
             '= "held" fixes the nodes whose contact is to be computed: [contact] needs "forces"',
         )
-    if scene.contact is not None and modal.rim == "free":
+    if scene.in_contact and modal.rim == "free":
         raise error(
             ("modal", "rim"),
             '= "free" leaves nothing to carry the load: [contact] needs "fixed"',
@@ -117,9 +107,6 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 
 def _force(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
-    sought = any(fields(kind) for _, kind in scene.output.kinds)
-    if scene.force and scene.time is None and not sought:
-        yield error(("force",), "has nothing to drive: add [time] or output.receptance")
     for number, force in enumerate(scene.force):
         if not any(force.direction):
             yield error(("force", str(number), "direction"), "must not be all zeros")
@@ -138,17 +125,6 @@ def _greens(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             ("greens", "residual"),
             '= "attachment" completes the modes: it needs rotation.method = "projected"',
         )
-
-
-def _contact_needs(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:
-    if scene.contact is None:
-        return
-    if scene.road is None:
-        yield error(("contact",), 'needs a road: add [road], e.g. kind = "flat"')
-    if scene.time is None:
-        yield error(("contact",), "needs a time to run: add [time] with duration")
-    if not scene.static.on_road:
-        yield error(("contact",), "needs a static road: add load (N) or deflection (m) to [static]")
 
 
 def _contact(scene: Scene, raw: dict[str, Any], error: Where) -> None:
@@ -197,14 +173,12 @@ def _time(scene: Scene, raw: dict[str, Any], error: Where) -> None:
 
 RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("static",), _static),
-    (("tire", "modal"), _modes),
     (("rotation",), _rotation),
-    (("modal", "static", "rotation", "contact", "damping", "greens"), _modal),
+    (("modal", "static", "rotation", "contact", "time", "damping", "greens"), _modal),
     (("damping", "rotation", "output"), full_matrices),
-    (("contact", "road", "time", "static"), _contact_needs),
-    (("contact", "road", "time", "static", "rotation"), _contact),
+    (("contact", "static", "rotation"), _contact),
     (
-        ("output", "force", "modal", "axle", "tire", "damping", "contact", "static"),
+        ("output", "force", "modal", "axle", "tire", "damping", "contact", "time", "static"),
         check_outputs,
     ),
     (("rotation",), check_campbell),
@@ -214,8 +188,8 @@ RULES: tuple[tuple[tuple[str, ...], Callable], ...] = (
     (("tire", "rotation", "modal", "greens"), check_cavity),
     (("pattern", "contact"), check_pattern),
     (("axle", "modal", "rotation", "greens", "output", "static"), check_axle),
-    (("output", "time", "contact", "force", "rotation"), check_vibration),
+    (("output", "time", "contact", "static", "force", "rotation"), check_vibration),
     (("static", "road", "modal", "tire"), check_shape),
     (("time",), _time),
-    (("accuracy", "contact", "road", "time", "output", "force"), check_accuracy),
+    (("accuracy", "contact", "road", "time", "static", "output", "force"), check_accuracy),
 )

@@ -45,7 +45,8 @@ class SectionKind(Parameters):
 
     `order` and `segments`: defaults of element order and elements around. `air`: whether air is
     included unless [tire.cavity] says otherwise. `tread_law`: default of `contact.tread`; a layer
-    for treads on belts, which hardly deform.
+    for treads on belts, which hardly deform. `without`: tables of [tire] that the kind has no use
+    for.
     """
 
     owner = "section"
@@ -53,6 +54,7 @@ class SectionKind(Parameters):
     segments: ClassVar[int] = 60
     air: ClassVar[bool] = True
     tread_law: ClassVar[str] = "layer"
+    without: ClassVar[tuple[str, ...]] = ()
 
     def elements(self, tire: Tire) -> tuple[Self, int, int]:
         """The kind with its number of elements set; order and segments, given or by default."""

@@ -80,8 +80,11 @@ def check_accuracy(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     key = ("accuracy", "target" if wanted.target is not None else "target_db")
     if not wanted.estimate:
         raise error(key, "is met by the estimated error: it needs accuracy.estimate = true")
-    if scene.contact is None or scene.road is None or scene.time is None:
-        raise error(key, "is of the forces of a tire on a road: add [contact], [road] and [time]")
+    if not scene.in_contact or scene.road is None or scene.time is None:
+        raise error(
+            key,
+            "is of the forces of a tire on a road: add [contact], [road], [time], and load (N) to [static]",
+        )
     if wanted.of == "axle_force" and not scene.output.axle_force:
         raise error(("accuracy", "of"), '= "axle_force" needs output.axle_force = true')
     if scene.road.kind == "flat" and scene.road.motion.kind == "none" and not scene.force:

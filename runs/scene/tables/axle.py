@@ -158,7 +158,7 @@ def _check_springs(axle: Axle, error: Where) -> None:
 def _check_company(scene: Scene, axle: Axle, error: Where) -> None:
     """Refuse what is available for a held wheel only."""
     turns = scene.rotation is not None and scene.rotation.speed > 0
-    if scene.modal.rim == "free":
+    if scene.modes.rim == "free":
         raise error(("modal", "rim"), '= "free" is a wheel without mass: [axle] needs "fixed"')
     if turns and scene.rotation.method == "full":
         raise error(("rotation", "method"), '= "full" knows no [axle] that moves: take "projected"')

@@ -63,7 +63,7 @@ def check_cavity(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             '= "full" knows no air: take "projected", or tire.cavity.gas = "none"',
         )
     used = bool(scene.force) or scene.contact is not None
-    if used and scene.modal.rim == "free" and residual not in ("none", "attachment"):
+    if used and scene.modes.rim == "free" and residual not in ("none", "attachment"):
         raise error(
             ("greens", "residual"),
             f'= "{residual}" of a free rim knows no air: take "attachment" or "none", or '

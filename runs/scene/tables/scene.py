@@ -196,7 +196,11 @@ class Scene:
     stiffness: Stiffness | None = table(
         Stiffness, "load over deflection, and the stiffness of the standing tire", optional=True
     )
-    modal: Modal = table(Modal, "modes at the static state")
+    modal: Modal | None = table(
+        Modal,
+        "modes at the static state; absent: with its defaults where anything needs modes",
+        optional=True,
+    )
     damping: Damping | None = table(
         Damping,
         "Rayleigh damping of the material; absent: by the loss factors of the compounds, where "
@@ -219,9 +223,19 @@ class Scene:
     output: Output = table(Output, "what is computed and kept")
 
     @property
+    def modes(self) -> Modal:
+        """The table [modal], or its defaults."""
+        return self.modal or Modal()
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether the contact with the road is followed in time."""
+        return self.contact is not None and self.time is not None and self.static.on_road
+
+    @property
     def joins_shapes(self) -> bool:
         """Whether rotation shapes join the modes of a rotating wheel (modal.rotation_shapes)."""
         rotation = self.rotation
-        if rotation is None or self.modal.rim == "free":
+        if rotation is None or self.modes.rim == "free":
             return False
         return rotation.shapes and rotation.method == "projected"

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 
 NEAR_ROAD = 0.2  # footprint_size with a road
+AROUND_CROWN = (0.0, 45.0)  # deg: arc of a region of a torus that has none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,10 +53,17 @@ def _loss_factor():
 @dataclass(frozen=True)
 class Region:
     name: str | None = text(
-        None, "region of a file, or compound of a radial tire, that this changes; not for a torus"
+        None,
+        "region of a file, or compound of a radial tire, that this changes; absent: all compounds of a radial tire; not "
+        "for a torus",
     )
-    arc: tuple[float, float] = vector(
-        (0.0, 45.0), "deg", "start and end, measured from the crown", least=0, most=175
+    arc: tuple[float, float] | None = vector(
+        AROUND_CROWN,
+        "deg",
+        "start and end, measured from the crown; of a torus only, where absent is 0 to 45",
+        least=0,
+        most=175,
+        absent=True,
     )
     side: str = choice("both", ("both", "left", "right"), "side of the crown; left: y < 0")
     depth: tuple[float, float] = vector(

@@ -48,7 +48,7 @@ def readings(job: Job) -> int:
     """
     if job.axle:
         return BESIDE
-    modal = job.scene.modal
+    modal = job.scene.modes
     held = (modal.rim, modal.road) == ("fixed", "forces") and job.scene.output.axle_force
     return MOMENTS if held else 0
 

@@ -76,7 +76,7 @@ class Driven:
         """
         turning = turning_of(self.job)
         motions = SmallMotions(
-            self.job.tire, self.static, rim="free", road=self.job.scene.modal.road
+            self.job.tire, self.static, rim="free", road=self.job.scene.modes.road
         )
         basis = standing_modes(motions, count=count, rotation=turning.speed != 0)
         wheel = wheel_of(motions, turning, projection=basis.projection)
@@ -88,7 +88,7 @@ class Driven:
     @property
     def drifts(self) -> bool:
         """Whether a constant force makes the tire drift: there is then no receptance at 0 Hz."""
-        return self.job.scene.modal.rim == "free" or self.response.rigid > 0
+        return self.job.scene.modes.rim == "free" or self.response.rigid > 0
 
     def force(self, order: int = 0) -> Array:
         """The prescribed forces (nt, k) N, or their time derivative of that order."""

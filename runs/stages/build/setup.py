@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Setup(Shared[ContactSetup | None]):
-    """The patch and the road under it; None for a scene without contact."""
+    """The patch and the road under it; None without contact in time."""
 
     name: ClassVar[str] = "setup"
     static: Done[StaticState]
@@ -39,7 +39,7 @@ class Setup(Shared[ContactSetup | None]):
     def make(self) -> ContactSetup | None:
         """The setup from the static state and the scene's road."""
         job = self.job
-        if not job.scene.contact:
+        if not job.scene.in_contact:
             return None
         state, on_grid = self.static.product, not job.scene.contact.on_nodes
         surface = tread_surface(job, state, self.static.key) if on_grid else None

@@ -47,7 +47,7 @@ class Transmissibility(Output):
 
     def check(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
         """Check that the axle is held, that a free rim has no air and no road, and the steps."""
-        if scene.modal.rim == "free" or scene.axle.kind != "fixed":
+        if scene.modes.rim == "free" or scene.axle.kind != "fixed":
             raise error(
                 path, 'is the force on a held axle: take modal.rim = "fixed", axle.kind = "fixed"'
             )

@@ -19,7 +19,7 @@ KNOWN: dict[str, tuple[str, Read, str]] = {
     "ρ": ("kg/m³", lambda scene: scene.tire.material.density, ""),
     "γ1": ("1/s", lambda scene: scene.damping.mass, ""),
     "γ2": ("s", lambda scene: scene.damping.stiffness, ""),
-    "modes": ("-", lambda scene: scene.modal.count, ""),
+    "modes": ("-", lambda scene: scene.modes.count, ""),
     "Ω": ("rad/s", lambda scene: scene.rotation.speed if scene.rotation else 0.0, ""),
     "E of the half-space": ("Pa", lambda scene: scene.contact.law.youngs_modulus, ""),
     "ν of the half-space": ("-", lambda scene: scene.contact.law.poisson_ratio, ""),

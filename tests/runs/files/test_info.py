@@ -78,8 +78,15 @@ def test_what_is_no_result_is_an_input_error(results: Path) -> None:
         describe(results / "scene.toml")
     with pytest.raises(InputError, match="no such file"):
         describe(results / "absent.h5")
-    with pytest.raises(InputError, match="no such file"):
+
+
+def test_of_a_folder_the_files_in_it_are_named(results: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
         describe(results)
+    assert f"{results} is a folder: give one of {results / 'contact.h5'}, " in str(caught.value)
+    assert str(results / "static.h5") in str(caught.value)
+    with pytest.raises(InputError, match="a folder: it holds no .h5 file"):
+        describe(tmp_path)
 
 
 def test_the_same_for_programs(results: Path) -> None:

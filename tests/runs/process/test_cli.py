@@ -98,6 +98,25 @@ def test_wrong_process_count_is_explained(launch, scene: Path) -> None:
     assert done.returncode == 2 and "mpirun -n 5" in done.stderr
 
 
+@pytest.mark.parametrize(("processes", "warned"), [(5, 1), (4, 0)])
+def test_more_processes_than_the_cores_serve_are_warned_of(
+    scene: Path, monkeypatch, capsys, processes: int, warned: int
+) -> None:
+    """By `check` for the processes it is told of, by `run` before MPI starts."""
+    monkeypatch.chdir(scene.parent)
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    words = f"warning: {processes} processes on the 2 core(s) of this machine"
+    assert cli.main(["check", str(scene), "-n", str(processes)]) == 0
+    assert capsys.readouterr().out.count(words) == warned
+    for name in ("OMPI_COMM_WORLD_LOCAL_SIZE", "OMPI_COMM_WORLD_SIZE"):
+        monkeypatch.setenv(name, str(processes))
+    assert cli.main(["run", "nowhere.toml"]) == 2
+    assert capsys.readouterr().err.count(words) == warned
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", str(2 * processes))
+    assert cli.main(["run", "nowhere.toml"]) == 2
+    assert "core(s)" not in capsys.readouterr().err
+
+
 def test_folder_of_another_scene_is_left_alone(launch, scene: Path, tmp_path: Path) -> None:
     from tireroad.runs.files.folder import Summary
 
@@ -131,6 +150,9 @@ def test_version_is_that_of_the_package(root: Path) -> None:
     assert f'version = "{VERSION}"' in (root / "pyproject.toml").read_text()
 
 
+STILL = {"rotating", "response", "contact", "spectra", "greens", "stiffness"}
+
+
 @pytest.mark.parametrize(
     ("overrides", "until", "expected"),
     [
@@ -138,16 +160,27 @@ def test_version_is_that_of_the_package(root: Path) -> None:
         (
             ["rotation.speed=0"],
             None,
-            {"rotating", "response", "contact", "spectra", "greens", "stiffness"},
+            STILL,
         ),
         (["force=[{}]", "time={}"], None, {"contact", "spectra", "stiffness"}),
         (["contact={}", "road={}", "time={}"], None, {"response", "stiffness"}),
         (["contact={}", "road={}", "time={}", "output.spectra=false"], None, None),
         ([], "modes", set(STAGES) - {"static", "modes"}),
+        (["rotation="], None, STILL | {"modes"}),
+        (["rotation=", "modal={}"], None, STILL),
+        (["rotation="], "modes", set(STAGES) - {"static", "modes"}),
+        (["contact={}"], None, {"response", "contact", "spectra", "greens", "stiffness"}),
+        (["contact={}", "force=[{}]"], None, {"response", "contact", "spectra", "stiffness"}),
+        (["contact={}", "time={}"], None, {"response", "stiffness"}),
+        (
+            ["contact={}", "time={}", "static.load="],
+            None,
+            {"response", "contact", "spectra", "greens", "stiffness"},
+        ),
     ],
 )
 def test_stages_follow_from_the_scene(scene: Path, overrides, until, expected) -> None:
-    reasons = skipped(load(scene, overrides), until)
+    reasons = skipped(load(scene, overrides, until=until), until)
     wanted = expected if expected is not None else {"response", "spectra", "stiffness"}
     bars = {"accuracy"} if "contact" in wanted else set()
     assert set(reasons) == wanted | {"vibration", "motion"} | bars

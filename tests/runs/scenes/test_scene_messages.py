@@ -54,6 +54,8 @@ def test_consequences_are_not_said(scene_file) -> None:
     """One mistake, one message: what other rules would say of a table that is wrong is left out."""
     broken = "[contact]\n[road]\nkind = 'wavy'\nseed = 3\n[static]\nload = 1\n[time]\n"
     assert refused(scene_file(broken)).count("\n") == 0
+    no_load = refused(scene_file(FULL), "force=", "output.fields=true", "static.load=-1")
+    assert no_load.count("\n") == 0 and "static.load" in no_load
     assert "known here: " in refused(scene_file("[road]\nkind = 'flat'\nzzz = 3\n"))
 
 

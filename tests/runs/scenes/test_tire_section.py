@@ -75,10 +75,17 @@ def test_unknowns_are_those_of_the_section(tmp_path, given):
             'section = "radial"\n[[tire.cords]]\nname = "x"',
             "one of cap ply, belt 2, belt 1, carcass",
         ),
-        ('section = "radial"\n[[tire.region]]\narc = [0, 9]', "one of tread, skim"),
+        ('section = "radial"\n[[tire.region]]\narc = [0, 9]', "name = one of tread, skim"),
+        ('section = "radial"\n[[tire.region]]\narc = [0, 45]', "name = one of tread, skim"),
+        ('section = "radial"\n[[tire.region]]\nside = "left"', "name = one of tread, skim"),
+        ('section = "radial"\n[[tire.region]]\n[[tire.region]]', "second without a name"),
         (
             'section = "radial"\n[[tire.region]]\nname = "ply"\ndepth = [0, 0.5]',
-            "follows from the size",
+            "follows from the size. Leave it out",
+        ),
+        (
+            'section = "radial"\n[[tire.cords]]\nname = "belt 1"\ndepth = 0.007',
+            "= 0.007 cannot be chosen.*Leave it out",
         ),
         ('section = "radial"\n[tire.material]\ndensity = 1.0', "follow from its size"),
         ('section = "radial"\norder = 1', "take 2 or 3"),
@@ -113,6 +120,42 @@ angle = 30.0
     assert [n for n in one if one[n] != other[n]] == ["belt 1"]
     assert np.degrees(other["belt 1"].angle) == pytest.approx(30)
     assert tire.shape.angles(tire)["belt 1"] == 30
+
+
+def test_a_region_without_a_name_changes_all_compounds(tmp_path):
+    """A region with a name goes before it, in either order; what neither says stays built-in."""
+    plain = scene(tmp_path, '[tire]\nsection = "radial"\n').tire
+    everywhere = "[[tire.region]]\ndynamic = 1.4\nloss_factor = 0.1\n"
+    tread = '[[tire.region]]\nname = "tread"\nloss_factor = 0.3\n'
+    before = plain.shape.rubbers(plain)
+    for regions in (everywhere + tread, tread + everywhere):
+        found = scene(tmp_path, f'[tire]\nsection = "radial"\n{regions}')
+        after = found.tire.shape.rubbers(found.tire)
+        assert {name: one.loss_factor for name, one in after.items()} == {
+            name: 0.3 if name == "tread" else 0.1 for name in before
+        }
+        assert {one.dynamic for one in after.values()} == {1.4}
+        assert [one.law for one in after.values()] == [one.law for one in before.values()]
+        assert scene(tmp_path, dumps(found)).tire == found.tire
+    given = "[[tire.region]]\nmaterial = { youngs_modulus = 7e6, density = 1000 }\n"
+    tire = scene(tmp_path, f'[tire]\nsection = "radial"\n{given}').tire
+    after = tire.shape.rubbers(tire)
+    assert {(one.law.youngs_modulus, one.density) for one in after.values()} == {(7e6, 1000)}
+    assert {n: one.loss_factor for n, one in after.items()} == {
+        n: one.loss_factor for n, one in before.items()
+    }
+
+
+def test_a_region_of_a_torus_without_an_arc_is_at_the_crown(tmp_path):
+    soft, said = (
+        scene(
+            tmp_path, f"[[tire.region]]\n{arc}material = {{ youngs_modulus = 1e7 }}\n"
+        ).tire.ring()
+        for arc in ("", "arc = [0, 45]\n")
+    )
+    assert soft.section.regions == said.section.regions
+    assert np.array_equal(soft.section.region, said.section.region)
+    assert 0 < np.count_nonzero(soft.section.region) < len(soft.section.region)
 
 
 def test_names_of_parts_are_matched_in_any_case(tmp_path):

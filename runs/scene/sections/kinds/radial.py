@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -12,6 +12,7 @@ import numpy as np
 from tireroad.fem.errors import InputError
 from tireroad.fem.parameters import integer, text
 from tireroad.fem.sections.ring import Ring
+from tireroad.runs.scene.resolved import literal
 from tireroad.runs.scene.sections.kind import Proportions, SectionKind, section_kind
 from tireroad.runs.scene.sections.parts import (
     cords_of,
@@ -40,6 +41,7 @@ class RadialSection(SectionKind):
     # With fewer, modes from 150 Hz up are too low (docs/verification.md, Frequencies of the default
     # mesh).
     segments = 40
+    without = ("material",)
 
     size: str = text("205/60 R15", "size of the built-in passenger tire (docs/radial-tire.md)")
     elements_arc: int | None = integer(
@@ -63,8 +65,8 @@ class RadialSection(SectionKind):
             source.add(("tire", "size"), str(problem).removeprefix("tire.size "))
             return
         lines = [line.name for line in construction.cords]
-        _known("region", tire.region, list(construction.compounds), source)
-        _known("cords", tire.cords, lines, source)
+        _check_parts("region", tire.region, list(construction.compounds), source)
+        _check_parts("cords", tire.cords, lines, source)
 
     def proportions(self, tire: Tire) -> Proportions:
         ring = self.ring(tire)
@@ -75,7 +77,7 @@ class RadialSection(SectionKind):
 
     def rubbers(self, tire: Tire) -> dict[str, Material]:
         return {
-            name: _compound(region_of(tire, name), dict(values))
+            name: _compound((_everywhere(tire), region_of(tire, name)), dict(values))
             for name, values in built(self.size).compounds.items()
         }
 
@@ -116,32 +118,51 @@ class RadialSection(SectionKind):
         return True
 
 
-def _known(table: str, given: Sequence[Region | Line], names: list[str], source: Source) -> None:
+def _check_parts(
+    table: str, given: Sequence[Region | Line], names: list[str], source: Source
+) -> None:
     """Note unknown or repeated names of parts, and keys for what follows from the tire's size."""
     default = type(given[0])() if given else None
     known = {name.upper() for name in names}
     for number, one in enumerate(given):
         path = ("tire", table, str(number))
         own = (one.name or "").upper()
-        if own not in known:
+        if own and own not in known:
             source.add((*path, "name"), f"must be one of {', '.join(names)} in a radial tire")
         elif own in [(other.name or "").upper() for other in given[:number]]:
-            source.add((*path, "name"), f'= "{one.name}" is taken')
+            taken = f'name = "{one.name}" is taken' if own else "is the second without a name"
+            source.add(path, taken)
         for key in ("arc", "depth", "side"):
-            if getattr(one, key, None) != getattr(default, key, None):
-                source.add((*path, key), "follows from the size of a radial tire: leave it out")
+            if (value := getattr(one, key, None)) != getattr(default, key, None):
+                source.add((*path, key), _fixed(value, names, named=bool(own)))
 
 
-def _compound(region: Region | None, values: dict[str, float]) -> Material:
-    """A built-in compound, modified by the [[tire.region]] of its name."""
+def _fixed(value: object, names: list[str], named: bool) -> str:
+    """The place of a part cannot be given: what to write instead."""
+    fixed = f"= {literal(value)} cannot be chosen: where each part of a radial tire lies follows from the size. "
+    if named:
+        return f"{fixed}Leave it out: the name says where"
+    return f"{fixed}Name a compound instead: name = one of {', '.join(names)}"
+
+
+def _everywhere(tire: Tire) -> Region | None:
+    """The scene's [[tire.region]] without a name, which changes every compound, or None."""
+    return next((region for region in tire.region if region.name is None), None)
+
+
+def _compound(regions: Iterable[Region | None], values: dict[str, float]) -> Material:
+    """A built-in compound, modified by the regions that it lies in, the last before the others."""
     from tireroad.fem.tire.material import Material, compound
 
-    values |= losses_of(region)
-    if region is None or region.material is None:
+    material = None
+    for region in regions:
+        values |= losses_of(region)
+        material = (region and region.material) or material
+    if material is None:
         return compound("neo-hookean", **values)
     return Material(
-        law=region.material.law,
-        density=region.material.density,
+        law=material.law,
+        density=material.density,
         dynamic=values["dynamic"],
         loss_factor=values["loss_factor"],
     )

@@ -94,7 +94,7 @@ class TorusSection(SectionKind):
                     'is for section = "file": a region of a torus is given by arc, side and depth',
                 )
             for key in ("arc", "depth"):
-                low, high = getattr(region, key)
+                low, high = getattr(region, key) or (0.0, 1.0)
                 if low >= high:
                     source.add((*place, key), f"= [{low:g}, {high:g}] must ascend")
         for which in range(len(tire.cords)):
@@ -222,7 +222,9 @@ def _note(
 
 def patch(which: int, region: Region) -> Patch:
     """The part of the section described by a [[tire.region]]."""
-    low, high = np.radians(region.arc)
+    from tireroad.runs.scene.tables.tire import AROUND_CROWN
+
+    low, high = np.radians(region.arc or AROUND_CROWN)
     sides = {"left": ((-high, -low),), "right": ((low, high),)}
     arcs = sides.get(region.side, sides["left"] + sides["right"])
     return Patch(f"tire.region {which}", arcs, region.depth)

@@ -1,0 +1,90 @@
+"""The library refuses what does not fit together in one message; its example shows a result."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tireroad as tr
+from tireroad.runs.library import RollingTire
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).resolve().parent.parent
+TIRE = {"youngs_modulus": 48e6, "segments": 16, "elements_arc": 6, "order": 1}
+
+
+@pytest.fixture(scope="module")
+def tire():
+    return tr.torus(**TIRE)
+
+
+@pytest.fixture(scope="module")
+def static(tire):
+    return tr.press(tire, inflation=2e5, load=300.0)
+
+
+@pytest.fixture(scope="module")
+def rolling(tire, static) -> RollingTire:
+    return tr.roll(tr.modes(tire, static, count=12), tr.Turning(speed=50.0, damping=(500.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"segments": 18}, "it has .* nodes, and the tire"),
+        ({"outer_radius": 0.33}, "its nodes lie elsewhere"),
+        ({"youngs_modulus": 47e6}, "its tire is of other materials"),
+    ],
+)
+def test_modes_refuse_the_state_of_another_tire(static, change: dict, why: str) -> None:
+    with pytest.raises(tr.InputError, match=f"another tire .{why}"):
+        tr.modes(tr.torus(**TIRE | change), static, count=4)
+
+
+def test_modes_take_the_state_of_an_equal_tire(rolling, static) -> None:
+    again = tr.modes(tr.torus(**TIRE), static, count=12)
+    assert again.frequency == pytest.approx(rolling.standing.frequency, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"tread": "rubber"}, "tread = 'rubber' is no tread law.*HalfSpace"),
+        ({"spacing": 0.0}, "spacing = 0.0 must be"),
+        ({"spacing": (0.01, 0.01, 0.01)}, "spacing = .* must be one length or two"),
+        ({"spacing": "fine"}, "spacing = 'fine' must be"),
+    ],
+)
+def test_drive_says_what_it_does_not_take(rolling, given: dict, message: str) -> None:
+    with pytest.raises(tr.InputError, match=message):
+        tr.drive(rolling, tr.make_road(kind="flat"), duration=0.01, **given)
+
+
+def test_one_spacing_is_that_of_both_ways(rolling) -> None:
+    road = tr.make_road(kind="sine", amplitude=2e-4)
+    one, two = (
+        tr.drive(rolling, road, duration=0.005, step=5e-4, spacing=spacing)
+        for spacing in (0.01, (0.01, 0.01))
+    )
+    assert np.array_equal(one.force, two.force) and one.force.any()
+
+
+def _example(page: str) -> str:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return re.findall(r"```python\n(import tireroad as tr\n.*?)```", text, re.DOTALL)[0]
+
+
+def test_the_example_is_the_same_on_both_pages() -> None:
+    assert _example("README.md") == _example("docs/how-to/library.md")
+
+
+@pytest.mark.long
+def test_the_example_shows_levels_of_what_the_road_does(capfd) -> None:
+    """Of the road's passing frequency, 80 Hz, which lies in a band of its own."""
+    exec(_example("README.md"), {})
+    printed = capfd.readouterr().out
+    assert printed.startswith("500 N, deviation ")
+    levels = {int(hz): float(db) for hz, db in re.findall(r"(\d+) Hz: (-?[\d.]+) dB", printed)}
+    assert len(levels) >= 2 and max(levels, key=levels.__getitem__) == 79
