@@ -98,6 +98,7 @@ def run_scene(
     scene = with_modal(scene, until)
     forget_peak()  # of an earlier member of a sweep in the same process
     job = Job(scene, directory, comm, fresh, cache)
+    on_root(comm, lambda: make_folder(directory))
     summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
     on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
     if scene.road is not None:
