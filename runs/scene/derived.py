@@ -50,6 +50,16 @@ def with_road(scene: Scene, say: Say) -> Scene:
     return replace(scene, road=Road())
 
 
+def with_outputs(scene: Scene, say: Say) -> Scene:
+    """Leave out what is asked of driven points where there are none."""
+    kept = tuple(one for one in scene.output.kinds if scene.force or one[1].of != "points")
+    if len(kept) == len(scene.output.kinds):
+        return scene
+    lost = [f"output.{name}" for name, kind in scene.output.kinds if (name, kind) not in kept]
+    say(f"no [[force]], hence no driven points: {', '.join(lost)} left out")
+    return replace(scene, output=replace(scene.output, kinds=kept))
+
+
 def with_modal(scene: Scene, until: str | None) -> Scene:
     """Set the default [modal] where something needs modes, or the run is to end with them."""
     needed = scene.contact, scene.force, scene.rotation, scene.axle.kind != "fixed"

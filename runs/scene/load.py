@@ -64,7 +64,8 @@ def load(
         scene.tire.shape.check(scene.tire, source)
     if "tire" not in source.broken():
         scene = derived.with_speed(derived.with_damping(scene))
-    scene = derived.with_modal(derived.with_road(scene, say), until)
+    scene = derived.with_outputs(derived.with_road(scene, say), say)
+    scene = derived.with_modal(scene, until)
     if not source.broken() & {"tire", "modal"}:
         scene = derived.with_count(scene, raw, until, source, say)
     rules.check(scene, raw, source)

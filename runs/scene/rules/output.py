@@ -27,8 +27,6 @@ def _check_kind(scene: Scene, kind: Output, path: tuple[str, ...], error: Where)
             path,
             "is not available in scenes with [contact]: leave it out, or take out [contact]",
         )
-    if kind.of == "points" and not scene.force:
-        raise error(path, "is of driven points: add a [[force]]")
     if kind.of == "contact" and not scene.in_contact:
         raise error(
             path, "is of the forces of the road: add [contact], [time], and load (N) to [static]"

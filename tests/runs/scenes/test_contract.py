@@ -107,3 +107,11 @@ def test_receptances_need_no_time(scene_file, tmp_path, ran) -> None:
     assert stages["contact"]["reason"] == "no [time]"
     assert (tmp_path / "out" / "response.h5").exists()
     assert not (tmp_path / "out" / "contact.h5").exists()
+
+
+def test_outputs_at_driven_points_go_with_the_forces(scene_file) -> None:
+    said: list[str] = []
+    scene = load(scene_file(CONTRACT), ["force=[]"], said.append)
+    assert not scene.output.kinds
+    assert skipped(scene)["response"] == "no [[force]]"
+    assert said == ["no [[force]], hence no driven points: output.receptance left out"]

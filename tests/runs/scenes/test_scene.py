@@ -93,7 +93,6 @@ def test_bad_values_are_named(scene_file, text: str, words: list[str]) -> None:
         (["output.velocity=true"], ["output.velocity", "contact"]),
         (["time=", "output.fields=true"], ["output.fields", "[time]"]),
         (["time=", "accuracy.target=0.1"], ["accuracy.target", "[time]"]),
-        (["force=", "output.receptance={}"], ["receptance", "[[force]]"]),
         (["output.receptance={to=1.0,step=2.0}"], ["receptance.step", "1 Hz"]),
         (["force.0.direction=[0,0,0]"], ["direction", "zeros"]),
         (["force.0.arc=130"], ["arc", "bead", "120"]),
