@@ -64,11 +64,11 @@ def test_a_footprint_of_few_points_is_told_where_the_road_has_heights() -> None:
     """Points 15 x 20 mm apart."""
     patch, record = oval_patch((9, 5), (0.015, 0.02), 500.0), Record()
     assert patch.touching.tolist() == [5, 3]
-    few, many = (Footprint(0.08, width, 1e-3) for width in (0.059, 0.061))
+    few, many = (Footprint(0.08, width, 1e-3) for width in (0.04, 0.05))
     points(record, patch, few, 0.0)
     points(record, patch, many, 1e-3)
     assert not record.warnings
     points(record, patch, few, 1e-3)
-    assert "15 × 20 mm apart on a footprint of 80 × 59 mm" in record.warnings[0]
+    assert "15 × 20 mm apart on a footprint of 80 × 40 mm" in record.warnings[0]
     points(record, replace(patch, force=0 * patch.force), few, 1e-3)
     assert len(record.warnings) == 1
