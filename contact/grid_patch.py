@@ -171,9 +171,7 @@ def spread_pull(patch: Patch, pull: np.ndarray, force: np.ndarray) -> np.ndarray
     near = patch.at_points(touching)
     share = patch.at_points(ratio * touching[:, None]) / np.maximum(near, 1e-12)[:, None]
     found = patch.force[:, None] * share
-    whole = float(patch.force.sum())
-    if whole == 0.0:
-        return found
+    whole = float(patch.force.sum()) or 1.0  # none where the tire is clear of the road
     return found + (pull.sum(axis=0) - found.sum(axis=0)) * (patch.force / whole)[:, None]
 
 

@@ -49,7 +49,7 @@ def _asked(standing, exponent: float, plain, rolling, biorthogonality: float) ->
         for name, unit, sign, asked, value in measured
     ]
     return Table(
-        "Asked and measured",
+        "Targets and measured figures",
         [("figure", ""), ("unit", ""), ("target", ""), ("measured", "-"), ("met", "")],
         rows,
         [
