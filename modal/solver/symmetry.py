@@ -5,9 +5,11 @@ symmetric from antisymmetric fields: two problems of half the size, or four with
 at +-alpha at different depths break both mirrors of a loaded tire at rest and leave their product,
 the half turn about the vertical.
 
-The parts are Q^T A Q. What couples them is rounding of A, whose entries are symmetric to about
-1e-13 of the largest. It changes an eigenvalue by at most |R A R - A| / 2. The residual on A itself,
-a bound on twice the relative error of a frequency, is measured.
+The parts are Q^T A Q. A maps each part onto itself, so a row of a part is that of A at one of the
+nodes that the symmetry exchanges, folded by Q: no triple product is formed. What couples the parts
+is rounding of A, whose entries are symmetric to about 1e-13 of the largest. It changes an
+eigenvalue by at most |R A R - A|. The residual on A itself, a bound on twice the relative error of
+a frequency, is measured.
 """
 
 from __future__ import annotations
@@ -21,12 +23,14 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from tireroad.fem.collective import joined
-from tireroad.modal.solver.distributed import congruent, largest_entry, less, row_sum, rows_of
+from tireroad.modal.solver.distributed import largest_entry, rows_of
+from tireroad.modal.solver.fields import multiply
 from tireroad.modal.solver.team import Team
 
 # Largest entry of R A R - A relative to that of A. A symmetric state converges to about 1e-13; a
 # road load, a slope of the footprint or a different mesh on one side gives 1e-6 and more.
 TOLERANCE = 1e-11
+_PROBES = 8  # random fields that tell whether an isometry leaves the matrix unchanged
 _NEAR = 1e-6  # of the body's size: distance within which nodes are images of each other
 
 
@@ -113,8 +117,8 @@ def _own_rows(matrix: PETSc.Mat, team: Team) -> sparse.csr_matrix:
 class Symmetry:
     """An isometry that leaves a matrix A unchanged.
 
-    `image` is its signed permutation R (n, n); `defect` the norm of R A R - A, in the units of the
-    eigenvalues: the rounding or slight asymmetry of A.
+    `image` is its signed permutation R (n, n); `defect` a bound on the norm of R A R - A, from an
+    estimate of its rows, in the units of the eigenvalues: the rounding or slight asymmetry of A.
     """
 
     isometry: Isometry
@@ -137,35 +141,28 @@ def symmetries(matrix: PETSc.Mat, sites: Sites) -> list[Symmetry]:
 
 def _found(matrix: PETSc.Mat, sites: Sites, isometry: Isometry) -> Symmetry | None:
     image = _permutation(sites, isometry)
-    if image is None or not _may_commute(matrix, image):
+    if image is None:
         return None
-    turned = congruent(matrix, image)  # an involution is its own transpose
-    difference = less(turned, matrix)
-    far, defect = largest_entry(difference), row_sum(difference)
-    turned.destroy()
-    difference.destroy()
-    return Symmetry(isometry, image, defect) if far <= TOLERANCE * largest_entry(matrix) else None
+    entries = int(np.diff(matrix.getValuesCSR()[0]).max(initial=0))
+    spread = np.sqrt(matrix.comm.tompi4py().allreduce(entries, MPI.MAX))
+    length = _change(matrix, image)
+    if length > TOLERANCE * largest_entry(matrix) * spread:
+        return None
+    return Symmetry(isometry, image, float(spread * length))
 
 
-def _may_commute(matrix: PETSc.Mat, image: sparse.csr_matrix) -> bool:
-    """Whether R A R v - A v of a random v is as small as `TOLERANCE` on all entries would make it.
+def _change(matrix: PETSc.Mat, image: sparse.csr_matrix) -> float:
+    """Estimated length of the longest row of D = R A R - A.
 
-    Costs a hundredth of R A R. Collective.
+    The mean square of row i of D v over random v of +-1 is the sum of its squared entries, and the
+    largest of the estimates is rarely too small. A hundredth of the cost of R A R. Collective.
     """
-    start, end = matrix.getOwnershipRange()
-    comm, size = matrix.comm.tompi4py(), matrix.getSize()[0]
-    field = np.random.default_rng(11).uniform(-1.0, 1.0, size)
-    straight, turned = (matrix.createVecs() for _ in range(2))
-    for (right, left), given in ((straight, field), (turned, image @ field)):
-        right.array[:] = given[start:end]
-        matrix.mult(right, left)
-    every = np.concatenate(comm.allgather(turned[1].array_r.copy()))
-    far = np.abs((image[start:end] @ every) - straight[1].array_r).max(initial=0.0)
-    entries = np.diff(matrix.getValuesCSR()[0]).max(initial=0)
-    for vector in (*straight, *turned):
-        vector.destroy()
-    far, entries = comm.allreduce(float(far), MPI.MAX), comm.allreduce(int(entries), MPI.MAX)
-    return bool(far <= TOLERANCE * entries * largest_entry(matrix))
+    comm, own = matrix.comm.tompi4py(), slice(*matrix.getOwnershipRange())
+    signs = np.random.default_rng(11).choice([-1.0, 1.0], (matrix.getSize()[0], _PROBES))
+    straight = multiply(matrix, signs[own])
+    turned = image[own] @ joined(comm, multiply(matrix, (image @ signs)[own]))
+    length = np.sqrt(((turned - straight) ** 2).mean(axis=1)).max(initial=0.0)
+    return comm.allreduce(float(length), MPI.MAX)
 
 
 def sectors(matrix: PETSc.Mat, images: list[sparse.csr_matrix], team: Team) -> list[Sector]:
@@ -180,10 +177,16 @@ def sectors(matrix: PETSc.Mat, images: list[sparse.csr_matrix], team: Team) -> l
 
 
 def _sector(matrix: PETSc.Mat, basis: sparse.csr_matrix, team: Team) -> Sector:
-    part = congruent(matrix, basis)
-    rows = _own_rows(part, team)
-    part.destroy()
-    return Sector(basis, rows)
+    """Rows of Q^T A Q: A Q q is a field of the part, so that one unknown of each q suffices."""
+    columns = basis.tocsc()
+    first = columns.indptr[:-1]
+    order = np.argsort(columns.indices[first])
+    basis, first = columns[:, order].tocsr(), first[order]
+    own = team.own(len(first))
+    rows = rows_of(matrix, columns.indices[first[own]])
+    part = (sparse.diags(1 / columns.data[first[own]]) @ rows @ basis).tocsr()
+    part.sort_indices()
+    return Sector(basis, part)
 
 
 def _permutation(sites: Sites, isometry: Isometry) -> sparse.csr_matrix | None:
