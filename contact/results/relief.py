@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tireroad.contact.roads.cell_mean import CellMean
+from tireroad.contact.roads.under_tire import NOTHING, is_level
 from tireroad.contact.setup import ContactSetup
 
-NOTHING = 1e-9  # m: relief below is rounding
 _LONGEST = 1.0  # m of road that is sampled
 _MOST = 8000  # samples along
 
@@ -24,8 +24,7 @@ class Relief(NamedTuple):
 def nothing_met(setup: ContactSetup) -> bool:
     """Whether all heights that the patch passes over are the same, by the road's own bounds."""
     _, x1, y0, y1 = setup.patch.extent
-    strip = x1, setup.road.end, y0, y1
-    return setup.road.highest(*strip) - setup.road.lowest(*strip) < NOTHING
+    return is_level(setup.road, x1, setup.road.end, y0, y1)
 
 
 def relief_seen(setup: ContactSetup) -> Relief | None:

@@ -15,6 +15,7 @@ from tireroad.fem.errors import InputError
 
 Array = NDArray[np.float64]
 
+NOTHING = 1e-9  # m: relief below is rounding
 # Smallest number of pieces that a strip is divided into for its bounds: the level varies slowly
 # over one.
 PIECES = 64
@@ -42,6 +43,12 @@ class Road(Protocol):
     def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float: ...
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Road": ...
+
+
+def is_level(road: Road, x0: float, x1: float, y0: float, y1: float) -> bool:
+    """Whether a strip of road has one height, by its own bounds."""
+    strip = x0, x1, y0, y1
+    return 0.0 <= road.highest(*strip) - road.lowest(*strip) < NOTHING
 
 
 class RoadUnderTire:

@@ -8,7 +8,7 @@ from tireroad.contact.roads.kind import RoadKind
 from tireroad.contact.roads.kinds.obstacle import Edges
 from tireroad.contact.roads.placement import begun_at, moved_start, shown
 from tireroad.contact.roads.road import placed
-from tireroad.contact.roads.under_tire import Road
+from tireroad.contact.roads.under_tire import Road, is_level
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.tables.road import Road as Table
 from tireroad.runs.scene.tables.scene import Scene
@@ -17,8 +17,8 @@ from tireroad.runs.scene.tables.scene import Scene
 # of the patch ahead of the axle, m: only what a run would certainly refuse is refused here.
 LEAST_RADIUS = 0.85
 AHEAD = 0.5
-# Half the width of road, and length, that `check` looks at for relief, m; less relief is rounding.
-BESIDE, LOOKED, NOTHING = 0.5, 20.0, 1e-9
+# Half the width of road, and length, that `check` looks at for relief, m.
+BESIDE, LOOKED = 0.5, 20.0
 Where = Callable[[tuple[str, ...], str], InputError]
 
 
@@ -77,11 +77,8 @@ def _level(table: Table, road: Road, start: float, end: float) -> bool:
     if end - start > LOOKED and not isinstance(table.surface, Edges):
         return False
     whole = placed(road, table.surface, table).road  # on a drum it repeats
-    for last in (min(start + 2.0, end), end):
-        strip = start, last, table.lateral - BESIDE, table.lateral + BESIDE
-        if not 0.0 <= whole.highest(*strip) - whole.lowest(*strip) < NOTHING:
-            return False
-    return True
+    beside = table.lateral - BESIDE, table.lateral + BESIDE
+    return all(is_level(whole, start, last, *beside) for last in (min(start + 2.0, end), end))
 
 
 def without_relief(road: Table, first: float, last: float) -> str:
