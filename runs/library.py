@@ -193,6 +193,7 @@ class RollingTire:
         """The response between points of the outer face (angle around, angle along section; rad).
 
         In all three directions: probes x, y, z of the first point, then of the second, and so on.
+        InputError for a point beyond a bead.
         """
         lattice = self.standing.motions.lattice
         rows = [

@@ -43,17 +43,54 @@ def third_octaves(
     in `contact.results.levels.band_sums`, below `up_to` Hz and half the sampling rate. Hann window
     over the whole record, mean removed. A record of one value has no band.
     """
-    from scipy import signal
-
     if len(values) < 2:
         return np.zeros(0), np.zeros((0, values.shape[1]))
+    frequency, square = _lines(values, step, rate, weighted)
+    centre, square = band_sums(frequency, square, up_to)
+    return centre, _decibel(square, reference)
+
+
+def total_level(
+    values: np.ndarray, step: float, up_to: float = np.inf, *, weighted: bool = False
+) -> np.ndarray:
+    """Level (d,), dB re `FORCE` (rms), of all lines of values (n, d) up to `up_to` Hz.
+
+    Unlike a sum of `third_octaves` it includes bands with too few lines for a level of their own.
+    """
+    frequency, square = _lines(values, step, weighted=weighted)
+    return _decibel(square[frequency <= up_to].sum(axis=0), FORCE)
+
+
+def off_middle(values: np.ndarray) -> np.ndarray:
+    """By how much (d,), dB, the Hann window changes the mean square of values (n, d).
+
+    0 for a stationary record; negative if what varies lies near its ends, positive if in its
+    middle, as an impact may.
+    """
+    from scipy import signal
+
+    weight = signal.get_window("hann", len(values))[:, None] ** 2
+    square = (values - values.mean(axis=0)) ** 2
+    seen, whole = (weight * square).sum(axis=0) / weight.sum(), square.mean(axis=0)
+    return _decibel(seen, 1.0) - _decibel(whole, 1.0)
+
+
+def _lines(
+    values: np.ndarray, step: float, rate: bool = False, weighted: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (f,) Hz and mean squares (f, d) of the lines, as for `third_octaves`."""
+    from scipy import signal
+
     frequency, power = signal.periodogram(values, 1 / step, "hann", detrend="constant", axis=0)
     if rate:
         power = power * (2 * np.pi * frequency[:, None]) ** 2
     if weighted:
         power = power * 10 ** (a_weighting(frequency)[:, None] / 10)
-    centre, square = band_sums(frequency, power * frequency[1], up_to)
-    return centre, 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference**2)
+    return frequency, power * frequency[1]
+
+
+def _decibel(square: np.ndarray, reference: float) -> np.ndarray:
+    return 10 * np.log10(np.maximum(square, np.finfo(float).tiny) / reference**2)
 
 
 def deviation(values: np.ndarray, step: float, up_to: float = np.inf) -> np.ndarray:

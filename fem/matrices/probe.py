@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from tireroad.fem.errors import InputError
 from tireroad.fem.sections.reference import line
 from tireroad.fem.tire.mesh import Lattice
 
@@ -27,14 +28,24 @@ def along(index: np.ndarray, count: int, vectors: np.ndarray) -> sparse.csr_matr
     return sparse.csr_matrix((vectors.ravel(), (rows, columns)), shape=(k, 3 * count))
 
 
+_STEP = 1e-5  # step of the difference quotient, as a fraction of an element
+
+
 def spot(
     lattice: Lattice, ring: float, arc: float, spread: tuple[float, float] = (0.0, 0.0)
 ) -> np.ndarray:
     """Weights (s,) of the outer-face nodes for a point load, or a uniform traction of total 1.
 
     Angles in rad: `ring` around the axle from the lowest point, `arc` along the section from the
-    crown; `spread`: half widths. As a reading, a spread spot gives the mean over it.
+    crown; `spread`: half widths. As a reading, a spread spot gives the mean over it. InputError if
+    it reaches beyond a bead.
     """
+    first, last = lattice.arc_corners[0], lattice.arc_corners[-1]
+    if not max(first - (arc - spread[1]), arc + spread[1] - last) <= _STEP * (last - first):
+        raise InputError(
+            f"a point at {arc:.4g} rad along the section, +- {spread[1]:.4g} rad, reaches beyond the bead: the "
+            f"outer face has {first:.4g} to {last:.4g} rad"
+        )
     around, ring_weight = _line_rule(lattice.ring_corners, ring, spread[0])
     along, arc_weight = _line_rule(lattice.arc_corners, arc, spread[1])
     # Area per unit angles: the outer parts of the spot are longer.
@@ -44,9 +55,6 @@ def spot(
     shape_ring[0] += shape_ring[-1]
     shape_arc = arc_weight @ _shape(lattice.arc_corners, lattice.edge, along)
     return np.outer(shape_ring[:-1], shape_arc).ravel()
-
-
-_STEP = 1e-5  # step of the difference quotient, as a fraction of an element
 
 
 def _area(lattice: Lattice, arc: np.ndarray) -> np.ndarray:

@@ -89,7 +89,7 @@ class SpectraStage(Computed[Spectra]):
         frequency, contact = amplitudes(total, step)
         below = frequency <= limit.frequency
         found = levels.levels_of(history, start, limit.frequency)
-        levels.describe(record, found)
+        levels.describe(record, found, history, start, limit.frequency)
         axle = {}
         if history.axle_force is not None:
             force = history.axle_force[start:]

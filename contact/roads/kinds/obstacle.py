@@ -47,7 +47,13 @@ class Step(Edges):
 class Cleat(Edges):
     """Two edges."""
 
-    length: float = number(0.02, "m", "length from foot to foot", least=1e-4, most=1e4)
+    length: float = number(
+        0.02,
+        "m",
+        "length from the foot of the first edge to the start of the second, which falls over one more ramp",
+        least=1e-4,
+        most=1e4,
+    )
 
     def validate(self) -> None:
         """Require that the second edge begins after the first has ended."""
@@ -65,7 +71,7 @@ class Obstacle:
     """z = h [s(xi/r) - s((xi - l)/r)], xi = (x - position) cos(a) + y sin(a).
 
     h, r, a, position: `height`, `ramp`, `angle` and `position` of `edges`; l = `length` (m) from
-    edge to edge, infinite for a step; s(t) = 3 t^2 - 2 t^3 on [0, 1], constant outside (a jump for
+    the beginning of one edge to that of the other, infinite for a step; s(t) = 3 t^2 - 2 t^3 on [0, 1], constant outside (a jump for
     r = 0).
     """
 

@@ -110,10 +110,17 @@ def _force(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputErr
     for number, force in enumerate(scene.force):
         if not any(force.direction):
             yield error(("force", str(number), "direction"), "must not be all zeros")
-        if abs(force.arc) >= scene.tire.proportions().half_angle:
+        bead = scene.tire.proportions().half_angle
+        if abs(force.arc) >= bead:
             yield error(
                 ("force", str(number), "arc"),
-                f"= {force.arc:g} deg lies beyond the bead at {scene.tire.proportions().half_angle:g} deg",
+                f"= {force.arc:g} deg lies beyond the bead at {bead:g} deg",
+            )
+        elif abs(force.arc) + force.spread[1] > bead:
+            yield error(
+                ("force", str(number), "spread"),
+                f"= {list(force.spread)} deg on both sides of arc = {force.arc:g} deg reaches beyond the bead "
+                f"at {bead:g} deg: its second number may be {bead - abs(force.arc):.4g} at most",
             )
 
 

@@ -6,7 +6,15 @@ import h5py
 import numpy as np
 
 from tireroad.contact.results import levels
-from tireroad.contact.results.spectra import FORCE, MOMENT, VELOCITY, density, third_octaves
+from tireroad.contact.results.spectra import (
+    FORCE,
+    MOMENT,
+    VELOCITY,
+    density,
+    off_middle,
+    third_octaves,
+    total_level,
+)
 from tireroad.runs.files.store import put
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.stored.contact_file import ContactHistory
@@ -20,6 +28,9 @@ _KINDS = {
     "point_velocity_level": ("point_velocity", VELOCITY, "1 nm/s", "m2/s2/Hz", True),
 }
 WEIGHTED = "_a_weighted"
+# dB by which the window may change the mean square of a force without a warning, where it varies by
+# more than this share.
+_OFF_MIDDLE, _ROUNDING = 3.0, 1e-6
 _ONE = {  # common to all
     "third_octave/centre": "Hz",
     "third_octave/nominal": "Hz",
@@ -82,24 +93,47 @@ def levels_of(history: ContactHistory, start: int, up_to: float) -> dict[str, np
     }
 
 
-def describe(record: Record, found: dict[str, np.ndarray]) -> None:
-    """Record the vertical totals over all bands, and the bands that the record is too short for."""
+def describe(
+    record: Record,
+    found: dict[str, np.ndarray],
+    history: ContactHistory,
+    start: int,
+    up_to: float,
+) -> None:
+    """Record the bands of `levels_of`, the vertical totals, and what the window hides.
+
+    Totals are over all lines below `up_to` Hz and do not depend on which bands have a level.
+    """
     names = found["third_octave/nominal"]
     if len(names):
         record.headline["bands"] = (_named(names), "-")
-        for name, what in (("contact_level", "contact force"), ("level", "force on the axle")):
-            for suffix, letter in (("", ""), (WEIGHTED, "(A)")):
-                level = found.get(f"third_octave/{name}{suffix}")
-                if level is not None:
-                    total = 10 * np.log10((10 ** (level[:, 2] / 10)).sum())
-                    kind = "A-weighted level" if letter else "level"
-                    record.headline[f"{kind} of the vertical {what}"] = (
-                        float(total),
-                        f"dB{letter} re 1 N",
-                    )
+    forces = series(history, start)
+    for name, what in (("contact_level", "contact force"), ("level", "force on the axle")):
+        if name not in forces or len(forces[name]) < 2:
+            continue
+        vertical = forces[name][:, 2:]
+        for kind, letter in (("level", ""), ("A-weighted level", "(A)")):
+            total = total_level(vertical, history.step, up_to, weighted=bool(letter))
+            record.headline[f"{kind} of the vertical {what}"] = (
+                float(total[0]),
+                f"dB{letter} re 1 N",
+            )
+        _warn_of_window(record, vertical, what)
     narrow = levels.nominal(found["third_octave/too_narrow"])
     if len(narrow):
         record.headline["bands left out, narrower than three lines"] = (_named(narrow), "-")
+
+
+def _warn_of_window(record: Record, force: np.ndarray, what: str) -> None:
+    """Warn where an impact near an end of the record, or in its middle, sets its level."""
+    off = float(off_middle(force)[0])
+    if abs(off) > _OFF_MIDDLE and force.std() > _ROUNDING * np.abs(force).max():
+        where, change = ("near an end", "lower") if off < 0 else ("in the middle", "higher")
+        record.warnings.append(
+            f"most of what the {what} varies lies {where} of the record, where the Hann window of spectra and "
+            f"levels makes them {abs(off):.2g} dB {change} than its mean square: such levels depend on when an "
+            "impact happens (road.position, time.duration); compare runs with equal ones only"
+        )
 
 
 def _named(bands: np.ndarray) -> str:

@@ -7,7 +7,7 @@ from petsc4py import PETSc
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices import probe
 from tireroad.fem.matrices.compliance import add_part, compliance, rotating_stiffness
 from tireroad.fem.matrices.operators import Operators
@@ -20,6 +20,17 @@ def test_weights_share_out_one(make_body, order, spread):
     for ring, arc in ((0.0, 0.0), (0.05, -0.3), (6.2, 1.0)):
         weights = probe.spot(lattice, ring, arc, spread)
         assert weights.sum() == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.1])
+def test_a_spot_ends_at_the_bead(make_body, spread):
+    """Beyond it the weights were not numbers, and a solver asked for a lower speed."""
+    lattice = make_body(2).lattice
+    bead = float(lattice.arc_corners[-1])
+    assert np.isfinite(probe.spot(lattice, 0.0, bead - spread, (0.0, spread))).all()
+    for arc in (bead - spread + 0.01, -bead + spread - 0.01, np.nan):
+        with pytest.raises(InputError, match="beyond the bead"):
+            probe.spot(lattice, 0.0, arc, (0.0, spread))
 
 
 def test_a_point_reads_what_stands_there(make_body):

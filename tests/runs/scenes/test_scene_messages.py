@@ -109,3 +109,11 @@ def test_each_thing_that_is_missing_is_said(scene_file) -> None:
         scene_file(FULL + "[[force]]\ndirection = [0.0, 0.0, 0.0]\n"), "force.0.arc=170"
     )
     assert "force.0.arc = 170 deg" in message and "force.1.direction must" in message
+
+
+def test_a_spread_force_that_reaches_beyond_the_bead_names_the_key(scene_file) -> None:
+    """It ran until the Green's functions, which then asked for a lower speed."""
+    force = "[[force]]\narc = {arc}\nspread = [12.0, 11.0]\n"
+    assert "force.0.spread" in (said := refused(scene_file(force.format(arc=110.0))))
+    assert "10 at most" in said
+    assert load(scene_file(force.format(arc=-109.0))).force[0].spread == (12.0, 11.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -74,13 +75,40 @@ def test_stored_and_read_again_with_units(history: ContactHistory, tmp_path: Pat
 
 def test_a_record_too_short_for_bands_says_so(history: ContactHistory) -> None:
     record = Record()
-    levels.describe(record, levels.levels_of(history, 9500, 200.0))
+    levels.describe(record, levels.levels_of(history, 9500, 200.0), history, 9500, 200.0)
     assert record.headline["bands left out, narrower than three lines"][0] == "20 to 160 Hz"
 
 
 def test_sums_have_names_that_do_not_change_with_the_bands(history: ContactHistory) -> None:
     record = Record()
-    levels.describe(record, levels.levels_of(history, 0, 400.0))
+    levels.describe(record, levels.levels_of(history, 0, 400.0), history, 0, 400.0)
     assert record.headline["bands"][0].endswith(" to 315 Hz")
     value, unit = record.headline["level of the vertical contact force"]
     assert (value, unit) == (pytest.approx(20 * np.log10(2 / np.sqrt(2)), abs=0.05), "dB re 1 N")
+
+
+def test_totals_count_lines_of_bands_too_narrow_for_a_level(history: ContactHistory) -> None:
+    """A tone of 20 Hz has no band in a record of 0.05 s; its level was left out of the total."""
+    time, record = 1e-4 * np.arange(500), Record()
+    force = np.zeros((500, 3))
+    force[:, 2] = 500.0 + np.sin(2 * np.pi * 20.0 * time)
+    short = replace(history, time=time, total_force=force, axle_force=None, driven=None, wheel={})
+    levels.describe(record, levels.levels_of(short, 0, 400.0), short, 0, 400.0)
+    value = record.headline["level of the vertical contact force"][0]
+    assert value == pytest.approx(10 * np.log10(0.5), abs=2.0)
+    assert not record.warnings
+
+
+@pytest.mark.parametrize(("at", "words"), [(0.02, "near an end"), (0.25, "in the middle")])
+def test_an_impact_warns_that_its_level_depends_on_when(
+    history: ContactHistory, at: float, words: str
+) -> None:
+    """The Hann window of the record hid an impact near its end by up to 45 dB."""
+    time, record = 1e-4 * np.arange(5000), Record()
+    force = np.zeros((5000, 3))
+    since = np.maximum(time - at, 0.0)
+    force[:, 2] = 500.0 + 100.0 * np.exp(-200.0 * since) * np.sin(600.0 * since)
+    hit = replace(history, time=time, total_force=force, axle_force=None, driven=None, wheel={})
+    levels.describe(record, levels.levels_of(hit, 0, 400.0), hit, 0, 400.0)
+    assert len(record.warnings) == 1
+    assert words in record.warnings[0] and "road.position" in record.warnings[0]
