@@ -1,13 +1,8 @@
-"""Vibration of the whole tire in the frequency domain, from the forces on it: u(w) = Phi a(w).
+"""Vibration of the whole tire in the frequency domain: u(w) = Phi a(w) of its coordinates a.
 
-With the states of the rolling tire, C = R and P = L B,
-
-    a(w) = [R (i w - s)^-1 P + R* (i w - s*)^-1 P*] F(w) / 2  +  R_b (i w - T)^-1 P_b F(w),
-
-where F(w) are the forces and B (m, k) the modal forces per unit of each. The mean square of the
-velocity normal to the surface, over its area S, is  w^2 a^H N a / (2 S)  with  N = sum_n (n A)_n
-Phi^T n_n n_n^T Phi:  one small matrix for all frequencies. A plate that radiated all of it would
-have the equivalent radiated power  rho c S <v^2>, an upper bound.
+The mean square of the velocity normal to the surface, over its area S, is  w^2 a^H N a / (2 S)
+with  N = sum_n (n A)_n Phi^T n_n n_n^T Phi:  one small matrix for all frequencies. A plate that
+radiated all of it would have the equivalent radiated power  rho c S <v^2>, an upper bound.
 """
 
 from __future__ import annotations
@@ -16,26 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tireroad.modal.states import StateModes
-
 IMPEDANCE = 413.3  # N s/m3, rho c of air at 20 deg C and 1013 hPa
-
-
-def coordinates(states: StateModes, pushed: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """a (f, m) m kg^1/2 at `frequency` (f,) Hz under modal forces `pushed` (f, m) N kg^-1/2, F B^T.
-
-    0 Hz only without rigid states. Not collective.
-    """
-    a = np.empty(pushed.shape, complex)
-    right, left, s = states.right, states.left, states.eigenvalue
-    for k, point in enumerate(2j * np.pi * frequency):
-        push = pushed[k]
-        a[k] = right @ ((left @ push) / (point - s)) / 2
-        a[k] += right.conj() @ ((left.conj() @ push) / (point - s.conj())) / 2
-        if len(states.block):
-            shifted = point * np.eye(len(states.block)) - states.block
-            a[k] += states.block_right @ np.linalg.solve(shifted, states.block_left @ push)
-    return a
 
 
 @dataclass(frozen=True)

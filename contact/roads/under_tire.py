@@ -48,7 +48,7 @@ class Road(Protocol):
 def is_level(road: Road, x0: float, x1: float, y0: float, y1: float) -> bool:
     """Whether a strip of road has one height, by its own bounds."""
     strip = x0, x1, y0, y1
-    return 0.0 <= road.highest(*strip) - road.lowest(*strip) < NOTHING
+    return bool(0.0 <= road.highest(*strip) - road.lowest(*strip) < NOTHING)
 
 
 class RoadUnderTire:

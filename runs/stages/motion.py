@@ -7,14 +7,11 @@ from typing import ClassVar
 
 import h5py
 import numpy as np
-from mpi4py import MPI
 
 from tireroad.greens.basis import Basis
-from tireroad.greens.recursion import Recursion
-from tireroad.greens.response import couple
 from tireroad.runs.files.store import put
 from tireroad.runs.stages.build.forces import Forces
-from tireroad.runs.stages.build.whole_tire import WholeTire
+from tireroad.runs.stages.build.whole_tire import WholeTire, replayed
 
 _INSTANTS = 400  # at most; the last ones of the run
 _PER_PERIOD = 8  # of the band's upper frequency
@@ -49,7 +46,9 @@ class MotionStage(WholeTire[Motion]):
     def seen(self, basis: Basis, forces: Forces) -> tuple[Motion, dict[str, tuple[float, str]]]:
         """The outer face at the stored instants. Root process only."""
         points = self.static.product.points
-        time, q = _replayed(basis, forces, self.band)
+        stride = max(int(1 / (_PER_PERIOD * self.band * forces.step)), 1)
+        kept = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS][::-1]
+        time, q = forces.time[kept], replayed(basis, forces, kept)
         field = (q @ basis.face(len(points)).T).reshape(len(time), -1, 3)
         size = float(np.linalg.norm(field, axis=2).max(initial=0.0))
         return Motion(time=time, displacement=field.astype("f4"), points=points), {
@@ -65,24 +64,3 @@ class MotionStage(WholeTire[Motion]):
     def read(self, file: h5py.File) -> Motion:
         """The same, read back."""
         return Motion(**{name: file[stored][:] for name, (stored, _) in _UNITS.items()})
-
-
-def _replayed(basis: Basis, forces: Forces, top: float) -> tuple[np.ndarray, np.ndarray]:
-    """Instants (g,) s, and the modal coordinates (g, m) at them, by the run's own scheme."""
-    unit = np.eye(basis.coordinates)
-    response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
-    # The rectangles of a convolution have no states to replay: it approximates the linear scheme.
-    scheme = "constant" if forces.scheme == "constant" else "linear"
-    tire = Recursion(response=response, step=forces.step, scheme=scheme, comm=MPI.COMM_SELF)
-    tire.start(forces.begun)
-    stride = max(int(1 / (_PER_PERIOD * top * forces.step)), 1)
-    kept = range(len(forces.time) - 1, -1, -stride)[:_INSTANTS]
-    wanted, found, number = set(kept), [], 0
-    for block in forces.pushes():
-        for push in block:
-            q = tire.predict() + tire.same_step @ push if number in wanted else tire.predict()
-            tire.advance(push)
-            if number in wanted:
-                found.append(q)
-            number += 1
-    return forces.time[sorted(kept)], np.array(found)

@@ -13,15 +13,16 @@ from tireroad.contact.results.spectra import amplitudes
 from tireroad.fem.errors import InputError
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
-from tireroad.greens.vibration import Surface, coordinates, mean_square_velocity, radiated_power
+from tireroad.greens.vibration import Surface, mean_square_velocity, radiated_power
 from tireroad.runs.files.store import put
 from tireroad.runs.stages.base.stage import Done
 from tireroad.runs.stages.build.forces import Forces
-from tireroad.runs.stages.build.whole_tire import WholeTire
+from tireroad.runs.stages.build.whole_tire import WholeTire, replayed
 from tireroad.runs.stages.spectra import Spectra
 
 VELOCITY, POWER = 1e-9, 1e-12  # m/s, W: reference values of the levels, ISO 1683
 _LARGEST = 2e8  # bytes: largest size of the stored displacement fields
+_AT_ONCE = 64  # coordinates transformed at a time, to save memory
 HANN = 1.5  # noise bandwidth of the window in lines: mean of w^2 over the square of its mean
 
 
@@ -95,17 +96,20 @@ class VibrationStage(WholeTire[Vibration]):
         self, basis: Basis, forces: Forces, left_out: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Lines (f,) Hz to the model's limit, and coordinates a (f, m) there. Root process only."""
-        start = round(left_out / forces.step)
-        pushed = np.concatenate(list(forces.pushes(start)))
-        frequency, amplitude = amplitudes(pushed, forces.step)
+        steps = range(round(left_out / forces.step), len(forces.time))
+        frequency = np.fft.rfftfreq(len(steps), forces.step)
         top = self.spectra.product.limit.frequency if self.spectra else self.band
         below = (frequency > 0) & (frequency <= top)
         if not below.any():
             raise InputError(
-                f"output.vibration: {len(pushed) * forces.step:.3g} s of forces have no spectral line up to the "
+                f"output.vibration: {len(steps) * forces.step:.3g} s of forces have no spectral line up to the "
                 f"{top:.4g} Hz to which the modes are an answer; raise time.duration or modal.count"
             )
-        return frequency[below], coordinates(basis.states, amplitude[below], frequency[below])
+        # Not the receptance times the forces of the window: what rings at its start is part of it.
+        moved = replayed(basis, forces, steps)
+        some = (slice(k, k + _AT_ONCE) for k in range(0, moved.shape[1], _AT_ONCE))
+        a = [amplitudes(moved[:, part], forces.step)[1][below] for part in some]
+        return frequency[below], np.hstack(a)
 
     def write(self, file: h5py.File, product: Vibration) -> None:
         """All fields of the product."""

@@ -6,31 +6,7 @@ import numpy as np
 import pytest
 
 from tireroad.contact.results.levels import a_weighting, band_sums
-from tireroad.greens.vibration import Surface, coordinates, mean_square_velocity
-from tireroad.modal.rotating import rotating
-
-
-@pytest.fixture
-def states():
-    rng = np.random.default_rng(3)
-    a, b = rng.normal(size=(2, 6, 6))
-    stiffness = 4e4 * (a @ a.T + 6 * np.eye(6))
-    return rotating(40 * np.eye(6) + 30 * (b - b.T), stiffness), (
-        40 * np.eye(6) + 30 * (b - b.T),
-        stiffness,
-    )
-
-
-def test_coordinates_solve_the_equation_of_motion(states):
-    """(-w^2 + i w D + K) a = F B^T, at several frequencies and forces at once."""
-    found, (drag, stiffness) = states
-    rng = np.random.default_rng(4)
-    frequency = np.array([3.0, 40.0, 150.0])
-    pushed = rng.normal(size=(3, 6)) + 1j * rng.normal(size=(3, 6))
-    a = coordinates(found, pushed, frequency)
-    for k, omega in enumerate(2 * np.pi * frequency):
-        whole = -(omega**2) * np.eye(6) + 1j * omega * drag + stiffness
-        np.testing.assert_allclose(a[k], np.linalg.solve(whole, pushed[k]), rtol=1e-9)
+from tireroad.greens.vibration import Surface, mean_square_velocity
 
 
 def _sphere(n: int) -> tuple[np.ndarray, np.ndarray]:

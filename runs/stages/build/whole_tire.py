@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, TypeVar
+
+import numpy as np
+from mpi4py import MPI
 
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.static.state import StaticState
 from tireroad.greens.basis import Basis
+from tireroad.greens.recursion import Recursion
+from tireroad.greens.response import couple
 from tireroad.greens.responses import Wanted, band
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process.mpi import on_root
@@ -64,3 +70,28 @@ class WholeTire(Computed[P]):
     def band(self) -> float:
         """Upper end of the frequency band of interest, Hz."""
         return band(self.rotating.product, Wanted(band=self.job.scene.greens.band))
+
+
+def replayed(basis: Basis, forces: Forces, wanted: Collection[int]) -> np.ndarray:
+    """The coordinates (g, m) m kg^1/2 at the ends of the `wanted` steps, by the run's own scheme.
+
+    The states are integrated once more under the forces of the run, which are known by now. Root
+    process only.
+    """
+    unit = np.eye(basis.coordinates)
+    response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
+    # The rectangles of a convolution have no states to replay: it approximates the linear scheme.
+    scheme = "constant" if forces.scheme == "constant" else "linear"
+    tire = Recursion(response=response, step=forces.step, scheme=scheme, comm=MPI.COMM_SELF)
+    tire.start(forces.begun)
+    found = np.empty((len(wanted), len(unit)))
+    number = filled = 0
+    for block in forces.pushes():
+        for push in block:
+            free = tire.predict()
+            if number in wanted:
+                found[filled] = free + tire.same_step @ push
+                filled += 1
+            tire.advance(push)
+            number += 1
+    return found

@@ -116,6 +116,23 @@ def test_a_rolling_tire_vibrates_as_its_road_passes(tmp_path: Path) -> None:
     assert len(time) > 200 and np.isfinite(moved).all() and np.abs(moved).max() > 1e-6
 
 
+def test_an_impact_is_not_left_out_and_rings_as_in_time(tmp_path: Path) -> None:
+    """The cleat was left out as run-in, and the ringing at the window's start was not counted."""
+    cleat = ROLLING.replace('"sine"\nwavelength = 0.3', '"cleat"').replace("0.3", "0.2")
+    results = run(tmp_path, cleat + "[damping]\nmass = 20.0\n[greens]\nband = 150.0\n")
+    assert results.attributes("spectra")["left_out"] == 0.0
+    time, moved = results["motion/time"], results["motion/displacement"]
+    step = time[1] - time[0]
+    assert len(time) * step > 0.198  # the whole run
+    field = moved.reshape(len(time), -1).astype(float)
+    window = np.sin(np.pi * (time / 0.2)) ** 2
+    seen = 2 * np.fft.rfft(window[:, None] * (field - field.mean(axis=0)), axis=0) / window.sum()
+    strongest = int(results["vibration/mean_square_velocity"].argmax())
+    line = results["vibration/surface/displacement"][strongest].ravel()
+    same = int(round(results["vibration/frequency"][strongest] * len(time) * step))
+    assert np.linalg.norm(line) == pytest.approx(np.linalg.norm(seen[same]), rel=0.02)
+
+
 def test_totals_count_lines_in_bands_too_narrow_for_a_level(tmp_path: Path) -> None:
     """0.04 s have lines 25 Hz apart, and no band of three up to 200 Hz: levels were -inf, and null."""
     results = run(tmp_path, FORCE.replace("0.4", "0.04"))
