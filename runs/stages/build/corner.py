@@ -105,12 +105,16 @@ def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def check_blocked(record: Record, rolling: RollingModes, loads, highest: float) -> None:
-    """Record how far hub force and blocked force (greens.blocked) differ up to `highest` Hz."""
+    """Record how far hub force and blocked force (greens.blocked) differ up to `highest` Hz.
+
+    Nothing is recorded of a hub that no force acts on.
+    """
     basis, some = Basis.of(rolling), loads[:: -(-loads.shape[0] // _LOADS)]
     frequency = np.linspace(0, highest, _FREQUENCIES + 1)[1:]
     off = disagreement(basis, rolling.turning, some, frequency)
-    name = f"force on the hub off that by the blocked force, up to {highest:.4g} Hz"
-    record.indicators[name] = (off, "-")
+    if off is not None:
+        name = f"force on the hub off that by the blocked force, up to {highest:.4g} Hz"
+        record.indicators[name] = (off, "-")
 
 
 def describe(record: Record, rolling: RollingModes) -> None:
