@@ -48,8 +48,7 @@ def readings(job: Job) -> int:
     """
     if job.axle:
         return BESIDE
-    modal = job.scene.modes
-    held = (modal.rim, modal.road) == ("fixed", "forces") and job.scene.output.axle_force
+    held = job.scene.modes.on_axle_alone and job.scene.output.axle_force
     return MOMENTS if held else 0
 
 

@@ -46,10 +46,16 @@ class Transmissibility(Output):
     )
 
     def check(self, scene: Scene, path: tuple[str, ...], error: Where) -> None:
-        """Check that the axle is held, that a free rim has no air and no road, and the steps."""
+        """Check that an axle alone holds the tire, that a free rim has no air and no road, and the steps."""
         if scene.modes.rim == "free" or scene.axle.kind != "fixed":
             raise error(
                 path, 'is the force on a held axle: take modal.rim = "fixed", axle.kind = "fixed"'
+            )
+        if not scene.modes.on_axle_alone:
+            raise error(
+                path,
+                'is the force on an axle that carries all of it, and with modal.road = "held" the road carries part: take '
+                '"forces"',
             )
         if self.free_rim and has_air(scene):
             raise error(

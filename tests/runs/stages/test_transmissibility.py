@@ -58,6 +58,15 @@ def test_a_free_rim_under_a_load_is_refused_before_anything_is_solved(tmp_path, 
     assert alone.static.on_road
 
 
+def test_refused_where_the_road_carries_part_of_the_force(tmp_path) -> None:
+    """A force on a node that the road holds was passed on to the axle in full."""
+    (tmp_path / "a.toml").write_text(SCENE)
+    changes = ["static.load=500.0", "output.transmissibility.free_rim=0"]
+    load(tmp_path / "a.toml", changes)
+    with pytest.raises(InputError, match=r'output\.transmissibility .*modal\.road = "held"'):
+        load(tmp_path / "a.toml", [*changes, "modal.road=held"])
+
+
 @pytest.mark.slow
 def test_both_ways_agree_and_slow_forces_pass(tmp_path) -> None:
     """Two modal bases of one mesh, 1 % at most below 150 Hz (8 segments: rolling also by the lumped mass)."""
@@ -90,3 +99,39 @@ def test_both_ways_agree_and_slow_forces_pass(tmp_path) -> None:
     with h5py.File(tmp_path / "response.h5") as file:
         again = file["transmissibility/momentum"][:]
     assert np.array_equal(again, momentum[1::2]), "the same from stored Green's functions"
+
+
+HELD = """
+[tire]
+segments = 8
+elements_arc = 4
+order = 2
+[tire.material]
+youngs_modulus = 48e6
+[static]
+load = 500.0
+error_estimate = false
+[modal]
+count = 20
+road = "held"
+[[force]]
+angle = 20.0
+amplitude = 10.0
+frequency = 2.0
+[time]
+duration = 0.01
+step = 1e-3
+"""
+
+
+def test_no_axle_force_where_the_road_carries_part_of_it(tmp_path, capsys) -> None:
+    """All of the force but the rate of momentum was reported on the axle, also on a node that the road holds."""
+    (tmp_path / "a.toml").write_text(HELD)
+    run_scene(load(tmp_path / "a.toml"), tmp_path, MPI.COMM_SELF, until="response", fresh=False, petsc_options=[])  # fmt: skip
+    with h5py.File(tmp_path / "response.h5") as file:
+        assert "displacement" in file
+        assert "axle_force" not in file
+        assert "hub_moment" not in file
+    assert (
+        'left out: the road carries part of them (modal.road = "held")' in capsys.readouterr().out
+    )
