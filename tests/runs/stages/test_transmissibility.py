@@ -10,7 +10,8 @@ from mpi4py import MPI
 from tireroad.fem.errors import InputError
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
-from tireroad.runs.stages.outputs.transmissibility import apart
+from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.outputs.transmissibility import apart, compare
 from tireroad.runs.stages.pipeline import run_scene
 
 SCENE = """
@@ -56,6 +57,29 @@ def test_a_free_rim_under_a_load_is_refused_before_anything_is_solved(tmp_path, 
         load(tmp_path / "a.toml", [f"static.{road}"])
     alone = load(tmp_path / "a.toml", [f"static.{road}", "output.transmissibility.free_rim=0"])
     assert alone.static.on_road
+
+
+def test_a_free_rim_with_loss_factors_is_refused(tmp_path) -> None:
+    """Up to 40 % off without a word: each mode is damped at its own frequency, with a free rim another one."""
+    text = SCENE.replace("[damping]\nmass = 100.0\n", "")
+    (tmp_path / "a.toml").write_text(text)
+    load(tmp_path / "a.toml")
+    lossy = ["tire.loss_factor=0.2"]
+    with pytest.raises(
+        InputError, match=r"output\.transmissibility\.free_rim = 30 .*add \[damping\]"
+    ):
+        load(tmp_path / "a.toml", lossy)
+    load(tmp_path / "a.toml", [*lossy, "output.transmissibility.free_rim=0"])
+    load(tmp_path / "a.toml", [*lossy, "damping.mass=100.0"])
+
+
+def test_two_ways_far_apart_are_warned_of() -> None:
+    record = Record()
+    compare(record, "axle force", 0.01, 150.0)
+    assert not record.warnings
+    compare(record, "axle moment", 0.38, 150.0)
+    assert "the axle moment by the free rim is 38 % off that by momentum" in record.warnings[0]
+    assert len(record.indicators) == 2
 
 
 def test_refused_where_the_road_carries_part_of_the_force(tmp_path) -> None:
