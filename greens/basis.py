@@ -114,7 +114,7 @@ class Basis:
         carried = self.projection.carried
         if not wanted.nnz:
             return carried
-        return np.vstack([carried, *self.projection.moments(self.speed)])
+        return np.vstack([carried, *self.projection.moments(self.speed, self.inertia)])
 
     @property
     def coordinates(self) -> int:

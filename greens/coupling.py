@@ -144,7 +144,7 @@ class Wheel:
             return carried
         rim = self.rim() if self.rim else None
         assert rim is not None, "moments are read of a rim whose motions are known"
-        return np.vstack([carried, *rim.moments(self.speed)])
+        return np.vstack([carried, *rim.moments(self.speed, self.inertia)])
 
     def _with_statics(self, basis: Basis, outputs: Probes, loads: Probes) -> Response:
         """The states, and the exact static flexibility of what they lack. Collective."""

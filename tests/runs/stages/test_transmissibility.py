@@ -135,6 +135,7 @@ def test_both_ways_agree_with_the_inertia_of_the_thesis(tmp_path) -> None:
     with h5py.File(tmp_path / "response.h5") as file:
         group = file["transmissibility"]
         assert apart(group["free_rim"][:], group["momentum"][:]) < 0.01
+        assert apart(group["free_rim_moment"][:], group["moment"][:]) < 0.01
 
 
 HELD = """
