@@ -4,7 +4,8 @@ The tire transmits the forces on it less the rate of change of its momentum,
 
     f_axle = sum f_c - d/dt int rho Du/Dt = sum f_c + omega^2 int rho u,
 
-since the convective part of the momentum cancels around the ring. The other way is the thesis's
+since the convective part of the momentum cancels around the ring. The doppler inertia has the body
+rate in place of D/Dt, and with it (d/dt - Omega e_y x)^2 in place of d^2/dt^2. The other way is the thesis's
 (7.1)-(7.4), corrected. With the six motions r of the rigid rim and the loads c, the rim stays at
 rest under the forces
 
@@ -85,9 +86,13 @@ def from_moment(total: np.ndarray, moment: np.ndarray, frequency: np.ndarray) ->
     """Force on the axle per unit load (f, 3, k), -, at `frequency` (f,) Hz.
 
     `total` (3, k) is the sum of each load, `moment` (f, 3, k) kg m/N the first moment int rho u of
-    the tire per unit load.
+    the tire per unit load, or (f, 9, k) all that the axle feels of it (greens.basis.Basis.felt).
     """
-    return total + (2 * np.pi * frequency[:, None, None]) ** 2 * moment
+    inertia, *rest = np.split(moment, moment.shape[1] // 3, axis=1)
+    force = total + (2 * np.pi * frequency[:, None, None]) ** 2 * inertia
+    if rest:
+        force = force - 2j * np.pi * frequency[:, None, None] * rest[0] - rest[1]
+    return force
 
 
 def by_momentum(response: Response, total: np.ndarray, frequency: np.ndarray) -> np.ndarray:
@@ -95,7 +100,7 @@ def by_momentum(response: Response, total: np.ndarray, frequency: np.ndarray) ->
 
     What no state contains follows statically, where its moment is known (Response.left_out).
     """
-    nothing = np.zeros((3, response.residual.shape[1]))
+    nothing = np.zeros((len(response.momentum), response.residual.shape[1]))
     moment = replace(
         response,
         output=response.momentum,

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from tireroad.fem.axle import Axle
+from tireroad.fem.turning import Turning
 from tireroad.greens.hub import reading
 from tireroad.greens.residual.second_order import Moments, modal_moments
 from tireroad.greens.response import Response, couple
@@ -19,6 +20,7 @@ from tireroad.modal.rotating import StateModes
 Array = np.ndarray
 Probes = sparse.csr_matrix  # (k, 3 s) over the outer face, or (k, 3 s + 6) with the rim
 Pencil = tuple[np.ndarray, np.ndarray]  # D~ and K~ of a projected problem
+ABOUT_AXLE = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])  # e_y x
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,25 +28,28 @@ class Basis:
     """The modal basis and its states, with the operations that probes need.
 
     `shape` kg^-1/2 of the outer face (3 s, m), with six more rows for a free rim; `projection`: the
-    projected matrices; `states`: the decoupled states at `speed` rad/s. Probes are weights (k, 3 s)
-    of the outer face. Wider ones have six more columns for the motion of a free rim, or, with a
-    corner, seven for wheel and body (modal.corner) and three more that read the hub moments.
+    projected matrices; `states`: the decoupled states at `speed` rad/s with this `inertia`. Probes
+    are weights (k, 3 s) of the outer face. Wider ones have six more columns for the motion of a
+    free rim, or, with a corner, seven for wheel and body (modal.corner) and three more that read
+    the hub moments.
     """
 
     shape: np.ndarray
     projection: Projection
     states: StateModes
     speed: float = 0.0
+    inertia: str = "full"
 
     @staticmethod
     def of(rolling: RollingModes) -> Basis:
         """The basis of the states of a rolling tire."""
-        return Basis(
-            shape=rolling.basis.shape,
-            projection=rolling.basis.projection,
-            states=rolling.states,
-            speed=rolling.turning.speed,
-        )
+        basis = rolling.basis
+        found = Basis(shape=basis.shape, projection=basis.projection, states=rolling.states)
+        return found.at(rolling.turning)
+
+    def at(self, turning: Turning) -> Basis:
+        """The same with the speed and the inertia of the rotation that its states are of."""
+        return replace(self, speed=turning.speed, inertia=turning.inertia)
 
     def couple(
         self,
@@ -58,7 +63,7 @@ class Basis:
         it.
         """
         given = self.seen(outputs), self.seen(loads)
-        response = couple(self.states, *given, self.projection.carried)
+        response = couple(self.states, *given, self.carried)
         wanted = self.of_hub(outputs)
         if wanted.nnz:
             response = reading(response, self.states, wanted, self.beside(wanted)[3:])
@@ -79,6 +84,27 @@ class Basis:
         """Moments (3, k), m, of unit loads about the axle's centre."""
         return self.projection.wheel.rigid(loads)[:, MOMENTS].T
 
+    @property
+    def carried(self) -> np.ndarray:
+        """Rows of all coordinates of which the axle feels the rates (Response.momentum)."""
+        whole, tire = self.projection.carried, self.projection.momentum
+        # The air moves with its own inertia, of which nothing is left out.
+        tire = np.pad(tire, ((0, 0), (0, whole.shape[1] - tire.shape[1])))
+        return np.vstack([whole, self.felt(tire)[3:]])
+
+    def felt(self, moment: np.ndarray) -> np.ndarray:
+        """Rows of which the axle feels the rates, of first moments (3, n) int rho u of the tire.
+
+        These themselves, since convective parts cancel around the ring; or, with the doppler
+        inertia, whose rate is that of a frame that turns with the wheel, the three parts (9, n) of
+
+            (d/dt - Omega e_y x)^2 int rho u.
+        """
+        if self.inertia == "full" or self.speed == 0 or self.projection.moves:
+            return moment
+        swept = self.speed * ABOUT_AXLE @ moment
+        return np.vstack([moment, -2 * swept, self.speed * ABOUT_AXLE @ swept])
+
     def beside(self, wanted: sparse.csr_matrix) -> np.ndarray:
         """Rows that all coordinates carry besides: the momentum (3, m + a + c).
 
@@ -88,7 +114,7 @@ class Basis:
         carried = self.projection.carried
         if not wanted.nnz:
             return carried
-        return np.vstack([carried, *self.projection.moments(self.speed)])
+        return np.vstack([carried, *self.projection.moments(self.speed, self.inertia)])
 
     @property
     def coordinates(self) -> int:

@@ -97,8 +97,14 @@ def by_states(basis: Basis, loads: sparse.csr_matrix, frequency: np.ndarray) -> 
 
 def disagreement(
     basis: Basis, turning: Turning, loads: sparse.csr_matrix, frequency: np.ndarray
-) -> float:
-    """Largest relative difference between the two over the frequencies, in the Frobenius norm."""
+) -> float | None:
+    """Largest relative difference between the two over the frequencies, in the Frobenius norm.
+
+    None if there is no force to compare: nothing holds a wheel that is free in x, y and z.
+    """
     one, other = substituted(basis, turning, loads, frequency), by_states(basis, loads, frequency)
     size = np.linalg.norm(one, axis=(1, 2))
-    return float((np.linalg.norm(one - other, axis=(1, 2)) / size).max())
+    some = size > 0
+    if not some.any():
+        return None
+    return float((np.linalg.norm(one - other, axis=(1, 2))[some] / size[some]).max())

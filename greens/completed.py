@@ -11,6 +11,11 @@ from tireroad.greens.response import Response
 from tireroad.modal.rotating import held_matrices
 
 
+def with_left_out(response: Response, whole: Array) -> Response:
+    """The response with what its states lack of the `whole` static rows (Basis.felt)."""
+    return replace(response, left_out=whole - response.static_moment())
+
+
 def completed(
     basis: Basis,
     turning: Turning,
@@ -32,7 +37,7 @@ def completed(
         if hub.nnz:
             flexibility = flexibility + hub @ basis.loaded(loads)
         response = basis.couple(outputs, loads, flexibility)
-        return replace(response, left_out=beside[:3] - response.static_moment())
+        return with_left_out(response, basis.felt(beside[:3]))
     held = basis.held
     pencil = held_matrices(basis.projection, turning.speed, turning.damping, turning.inertia)
     known = modal_moments(*pencil, held.seen(outputs), held.seen(loads), held.beside(hub))

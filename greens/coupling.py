@@ -27,7 +27,7 @@ from tireroad.fem.matrices.receptance import receptance
 from tireroad.fem.matrices.rim_motion import RimMotion
 from tireroad.fem.turning import Turning
 from tireroad.greens.basis import Array, Basis, Pencil, Probes, regained
-from tireroad.greens.completed import completed
+from tireroad.greens.completed import completed, with_left_out
 from tireroad.greens.residual.attachment import dynamic, fewest, foremost
 from tireroad.greens.residual.second_order import Moments, second_order
 from tireroad.greens.response import Response
@@ -131,11 +131,11 @@ class Wheel:
             moments = moments.plus(regained(basis.held, *pencils, probes, probes))
             loss = self.beyond[0], tail_loss(basis.projection)
         given = basis.states, basis.seen(face), basis.beside(hub), moments
-        whole = second_order(poles, *given, loss, hub)
+        whole = second_order(poles, *given, loss, hub, basis.felt)
         if hub.nnz:
             whole = replace(whole, residual=whole.residual + hub @ basis.loaded(face))
-        moment = moments.momentum[:3] - whole.static_moment()
-        return whole if self.air is not None else replace(whole, left_out=moment)
+        moment = basis.felt(moments.momentum[:3])
+        return whole if self.air is not None else with_left_out(whole, moment)
 
     def _beside(self, hub: Probes) -> Array:
         """Own rows (3, n) of momentum; with A_0 to A_2 of greens.hub (12, n) if `hub` is read."""
@@ -144,7 +144,7 @@ class Wheel:
             return carried
         rim = self.rim() if self.rim else None
         assert rim is not None, "moments are read of a rim whose motions are known"
-        return np.vstack([carried, *rim.moments(self.speed)])
+        return np.vstack([carried, *rim.moments(self.speed, self.inertia)])
 
     def _with_statics(self, basis: Basis, outputs: Probes, loads: Probes) -> Response:
         """The states, and the exact static flexibility of what they lack. Collective."""
@@ -226,10 +226,9 @@ class Wheel:
             projection, grown = projection.among(stays), grown.among(stays)
         projection = self.with_air(projection, grown)
         projection = self.corner(projection, grown) if self.corner else projection
-        states = self.decouple(projection, comm)
-        shape, speed = operators.trace(grown.vectors), self.speed
-        basis = Basis(shape=shape, projection=projection, states=states, speed=speed)
-        return basis, grown.vectors
+        states, shape = self.decouple(projection, comm), operators.trace(grown.vectors)
+        basis = Basis(shape=shape, projection=projection, states=states)
+        return basis.at(self.turning), grown.vectors
 
     @property
     def turning(self) -> Turning:

@@ -10,13 +10,45 @@ set of states, is omitted, as for the momentum (Response.direct_momentum_rate).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 
-from tireroad.greens.response import Response
 from tireroad.modal.states import StateModes
+
+if TYPE_CHECKING:
+    from tireroad.greens.response import Response
+
+
+def rates(response: Response) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Rows of its momentum per state (3, q) and per state of the block (3, b), two pairs.
+
+    First A_2 s + A_1, by which a force changes the axle force at once, then A_2 s^2 + A_1 s + A_0.
+    """
+    s, block = response.eigenvalue, response.block
+    poles = _horner(response.momentum, lambda rows: rows * s)
+    return list(
+        zip(poles, _horner(response.block_momentum, lambda rows: rows @ block), strict=True)
+    )
+
+
+def _horner(rows: np.ndarray, rate: Callable[[np.ndarray], np.ndarray]) -> list[np.ndarray]:
+    """Both of `rates`; `rows` (3, n) are A_2 alone, (9, n) are A_2, A_1 and A_0 (Basis.felt)."""
+    inertia, *rest = np.split(rows, len(rows) // 3)
+    first, still = rest or (0.0, 0.0)
+    direct = rate(inertia) + first
+    return [direct, rate(direct) + still]
+
+
+def at_once(response: Response) -> np.ndarray:
+    """Rate of momentum (3, k) due to each force at the same instant, A_0 u of what follows it too."""
+    poles, block = rates(response)[0]
+    direct = (poles @ response.input).real + block @ response.block_input
+    follows = response.left_out
+    return direct if follows is None or len(follows) == 3 else direct + follows[6:]
 
 
 def reading(

@@ -18,7 +18,7 @@ class Block:
 
     def __init__(self, response: Response, step: float, scheme: str) -> None:
         block, push = response.block, response.block_input
-        self._output = np.vstack([response.block_output, response.block_momentum @ block @ block])
+        self._output = np.vstack([response.block_output, response.inertia[1]])
         self._decay, self._old, self._new = block_steps(block, push, step, scheme)
         size, forces = push.shape
         self.state = np.zeros(size)

@@ -53,9 +53,8 @@ class Recursion:
         s = response.eigenvalue[mine]
         self._decay = np.exp(s * step)
         self._old, self._new = weights(s * step, step, scheme)
-        momentum = response.momentum[:, mine]
         # Real arithmetic on adjacent (re, im), as the states lie in memory.
-        output = np.vstack([response.output[:, mine], momentum * s**2])
+        output = np.vstack([response.output[:, mine], response.inertia[0][:, mine]])
         into = np.ascontiguousarray(response.input[mine])
         self._output = np.ascontiguousarray(output.conj()).view(float)
         self._block = None

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg
 
+from tireroad.greens.hub import at_once, rates
 from tireroad.greens.residual.parted import parted
 from tireroad.modal.states import StateModes, growing
 
@@ -29,12 +30,12 @@ class Response:
 
     `eigenvalue` (q,) 1/s, `output` (r, q) and `input` (q, k) complex, `block` (b, b) with its
     `block_output` (r, b) and `block_input` (b, k), `residual` (r, k) m/N; `momentum` (3, q) and
-    `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries. The last `rigid`
-    states of the block drift under a constant force and are omitted from static results. In the
-    first `pulse` outputs the residual responds not at once but with a pulse 1/step high and one
-    step long, in place of its delta(t) (thesis (C.4)). `left_out` (3, k) kg m/N, where known: the
-    static first moment int rho u of all motions outside the states, whose second rate the axle
-    force lacks."""
+    `block_momentum` (3, b): the momentum (kg m/s) that each state's rate carries, or nine rows
+    (basis.Basis.felt). The last `rigid` states of the block drift under a constant force and are
+    omitted from static results. In the first `pulse` outputs the residual responds not at once but
+    with a pulse 1/step high and one step long, in place of its delta(t) (thesis (C.4)). `left_out`
+    (3 or 9, k) kg m/N, where known: the same rows of all motions outside the states, which follow
+    statically; their rates are what the axle force lacks."""
 
     eigenvalue: np.ndarray
     output: np.ndarray
@@ -55,13 +56,16 @@ class Response:
 
     def momentum_rate(self, times: np.ndarray) -> np.ndarray:
         """Rate of momentum (t, 3, k) 1/s after a unit impulse of each force, without its jump."""
-        s, block = self.eigenvalue, self.block
-        return self._waves(times, self.momentum * s**2, self.block_momentum @ block @ block)
+        return self._waves(times, *self.inertia)
+
+    @property
+    def inertia(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rate of momentum (3, q) and (3, b), N, per state and per state of the block."""
+        return rates(self)[1]
 
     def direct_momentum_rate(self) -> np.ndarray:
         """Rate of momentum (3, k) due to each force at the same instant."""
-        direct = ((self.momentum * self.eigenvalue) @ self.input).real
-        return direct + self.block_momentum @ self.block @ self.block_input
+        return at_once(self)
 
     def _waves(self, times: np.ndarray, output: np.ndarray, block_output: np.ndarray) -> np.ndarray:
         g = np.stack([((output * np.exp(self.eigenvalue * t)) @ self.input).real for t in times])
@@ -91,9 +95,8 @@ class Response:
         return static
 
     def static_moment(self) -> np.ndarray:
-        """First moment (3, k) kg m of all states per constant force, N."""
-        moving = replace(self, output=self.momentum, block_output=self.block_momentum)
-        return moving.static()
+        """First moment (3, k) kg m of all states, or the nine rows, per constant force, N."""
+        return replace(self, output=self.momentum, block_output=self.block_momentum).static()
 
     @property
     def growth(self) -> tuple[int, float]:
@@ -227,7 +230,7 @@ def couple(
 ) -> Response:
     """Response from modal shapes at the outputs (r, m) and forces (k, m), kg^-1/2.
 
-    `momentum` (3, m) as in modal.basis. With the exact static flexibility `compliance` (r, k) m/N
+    `momentum` (3, m) as in modal.basis, or (9, m). With the exact static flexibility `compliance` (r, k) m/N
     of the rolling tire, G_res = [K_Omega^-1]_rk - Phi_r K~^-1 Phi_k^T represents the truncated
     modes (statically, exact at 0 Hz); without it they are missing."""
     response = Response(

@@ -78,9 +78,9 @@ class Projection:
         seen = shapes if self.air is None else np.pad(shapes, ((0, 0), (0, self.air.count)))
         return self.wheel.seen(seen, probes) @ self._change if self.moves else seen
 
-    def moments(self, speed: float) -> np.ndarray:
+    def moments(self, speed: float, inertia: str = "full") -> np.ndarray:
         """The rows (3, 3, m + a + c) of `Corner.moments` in all coordinates."""
-        rows = self.wheel.moments(self.inside.shape[1], speed)
+        rows = self.wheel.moments(self.inside.shape[1], speed, inertia)
         return rows @ self._change if self.moves else rows
 
     @property

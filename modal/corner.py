@@ -26,7 +26,7 @@ from scipy import linalg, sparse
 from tireroad.fem.axle import DIRECTIONS, Axle
 from tireroad.fem.collective import summed
 from tireroad.fem.errors import InputError
-from tireroad.fem.matrices.rim_motion import RimMotion, carried_pencil
+from tireroad.fem.matrices.rim_motion import FELT, RimMotion, carried_pencil
 
 BODY = 6  # index of the body's height, after the six motions of the rim
 # Motions that probes can read or load after the outer face: the rim's six and the body's height.
@@ -38,8 +38,8 @@ MOMENTS = slice(3, 6)  # of the six; after the motions probes can read the hub m
 class Corner:
     """The wheel and its coupling to m modes.
 
-    `axle`: the wheel and its suspension; `mass` P^T, `stiffness`, `gyroscopic`, `convective` (m, 6)
-    of the modes, and `own_...` (6, 6) of the rim's motions alone, factors of Omega taken out;
+    `axle`: the wheel and its suspension; `mass` P^T, `stiffness`, `gyroscopic`, `convective` and, for
+    the moments with the doppler inertia, `body`, `body_convective` (m, 6) of the modes, and `own_...` (6, 6) of the rim's motions alone, factors of Omega taken out;
     `places` (s, 3) m of the outer face in the static state. Gyroscopic and convective arrays are
     zero for a standing wheel.
     """
@@ -50,6 +50,8 @@ class Corner:
     stiffness: np.ndarray
     gyroscopic: np.ndarray
     convective: np.ndarray
+    body: np.ndarray
+    body_convective: np.ndarray
     own_mass: np.ndarray
     own_stiffness: np.ndarray
     own_gyroscopic: np.ndarray
@@ -67,7 +69,7 @@ class Corner:
 
     def first(self, count: int) -> Corner:
         """The corner with the first `count` modes only."""
-        cut = {name: getattr(self, name)[:count] for name in _PER_MODE}
+        cut = {name: getattr(self, name)[:count] for name in _PER_MODE + FELT["doppler"]}
         return replace(self, **cut)
 
     def momentum(self, air: np.ndarray | None) -> np.ndarray:
@@ -157,14 +159,18 @@ class Corner:
             seen += probes[:, 3 * s : 3 * s + SEEN].toarray()
         return seen
 
-    def moments(self, n: int, speed: float) -> np.ndarray:
+    def moments(self, n: int, speed: float, inertia: str = "full") -> np.ndarray:
         """A (3, 3, n + c), N m: hub moments are those of loads less A_2 q'' + A_1 q' + A_0 q.
 
         q = (eta, xi) has n coordinates of tire and air and c of the wheel.
         """
         zero, m = np.zeros((n, n)), len(self.mass)
+        gyroscopic, convective = (getattr(self, name) for name in FELT[inertia])
         held = replace(
-            self, axle=replace(self.axle, stiffness=np.zeros(6), damping=np.zeros(6), locked=())
+            self,
+            axle=replace(self.axle, stiffness=np.zeros(6), damping=np.zeros(6), locked=()),
+            gyroscopic=gyroscopic,
+            convective=convective,
         )
         drag, stiffness = held.joined(zero, zero, speed)
         mass = np.zeros((3, n + SEEN))
@@ -193,7 +199,7 @@ def meeting(
     nothing = np.zeros((vectors.shape[1], 6))
     per_mode = {
         name: summed(comm, vectors.T @ rim.rows[name]) if name in rim.rows else nothing
-        for name in _PER_MODE
+        for name in _PER_MODE + FELT["doppler"]
     }
     own = {f"own_{name}": rim.whole.get(name, np.zeros((6, 6))) for name in _PER_MODE}
     return Corner(axle=axle, places=places, **per_mode, **own)

@@ -21,13 +21,14 @@ from petsc4py import PETSc
 from scipy import sparse
 from ufl.core.expr import Expr
 
-from tireroad.fem import compat, kinematics
+from tireroad.fem import compat
 from tireroad.fem.matrices.local_rows import from_local_rows
 from tireroad.fem.matrices.support import FIXED, Rim, Support, Unknowns
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,
     added_stress,
+    body_convective_form,
     body_rate_form,
     convection_form,
     convective_form,
@@ -66,9 +67,7 @@ class Rotation:
     @cached_property
     def body_convective(self) -> PETSc.Mat:
         """S_B, kg."""
-        u, v, w = self._body.trial, self._body.test, kinematics.wheel_velocity(self._body.mesh)
-        rate, test_rate = kinematics.body_rate(u, w), kinematics.body_rate(v, w)
-        return self._assemble(self._body.inertia(-ufl.inner(test_rate, rate)))
+        return self._assemble(body_convective_form(self._body))
 
     def coriolis(self, inertia: str) -> PETSc.Mat:
         """The factor of 2 Omega, kg: G, or B for the doppler inertia."""

@@ -23,6 +23,7 @@ from tireroad.fem.matrices.support import FIXED, TURN, Unknowns, rigid_motions, 
 from tireroad.fem.static.virtual_work import (
     AT_REST,
     Rolling,
+    body_convective_form,
     body_rate_form,
     convection_form,
     convective_form,
@@ -31,21 +32,24 @@ from tireroad.fem.static.virtual_work import (
 from tireroad.fem.tire.body import Body
 
 TRANSLATIONS = slice(0, 3)
+# The factors of 2 Omega and of Omega^2, by the inertia of rotation.
+FELT = {"full": ("gyroscopic", "convective"), "doppler": ("body", "body_convective")}
 
 
 @dataclass(frozen=True)
 class RimMotion:
     """Products of the matrices X with the rim's motions R, by the names of the matrices.
 
-    `rows` (n, 6): X R on own unknowns of the tire with fixed rim, "body" (B R) included; `whole`
+    `rows` (n, 6): X R on own unknowns of the tire with fixed rim; `whole`
     (6, 6): R^T X R including the rim's own part. kg, N/m; kg/rad, kg/rad2 and factors m, m2 for
-    rotations. A standing wheel has no "gyroscopic", "convective" and "body".
+    rotations. A standing wheel has no "gyroscopic", "convective", "body" and "body_convective" (B R
+    and S_B R, of `rows` alone).
     """
 
     rows: dict[str, np.ndarray]
     whole: dict[str, np.ndarray]
 
-    def moments(self, speed: float) -> np.ndarray:
+    def moments(self, speed: float, inertia: str = "full") -> np.ndarray:
         """A (3, 3, n) on own unknowns at `speed` (rad/s), for the moments at a fixed hub, N m.
 
         They are the moments of the loads minus A_2 u'' + A_1 u' + A_0 u
@@ -53,8 +57,9 @@ class RimMotion:
         turned = {name: rows[:, TURN:].T for name, rows in self.rows.items()}
         out = np.stack([turned["stiffness"], np.zeros_like(turned["mass"]), turned["mass"]])
         if speed:
-            out[0] += speed**2 * turned["convective"]
-            out[1] -= 2 * speed * turned["gyroscopic"]
+            gyroscopic, convective = FELT[inertia]
+            out[0] += speed**2 * turned[convective]
+            out[1] -= 2 * speed * turned[gyroscopic]
         return out
 
 
@@ -75,7 +80,8 @@ def rim_motion(body: Body, inflation: float, rolling: Rolling, turns: bool) -> R
     if turns:
         products |= _turning(body, motions)
     rows = {name: product[unknowns.free] for name, product in products.items()}
-    products.pop("body", None)
+    for name in FELT["doppler"]:
+        products.pop(name, None)
     whole = {name: summed(comm, motions.T @ product) for name, product in products.items()}
     # The wheel carries the forces on the rim: those of the tire's own nodes and those of rolling.
     rim = np.setdiff1d(np.arange(body.nodes), unknowns.free // 3)
@@ -106,7 +112,7 @@ def _assembled(body: Body, form: ufl.Form) -> np.ndarray:
 
 
 def _turning(body: Body, motions: np.ndarray) -> dict[str, np.ndarray]:
-    """G R, S R and B R (3 nodes, 6). Collective.
+    """G R, S R, B R and S_B R (3 nodes, 6). Collective.
 
     For translations G R and S R are set to 0: the assembled values are rounding, or the mesh's
     error in a closed surface."""
@@ -115,6 +121,7 @@ def _turning(body: Body, motions: np.ndarray) -> dict[str, np.ndarray]:
         "gyroscopic": convection_form(body),
         "convective": convective_form(body),
         "body": body_rate_form(body),
+        "body_convective": body_convective_form(body),
     }
     acting = {name: ufl.action(form, field) for name, form in forms.items()}
     out = {name: np.zeros_like(motions) for name in forms}
@@ -122,7 +129,7 @@ def _turning(body: Body, motions: np.ndarray) -> dict[str, np.ndarray]:
         body.owned(field.x.array)[:] = motion.reshape(-1, 3)
         field.x.scatter_forward()
         for name, form in acting.items():
-            if k >= TURN or name == "body":
+            if k >= TURN or name in FELT["doppler"]:
                 out[name][:, k] = _assembled(body, form).ravel()
     return out
 

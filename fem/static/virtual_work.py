@@ -127,6 +127,12 @@ def body_rate_form(body: Body) -> ufl.Form:
     return convection_form(body) - body.inertia(ufl.inner(v, kinematics.cross_axle(u)))
 
 
+def body_convective_form(body: Body) -> ufl.Form:
+    """S_B: -int rho (body rate of v) . (body rate of u), in trial and test functions."""
+    w, rate = kinematics.wheel_velocity(body.mesh), kinematics.body_rate
+    return body.inertia(-ufl.inner(rate(body.test, w), rate(body.trial, w)))
+
+
 def tangent(body: Body, residual: ufl.Form) -> ufl.Form:
     """Derivative of a residual with respect to the body's displacement."""
     return ufl.derivative(residual, body.u, body.trial)

@@ -14,6 +14,7 @@ here.)
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,6 +77,7 @@ def second_order(
     moments: Moments,
     loss: tuple[float, float] | None = None,
     hub: sparse.csr_matrix | None = None,
+    felt: Callable[[np.ndarray], np.ndarray] = np.asarray,
 ) -> Response:
     """The response of p probes (outputs = forces) with residual states and an exact static limit.
 
@@ -83,7 +85,8 @@ def second_order(
     `loss`: the uniform damping rate (1/s) in the moments, and the loss factor eta that replaces it,
     each state being damped at eta times its own circular frequency. `hub` (p, 3): the weights by
     which probes read hub moments, which `response` lacks; `carried` and the momentum of the moments
-    then have the rows of greens.hub. The immediate moments of the loads are not included.
+    then have the rows of greens.hub. The immediate moments of the loads are not included. `felt`:
+    what the axle feels of a first moment (Basis.felt).
     """
     missing = _missing(response, modes, shape, carried, moments)
     flexibility = missing.compliance
@@ -110,7 +113,8 @@ def second_order(
     output = flexibility @ basis
     forces = inverse @ (basis.T @ flexibility)
     beside = missing.momentum @ basis
-    extra = reading(couple(states, output, forces.T, beside[:3]), states, hub, beside[3:])
+    extra = couple(states, output, forces.T, felt(beside[:3]))
+    extra = reading(extra, states, hub, beside[3:])
     whole = whole.joined(extra.keeping_where(lambda s: ~growing(s)))
     return replace(whole, residual=answers - whole.static())
 

@@ -23,7 +23,7 @@ def participation(response: Response, band: float) -> np.ndarray:
     still = np.linalg.norm(response.static() + response.residual)
     displacement = _lost(response, response.output, band) / still
     # Of each unit force one unit reaches the axle.
-    axle = _lost(response, response.momentum * response.eigenvalue**2, band)
+    axle = _lost(response, response.inertia[0], band)
     return np.maximum(displacement, axle / np.sqrt(response.input.shape[1]))
 
 

@@ -61,9 +61,12 @@ def estimate_axle(response: Response, cutoff: Cutoff, frequency: np.ndarray) -> 
     """
     if response.left_out is None:
         return None
-    lacking = np.linalg.norm(response.left_out) / np.sqrt(response.left_out.shape[1])
+    inertia, *rest = np.split(response.left_out, len(response.left_out) // 3)
+    s = 2j * np.pi * frequency[:, None, None]
+    felt = s**2 * inertia + (s * rest[0] if rest else 0.0)
+    lacking = _size(felt) / np.sqrt(response.left_out.shape[1])
     share = np.where(frequency > 0, cutoff.share(frequency), 0.0)
-    return (2 * np.pi * frequency) ** 2 * lacking * (1 + share)
+    return lacking * (1 + share)
 
 
 def _size(matrices: np.ndarray) -> np.ndarray:

@@ -120,9 +120,13 @@ class ResponseStage(Computed[PointResponse]):
             "force": (force, "N"),
             "displacement": (displacement.reshape(len(force), -1, 3), "m"),
         }
-        if scene.output.axle_force and scene.modes.rim != "free":  # a free axle carries no force
+        if scene.output.axle_force and scene.modes.on_axle_alone:
             curves["axle_force"] = axle, "N"
             curves |= {"hub_moment": (moment, "N m")} if moment.size else {}
+        elif scene.output.axle_force and scene.modes.rim == "fixed":  # a free axle carries none
+            observe.say(
+                '  axle force and moments left out: the road carries part of them (modal.road = "held")'
+            )
         return curves
 
     def _marched(self, record: Record, seen: Driven, force: np.ndarray) -> tuple:

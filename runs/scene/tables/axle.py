@@ -160,6 +160,12 @@ def _check_company(scene: Scene, axle: Axle, error: Where) -> None:
     turns = scene.rotation is not None and scene.rotation.speed > 0
     if scene.modes.rim == "free":
         raise error(("modal", "rim"), '= "free" is a wheel without mass: [axle] needs "fixed"')
+    if scene.modes.road == "held":
+        raise error(
+            ("modal", "road"),
+            f'= "held" keeps the wheel of axle.kind = "{scene.axle.kind}" where it is: take modal.road = "forces", '
+            'or axle.kind = "fixed"',
+        )
     if turns and scene.rotation.method == "full":
         raise error(("rotation", "method"), '= "full" knows no [axle] that moves: take "projected"')
     if turns and scene.rotation.inertia == "doppler":

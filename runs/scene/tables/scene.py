@@ -33,6 +33,11 @@ class Modal:
         "road in the modes: replaced by its static forces, or the touching nodes held in height",
     )
 
+    @property
+    def on_axle_alone(self) -> bool:
+        """Whether the axle alone carries what acts on the tire: its rim is fixed, no other node is held."""
+        return (self.rim, self.road) == ("fixed", "forces")
+
 
 @dataclass(frozen=True)
 class Damping:

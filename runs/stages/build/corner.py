@@ -48,8 +48,7 @@ def readings(job: Job) -> int:
     """
     if job.axle:
         return BESIDE
-    modal = job.scene.modes
-    held = (modal.rim, modal.road) == ("fixed", "forces") and job.scene.output.axle_force
+    held = job.scene.modes.on_axle_alone and job.scene.output.axle_force
     return MOMENTS if held else 0
 
 
@@ -105,12 +104,16 @@ def parts(readings: np.ndarray, static: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def check_blocked(record: Record, rolling: RollingModes, loads, highest: float) -> None:
-    """Record how far hub force and blocked force (greens.blocked) differ up to `highest` Hz."""
+    """Record how far hub force and blocked force (greens.blocked) differ up to `highest` Hz.
+
+    Nothing is recorded of a hub that no force acts on.
+    """
     basis, some = Basis.of(rolling), loads[:: -(-loads.shape[0] // _LOADS)]
     frequency = np.linspace(0, highest, _FREQUENCIES + 1)[1:]
     off = disagreement(basis, rolling.turning, some, frequency)
-    name = f"force on the hub off that by the blocked force, up to {highest:.4g} Hz"
-    record.indicators[name] = (off, "-")
+    if off is not None:
+        name = f"force on the hub off that by the blocked force, up to {highest:.4g} Hz"
+        record.indicators[name] = (off, "-")
 
 
 def describe(record: Record, rolling: RollingModes) -> None:

@@ -45,6 +45,7 @@ def golden_car() -> Basis:
     corner = Corner(
         axle=axle, places=np.array([[0.0, 0.0, -0.3]]),
         mass=nothing, stiffness=nothing, gyroscopic=nothing, convective=nothing,
+        body=nothing, body_convective=nothing,
         own_mass=own, own_stiffness=own, own_gyroscopic=own, own_convective=own,
     )  # fmt: skip
     projection = Projection(squares=np.zeros(0), momentum=np.zeros((3, 0)), corner=corner)

@@ -26,6 +26,7 @@ from tireroad.greens.blocked import disagreement
 from tireroad.greens.coupling import Wheel
 from tireroad.modal.basis import project
 from tireroad.modal.joined import with_corner
+from tireroad.modal.rolling import decouple
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.fields import everywhere
 from tireroad.modal.standing import sites
@@ -225,3 +226,21 @@ def test_what_is_no_axle() -> None:
         Axle(stiffness=six, damping=six, locked=("w",), **mass)
     with pytest.raises(InputError, match="mass"):
         Axle(stiffness=six, damping=six, wheel_mass=1.0, wheel_inertia=(0.0, 1.0, 1.0))
+
+
+def test_a_wheel_free_in_all_directions_has_no_hub_force_to_compare() -> None:
+    """Its hub force is 0 at every frequency: a relative difference divided by zero, and was stored as null."""
+    _, modes, basis = wheel(0.0, 60)
+    axle = Axle(
+        wheel_mass=5.0,
+        wheel_inertia=(0.4, 0.8, 0.5),
+        stiffness=np.zeros(6),
+        damping=np.zeros(6),
+        locked=("rx", "ry", "rz"),
+    )
+    projection = replace(basis.projection, corner=replace(basis.projection.wheel, axle=axle))
+    turning = Turning(speed=0.0, damping=DAMPING)
+    states = decouple(projection, turning, COMM)
+    free = replace(basis, projection=projection, states=states)
+    with np.errstate(all="raise"):
+        assert disagreement(free, turning, loads(0.0, 0), FREQUENCY) is None

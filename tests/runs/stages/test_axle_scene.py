@@ -112,6 +112,10 @@ def test_corner_free_wheel_and_the_fixed_axle_as_its_limit(run):
         ('body_mass = 3.0\nlocked = ["x", "y", "z", "rx", "rz"]', "no part where z is locked"),
         ('body_mass = 3.0\n[greens]\nresidual = "second-order"', "knows no [axle]"),
         ('body_mass = 3.0\n[modal]\nrim = "free"\n[damping]\nmass = 0.0', "massless|without mass"),
+        (
+            '[modal]\nroad = "held"',
+            'keeps the wheel of axle.kind = "corner" where it is: take modal.road = "forces"',
+        ),
     ],
 )
 def test_a_corner_that_cannot_be_is_refused(tmp_path, axle, told):
