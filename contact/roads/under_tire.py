@@ -24,7 +24,15 @@ LONGEST = 0.25  # m, longest piece
 _SEEN, _LEAST_SEEN, _MOST_SEEN, _COARSEST = 20.0, 0.1, 100_000, 1e-3
 
 
-class Road(Protocol):
+class Bounded(Protocol):
+    """Bounds (m) of the heights in a strip of road."""
+
+    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float: ...
+
+    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float: ...
+
+
+class Road(Bounded, Protocol):
     """Heights (m) at x in rolling direction and y to the left (m).
 
     `extent` ((x0, x1), (y0, y1)) in m, may be infinite; `spacing` (m) the shortest length resolved.
@@ -38,14 +46,10 @@ class Road(Protocol):
 
     def height(self, x: Array, y: Array) -> Array: ...
 
-    def highest(self, x0: float, x1: float, y0: float, y1: float) -> float: ...
-
-    def lowest(self, x0: float, x1: float, y0: float, y1: float) -> float: ...
-
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "Road": ...
 
 
-def is_level(road: Road, x0: float, x1: float, y0: float, y1: float) -> bool:
+def is_level(road: Bounded, x0: float, x1: float, y0: float, y1: float) -> bool:
     """Whether a strip of road has one height, by its own bounds."""
     strip = x0, x1, y0, y1
     return bool(0.0 <= road.highest(*strip) - road.lowest(*strip) < NOTHING)
