@@ -182,7 +182,7 @@ class RollingTire:
         """Green's functions between probes (r, 3 s) and loads (k, 3 s) on the outer face.
 
         `residual`: kind of residual flexibility that replaces the truncated modes
-        (greens.responses).
+        (greens.responses); InputError for an unknown one.
         """
         basis = self.standing.basis
         return make_response(

@@ -55,11 +55,17 @@ def test_modes_take_the_state_of_an_equal_tire(rolling, static) -> None:
         ({"spacing": 0.0}, "spacing = 0.0 must be"),
         ({"spacing": (0.01, 0.01, 0.01)}, "spacing = .* must be one length or two"),
         ({"spacing": "fine"}, "spacing = 'fine' must be"),
+        ({"residual": "statics"}, 'residual = "statics" is unknown: take none, .*static'),
     ],
 )
 def test_drive_says_what_it_does_not_take(rolling, given: dict, message: str) -> None:
     with pytest.raises(tr.InputError, match=message):
         tr.drive(rolling, tr.make_road(kind="flat"), duration=0.01, **given)
+
+
+def test_a_response_has_one_of_the_known_residuals(rolling) -> None:
+    with pytest.raises(tr.InputError, match='residual = "x" is unknown: take none'):
+        rolling.at([(0.0, 0.0)], residual="x")
 
 
 def test_one_spacing_is_that_of_both_ways(rolling) -> None:
