@@ -22,6 +22,7 @@ from tireroad.fem.matrices import probe
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.library import RollingTire
+from tireroad.runs.scene.rules.scene import barred_from_contact
 from tireroad.runs.stages.build.rolling.loop import make_loop
 
 Array = NDArray[np.float64]
@@ -84,8 +85,9 @@ def drive(
 
     `step` s: time step, by default small enough for the fastest mode. `tread`: a law of
     contact.tread.laws, by default a half-space of 10 MPa. `spacing` (m, or m, m along and across) of
-    a grid of contact points, by default the nodes of the mesh. Frictionless. Raises ConvergenceError if the road
-    touches the tire outside the patch of contact points. Collective.
+    a grid of contact points, by default the nodes of the mesh. Frictionless. Raises InputError
+    for a tire that is off the road or whose modes have a free rim or a held road, and
+    ConvergenceError if the road touches the tire outside the patch of contact points. Collective.
     """
     if duration <= 0:
         raise InputError(f"drive: duration = {duration:g} s must be above 0")
@@ -94,6 +96,8 @@ def drive(
     static = motions.static
     if static.road_height is None:
         raise InputError("drive: the tire is not on a road: press it on one first")
+    for key, why in barred_from_contact(motions.rim, motions.road):
+        raise InputError(f"drive: modes with {key} {why}")
     rolled = Rolled(
         speed=turning.speed * static.rolling_radius(), duration=duration, motion=lambda t: 0.0
     )

@@ -1,12 +1,14 @@
 """The library refuses what does not fit together in one message; its example shows a result."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tireroad as tr
+from tireroad.fem.model import SmallMotions
 from tireroad.runs.library import RollingTire
 
 pytestmark = pytest.mark.slow
@@ -61,6 +63,21 @@ def test_modes_take_the_state_of_an_equal_tire(rolling, static) -> None:
 def test_drive_says_what_it_does_not_take(rolling, given: dict, message: str) -> None:
     with pytest.raises(tr.InputError, match=message):
         tr.drive(rolling, tr.make_road(kind="flat"), duration=0.01, **given)
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"road": "held"}, 'road = "held" fixes the nodes'),
+        ({"rim": "free"}, 'rim = "free" leaves nothing'),
+    ],
+)
+def test_drive_refuses_modes_that_cannot_carry_the_contact(
+    rolling, tire, static, change: dict, why: str
+) -> None:
+    standing = replace(rolling.standing, motions=SmallMotions(tire, static, **change))
+    with pytest.raises(tr.InputError, match=why):
+        tr.drive(replace(rolling, standing=standing), tr.make_road(kind="flat"), duration=0.01)
 
 
 def test_a_response_has_one_of_the_known_residuals(rolling) -> None:
