@@ -19,6 +19,8 @@ from tireroad.contact.steps import Steps, equal_steps
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices import probe
+from tireroad.fem.model import SmallMotions
+from tireroad.fem.static.footprint import Footprint
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.library import RollingTire
@@ -85,19 +87,19 @@ def drive(
 
     `step` s: time step, by default small enough for the fastest mode. `tread`: a law of
     contact.tread.laws, by default a half-space of 10 MPa. `spacing` (m, or m, m along and across) of
-    a grid of contact points, by default the nodes of the mesh. Frictionless. Raises InputError
-    for a tire that is off the road or whose modes have a free rim or a held road, and
-    ConvergenceError if the road touches the tire outside the patch of contact points. Collective.
+    a grid of contact points, by default the nodes of the mesh. Frictionless. Raises InputError for a
+    tire that is off the road, modes with a free rim or a held road, and a `spacing` with less than
+    two points along or across the footprint; ConvergenceError if the road touches the tire outside
+    the patch of contact points. Collective.
     """
     if duration <= 0:
         raise InputError(f"drive: duration = {duration:g} s must be above 0")
     law, pitches = _law(tread), _pitches(spacing)
     motions, turning = tire.standing.motions, tire.states.turning
     static = motions.static
-    if static.road_height is None:
-        raise InputError("drive: the tire is not on a road: press it on one first")
-    for key, why in barred_from_contact(motions.rim, motions.road):
-        raise InputError(f"drive: modes with {key} {why}")
+    _check_motions(motions)
+    if pitches is not None:
+        _check_pitches(pitches, static.footprint())
     rolled = Rolled(
         speed=turning.speed * static.rolling_radius(), duration=duration, motion=lambda t: 0.0
     )
@@ -112,6 +114,14 @@ def drive(
     highest = tire.states.highest / (2 * np.pi)
     bounds = limits(step=chosen.size, highest=highest, pitch=pitch(setup.patch), speed=rolled.speed)
     return _history(setup.patch, instants, lowest(bounds))
+
+
+def _check_motions(motions: SmallMotions) -> None:
+    """InputError for a tire off the road, and for modes that cannot carry the contact."""
+    if motions.static.road_height is None:
+        raise InputError("drive: the tire is not on a road: press it on one first")
+    for key, why in barred_from_contact(motions.rim, motions.road):
+        raise InputError(f"drive: modes with {key} {why}")
 
 
 def _law(tread: TreadLaw | None) -> TreadLaw:
@@ -139,6 +149,16 @@ def _pitches(spacing: float | tuple[float, float] | None) -> tuple[float, float]
             f"drive: spacing = {spacing!r} must be one length or two (along, across) above 0 m, such as 0.005"
         )
     return float(along), float(across)
+
+
+def _check_pitches(pitches: tuple[float, float], found: Footprint) -> None:
+    """InputError if fewer than two points fit along or across the footprint at rest."""
+    extents = found.length, found.width
+    if any(0 < extent < pitch for extent, pitch in zip(extents, pitches, strict=True)):
+        raise InputError(
+            f"drive: spacing = {pitches[0]:g} m along, {pitches[1]:g} m across leaves less than two points in a "
+            f"footprint of {found.length:.3g} m x {found.width:.3g} m: take {min(extents) / 8:.1g} m, for example"
+        )
 
 
 def _instants(

@@ -57,6 +57,8 @@ def test_modes_take_the_state_of_an_equal_tire(rolling, static) -> None:
         ({"spacing": 0.0}, "spacing = 0.0 must be"),
         ({"spacing": (0.01, 0.01, 0.01)}, "spacing = .* must be one length or two"),
         ({"spacing": "fine"}, "spacing = 'fine' must be"),
+        ({"spacing": 5}, "spacing = 5 m .* less than two points in a footprint of 0.036"),
+        ({"spacing": (0.01, 0.1)}, "across leaves less than two points.*take 0.005 m"),
         ({"residual": "statics"}, 'residual = "statics" is unknown: take none, .*static'),
     ],
 )
