@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from tireroad.fem import InputError, Torus, compound
+from tireroad.fem import InputError, Torus, Turning, compound
+from tireroad.modal import StrainEnergy
 
 PACKAGES = ("fem", "modal", "greens", "contact")
 UNIT = re.compile(r"\b(m|m2|N|Pa|Hz|rad|s|kg|K|degrees)\b|1/s|N/m|kg\^")
@@ -92,3 +93,13 @@ def test_a_rubber_without_stiffness_or_volume_change_is_refused(wrong: dict[str,
         compound("neo-hookean", 1200.0, **(good | wrong))
     with pytest.raises(InputError, match="density"):
         compound("neo-hookean", 0.0, **good)
+
+
+@pytest.mark.parametrize(
+    "wrong", [(-500.0, 0.0), (0.0, -1e-5), (float("nan"), 0.0), (500.0,), 500.0, "soft", None]
+)
+def test_damping_is_two_numbers_that_take_energy(wrong: object) -> None:
+    Turning(damping=(500, 1e-5))
+    Turning(damping=StrainEnergy())
+    with pytest.raises(InputError, match=r"damping = .* must be two numbers"):
+        Turning(damping=wrong)
