@@ -39,6 +39,8 @@ from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes
+from tireroad.runs.scene.sections.kinds.torus import TorusSection
+from tireroad.runs.scene.tables.tire import Tire
 from tireroad.runs.stages.build.turning import rolling_shape
 
 Array = NDArray[np.float64]
@@ -64,9 +66,9 @@ def torus(
     """A toroidal tire without loads. Lengths in m; `half_angle` in rad from the crown to each bead.
 
     `material`, or else a neo-Hookean rubber of `youngs_modulus` Pa, `poisson_ratio` and `density`
-    kg/m3.
+    kg/m3. Raises InputError for a value of wrong kind, or out of the range that it has in a scene.
     """
-    section = Torus(
+    shape = Torus(
         outer_radius=outer_radius,
         minor_radius=minor_radius,
         thickness=thickness,
@@ -76,11 +78,27 @@ def torus(
         elements_thickness=elements_thickness,
         order=order,
         footprint_size=footprint_size,
-    ).ring()
+    )
+    _check_ranges(shape)
+    section = shape.ring()
     rubber = material or compound(
         "neo-hookean", density, youngs_modulus=youngs_modulus, poisson_ratio=poisson_ratio
     )
     return TireModel(section, lambda: Body(comm, section, {"wall": rubber}))
+
+
+def _check_ranges(torus: Torus) -> None:
+    """ParameterError for a value out of the range of the scene's key."""
+    same = "outer_radius", "minor_radius", "thickness", "elements_arc", "elements_thickness"
+    shape = TorusSection(
+        half_angle=math.degrees(torus.half_angle), **{name: getattr(torus, name) for name in same}
+    )
+    Tire(
+        shape=shape,
+        segments=torus.segments,
+        order=torus.order,
+        footprint_size=torus.footprint_size,
+    )
 
 
 def press(

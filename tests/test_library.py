@@ -33,6 +33,24 @@ def rolling(tire, static) -> RollingTire:
 
 
 @pytest.mark.parametrize(
+    "wrong",
+    [
+        {"segments": 7},
+        {"segments": 7.5},
+        {"elements_arc": 1},
+        {"elements_thickness": 21},
+        {"footprint_size": 0.01},
+        {"outer_radius": 320},
+        {"half_angle": 0.1},
+    ],
+)
+def test_a_torus_has_the_ranges_of_a_scene(wrong: dict) -> None:
+    tr.torus(**TIRE | {"segments": np.int64(16), "half_angle": np.radians(175), "outer_radius": 1})
+    with pytest.raises(tr.InputError, match=f"{next(iter(wrong))} must be"):
+        tr.torus(**TIRE | wrong)
+
+
+@pytest.mark.parametrize(
     ("change", "why"),
     [
         ({"segments": 18}, "it has .* nodes, and the tire"),

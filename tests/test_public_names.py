@@ -75,12 +75,23 @@ MESH = {"segments": 10, "elements_arc": 6, "elements_thickness": 1, "order": 2}
         {"thickness": 0.2},
         {"minor_radius": 0.01},
         {"outer_radius": float("nan")},
+        {"outer_radius": "wide"},
+        {"segments": 7.5},
+        {"segments": True},
+        {"segments": 0},
+        {"elements_arc": 6.5},
+        {"elements_arc": 0},
+        {"elements_thickness": 0},
+        {"order": 4},
+        {"footprint_size": 0},
+        {"footprint_size": 2},
+        {"footprint_size": float("nan")},
     ],
 )
-def test_a_torus_refuses_what_is_none(wrong: dict[str, float]) -> None:
+def test_a_torus_refuses_what_is_none(wrong: dict[str, object]) -> None:
     Torus(**SIZES, **MESH)
     with pytest.raises(InputError, match="torus"):
-        Torus(**(SIZES | wrong), **MESH)
+        Torus(**(SIZES | MESH | wrong))
 
 
 @pytest.mark.parametrize(
