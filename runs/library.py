@@ -154,7 +154,7 @@ def modes(
     `rim` "fixed" or "free". `road` "forces": the road is replaced by its contact forces; "held":
     the touching nodes are held in height. `turning`: how the wheel will rotate; the shapes that
     belts couple to then join the modes (modal.rotation_shapes), as in a run. Raises InputError for
-    a static state of another tire.
+    a static state of another tire, and unless one of `count` and `up_to` is given, within its range.
     """
     _check_state(tire, static)
     motions = SmallMotions(tire, static, rim=rim, road=road)
