@@ -54,15 +54,23 @@ class History:
         """Vertical force of the road (n,), N."""
         return self.force.sum(axis=1)
 
+    @property
+    def step(self) -> float:
+        """Time step, s: the first instant is one step after the state at rest."""
+        return float(self.time[0])
+
     def spectrum(self) -> tuple[Array, NDArray[np.complex128]]:
         """Frequencies (f,) Hz up to the limit, axle-force amplitudes (f, 3) N (contact.results)."""
-        frequency, amplitude = amplitudes(self.axle_force, self.time[1] - self.time[0])
+        frequency, amplitude = amplitudes(self.axle_force, self.step)
         below = frequency <= self.limit.frequency
         return frequency[below], amplitude[below]
 
     def third_octaves(self) -> tuple[Array, Array]:
-        """Axle force: third-octave centres (b,) Hz to the limit, levels (b, 3) dB re 1 N rms."""
-        return third_octaves(self.axle_force, self.time[1] - self.time[0], self.limit.frequency)
+        """Axle force: third-octave centres (b,) Hz to the limit, levels (b, 3) dB re 1 N rms.
+
+        A run of one step has no band.
+        """
+        return third_octaves(self.axle_force, self.step, self.limit.frequency)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -105,6 +105,15 @@ def test_a_response_has_one_of_the_known_residuals(rolling) -> None:
         rolling.at([(0.0, 0.0)], residual="x")
 
 
+def test_a_run_of_one_step_has_no_band(rolling) -> None:
+    run = tr.drive(rolling, tr.make_road(kind="flat"), duration=1e-3, step=1e-3)
+    assert run.time.tolist() == [1e-3] and run.step == 1e-3
+    frequency, amplitude = run.spectrum()
+    assert frequency.tolist() == [0.0] and not amplitude.any()
+    centre, level = run.third_octaves()
+    assert centre.shape == (0,) and level.shape == (0, 3)
+
+
 def test_one_spacing_is_that_of_both_ways(rolling) -> None:
     road = tr.make_road(kind="sine", amplitude=2e-4)
     one, two = (
