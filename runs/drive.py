@@ -15,7 +15,7 @@ from tireroad.contact.results.spectra import amplitudes, third_octaves
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.rolling import Instant, roll
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
-from tireroad.contact.steps import Steps, equal_steps
+from tireroad.contact.steps import Steps, check_times, equal_steps
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices import probe
@@ -95,13 +95,14 @@ def drive(
 
     `step` s: time step, by default small enough for the fastest mode. `tread`: a law of
     contact.tread.laws, by default a half-space of 10 MPa. `spacing` (m, or m, m along and across) of
-    a grid of contact points, by default the nodes of the mesh. Frictionless. Raises InputError for a
-    tire that is off the road, modes with a free rim or a held road, and a `spacing` with less than
-    two points along or across the footprint; ConvergenceError if the road touches the tire outside
-    the patch of contact points. Collective.
+    a grid of contact points, by default the nodes of the mesh. Frictionless.
+
+    Raises InputError for times that are not positive and finite, a tire that is off the road, modes
+    with a free rim or a held road, and a `spacing` with less than two points along or across the
+    footprint; ConvergenceError if the road touches the tire outside the patch of contact points.
+    Collective.
     """
-    if duration <= 0:
-        raise InputError(f"drive: duration = {duration:g} s must be above 0")
+    check_times(duration, duration if step is None else step)
     law, pitches = _law(tread), _pitches(spacing)
     motions, turning = tire.standing.motions, tire.states.turning
     static = motions.static
@@ -117,7 +118,8 @@ def drive(
     spec = _Spec(law=law)
     setup, _ = setup.settled(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
-    chosen = equal_steps(duration, step or min(duration / _LEAST_STEPS, _TURN / fastest))
+    largest = min(duration / _LEAST_STEPS, _TURN / fastest) if step is None else step
+    chosen = equal_steps(duration, largest)
     instants = _instants(spec, setup, response, chosen, motions.body.comm)
     highest = tire.states.highest / (2 * np.pi)
     bounds = limits(step=chosen.size, highest=highest, pitch=pitch(setup.patch), speed=rolled.speed)

@@ -80,6 +80,11 @@ def torus(
         footprint_size=footprint_size,
     )
     _check_ranges(shape)
+    if material is not None and not isinstance(material, Material):
+        raise InputError(
+            f"torus: material = {material!r} is no material: take tireroad.compound(…), or "
+            "youngs_modulus, poisson_ratio and density"
+        )
     section = shape.ring()
     rubber = material or compound(
         "neo-hookean", density, youngs_modulus=youngs_modulus, poisson_ratio=poisson_ratio
@@ -211,8 +216,10 @@ class RollingTire:
         """The response between points of the outer face (angle around, angle along section; rad).
 
         In all three directions: probes x, y, z of the first point, then of the second, and so on.
-        InputError for a point beyond a bead.
+        InputError for a point beyond a bead, and without any point.
         """
+        if not len(spots):
+            raise InputError("at: no point given: take (angle around, angle along section) in rad")
         lattice = self.standing.motions.lattice
         rows = [
             probe.directed(probe.spot(lattice, *spot), axis) for spot in spots for axis in np.eye(3)

@@ -72,6 +72,10 @@ def test_modes_take_the_state_of_an_equal_tire(rolling, static) -> None:
     ("given", "message"),
     [
         ({"tread": "rubber"}, "tread = 'rubber' is no tread law.*HalfSpace"),
+        ({"duration": float("nan")}, "duration = nan s must be positive and finite"),
+        ({"duration": -1.0}, "duration = -1 s must be"),
+        ({"step": 0.0}, "step = 0 s must be"),
+        ({"step": float("inf")}, "step = inf s must be"),
         ({"spacing": 0.0}, "spacing = 0.0 must be"),
         ({"spacing": (0.01, 0.01, 0.01)}, "spacing = .* must be one length or two"),
         ({"spacing": "fine"}, "spacing = 'fine' must be"),
@@ -82,7 +86,7 @@ def test_modes_take_the_state_of_an_equal_tire(rolling, static) -> None:
 )
 def test_drive_says_what_it_does_not_take(rolling, given: dict, message: str) -> None:
     with pytest.raises(tr.InputError, match=message):
-        tr.drive(rolling, tr.make_road(kind="flat"), duration=0.01, **given)
+        tr.drive(rolling, tr.make_road(kind="flat"), **{"duration": 0.01} | given)
 
 
 @pytest.mark.parametrize(
@@ -103,6 +107,16 @@ def test_drive_refuses_modes_that_cannot_carry_the_contact(
 def test_a_response_has_one_of_the_known_residuals(rolling) -> None:
     with pytest.raises(tr.InputError, match='residual = "x" is unknown: take none'):
         rolling.at([(0.0, 0.0)], residual="x")
+
+
+def test_a_response_has_a_point(rolling) -> None:
+    with pytest.raises(tr.InputError, match="at: no point given"):
+        rolling.at([])
+
+
+def test_a_torus_is_of_a_material() -> None:
+    with pytest.raises(tr.InputError, match="material = 'rubber' is no material: take"):
+        tr.torus(**TIRE, material="rubber")
 
 
 def test_a_run_of_one_step_has_no_band(rolling) -> None:
