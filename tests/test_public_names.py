@@ -8,6 +8,7 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from runpy import run_path
 
 import pytest
 
@@ -31,6 +32,12 @@ def test_every_name_is_there_with_its_docstring(package: str, name: str) -> None
     takes = [p for p in inspect.signature(found).parameters.values() if _number(p)]
     if takes:
         assert UNIT.search(text), f"{package}.{name} takes {takes[0]} and names no unit"
+
+
+def test_every_name_is_on_the_page(root: Path) -> None:
+    page = run_path(str(root / "docs" / "public_names.py"))["page"]()
+    assert page.count("\n### ") == len(NAMES)
+    assert "Proportional(mass: float = 0.0, stiffness: float = 0.0)" in page
 
 
 def _number(parameter: inspect.Parameter) -> bool:
