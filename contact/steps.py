@@ -25,18 +25,19 @@ class Steps:
 
 def steps_of(duration: float, size: float) -> Steps:
     """The smallest number of steps of `size` (s) that cover `duration` (s), at least one."""
-    _check(duration, size)
+    check_times(duration, size)
     return Steps(size, max(math.ceil(duration / size * (1.0 - _ROUNDING)), 1))
 
 
 def equal_steps(duration: float, largest: float) -> Steps:
     """Equal steps no longer than `largest` (s) that end exactly at `duration` (s)."""
-    _check(duration, largest)
+    check_times(duration, largest)
     count = steps_of(duration, largest).count
     return Steps(duration / count, count)
 
 
-def _check(duration: float, size: float) -> None:
+def check_times(duration: float, size: float) -> None:
+    """InputError for a duration or a step (s) that is not positive and finite."""
     for name, value in (("duration", duration), ("step", size)):
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"time.{name} = {value:g} s must be positive and finite")

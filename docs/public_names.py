@@ -34,14 +34,23 @@ def _sets(node: ast.stmt, name: str) -> bool:
 
 
 def _entry(package: str, name: str, home: str) -> str:
-    file = ROOT / package / Path(*home.split(".")).with_suffix(".py")
-    tree = ast.parse(file.read_text())
-    found = next(n for n in tree.body if getattr(n, "name", None) == name or _sets(n, name))
+    found = _definition(f"{package}.{home}", name)
     if isinstance(found, ast.Assign):  # a registry's decorator
         tree = ast.parse((ROOT / "fem" / "registry.py").read_text())
         found = next(n for n in ast.walk(tree) if getattr(n, "name", None) == "register")
     text = inspect.cleandoc(ast.get_docstring(found, clean=False) or "")
     return f"\n### {name}\n\n```python\n{_signature(found, name)}\n```\n\n```text\n{text}\n```\n"
+
+
+def _definition(module: str, name: str) -> ast.stmt:
+    """The statement that defines a name of a module, also where the module imports it."""
+    tree = ast.parse((ROOT / Path(*module.split(".")).with_suffix(".py")).read_text())
+    for node in tree.body:
+        if getattr(node, "name", None) == name or _sets(node, name):
+            return node
+        if isinstance(node, ast.ImportFrom) and name in [one.name for one in node.names]:
+            return _definition(str(node.module).removeprefix("tireroad."), name)
+    raise LookupError(f"{module} has no {name}")
 
 
 def _signature(found: ast.AST, name: str) -> str:

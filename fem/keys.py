@@ -6,6 +6,7 @@ All packages may import this module; it needs only the standard library.
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import Field, dataclass, fields
+from numbers import Integral, Real
 from typing import Any
 
 OnlyFor = tuple[str, tuple[str, ...]] | None
@@ -84,9 +85,16 @@ def described(value: Any) -> str:
     return str(value)[:60]
 
 
+def whole(value: Any) -> int:
+    """A whole number, also of numpy, as an int (not bool); else raises ValueError."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise ValueError(f"must be a whole number, not {described(value)}")
+    return int(value)
+
+
 def finite(value: Any) -> float:
-    """A finite real number as a float (int is accepted, not bool); else raises ValueError."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    """A finite real number, also of numpy, as a float (not bool); else raises ValueError."""
+    if isinstance(value, bool) or not isinstance(value, Real):
         raise ValueError(f"must be a number, not {described(value)}")
     try:
         result = float(value)

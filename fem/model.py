@@ -53,7 +53,7 @@ class SmallMotions:
         for name, value, known in (("rim", rim, RIMS), ("road", road, ROADS)):
             if value not in known:
                 raise InputError(f'{name} = "{value}" is unknown: take {" or ".join(known)}')
-        self.tire, self.static, self.rim, self._road = tire, static, rim, road
+        self.tire, self.static, self.rim, self.road = tire, static, rim, road
         self._rim_motions: dict[bool, RimMotion] = {}
 
     @property
@@ -72,7 +72,7 @@ class SmallMotions:
     def operators(self) -> Operators:
         """Mass, stiffness and the map of unknowns."""
         self.body.set_displacement(self.static.displacement)
-        held = {} if self._road == "forces" else {"held": self._touching()}
+        held = {} if self.road == "forces" else {"held": self._touching()}
         support = Support(self.rim, **held)
         return Operators(self.body, self.static.inflation, support, self.static.rolling)
 
@@ -81,7 +81,7 @@ class SmallMotions:
 
         None for a free rim, and where the road holds the nodes in contact. Collective.
         """
-        if (self.rim, self._road) != ("fixed", "forces"):
+        if (self.rim, self.road) != ("fixed", "forces"):
             return None
         if turns not in self._rim_motions:
             self.body.set_displacement(self.static.displacement)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, dataclass_transform
 
 from tireroad.fem.errors import InputError
-from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite, keys
+from tireroad.fem.keys import Key, Limits, OnlyFor, described, finite, keys, whole
 
 
 class ParameterError(InputError):
@@ -97,10 +97,9 @@ def integer(
     limits = Limits(least=least, most=most)
 
     def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise ValueError(f"must be a whole number, not {described(value)}")
-        limits.check(value, "-")
-        return value
+        result = whole(value)
+        limits.check(result, "-")
+        return result
 
     optional = default is None
     key = Key(

@@ -4,11 +4,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.keys import Limits, finite
 
 INERTIAS = ("full", "doppler")
+_RATES = Limits(least=0.0)
+
+
+class Proportional(NamedTuple):
+    """D = mass M + stiffness K: gamma1 in 1/s, gamma2 in s."""
+
+    mass: float = 0.0
+    stiffness: float = 0.0
+
+
+@dataclass(frozen=True)
+class StrainEnergy:
+    """Damping by the loss factors of the modes, `Projection.loss_factor`."""
+
+
+Damping = Proportional | tuple[float, float] | StrainEnergy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,11 +34,11 @@ class Turning:
 
     `speed` rad/s, 0: standing; `damping` of the material, (gamma1 1/s, gamma2 s) or by strain
     energy, as in modal.damping; `inertia` "full", or "doppler": without Coriolis and centrifugal
-    forces.
+    forces. InputError for a value that is out of range.
     """
 
     speed: float = 0.0
-    damping: Any = (0.0, 0.0)
+    damping: Damping = (0.0, 0.0)
     inertia: str = "full"
 
     def __post_init__(self) -> None:
@@ -29,3 +46,18 @@ class Turning:
             raise InputError(f"speed = {self.speed:g} rad/s must be 0 or more, and finite")
         if self.inertia not in INERTIAS:
             raise InputError(f'inertia = "{self.inertia}" is unknown: take "full" or "doppler"')
+        if not isinstance(self.damping, StrainEnergy):
+            _check_rates(self.damping)
+
+
+def _check_rates(damping: tuple[float, float]) -> None:
+    """InputError unless `damping` is two numbers of at least 0."""
+    try:
+        mass, stiffness = damping
+        for value in (mass, stiffness):
+            _RATES.check(finite(value), "-")
+    except (TypeError, ValueError):
+        raise InputError(
+            f"damping = {damping!r} must be two numbers of 0 or more, (gamma1 in 1/s, gamma2 in s), "
+            "such as (500.0, 0.0)"
+        ) from None

@@ -45,11 +45,14 @@ class Wanted:
     band: float | None = None
 
     def __post_init__(self) -> None:
-        for name, known in (("residual", RESIDUALS), ("choice", CHOICES)):
-            if getattr(self, name) not in known:
-                raise InputError(
-                    f'greens.{name} = "{getattr(self, name)}" is unknown: take {", ".join(known)}'
-                )
+        _check_known("residual", self.residual, RESIDUALS)
+        _check_known("choice", self.choice, CHOICES)
+
+
+def _check_known(name: str, value: str, known: tuple[str, ...]) -> None:
+    """InputError for a value that is none of the known ones."""
+    if value not in known:
+        raise InputError(f'greens.{name} = "{value}" is unknown: take {", ".join(known)}')
 
 
 @dataclass(frozen=True)
@@ -72,8 +75,9 @@ def make_response(
     """The response (r, k) between probes `outputs` (r, 3 s) and `loads` (k, 3 s) with a residual.
 
     `wheel` returns the full matrices and `fields` the modes on all unknowns; each is called only if
-    the residual needs it. Collective.
+    the residual needs it. InputError for an unknown residual. Collective.
     """
+    _check_known("residual", residual, RESIDUALS)
     if residual == "none":
         return _made(Basis.of(rolling).couple(outputs, loads))
     if residual == "attachment":

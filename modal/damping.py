@@ -19,28 +19,11 @@ where eta_c is the mean loss factor of the upper quarter of the modes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
-
 import numpy as np
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.turning import Damping, Proportional, StrainEnergy
 from tireroad.modal.basis import Projection
-
-
-class Proportional(NamedTuple):
-    """D = mass M + stiffness K: gamma1 in 1/s, gamma2 in s."""
-
-    mass: float = 0.0
-    stiffness: float = 0.0
-
-
-@dataclass(frozen=True)
-class StrainEnergy:
-    """Damping by the loss factors of the modes, `Projection.loss_factor`."""
-
-
-Damping = Proportional | tuple[float, float] | StrainEnergy
 
 
 def rates(damping: Damping, projection: Projection) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 from tireroad.fem.axle import Axle
 from tireroad.fem.cavity.column import Column
 from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.keys import Limits, finite, whole
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.model import SmallMotions
 from tireroad.fem.static.path.journal import Journal
@@ -18,6 +19,7 @@ from tireroad.modal.solver import undamped
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.symmetry import Sites
 
+_COUNT, _UP_TO = Limits(least=1), Limits(least=1e-3)  # -, Hz
 _SAME = 1e-6  # relative difference of the frequencies of one mode in two solutions
 
 
@@ -36,8 +38,9 @@ def standing_modes(
     `rotation`: also project the matrices of the rotating frame, without which the wheel can only
     stand. `turning`: how the wheel rotates, so that rotation shapes join the modes
     (modal.rotation_shapes); belts need them. `air`: the air in the cavity joins the projected
-    problem, and so does the wheel of an `axle` that moves. ConvergenceError if a mode is missing,
-    inaccurate or unstable. Collective.
+    problem, and so does the wheel of an `axle` that moves. InputError unless one of `count` and
+    `up_to` is given, within its range; ConvergenceError if a mode is missing, inaccurate or
+    unstable. Collective.
     """
     modes = solved(motions.operators, count=count, up_to=up_to)
     return projected(motions, modes, rotation, air, axle, turning)
@@ -65,20 +68,33 @@ def solved(
 ) -> Modes:
     """The modes alone, found by `teams` of processes (modal.solver.team).
 
-    Results that the `journal` holds are not computed again. InputError if neither `count` nor
-    `up_to` (Hz) is given. Collective.
+    Results that the `journal` holds are not computed again. InputError unless one of `count` and
+    `up_to` (Hz) is given, within its range. Collective.
     """
-    if count is None and up_to is None:
-        raise InputError("modes: give count, how many of the lowest, or up_to, a frequency in Hz")
+    _check_wanted(count, up_to)
     return undamped.solve(
         operators.stiffness,
         operators.mass,
-        None if up_to else count,
-        up_to=up_to or np.inf,
+        count,
+        up_to=np.inf if up_to is None else up_to,
         sites=sites(operators),
         teams=teams,
         journal=journal,
     )
+
+
+def _check_wanted(count: int | None, up_to: float | None) -> None:
+    if (count is None) == (up_to is None):
+        raise InputError(
+            "modes: give count, how many of the lowest, or up_to, a frequency in Hz; one of the two"
+        )
+    try:
+        if count is None:
+            _UP_TO.check(finite(up_to), "Hz")
+        else:
+            _COUNT.check(whole(count), "-")
+    except ValueError as error:
+        raise InputError(f"modes: {'up_to' if count is None else 'count'} {error}") from None
 
 
 def projected(

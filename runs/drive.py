@@ -15,13 +15,16 @@ from tireroad.contact.results.spectra import amplitudes, third_octaves
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.rolling import Instant, roll
 from tireroad.contact.setup import ContactSetup, Rolled, contact_setup
-from tireroad.contact.steps import Steps, equal_steps
+from tireroad.contact.steps import Steps, check_times, equal_steps
 from tireroad.contact.tread.law import TREADS, TreadLaw
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.matrices import probe
+from tireroad.fem.model import SmallMotions
+from tireroad.fem.static.footprint import Footprint
 from tireroad.greens.recursion import Recursion
 from tireroad.greens.response import Response
 from tireroad.runs.library import RollingTire
+from tireroad.runs.scene.rules.scene import barred_from_contact
 from tireroad.runs.stages.build.rolling.loop import make_loop
 
 Array = NDArray[np.float64]
@@ -51,15 +54,23 @@ class History:
         """Vertical force of the road (n,), N."""
         return self.force.sum(axis=1)
 
+    @property
+    def step(self) -> float:
+        """Time step, s: the first instant is one step after the state at rest."""
+        return float(self.time[0])
+
     def spectrum(self) -> tuple[Array, NDArray[np.complex128]]:
         """Frequencies (f,) Hz up to the limit, axle-force amplitudes (f, 3) N (contact.results)."""
-        frequency, amplitude = amplitudes(self.axle_force, self.time[1] - self.time[0])
+        frequency, amplitude = amplitudes(self.axle_force, self.step)
         below = frequency <= self.limit.frequency
         return frequency[below], amplitude[below]
 
     def third_octaves(self) -> tuple[Array, Array]:
-        """Axle force: third-octave centres (b,) Hz to the limit, levels (b, 3) dB re 1 N rms."""
-        return third_octaves(self.axle_force, self.time[1] - self.time[0], self.limit.frequency)
+        """Axle force: third-octave centres (b,) Hz to the limit, levels (b, 3) dB re 1 N rms.
+
+        A run of one step has no band.
+        """
+        return third_octaves(self.axle_force, self.step, self.limit.frequency)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,16 +95,20 @@ def drive(
 
     `step` s: time step, by default small enough for the fastest mode. `tread`: a law of
     contact.tread.laws, by default a half-space of 10 MPa. `spacing` (m, or m, m along and across) of
-    a grid of contact points, by default the nodes of the mesh. Frictionless. Raises ConvergenceError if the road
-    touches the tire outside the patch of contact points. Collective.
+    a grid of contact points, by default the nodes of the mesh. Frictionless.
+
+    Raises InputError for times that are not positive and finite, a tire that is off the road, modes
+    with a free rim or a held road, and a `spacing` with less than two points along or across the
+    footprint; ConvergenceError if the road touches the tire outside the patch of contact points.
+    Collective.
     """
-    if duration <= 0:
-        raise InputError(f"drive: duration = {duration:g} s must be above 0")
+    check_times(duration, duration if step is None else step)
     law, pitches = _law(tread), _pitches(spacing)
     motions, turning = tire.standing.motions, tire.states.turning
     static = motions.static
-    if static.road_height is None:
-        raise InputError("drive: the tire is not on a road: press it on one first")
+    _check_motions(motions)
+    if pitches is not None:
+        _check_pitches(pitches, static.footprint())
     rolled = Rolled(
         speed=turning.speed * static.rolling_radius(), duration=duration, motion=lambda t: 0.0
     )
@@ -103,11 +118,20 @@ def drive(
     spec = _Spec(law=law)
     setup, _ = setup.settled(response, static.force, spec)
     fastest = np.abs(response.eigenvalue).max(initial=1.0 / duration)
-    chosen = equal_steps(duration, step or min(duration / _LEAST_STEPS, _TURN / fastest))
+    largest = min(duration / _LEAST_STEPS, _TURN / fastest) if step is None else step
+    chosen = equal_steps(duration, largest)
     instants = _instants(spec, setup, response, chosen, motions.body.comm)
     highest = tire.states.highest / (2 * np.pi)
     bounds = limits(step=chosen.size, highest=highest, pitch=pitch(setup.patch), speed=rolled.speed)
     return _history(setup.patch, instants, lowest(bounds))
+
+
+def _check_motions(motions: SmallMotions) -> None:
+    """InputError for a tire off the road, and for modes that cannot carry the contact."""
+    if motions.static.road_height is None:
+        raise InputError("drive: the tire is not on a road: press it on one first")
+    for key, why in barred_from_contact(motions.rim, motions.road):
+        raise InputError(f"drive: modes with {key} {why}")
 
 
 def _law(tread: TreadLaw | None) -> TreadLaw:
@@ -135,6 +159,16 @@ def _pitches(spacing: float | tuple[float, float] | None) -> tuple[float, float]
             f"drive: spacing = {spacing!r} must be one length or two (along, across) above 0 m, such as 0.005"
         )
     return float(along), float(across)
+
+
+def _check_pitches(pitches: tuple[float, float], found: Footprint) -> None:
+    """InputError if fewer than two points fit along or across the footprint at rest."""
+    extents = found.length, found.width
+    if any(0 < extent < pitch for extent, pitch in zip(extents, pitches, strict=True)):
+        raise InputError(
+            f"drive: spacing = {pitches[0]:g} m along, {pitches[1]:g} m across leaves less than two points in a "
+            f"footprint of {found.length:.3g} m x {found.width:.3g} m: take {min(extents) / 8:.1g} m, for example"
+        )
 
 
 def _instants(

@@ -39,6 +39,8 @@ from tireroad.greens.small_motions import wheel_of
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes, rolling_modes
 from tireroad.modal.standing import standing_modes
+from tireroad.runs.scene.sections.kinds.torus import TorusSection
+from tireroad.runs.scene.tables.tire import Tire
 from tireroad.runs.stages.build.turning import rolling_shape
 
 Array = NDArray[np.float64]
@@ -64,9 +66,9 @@ def torus(
     """A toroidal tire without loads. Lengths in m; `half_angle` in rad from the crown to each bead.
 
     `material`, or else a neo-Hookean rubber of `youngs_modulus` Pa, `poisson_ratio` and `density`
-    kg/m3.
+    kg/m3. Raises InputError for a value of wrong kind, or out of the range that it has in a scene.
     """
-    section = Torus(
+    shape = Torus(
         outer_radius=outer_radius,
         minor_radius=minor_radius,
         thickness=thickness,
@@ -76,11 +78,32 @@ def torus(
         elements_thickness=elements_thickness,
         order=order,
         footprint_size=footprint_size,
-    ).ring()
+    )
+    _check_ranges(shape)
+    if material is not None and not isinstance(material, Material):
+        raise InputError(
+            f"torus: material = {material!r} is no material: take tireroad.compound(…), or "
+            "youngs_modulus, poisson_ratio and density"
+        )
+    section = shape.ring()
     rubber = material or compound(
         "neo-hookean", density, youngs_modulus=youngs_modulus, poisson_ratio=poisson_ratio
     )
     return TireModel(section, lambda: Body(comm, section, {"wall": rubber}))
+
+
+def _check_ranges(torus: Torus) -> None:
+    """ParameterError for a value out of the range of the scene's key."""
+    same = "outer_radius", "minor_radius", "thickness", "elements_arc", "elements_thickness"
+    shape = TorusSection(
+        half_angle=math.degrees(torus.half_angle), **{name: getattr(torus, name) for name in same}
+    )
+    Tire(
+        shape=shape,
+        segments=torus.segments,
+        order=torus.order,
+        footprint_size=torus.footprint_size,
+    )
 
 
 def press(
@@ -136,7 +159,7 @@ def modes(
     `rim` "fixed" or "free". `road` "forces": the road is replaced by its contact forces; "held":
     the touching nodes are held in height. `turning`: how the wheel will rotate; the shapes that
     belts couple to then join the modes (modal.rotation_shapes), as in a run. Raises InputError for
-    a static state of another tire.
+    a static state of another tire, and unless one of `count` and `up_to` is given, within its range.
     """
     _check_state(tire, static)
     motions = SmallMotions(tire, static, rim=rim, road=road)
@@ -182,7 +205,7 @@ class RollingTire:
         """Green's functions between probes (r, 3 s) and loads (k, 3 s) on the outer face.
 
         `residual`: kind of residual flexibility that replaces the truncated modes
-        (greens.responses).
+        (greens.responses); InputError for an unknown one.
         """
         basis = self.standing.basis
         return make_response(
@@ -193,8 +216,10 @@ class RollingTire:
         """The response between points of the outer face (angle around, angle along section; rad).
 
         In all three directions: probes x, y, z of the first point, then of the second, and so on.
-        InputError for a point beyond a bead.
+        InputError for a point beyond a bead, and without any point.
         """
+        if not len(spots):
+            raise InputError("at: no point given: take (angle around, angle along section) in rad")
         lattice = self.standing.motions.lattice
         rows = [
             probe.directed(probe.spot(lattice, *spot), axis) for spot in spots for axis in np.eye(3)

@@ -1,12 +1,14 @@
 """The library refuses what does not fit together in one message; its example shows a result."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tireroad as tr
+from tireroad.fem.model import SmallMotions
 from tireroad.runs.library import RollingTire
 
 pytestmark = pytest.mark.slow
@@ -31,6 +33,24 @@ def rolling(tire, static) -> RollingTire:
 
 
 @pytest.mark.parametrize(
+    "wrong",
+    [
+        {"segments": 7},
+        {"segments": 7.5},
+        {"elements_arc": 1},
+        {"elements_thickness": 21},
+        {"footprint_size": 0.01},
+        {"outer_radius": 320},
+        {"half_angle": 0.1},
+    ],
+)
+def test_a_torus_has_the_ranges_of_a_scene(wrong: dict) -> None:
+    tr.torus(**TIRE | {"segments": np.int64(16), "half_angle": np.radians(175), "outer_radius": 1})
+    with pytest.raises(tr.InputError, match=f"{next(iter(wrong))} must be"):
+        tr.torus(**TIRE | wrong)
+
+
+@pytest.mark.parametrize(
     ("change", "why"),
     [
         ({"segments": 18}, "it has .* nodes, and the tire"),
@@ -52,14 +72,60 @@ def test_modes_take_the_state_of_an_equal_tire(rolling, static) -> None:
     ("given", "message"),
     [
         ({"tread": "rubber"}, "tread = 'rubber' is no tread law.*HalfSpace"),
+        ({"duration": float("nan")}, "duration = nan s must be positive and finite"),
+        ({"duration": -1.0}, "duration = -1 s must be"),
+        ({"step": 0.0}, "step = 0 s must be"),
+        ({"step": float("inf")}, "step = inf s must be"),
         ({"spacing": 0.0}, "spacing = 0.0 must be"),
         ({"spacing": (0.01, 0.01, 0.01)}, "spacing = .* must be one length or two"),
         ({"spacing": "fine"}, "spacing = 'fine' must be"),
+        ({"spacing": 5}, "spacing = 5 m .* less than two points in a footprint of 0.036"),
+        ({"spacing": (0.01, 0.1)}, "across leaves less than two points.*take 0.005 m"),
+        ({"residual": "statics"}, 'residual = "statics" is unknown: take none, .*static'),
     ],
 )
 def test_drive_says_what_it_does_not_take(rolling, given: dict, message: str) -> None:
     with pytest.raises(tr.InputError, match=message):
-        tr.drive(rolling, tr.make_road(kind="flat"), duration=0.01, **given)
+        tr.drive(rolling, tr.make_road(kind="flat"), **{"duration": 0.01} | given)
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"road": "held"}, 'road = "held" fixes the nodes'),
+        ({"rim": "free"}, 'rim = "free" leaves nothing'),
+    ],
+)
+def test_drive_refuses_modes_that_cannot_carry_the_contact(
+    rolling, tire, static, change: dict, why: str
+) -> None:
+    standing = replace(rolling.standing, motions=SmallMotions(tire, static, **change))
+    with pytest.raises(tr.InputError, match=why):
+        tr.drive(replace(rolling, standing=standing), tr.make_road(kind="flat"), duration=0.01)
+
+
+def test_a_response_has_one_of_the_known_residuals(rolling) -> None:
+    with pytest.raises(tr.InputError, match='residual = "x" is unknown: take none'):
+        rolling.at([(0.0, 0.0)], residual="x")
+
+
+def test_a_response_has_a_point(rolling) -> None:
+    with pytest.raises(tr.InputError, match="at: no point given"):
+        rolling.at([])
+
+
+def test_a_torus_is_of_a_material() -> None:
+    with pytest.raises(tr.InputError, match="material = 'rubber' is no material: take"):
+        tr.torus(**TIRE, material="rubber")
+
+
+def test_a_run_of_one_step_has_no_band(rolling) -> None:
+    run = tr.drive(rolling, tr.make_road(kind="flat"), duration=1e-3, step=1e-3)
+    assert run.time.tolist() == [1e-3] and run.step == 1e-3
+    frequency, amplitude = run.spectrum()
+    assert frequency.tolist() == [0.0] and not amplitude.any()
+    centre, level = run.third_octaves()
+    assert centre.shape == (0,) and level.shape == (0, 3)
 
 
 def test_one_spacing_is_that_of_both_ways(rolling) -> None:

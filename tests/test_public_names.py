@@ -8,10 +8,12 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from runpy import run_path
 
 import pytest
 
-from tireroad.fem import InputError, Torus, compound
+from tireroad.fem import InputError, Torus, Turning, compound
+from tireroad.modal import StrainEnergy
 
 PACKAGES = ("fem", "modal", "greens", "contact")
 UNIT = re.compile(r"\b(m|m2|N|Pa|Hz|rad|s|kg|K|degrees)\b|1/s|N/m|kg\^")
@@ -30,6 +32,12 @@ def test_every_name_is_there_with_its_docstring(package: str, name: str) -> None
     takes = [p for p in inspect.signature(found).parameters.values() if _number(p)]
     if takes:
         assert UNIT.search(text), f"{package}.{name} takes {takes[0]} and names no unit"
+
+
+def test_every_name_is_on_the_page(root: Path) -> None:
+    page = run_path(str(root / "docs" / "public_names.py"))["page"]()
+    assert page.count("\n### ") == len(NAMES)
+    assert "Proportional(mass: float = 0.0, stiffness: float = 0.0)" in page
 
 
 def _number(parameter: inspect.Parameter) -> bool:
@@ -74,12 +82,23 @@ MESH = {"segments": 10, "elements_arc": 6, "elements_thickness": 1, "order": 2}
         {"thickness": 0.2},
         {"minor_radius": 0.01},
         {"outer_radius": float("nan")},
+        {"outer_radius": "wide"},
+        {"segments": 7.5},
+        {"segments": True},
+        {"segments": 0},
+        {"elements_arc": 6.5},
+        {"elements_arc": 0},
+        {"elements_thickness": 0},
+        {"order": 4},
+        {"footprint_size": 0},
+        {"footprint_size": 2},
+        {"footprint_size": float("nan")},
     ],
 )
-def test_a_torus_refuses_what_is_none(wrong: dict[str, float]) -> None:
+def test_a_torus_refuses_what_is_none(wrong: dict[str, object]) -> None:
     Torus(**SIZES, **MESH)
     with pytest.raises(InputError, match="torus"):
-        Torus(**(SIZES | wrong), **MESH)
+        Torus(**(SIZES | MESH | wrong))
 
 
 @pytest.mark.parametrize(
@@ -92,3 +111,13 @@ def test_a_rubber_without_stiffness_or_volume_change_is_refused(wrong: dict[str,
         compound("neo-hookean", 1200.0, **(good | wrong))
     with pytest.raises(InputError, match="density"):
         compound("neo-hookean", 0.0, **good)
+
+
+@pytest.mark.parametrize(
+    "wrong", [(-500.0, 0.0), (0.0, -1e-5), (float("nan"), 0.0), (500.0,), 500.0, "soft", None]
+)
+def test_damping_is_two_numbers_that_take_energy(wrong: object) -> None:
+    Turning(damping=(500, 1e-5))
+    Turning(damping=StrainEnergy())
+    with pytest.raises(InputError, match=r"damping = .* must be two numbers"):
+        Turning(damping=wrong)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from tireroad.fem.keys import Limits
 from tireroad.fem.sections.grid import corners
 
+SIZE = Limits(least=0.05, most=1.0)  # of elements at the footprint, relative to that elsewhere
 # (from, to) rad: the footprint's element size holds up to the first, the full size from the second.
 # A deflection of 20 mm reaches 0.35 rad along a ring of 0.32 m and 0.6 rad along a section of 0.1
 # m.

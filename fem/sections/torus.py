@@ -3,19 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.keys import Limits, finite, whole
+from tireroad.fem.parameters import ParameterError
 from tireroad.fem.sections import bead
-from tireroad.fem.sections.footprint import ARC_NEAR, near_road, ring_corners
+from tireroad.fem.sections.footprint import ARC_NEAR, SIZE, near_road, ring_corners
 from tireroad.fem.sections.grid import Patch, PlyLine, corners, product
 from tireroad.fem.sections.mesh2d import SectionMesh
 from tireroad.fem.sections.ring import Ring
 
 LEAST = (6, 2)  # elements around and along: minimum for a tire
+# What a section can be made of; those of a scene's tire are narrower.
+_WHOLE = {
+    "segments": Limits(least=3),
+    "elements_arc": Limits(least=1),
+    "elements_thickness": Limits(least=1),
+    "order": Limits(least=1, most=3),
+}
+_REAL = {
+    "outer_radius": Limits(),
+    "minor_radius": Limits(),
+    "thickness": Limits(),
+    "half_angle": Limits(),
+    "footprint_size": SIZE,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +40,8 @@ class Torus:
 
     Lengths in m; `half_angle` in rad: arc from the crown to each bead. `segments` elements around,
     `elements_arc` along the arc, `elements_thickness` through the wall, all of `order`;
-    `footprint_size`: relative element length at the road.
+    `footprint_size`: relative element length at the road. InputError for a value of wrong kind or
+    out of range.
     """
 
     outer_radius: float
@@ -39,6 +56,8 @@ class Torus:
     footprint_size: float = 1.0
 
     def __post_init__(self) -> None:
+        self._check(_WHOLE, whole)
+        self._check(_REAL, finite)
         if not 0 < self.half_angle < math.pi:
             raise InputError(
                 f"torus: half_angle = {self.half_angle:g} rad must lie between 0 and pi: it is in radians"
@@ -46,13 +65,18 @@ class Torus:
         # A minor radius larger than the outer one gives a barrel, up to the cylinder of closed
         # forms.
         least = min(self.minor_radius, self.outer_radius)
-        if not 0 < self.thickness < least or not math.isfinite(
-            self.minor_radius + self.outer_radius
-        ):
+        if not 0 < self.thickness < least:
             raise InputError(
                 f"torus: thickness = {self.thickness:g} m must be above 0 and less than minor_radius = "
                 f"{self.minor_radius:g} m and outer_radius = {self.outer_radius:g} m"
             )
+
+    def _check(self, ranges: Mapping[str, Limits], read: Callable[[object], float]) -> None:
+        for name, limits in ranges.items():
+            try:
+                limits.check(read(getattr(self, name)), "-")
+            except ValueError as error:
+                raise ParameterError(name, str(error), "torus") from None
 
     @property
     def ring_corners(self) -> np.ndarray:

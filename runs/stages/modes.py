@@ -80,9 +80,7 @@ class ModesStage(Computed[ModalBasis]):
             checkpointed(self, "count(s) and slice(s)") as journal,
         ):
             teams = self._teams(record)
-            modes = solved(
-                operators, count=wanted.count, up_to=wanted.up_to, teams=teams, journal=journal
-            )
+            modes = solved(operators, **wanted.asked, teams=teams, journal=journal)
         with record.timing("air"):
             air = cavity.make_air(self.job, motions, float(modes.frequency[-1]))
         with record.timing("projection and rotation shapes"):
@@ -153,8 +151,7 @@ class Fields(Shared[ModalBasis]):
         again = with_fields(
             basis,
             motions,
-            count=wanted.count,
-            up_to=wanted.up_to,
+            **wanted.asked,
             air=air,
             axle=self.job.axle,
             turning=shapes_of(self.job),

@@ -6,12 +6,13 @@ from chains import chain, distributed, own_rows, ring, spatial
 from mpi4py import MPI
 from scipy import sparse
 
-from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.modal.solver import undamped
 from tireroad.modal.solver.boundaries import merged
 from tireroad.modal.solver.fields import gram, multiply
 from tireroad.modal.solver.modes import Modes
 from tireroad.modal.solver.symmetry import Sites
+from tireroad.modal.standing import solved
 
 COMM = MPI.COMM_WORLD
 ROUNDING = 1e-9  # relative error of an eigenvalue of a well-scaled chain
@@ -94,6 +95,25 @@ def test_no_mode_below_the_frequency():
     stiffness, _ = chain(30)
     with pytest.raises(ConvergenceError, match="no mode below"):
         undamped.solve(distributed(stiffness), ones(30), up_to=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "message"),
+    [
+        ({}, "give count.* or up_to"),
+        ({"count": 5, "up_to": 100.0}, "one of the two"),
+        ({"count": 0}, "count must be ≥ 1, not 0"),
+        ({"count": -3}, "count must be ≥ 1"),
+        ({"count": 2.5}, "count must be a whole number, not 2.5"),
+        ({"up_to": 0.0}, "up_to must be ≥ 0.001 Hz, not 0"),
+        ({"up_to": -1.0}, "up_to must be ≥ 0.001 Hz"),
+        ({"up_to": float("nan")}, "up_to must be a finite number"),
+    ],
+)
+def test_which_modes_is_one_number_in_its_range(wanted: dict, message: str) -> None:
+    """Before anything is solved: without a lowest mode or an upper limit a search never ends."""
+    with pytest.raises(InputError, match=f"modes: .*{message}"):
+        solved(None, **wanted)
 
 
 @pytest.mark.mpi

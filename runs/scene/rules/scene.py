@@ -70,16 +70,8 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
     modal, static, rotation = scene.modes, scene.static, scene.rotation
     if modal.road == "held" and not static.on_road:
         raise error(("modal", "road"), '= "held" needs a road: add load (N) to [static]')
-    if scene.in_contact and modal.road == "held":
-        raise error(
-            ("modal", "road"),
-            '= "held" fixes the nodes whose contact is to be computed: [contact] needs "forces"',
-        )
-    if scene.in_contact and modal.rim == "free":
-        raise error(
-            ("modal", "rim"),
-            '= "free" leaves nothing to carry the load: [contact] needs "fixed"',
-        )
+    for key, why in barred_from_contact(modal.rim, modal.road) if scene.in_contact else ():
+        raise error(("modal", key), why)
     if modal.rim == "fixed" or rotation is None or rotation.speed == 0:
         return
     if rotation.method == "full":
@@ -104,6 +96,17 @@ def _modal(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             f'= "{scene.greens.residual}" needs the static answer of the turning tire, which with a'
             ' free rim does not exist: take "attachment" or "none"',
         )
+
+
+def barred_from_contact(rim: str, road: str) -> Iterator[tuple[str, str]]:
+    """Why modes with this `rim` and `road` cannot carry a time loop in contact: (key, reason)."""
+    if road == "held":
+        yield (
+            "road",
+            '= "held" fixes the nodes whose contact is to be computed: contact needs "forces"',
+        )
+    if rim == "free":
+        yield "rim", '= "free" leaves nothing to carry the load: contact needs "fixed"'
 
 
 def _force(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:

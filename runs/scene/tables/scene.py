@@ -1,6 +1,7 @@
 """The tables of a scene, key by key, with units, ranges and defaults (contract: Scene)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from tireroad.fem.parameters import choice, flag, integer, number, text, vector
 from tireroad.runs.scene.outputs import OUTPUTS
@@ -37,6 +38,11 @@ class Modal:
     def on_axle_alone(self) -> bool:
         """Whether the axle alone carries what acts on the tire: its rim is fixed, no other node is held."""
         return (self.rim, self.road) == ("fixed", "forces")
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """`count` or `up_to` (Hz), whichever decides; the other is None."""
+        return {"count": None if self.up_to else self.count, "up_to": self.up_to}
 
 
 @dataclass(frozen=True)

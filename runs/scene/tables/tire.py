@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from tireroad.fem.sections.footprint import SIZE
 from tireroad.fem.tire.law import MATERIALS, MaterialLaw
 from tireroad.runs.scene.schema import (
     Variants,
@@ -144,8 +145,8 @@ class Tire(Variants):
         None,
         "-",
         "element length at the footprint relative to that elsewhere; absent: 0.2 with a road, else 1",
-        least=0.05,
-        most=1,
+        least=SIZE.least,
+        most=SIZE.most,
     )
     material: Material = table(Material, "material of the wall")
     dynamic: float = _dynamic()
