@@ -55,7 +55,7 @@ def _gather(family: Sweep, folder: Path, failed: Sequence[str]) -> None:
     write(table, folder)
     page = write_page(table, folder, family.name, failed)
     for name in table.missing:
-        observe.say(f"  {name}: no results yet")
+        observe.say(f"  {name}: no results of a finished run of this scene")
     observe.say(f"{page} and sweep.csv, sweep.h5 beside it")
 
 
