@@ -12,8 +12,9 @@ from tireroad.runs.files.store import stage_hash
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.sweep import local, queue
-from tireroad.runs.sweep.definition import Member, Sweep, read
+from tireroad.runs.sweep.definition import Sweep, read
 from tireroad.runs.sweep.gather import gather, write
+from tireroad.runs.sweep.members import Member
 from tireroad.runs.sweep.page import write_page
 
 

@@ -21,7 +21,8 @@ from tireroad.runs.scene.derived import with_modal
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.search.journal import NAME, read_trials
 from tireroad.runs.search.settings import applied
-from tireroad.runs.sweep.definition import Member, Sweep
+from tireroad.runs.sweep.definition import Sweep
+from tireroad.runs.sweep.members import Member
 
 Array = NDArray[np.float64]
 
