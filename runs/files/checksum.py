@@ -56,13 +56,13 @@ def is_whole(path: Path) -> bool:
 
 def signed(text: str) -> str:
     """A text with # comments, plus a last line with the checksum of the lines above."""
-    return f"{text}{_SIGNATURE}{_text_digest(text)}\n"
+    return f"{text}{_SIGNATURE}{text_digest(text)}\n"
 
 
 def is_as_signed(text: str) -> bool:
     """Whether a text is unchanged since `signed`; a truncated text is not."""
     lines, found, digest = text.rpartition(_SIGNATURE)
-    return bool(found) and digest.strip() == _text_digest(lines)
+    return bool(found) and digest.strip() == text_digest(lines)
 
 
 def signed_table(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -75,13 +75,14 @@ def is_table_as_signed(table: Mapping[str, Any]) -> bool:
     return _ENTRY not in table or table[_ENTRY] == _table_digest(table)
 
 
-def _text_digest(text: str) -> str:
+def text_digest(text: str) -> str:
+    """SHA-256 of a text."""
     return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def _table_digest(table: Mapping[str, Any]) -> str:
     rest = {key: value for key, value in table.items() if key != _ENTRY}
-    return _text_digest(json.dumps(rest, sort_keys=True))
+    return text_digest(json.dumps(rest, sort_keys=True))
 
 
 def _block(file) -> bytes:

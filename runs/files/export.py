@@ -96,10 +96,10 @@ def modes(file: h5py.File) -> dict[str, Callable[[Path], object]]:
 
 def static(file: h5py.File) -> dict[str, Callable[[Path], object]]:
     """footprint.csv: deformed contact points and their forces; static.xdmf: the loaded surface."""
-    points, force = file["contact/points"][()], file["contact/force"][()]
     files = _page(xdmf.static(file))
-    if not len(points):
+    if "contact/points" not in file or not len(file["contact/points"]):  # a tire without a road
         return files
+    points, force = file["contact/points"][()], file["contact/force"][()]
     columns = _components("position", points, "m") | _components("force", force, "N")
     return _table("footprint.csv", columns) | files
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed, signed_table
+from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed, signed_table, text_digest
 from tireroad.runs.files.disk import explained, remove_leftovers, write_text
 from tireroad.runs.files.store import plain
 from tireroad.runs.scene.resolved import MARK
@@ -162,14 +162,21 @@ def _unusable(directory: Path, error: OSError) -> InputError:
 
 
 class Summary:
-    """`summary.json`: one entry per stage, rewritten completely after each. Root process only."""
+    """`summary.json`: one entry per stage, rewritten completely after each. Root process only.
 
-    def __init__(self, directory: Path, scene_name: str, processes: int) -> None:
+    Until the first stage of a run has ended, the file is that of an earlier run: the hash of the
+    resolved scene, `scene_text`, tells them apart.
+    """
+
+    def __init__(
+        self, directory: Path, scene_name: str, processes: int, scene_text: str = ""
+    ) -> None:
         self.path = directory / "summary.json"
         self.earlier: dict[str, Any] = (_earlier(directory) or {"stages": {}})["stages"]
         self.data: dict[str, Any] = {
             "program": {"name": PROGRAM, "version": VERSION, "format": RESULT_FORMAT},
             "scene": scene_name,
+            "resolved_scene": text_digest(scene_text),
             "processes": processes,
             "stages": {},
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.store import verify
+from tireroad.runs.files.checksum import (
+    is_as_signed,
+    is_table_as_signed,
+    signed,
+    text_digest,
+)
+from tireroad.runs.files.store import AGAIN, verify
 
 
 class RunResults(Mapping[str, NDArray[Any]]):
@@ -23,7 +29,7 @@ class RunResults(Mapping[str, NDArray[Any]]):
     unit; `attributes(file)` are a file's attributes (for example
     `run.attributes("static")["load"]`, N); `scene` is the resolved scene, `summary` the stages as
     in `summary.json`. No file stays open. Raises InputError for a folder without results and for an
-    unreadable file; KeyError, with the names available, for a dataset that does not exist.
+    unreadable or damaged file; KeyError, with the names available, for a dataset that does not exist.
     """
 
     def __init__(self, directory: str | Path) -> None:
@@ -35,13 +41,22 @@ class RunResults(Mapping[str, NDArray[Any]]):
     @property
     def scene(self) -> dict[str, Any]:
         """The resolved scene with every default."""
-        return tomllib.loads((self.directory / "scene.toml").read_text(encoding="utf-8"))
+        return tomllib.loads(self._scene_text())
 
     @property
     def summary(self) -> dict[str, Any]:
         """Per stage: seconds, headline figures and indicators with units, warnings."""
-        text = (self.directory / "summary.json").read_text(encoding="utf-8")
-        return json.loads(text)["stages"]
+        return self._table()["stages"]
+
+    def finished(self, scenes: Iterable[str]) -> bool:
+        """Whether the run of one of these scenes, resolved as in scene.toml, is finished.
+
+        A run that failed or was stopped leaves results of an earlier one beside its own.
+        """
+        known, table = set(scenes), self._table()
+        own = self._scene_text() in {signed(text) for text in known}
+        told = table.get("resolved_scene") in {text_digest(text) for text in known}
+        return own and told and "report" in table["stages"]
 
     def unit(self, name: str) -> str:
         """The unit of a dataset; "-" if dimensionless."""
@@ -68,6 +83,35 @@ class RunResults(Mapping[str, NDArray[Any]]):
 
     def __repr__(self) -> str:
         return f"RunResults({str(self.directory)!r}: {len(self)} datasets)"
+
+    def _scene_text(self) -> str:
+        text = self._text("scene.toml")
+        if not is_as_signed(text):
+            raise self._damaged("scene.toml", "it is not what the run wrote (checksum)")
+        return text
+
+    def _table(self) -> dict[str, Any]:
+        """All of summary.json."""
+        try:
+            table = json.loads(self._text("summary.json"))
+            table["stages"].items()
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise self._damaged("summary.json", "it is no summary of a run") from None
+        if not is_table_as_signed(table):
+            raise self._damaged("summary.json", "it is not what the run wrote (checksum)")
+        return table
+
+    def _text(self, name: str) -> str:
+        path = self.directory / name
+        try:
+            return path.read_text(encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{path} cannot be read ({error.strerror}); {AGAIN}") from None
+        except UnicodeDecodeError:
+            raise self._damaged(name, "it is no text") from None
+
+    def _damaged(self, name: str, why: str) -> InputError:
+        return InputError(f"{self.directory / name} is damaged: {why}; {AGAIN}")
 
     def _known(self, name: str) -> None:
         if name not in self._listed():

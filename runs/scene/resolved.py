@@ -1,6 +1,7 @@
 """The resolved scene as text: every default written out, with unit and meaning of each key."""
 
 import json
+from math import isfinite
 from typing import Any
 
 from tireroad.fem.keys import Key
@@ -19,13 +20,16 @@ def literal(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return f"[{', '.join(literal(part) for part in value)}]"
+    if isinstance(value, dict):
+        pairs = (f"{literal(key)} = {literal(part)}" for key, part in value.items())
+        return f"{{ {', '.join(pairs)} }}"
     if isinstance(value, Pitch):
         return f"{{ dx = {literal(value.dx)}, dy = {literal(value.dy)} }}"
     if isinstance(value, float):
         text = repr(value)
-        return text if "." in text or "e" in text else f"{text}.0"
+        return text if "." in text or "e" in text or not isfinite(value) else f"{text}.0"
     return str(value)
 
 

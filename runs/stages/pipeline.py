@@ -99,8 +99,9 @@ def run_scene(
     forget_peak()  # of an earlier member of a sweep in the same process
     job = Job(scene, directory, comm, fresh, cache)
     on_root(comm, lambda: make_folder(directory))
-    summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size))
-    on_root(comm, lambda: write_text(directory / "scene.toml", signed(dumps(scene))))
+    text = dumps(scene)
+    summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size, text))
+    on_root(comm, lambda: write_text(directory / "scene.toml", signed(text)))
     if scene.road is not None:
         # Report an unusable road file before hours of solving, not after.
         share(scene.road.surface, comm)

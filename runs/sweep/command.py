@@ -12,8 +12,9 @@ from tireroad.runs.files.store import stage_hash
 from tireroad.runs.process import observe
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.sweep import local, queue
-from tireroad.runs.sweep.definition import Member, Sweep, read
+from tireroad.runs.sweep.definition import Sweep, read
 from tireroad.runs.sweep.gather import gather, write
+from tireroad.runs.sweep.members import Member
 from tireroad.runs.sweep.page import write_page
 
 
@@ -55,7 +56,7 @@ def _gather(family: Sweep, folder: Path, failed: Sequence[str]) -> None:
     write(table, folder)
     page = write_page(table, folder, family.name, failed)
     for name in table.missing:
-        observe.say(f"  {name}: no results yet")
+        observe.say(f"  {name}: no results of a finished run of this scene")
     observe.say(f"{page} and sweep.csv, sweep.h5 beside it")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,12 @@ from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.reader import RunResults
 from tireroad.runs.files.store import sealed
+from tireroad.runs.scene.derived import with_modal
+from tireroad.runs.scene.resolved import dumps
+from tireroad.runs.search.journal import NAME, read_trials
+from tireroad.runs.search.settings import applied
 from tireroad.runs.sweep.definition import Sweep
+from tireroad.runs.sweep.members import Member
 
 Array = NDArray[np.float64]
 
@@ -32,7 +38,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Gathered:
-    """The table: `settings` per axis and member, `columns` of results, members without results."""
+    """The table: `settings` per axis and member, `columns` of results, members without (`missing`)."""
 
     names: tuple[str, ...]
     settings: Mapping[str, tuple[Any, ...]]
@@ -41,12 +47,17 @@ class Gathered:
 
 
 def gather(sweep: Sweep, folder: Path) -> Gathered:
-    """Gather the members' results in folder/members."""
+    """Gather the results of finished members in folder/members.
+
+    A folder may hold the results of an earlier scene of the same name: they are not those of the
+    member.
+    """
     rows: list[dict[tuple[str, str], float]] = []
     missing = []
     for member in sweep.members:
         try:
-            rows.append(_figures(RunResults(folder / "members" / member.name)))
+            run = RunResults(folder / "members" / member.name)
+            rows.append(_figures(run) if run.finished(_scenes(sweep, member, run)) else {})
         except (InputError, KeyError, ValueError):
             rows.append({})
         if not rows[-1]:
@@ -63,6 +74,17 @@ def gather(sweep: Sweep, folder: Path) -> Gathered:
     )
 
 
+def _scenes(sweep: Sweep, member: Member, run: RunResults) -> list[str]:
+    """The resolved scenes that a run of the member leaves: its own, and those a search tries."""
+    scene = sweep.load(member)
+    found = [dumps(scene)]
+    if scene.accuracy.searches:
+        with suppress(OSError):
+            for trial in read_trials(run.directory / NAME):
+                found.append(dumps(with_modal(applied(scene, trial.settings), None)))
+    return found
+
+
 def _figures(run: RunResults) -> dict[tuple[str, str], float]:
     """Headline numbers of all stages, third-octave levels and their errors, by (name, unit)."""
     found: dict[tuple[str, str], float] = {}
@@ -71,7 +93,10 @@ def _figures(run: RunResults) -> dict[tuple[str, str], float]:
             value = entry.get("value")
             if isinstance(value, int | float) and not isinstance(value, bool):
                 found[f"{stage}: {name}", entry.get("unit", "-")] = float(value)
-    if "spectra/third_octave/level" in run:
+    ended = (
+        run.summary.get("spectra", {}).get("status") != "skipped"
+    )  # else a file is an earlier run's
+    if ended and "spectra/third_octave/level" in run:
         centres = nominal(run["spectra/third_octave/centre"])
         level = run["spectra/third_octave/level"]
         for centre, parts in zip(centres, level, strict=True):

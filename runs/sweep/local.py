@@ -15,7 +15,8 @@ from pathlib import Path
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import available_memory
 from tireroad.runs.scene.extent.estimate import memory
-from tireroad.runs.sweep.definition import Member, Sweep
+from tireroad.runs.sweep.definition import Sweep
+from tireroad.runs.sweep.members import Member
 
 _LOOK = 0.5  # s between two checks of the running members
 _OUTCOME = {0: "done", 2: "its input is wrong", 3: "a solver gave up", 4: "stopped"}

@@ -19,8 +19,9 @@ from typing import Any
 
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.disk import write_text
-from tireroad.runs.sweep.definition import Member, Sweep
+from tireroad.runs.sweep.definition import Sweep
 from tireroad.runs.sweep.local import command
+from tireroad.runs.sweep.members import Member
 
 WARNING = 120  # s before the time limit at which a job is signalled to write a checkpoint
 _DIRECTIVE = re.compile(r"[A-Za-z][A-Za-z0-9-]*")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import tomllib
 from pathlib import Path
 
 import h5py
@@ -11,6 +12,8 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.folder import held
+from tireroad.runs.scene.resolved import literal
+from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.sweep.command import sweep as run_sweep
 from tireroad.runs.sweep.definition import _absolute, read
 
@@ -29,6 +32,10 @@ error_estimate = false
 [modal]
 count = 8
 """
+
+
+LOADS = '[[axis]]\nkey = "static.load"\nvalues = [1.0]\n'
+MANY = '[[axis]]\nkey = "{}"\nrange = [1.0, 9.0]\ncount = 10000\n'
 
 
 @pytest.fixture
@@ -68,6 +75,32 @@ def test_a_range_with_a_count(folder: Path) -> None:
     assert [member.settings["static.load"] for member in sweep.members] == [100.0, 200.0, 300.0]
 
 
+def test_a_range_of_whole_numbers_suits_a_count(folder: Path) -> None:
+    sweep = sweep_of(folder, '[[axis]]\nkey = "modal.count"\nrange = [12, 16]\ncount = 3\n')
+    assert [sweep.load(member).modal.count for member in sweep.members] == [12, 14, 16]
+    sweep = sweep_of(folder, '[[axis]]\nkey = "static.load"\nrange = [100, 101]\ncount = 3\n')
+    assert [member.settings["static.load"] for member in sweep.members] == [100, 100.5, 101]
+
+
+def test_tables_and_lists_vary(folder: Path) -> None:
+    text = '[[axis]]\nkey = "contact.points"\nvalues = ["nodes", { dx = 0.01, dy = 0.02 }]\n'
+    with (folder / "base.toml").open("a") as file:
+        file.write(
+            "[rotation]\nspeed = 40.0\n[contact]\n[road]\nkind = 'sine'\n[time]\nduration = 0.1\n"
+        )
+    sweep = sweep_of(folder, text)
+    assert [m.name for m in sweep.members] == ["1_points-nodes", "2_points-dx0.01dy0.02"]
+    assert sweep.load(sweep.members[1]).contact.points == Pitch(0.01, 0.02)
+    given = {"a": [True, 1, 1.0, "x"], "b c": {"d": [float("inf")]}}
+    assert tomllib.loads(f"v = {literal(given)}")["v"] == given
+
+
+def test_a_byte_order_mark_is_read(folder: Path) -> None:
+    path = folder / "family.toml"
+    path.write_text(f'scene = "base.toml"\n{LOADS}', encoding="utf-8-sig")
+    assert len(read(path).members) == 1
+
+
 def test_a_latin_hypercube_has_one_sample_in_every_layer(folder: Path) -> None:
     text = 'plan = "latin-hypercube"\nsamples = 8\nseed = 3\n'
     text += '[[axis]]\nkey = "static.load"\nrange = [100.0, 300.0]\n'
@@ -102,6 +135,21 @@ def test_a_list_names_its_members(folder: Path) -> None:
         ("axes = 1\n", "unknown key axes"),
         ('[[member]]\nname = "a/b"\n', "member name"),
         ('[[member]]\nname = "a"\n[[member]]\nname = "a"\n', "unique"),
+        ('[member]\nname = "a"\n', "[[member]]"),
+        ('member = "a"\n', "[[member]]"),
+        ('axis = ["key"]\n', "[[axis]]"),
+        ('plan = ["grid"]\n', "plan must be one of"),
+        ('[[member]]\nset = "a"\n', "set must be a table"),
+        ('[[member]]\nsets = { "static.load" = 1.0 }\n', "unknown key sets"),
+        (LOADS + "value = 3\n", "unknown key value"),
+        (LOADS + "count = 3\n", "not values and count"),
+        (LOADS + "range = [1.0, 2.0]\n", "not values and range"),
+        (LOADS + '[[member]]\nname = "a"\n', "axis belongs to plan"),
+        ("samples = 3\n" + LOADS, "samples belongs to plan = latin-hypercube"),
+        ('plan = "latin-hypercube"\nsamples = 3\n' + LOADS, "unknown key values"),
+        ('[[axis]]\nkey = "static.load"\nrange = [0.0, inf]\ncount = 2\n', "finite number"),
+        ('[[axis]]\nkey = "static.load"\nvalues = [nan]\n', "finite number, not nan"),
+        (MANY.format("static.load") + MANY.format("static.inflation"), "100000000 members"),
     ],
 )
 def test_mistakes_are_named(folder: Path, text: str, wanted: str) -> None:

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from synthetic_results import write_results
+from synthetic_results import sealed, write_results
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.export import export
@@ -161,6 +161,15 @@ def test_only_what_is_there_is_exported(tmp_path: Path) -> None:
     }
     topology = ElementTree.parse(directory / "export" / "modes.xdmf").find(".//Topology")
     assert topology.get("TopologyType") == "Polyvertex", "the quads are in static.h5"
+
+
+def test_a_tire_without_a_road_has_no_footprint(tmp_path: Path) -> None:
+    """Its static state has no `contact/`."""
+    directory = write_results(tmp_path / "run")
+    with sealed(directory / "static.h5", "a") as file:
+        del file["contact"]
+    names = {path.name for path in export(directory)}
+    assert names == (CSV | XDMF) - {"footprint.csv"}
 
 
 def test_damage_is_an_input_error_and_writes_nothing(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 import tireroad
 from tireroad.fem.errors import InputError
+from tireroad.runs.files.checksum import signed, signed_table
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def folder(tmp_path: Path) -> Path:
     with h5py.File(tmp_path / "static.h5", "w") as file:
         file.attrs["load"] = 500.0
     (tmp_path / "summary.json").write_text(json.dumps({"stages": {"static": {"seconds": 1.5}}}))
-    (tmp_path / "scene.toml").write_text('name = "a"\n')
+    (tmp_path / "scene.toml").write_text(signed('name = "a"\n'))
     return tmp_path
 
 
@@ -45,3 +46,27 @@ def test_what_is_not_there_is_named(folder: Path) -> None:
     (folder / "modes.h5").write_bytes(b"no HDF5")
     with pytest.raises(InputError, match="damaged"):
         len(tireroad.load(folder))
+
+
+@pytest.mark.parametrize(
+    "text", [None, b"", b"a = ", b"\xff\xfe", b'name = "b"\n', b'{"stages": 3}', b"[]"]
+)
+@pytest.mark.parametrize("name", ["scene.toml", "summary.json"])
+def test_damaged_texts_are_named(folder: Path, name: str, text: bytes | None) -> None:
+    run = tireroad.load(folder)
+    if text is None:
+        (folder / name).unlink()
+    else:
+        (folder / name).write_bytes(text)
+    with pytest.raises(InputError, match=name):
+        _ = run.scene if name == "scene.toml" else run.summary
+
+
+def test_a_changed_summary_is_not_believed(folder: Path) -> None:
+    table = signed_table({"stages": {"static": {"seconds": 1.5}}})
+    path = folder / "summary.json"
+    path.write_text(json.dumps(table))
+    assert tireroad.load(folder).summary == {"static": {"seconds": 1.5}}
+    path.write_text(json.dumps(table).replace("1.5", "2.5"))
+    with pytest.raises(InputError, match=r"summary\.json is damaged"):
+        _ = tireroad.load(folder).summary

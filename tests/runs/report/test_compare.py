@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.files.checksum import signed
 from tireroad.runs.report.compare import compare
 from tireroad.runs.report.differences import assurance, scene_rows
 
 
 def write(folder: Path, load: float, level: float, frequencies: list[float], turn: bool) -> Path:
     folder.mkdir()
-    (folder / "scene.toml").write_text(f'name = "{folder.name}"\n[static]\nload = {load}\n')
+    text = f'name = "{folder.name}"\n[static]\nload = {load}\n'
+    (folder / "scene.toml").write_text(signed(text))
     headline = {"load": {"value": load, "unit": "N"}}
     stages = {"static": {"seconds": 1.0, "headline": headline}}
     (folder / "summary.json").write_text(json.dumps({"stages": stages}))
@@ -82,6 +84,15 @@ def test_folders_without_results_are_refused(pair: list[Path], tmp_path: Path) -
         compare(pair[:1], tmp_path / "out")
     with pytest.raises(InputError, match=r"summary\.json"):
         compare([pair[0], tmp_path], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["scene.toml", "summary.json"])
+def test_damaged_runs_are_refused(pair: list[Path], tmp_path: Path, name: str) -> None:
+    """An empty scene is damaged too, not a scene without keys."""
+    (pair[1] / name).write_text("")
+    with pytest.raises(InputError, match=f"b/{name} is damaged"):
+        compare(pair, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
