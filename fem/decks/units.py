@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tireroad.fem.errors import InputError
+from tireroad.fem.sections.outline import RADII
 
-_SMALLEST, _LARGEST = 0.1, 2.5  # m, range of the outer radius of a tire
+_SMALLEST, _LARGEST = RADII
 
 
 @dataclass(frozen=True)

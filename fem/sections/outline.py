@@ -8,6 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from tireroad.fem.errors import InputError
 
+RADII = 0.1, 2.5  # m, range of the outer radius of a tire
 _SAMPLES = 4001
 _ARC = 24  # points on each arc
 

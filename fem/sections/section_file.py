@@ -10,7 +10,7 @@ import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.construction import Construction, CordLine, Layer, Part
-from tireroad.fem.sections.outline import Outline, arcs
+from tireroad.fem.sections.outline import RADII, Outline, arcs
 
 UNITS = {"m": 1.0, "mm": 1e-3}
 LARGEST = 1_000_000  # bytes
@@ -43,7 +43,7 @@ def read(path: Path | str) -> Construction:
     if len(data) > LARGEST:
         raise InputError(f"{path}: not a section file: more than {LARGEST / 1e6:g} MB")
     try:
-        raw = tomllib.loads(data.decode("utf-8"))
+        raw = tomllib.loads(data.decode("utf-8-sig"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{path}: not a TOML file: {error}") from None
     try:
@@ -58,10 +58,15 @@ def _construction(raw: dict[str, Any]) -> Construction:
     if unit not in UNITS:
         raise InputError(f'unit = "{unit}": must be "m" or "mm"')
     scale = UNITS[unit]
+    layers = [_layer(one, scale) for one in _tables(raw, "layer", least=1)]
+    if twice := {one.name for one in layers if [o.name for o in layers].count(one.name) > 1}:
+        raise InputError(
+            f"layer {min(twice)!r}: the name of two layers; parts and cords refer to one"
+        )
     held = scale * _number(raw, "held", "the file") if "held" in raw else None
     return Construction(
         outline=_outline(_table(raw, "outline"), scale),
-        layers=[_layer(one, scale) for one in _tables(raw, "layer", least=1)],
+        layers=layers,
         parts=[_part(one, scale) for one in _tables(raw, "part")],
         cords=[_cords(one, scale) for one in _tables(raw, "cords")],
         compounds={name: _compound(name, one) for name, one in _table(raw, "compound").items()},
@@ -78,6 +83,12 @@ def _outline(table: dict[str, Any], scale: float) -> Outline:
     points = scale * _pairs(points, f"outline.{kind}")
     if points.min(axis=0)[0] <= 0:
         raise InputError(f"outline.{kind}: r must be above 0 everywhere: points are [r, y]")
+    low, high = RADII
+    if not low <= (outer := float(points[:, 0].max())) <= high:
+        raise InputError(
+            f"outline.{kind}: r reaches {outer:.4g} m; {low:g} to {high:g} m is a tire: is unit (m or mm) that "
+            "of the drawing?"
+        )
     return Outline(arcs(points) if kind == "arcs" else points)
 
 
@@ -116,6 +127,9 @@ def _cords(table: dict[str, Any], scale: float) -> CordLine:
     }
     _known(table, keys, "[[cords]]")
     name = _text(table, "name", "[[cords]]")
+    angle = _number(table, "angle", f"cords {name!r}")
+    if not -90.0 <= angle <= 90.0:
+        raise InputError(f"cords {name!r}: angle = {angle:g} deg must lie between -90 and 90")
     numbers = {
         key: _number(table, key, f"cords {name!r}", default)
         for key, default in (
@@ -130,7 +144,7 @@ def _cords(table: dict[str, Any], scale: float) -> CordLine:
         name=name,
         under=_text(table, "under", f"cords {name!r}"),
         to=scale * _number(table, "to", f"cords {name!r}"),
-        angle=float(np.radians(_number(table, "angle", f"cords {name!r}"))),
+        angle=float(np.radians(angle)),
         **numbers,
     )
 

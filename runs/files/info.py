@@ -26,7 +26,9 @@ def describe(file: Path, as_json: bool = False) -> str:
     if file.is_dir():
         raise InputError(f"{file} is a folder: {_candidates(file)}")
     if not file.is_file():
-        raise InputError(f"{file}: there is no such file")
+        raise InputError(
+            f"{file}: {'is no file of data' if file.exists() else 'there is no such file'}"
+        )
     try:
         whole = "right" if checksum.is_whole(file) else "wrong"
     except checksum.NoChecksum:

@@ -7,8 +7,9 @@ from typing import Any
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.sections.kind import SECTIONS
 from tireroad.runs.scene.source import Source
+from tireroad.runs.scene.tables.modal import Modal
 from tireroad.runs.scene.tables.road import Road
-from tireroad.runs.scene.tables.scene import Damping, Modal, Scene
+from tireroad.runs.scene.tables.scene import Damping, Scene
 
 Say = Callable[[str], object]
 

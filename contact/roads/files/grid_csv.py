@@ -54,7 +54,14 @@ def _blocks(lines: Iterator[Line]) -> Iterator[list[Line]]:
 
 def _csv_rows(file: Path, lines: Iterator[Line]) -> tuple[Array, Array, Rows]:
     """x, y and z from numbered lines of text, block by block."""
-    number, first = next(lines, (1, ""))
+    number, first = next(lines, (0, ""))
+    if "," not in first:
+        raise InputError(
+            f"road.file {file}, line {number}: no comma; a matrix has the positions across in its first line, "
+            "after a comma, and then a line for each x; a list of points begins with x,y,z"
+            if number
+            else f"road.file {file}: is empty"
+        )
     header = [field.strip().lower() for field in first.split(",")]
     listed = header == ["x", "y", "z"]
     # The text of the corner is ignored: a zero replaces it.

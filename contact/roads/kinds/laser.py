@@ -106,7 +106,7 @@ class LaserFile(Levelled):
             lines = [row for row in text.splitlines() if row.strip() and not row.startswith("#")]
             begin = 1 if lines and _is_heading(lines[0]) else 0
             if len(lines) - begin < 3:
-                raise InputError(f"{source}: {len(lines) - begin} heights are no road")
+                raise InputError(f"{len(lines) - begin} heights are no road")
             check_count(path, len(lines))
             table = np.loadtxt(lines[begin:], delimiter=",", ndmin=2, dtype=float)
         except UnicodeDecodeError as error:

@@ -103,10 +103,10 @@ def barred_from_contact(rim: str, road: str) -> Iterator[tuple[str, str]]:
     if road == "held":
         yield (
             "road",
-            '= "held" fixes the nodes whose contact is to be computed: contact needs "forces"',
+            '= "held" fixes the nodes whose contact is to be computed: [contact] needs "forces"',
         )
     if rim == "free":
-        yield "rim", '= "free" leaves nothing to carry the load: contact needs "fixed"'
+        yield "rim", '= "free" leaves nothing to carry the load: [contact] needs "fixed"'
 
 
 def _force(scene: Scene, raw: dict[str, Any], error: Where) -> Iterator[InputError]:

@@ -77,7 +77,10 @@ def test_a_section_file_is_built_as_drawn(tmp_path):
     ("old", "new", "message"),
     [
         ('unit = "mm"', 'unit = "inch"', "unit"),
+        ('unit = "mm"', 'unit = "m"', "r reaches 320 m; .*is unit"),
         ("tread = 60.0", "", "tread must be a number"),
+        ('name = "inner"', 'name = "outer"', "'outer': the name of two layers"),
+        ("angle = 20", "angle = 240", "angle = 240 deg must lie between"),
         ('compound = "soft"', 'compound = "sof"', "no compound 'sof'"),
         ('under = "outer"', 'under = "middle"', "'middle'; there are outer, inner"),
         ("thickness = 4", "thickness = -4", "needs a thickness above 0"),
