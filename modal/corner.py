@@ -38,8 +38,9 @@ MOMENTS = slice(3, 6)  # of the six; after the motions probes can read the hub m
 class Corner:
     """The wheel and its coupling to m modes.
 
-    `axle`: the wheel and its suspension; `mass` P^T, `stiffness`, `gyroscopic`, `convective` and, for
-    the moments with the doppler inertia, `body`, `body_convective` (m, 6) of the modes, and `own_...` (6, 6) of the rim's motions alone, factors of Omega taken out;
+    `axle`: the wheel and its suspension; `mass` P^T, `stiffness`, `gyroscopic`, `convective` and,
+    for the moments with the doppler inertia, `body`, `body_convective` (m, 6) of the modes, and
+    `own_...` (6, 6) of the rim's motions alone, factors of Omega taken out;
     `places` (s, 3) m of the outer face in the static state. Gyroscopic and convective arrays are
     zero for a standing wheel.
     """

@@ -71,8 +71,8 @@ class Obstacle:
     """z = h [s(xi/r) - s((xi - l)/r)], xi = (x - position) cos(a) + y sin(a).
 
     h, r, a, position: `height`, `ramp`, `angle` and `position` of `edges`; l = `length` (m) from
-    the beginning of one edge to that of the other, infinite for a step; s(t) = 3 t^2 - 2 t^3 on [0, 1], constant outside (a jump for
-    r = 0).
+    the beginning of one edge to that of the other, infinite for a step; s(t) = 3 t^2 - 2 t^3 on
+    [0, 1], constant outside (a jump for r = 0).
     """
 
     extent = ((-np.inf, np.inf), (-np.inf, np.inf))
