@@ -18,10 +18,10 @@ from tireroad.runs.scene.extent.demand import DOUBTFUL
 from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.search.journal import Trial
-from tireroad.runs.search.settings import CAUSES, Ladders, Settings, applied, size_ratio
+from tireroad.runs.search.settings import CAUSES, MARGIN, Ladders, Settings, applied, size_ratio
 from tireroad.runs.search.shares import worst
 
-AIM = 0.9  # of the target: margin of a plan, as the orders hold only asymptotically
+AIM = 0.9 / MARGIN  # of the target; 0.9: the orders hold only asymptotically
 AT_ONCE = {"mesh": 2, "modes": 2, "points": 2, "step": 1}  # most rungs per plan: same reason
 # Of the target. A cause is refined only above SMALL; above EVEN (the value of four equal shares) if
 # another cause that cannot be refined alone misses the target, so that none becomes finer than that

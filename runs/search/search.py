@@ -22,7 +22,7 @@ from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.search.journal import Journal, Trial
 from tireroad.runs.search.planning import planned
-from tireroad.runs.search.settings import Ladders, Settings, aim, applied
+from tireroad.runs.search.settings import MARGIN, MARGINAL, Ladders, Settings, aim, applied
 from tireroad.runs.search.shares import CAUSES, Found, shown, worst
 from tireroad.runs.stages.pipeline import Finished, run_scene
 
@@ -41,27 +41,32 @@ class Search:
     cache: Cache = NO_CACHE
 
     def run(self) -> None:
-        """Run trials until one meets the target, then the run with its settings and stages.
+        """Run trials until one surely meets the target, then the run with its settings and stages.
 
-        Raises ConvergenceError if none meets it within the limits; the results are then those of
-        the closest trial. Collective.
+        Within the limits, the closest trial has to do if its estimate meets the target. Raises
+        ConvergenceError if not; the results are then those of that trial. Collective.
         """
         on_root(self.comm, lambda: self._begin())
-        observe.say(f"search    for {aim(self.scene.accuracy)}")
+        observe.say(f"search    for {aim(self.scene.accuracy)}, {MARGINAL}")
         tried: list[Trial] = []
         why = ""
         settings: Settings | None = self._ladders.first()
         while settings is not None:
             tried.append(self._trial(settings, len(tried) + 1))
-            if self._met(tried[-1]):
+            if self._over(tried[-1]) <= 1 / MARGIN:
                 self._keep(tried[-1])
                 return
             why = self._limit(tried)
             settings = None if why else on_root(self.comm, lambda: self._next(tried[-1]))
-        self._give_up(
-            tried,
-            why or "no finer settings are left, or the memory that is free does not hold them",
-        )
+        why = why or "no finer settings are left, or the memory that is free does not hold them"
+        best = min(tried, key=lambda trial: (self._over(trial), trial.found is None))
+        if self._over(best) <= 1:
+            observe.say(
+                f"  {why}; the target is met without the margin of {MARGIN:g} for estimates too small"
+            )
+            self._keep(best)
+        else:
+            self._give_up(tried, best, why)
 
     @cached_property
     def _ladders(self) -> Ladders:
@@ -125,8 +130,9 @@ class Search:
         spent = self.comm.bcast(time.perf_counter() - began)
         return Trial(settings, cost, spent, Found.of(product, self.scene.accuracy), scheme)
 
-    def _met(self, trial: Trial) -> bool:
-        return trial.found is not None and worst(trial.found.over(self.scene.accuracy))[0] <= 1
+    def _over(self, trial: Trial) -> float:
+        """The estimated error over the target; infinite for a failed trial."""
+        return worst(trial.found.over(self.scene.accuracy))[0] if trial.found else float("inf")
 
     def _limit(self, tried: list[Trial]) -> str:
         """The limit of the search that is reached; "" if none."""
@@ -159,18 +165,13 @@ class Search:
         )
         _tell(scene, done)
 
-    def _give_up(self, tried: list[Trial], why: str) -> None:
-        """Compute the closest trial's results, then raise ConvergenceError. Collective."""
+    def _give_up(self, tried: list[Trial], best: Trial, why: str) -> None:
+        """Compute the best trial's results, then raise ConvergenceError. Collective."""
         wanted = self.scene.accuracy
-        ended = [trial for trial in tried if trial.found is not None]
-        if not ended:
+        if best.found is None:
             raise ConvergenceError(
                 f"accuracy: no trial finished ({why}); the last: {tried[-1].failed}"
             )
-        best = min(
-            ended, key=lambda trial: worst(trial.found.over(wanted))[0] if trial.found else 0.0
-        )
-        assert best.found is not None
         over = best.found.over(wanted)
         largest = CAUSES[int(over[:, worst(over)[1]].argmax())]
         self._final(applied(self.scene, best.settings))

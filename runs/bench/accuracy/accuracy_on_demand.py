@@ -32,6 +32,7 @@ from tireroad.runs.bench.parts.rolling_cases import (
 from tireroad.runs.files.cache import Cache
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
+from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.search.journal import Journal, Trial
 from tireroad.runs.search.search import Search, seconds
 from tireroad.runs.search.settings import Ladders, Settings, applied
@@ -113,20 +114,30 @@ def _outcome(folder: Path, case: Case, grid: Mapping, forces: Path) -> Outcome:
 
 
 def _cheapest(folder: Path, ladders: Ladders, grid: Mapping, truth: _Truth) -> float | None:
-    """Seconds of the cheapest settings in the grid that meet the target, or None; those whose
-    stages before the loop are known to cost more are not run."""
+    """Seconds of the cheapest settings in the grid that meet the target, or None.
+
+    Tried in the order of their estimated cost. Cost grows with every rung, so settings are skipped
+    that are nowhere below settings known to cost as much as the best.
+    """
+    tried: dict[tuple[int, ...], float] = {}
     best: float | None = None
-    known: dict[tuple, float] = {}
-    for rungs in product(*grid.values()):
-        at = dict(zip(grid, rungs, strict=True))
-        keys = [(stage, *(at[cause] for cause in causes)) for stage, causes in DEPENDS.items()]
-        if best is not None and sum(known.get(key, 0.0) for key in keys) >= best:
+
+    def at(rungs: tuple[int, ...]) -> Settings:
+        found = ladders.at(dict(zip(grid, rungs, strict=True)))
+        assert found is not None  # all rungs of the grid exist
+        return found
+
+    def work(rungs: tuple[int, ...]) -> float:
+        return sum(estimate(applied(ladders.scene, at(rungs))).work.values())
+
+    for rungs in sorted(product(*grid.values()), key=work):
+        dear = [one for one, cost in tried.items() if best is not None and cost >= best]
+        if any(np.greater_equal(rungs, one).all() for one in dear):
             continue
-        tried = _driven(folder, ladders, ladders.at(at))
-        spent = seconds(folder / "grid")
-        known |= {key: spent.get(key[0], 0.0) for key in keys}
-        if truth.error(tried) <= TARGET:
-            best = min(best or np.inf, _cost(spent))
+        run = _driven(folder, ladders, at(rungs))
+        tried[rungs] = _cost(seconds(folder / "grid"))
+        if truth.error(run) <= TARGET:
+            best = min(best or np.inf, tried[rungs])
     return best
 
 
@@ -142,9 +153,8 @@ def _searched(folder: Path, scene) -> tuple[bool, list[Trial]]:
     return ended, [trial for trial in Journal(folder, scene).trials if trial.found is not None]
 
 
-def _driven(folder: Path, ladders: Ladders, settings: Settings | None) -> Driven:
+def _driven(folder: Path, ladders: Ladders, settings: Settings) -> Driven:
     """A run with these settings; stages are shared with runs of the same wheel. Collective."""
-    assert settings is not None  # all rungs of the grid exist
     scene = applied(ladders.scene, settings)
     return driven(scene, folder / "grid", "contact", _cache(folder))
 

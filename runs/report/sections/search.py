@@ -14,7 +14,7 @@ from tireroad.runs.report import figures
 from tireroad.runs.report.quantities import quantity
 from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.search.journal import NAME, Trial, read_trials
-from tireroad.runs.search.settings import aim
+from tireroad.runs.search.settings import MARGIN, aim
 from tireroad.runs.search.shares import CAUSES, worst
 
 
@@ -43,7 +43,7 @@ def _show(section: Section, wanted: Accuracy, trials: list[Trial]) -> None:
     section.show(
         trade(cost, np.array([worst(one)[0] for one in over]), np.array([_shares(o) for o in over])),
         "The search: estimated error over the one asked for, against the cost of a run with the settings of each "
-        "trial, in the order tried; marks: the part of each cause.",
+        f"trial, in the order tried; marks: the part of each cause. A search goes on to 1/{MARGIN:g}.",
     )  # fmt: skip
 
 
