@@ -11,7 +11,7 @@ from scipy import sparse
 from tireroad.fem.errors import InputError
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.residual.state_selection import keep
-from tireroad.greens.residual.truncation import Cutoff, estimate, estimate_axle
+from tireroad.greens.residual.truncation import Cutoff, estimate, estimate_axle, relative
 from tireroad.greens.response import Response
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.damping import beyond
@@ -147,7 +147,7 @@ def judged(
     if wanted.dynamic is not None:
         H = whole.receptance(frequency)
         lost = np.linalg.norm(response.receptance(frequency) - H, axis=(1, 2))
-        lost /= np.linalg.norm(H, axis=(1, 2))
+        lost = relative(lost, np.linalg.norm(H, axis=(1, 2)))
         figures[f"error of the states made static {label}"] = (float(lost.max()), "-")
     axle = estimate_axle(response, cutoff(rolling), frequency)
     if axle is not None:

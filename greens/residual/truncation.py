@@ -50,7 +50,12 @@ def estimate(response: Response, option: str, cutoff: Cutoff, frequency: np.ndar
     else:
         lagging = H - response.keeping(~beyond).receptance(frequency)
         off = (_size(lagging) + _size(response.residual)) * share
-    return off / _size(H)
+    return relative(off, _size(H))
+
+
+def relative(off: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """off / size (f,); 0 where both are, as for points that the road holds."""
+    return np.divide(off, size, out=np.where(off > 0, np.inf, 0.0), where=size > 0)
 
 
 def estimate_axle(response: Response, cutoff: Cutoff, frequency: np.ndarray) -> np.ndarray | None:

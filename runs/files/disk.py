@@ -30,7 +30,7 @@ def explained(error: BaseException, path: Path | str) -> Refused | None:
     if number in FULL or any(f"errno = {code}," in text for code in FULL):
         reason = "the disk is full (or the file too large for it): free some space and run again"
     elif number in REFUSED or any(f"errno = {code}," in text for code in REFUSED):
-        reason = "the folder is not writable: choose another with --out"
+        reason = "the folder is not writable: make it so, or run with another --out"
     else:
         return None
     return Refused(f"{path}: cannot be written, {reason}; what was there before is kept")

@@ -48,7 +48,7 @@ def check_kept_scene(directory: Path) -> None:
     path = directory / "scene.toml"
     try:
         text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         raise InputError(f"{directory}: there is no run to resume: it has no scene.toml") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None

@@ -164,7 +164,7 @@ def _nested(part: Table, raw: Any, path: tuple[str, ...], source: Source) -> Any
     if not part.many:
         return _table(part.of, raw, path, source)
     if not isinstance(raw, list):
-        source.add(path, f"must be written [[{'.'.join(path)}]], one for each")
+        source.add(path, f"must be written [[{'.'.join(path)}]] in the scene, one for each")
         return ()
     return tuple(_table(part.of, one, (*path, str(i)), source) for i, one in enumerate(raw))
 

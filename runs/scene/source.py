@@ -23,8 +23,10 @@ class Source:
         for length in range(len(path), 0, -1):
             if path[:length] in self.overridden:
                 return f"--set {shortened(path[:length])}"
-        line = locate.line_of(self.text, path)
-        return f"{self.path}, line {line}" if line else f"{self.path}"
+        if line := locate.line_of(self.text, path):
+            return f"{self.path}, line {line}"
+        below = (one for one in self.overridden if one[: len(path)] == path)
+        return f"--set {shortened(least)}" if (least := min(below, default=())) else f"{self.path}"
 
     def add(self, path: Path_, message: str) -> None:
         """Note a problem with a key."""

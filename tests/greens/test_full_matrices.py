@@ -17,7 +17,7 @@ from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.tire.body import Body
 from tireroad.fem.tire.material import compound
 from tireroad.greens.coupling import Basis, Wheel
-from tireroad.greens.residual.truncation import Cutoff, estimate, estimate_axle
+from tireroad.greens.residual.truncation import Cutoff, estimate, estimate_axle, relative
 from tireroad.modal.basis import project
 from tireroad.modal.joined import joined
 from tireroad.modal.solver import undamped
@@ -216,3 +216,9 @@ def test_the_error_of_the_axle_force_is_about_what_is_estimated(speed, option) -
     else:
         assert error[0] < 0.02
         assert np.all(guess < 0.02)
+
+
+def test_points_that_the_road_holds_have_no_error() -> None:
+    """Their receptance and its error are zero; an error of a receptance of zero is infinite."""
+    found = relative(np.array([0.0, 1.0, 1.0]), np.array([0.0, 0.0, 2.0]))
+    assert found.tolist() == [0.0, np.inf, 0.5]

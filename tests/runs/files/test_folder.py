@@ -74,6 +74,9 @@ def test_stopped_run_goes_on(tmp_path: Path) -> None:
 def test_a_changed_scene_is_not_resumed(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no run to resume"):
         check_kept_scene(tmp_path)
+    (tmp_path / "contact.h5").write_text("")
+    with pytest.raises(InputError, match="no run to resume"):
+        check_kept_scene(tmp_path / "contact.h5")
     path = tmp_path / "scene.toml"
     path.write_text(signed("load = 300.0\n"))
     check_kept_scene(tmp_path)

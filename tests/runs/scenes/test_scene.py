@@ -129,6 +129,7 @@ def test_contradictions_need_both_sides(scene_file) -> None:
     [
         ("static.lod=3", ["--set static.lod", "static.load"]),
         ("static.load=-3", ["--set static.load", "≥ 0.001"]),
+        ("tire.cords.0.angle=3", ["--set tire.cords.0.angle", "[[tire.cords]] in the scene"]),
         ("force.1.angle=2", ["force.1.angle", "0 to 0"]),
         ("force.x.angle=2", ["force.x.angle", "0 to 0"]),
         ("name.first=2", ["name", "not a table"]),
