@@ -122,16 +122,17 @@ def test_all_that_count_are_found() -> None:
     sizes = np.linalg.eigvalsh(gram(comm, X, multiply(operators.stiffness, X)))
     wanted = int((sizes > TOLERANCE).sum())
     assert 10 < wanted < COUNT
-    assert abs(len(grown.squares) - COUNT - wanted) <= 1
+    assert len(grown.squares) - COUNT == wanted
     assert grown.count == COUNT and grown.squares[COUNT] > modes.squares[-1]
     unit = gram(comm, grown.vectors, mass * grown.vectors)
     assert np.abs(unit - np.eye(len(unit))).max() < 1e-9
-    # In no direction of X do they leave more than what does not count.
+    # In no direction of X do they leave more than what does not count, and so they are those of the
+    # mirror image, mirrored.
     space = grown.vectors[:, COUNT:]
     shares = gram(comm, space, multiply(operators.stiffness, X)) / grown.squares[COUNT:, None]
     X -= space @ shares
     left = np.linalg.eigvalsh(gram(comm, X, multiply(operators.stiffness, X)))
-    assert left.max() < 2 * TOLERANCE
+    assert left.max() == pytest.approx(sizes[-wanted - 1], rel=1e-3)
 
 
 def test_speeds_of_a_family_share_them() -> None:
