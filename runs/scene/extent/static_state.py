@@ -14,7 +14,7 @@ processes; the estimate is 1.8, 1.4 without them. Released before the modes.
 HIGHEST = 3
 """Highest element order, as in fem.static.load_error, which is not imported just to estimate."""
 LOAD_ERROR = "estimate of the load's error"
-FRICTION = "friction in the static state"
+FRICTION = "static friction"
 # Tangents with friction, as counted on the built-in tire with 25,056 and 40,176 unknowns: a rolling
 # tire takes 7 or 8 with its friction, 13 or 14 to find its free travel and 8 with its slip; a
 # standing one 6 or 7 a step, and 4 for its load.
