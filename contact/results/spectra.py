@@ -10,7 +10,9 @@ from tireroad.contact.results.levels import a_weighting, band_sums, confidence
 
 # References of the levels: N, N m, and m/s by ISO 1683.
 FORCE, MOMENT, VELOCITY = 1.0, 1.0, 1e-9
+SILENT = -1000.0  # dB: levels below are of records that do not vary beyond rounding
 BAND = 300.0  # Hz, up to which two histories are compared by default
+_ROUNDING = 1e-12  # of the largest value of a record: less variation than this is rounding
 _SEGMENTS = 4.5  # with half overlap, eight averages
 _LONGEST = 0.5  # s of a segment: lines of 2 Hz; longer records give more averages instead
 
@@ -41,7 +43,8 @@ def third_octaves(
 
     With `rate`, of their rate of change per second; A-weighted line by line if `weighted`. Bands as
     in `contact.results.levels.band_sums`, below `up_to` Hz and half the sampling rate. Hann window
-    over the whole record, mean removed. A record of one value has no band.
+    over the whole record, mean removed. A record of one value has no band, and levels of one that
+    does not vary are below `SILENT`.
     """
     if len(values) < 2:
         return np.zeros(0), np.zeros((0, values.shape[1]))
@@ -56,6 +59,7 @@ def total_level(
     """Level (d,), dB re `FORCE` (rms), of all lines of values (n, d) up to `up_to` Hz.
 
     Unlike a sum of `third_octaves` it includes bands with too few lines for a level of their own.
+    Below `SILENT` if nothing varies.
     """
     frequency, square = _lines(values, step, weighted=weighted)
     return _decibel(square[frequency <= up_to].sum(axis=0), FORCE)
@@ -78,10 +82,16 @@ def off_middle(values: np.ndarray) -> np.ndarray:
 def _lines(
     values: np.ndarray, step: float, rate: bool = False, weighted: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (f,) Hz and mean squares (f, d) of the lines, as for `third_octaves`."""
+    """Frequencies (f,) Hz and mean squares (f, d) of the lines, as for `third_octaves`.
+
+    Exactly 0 where the values vary by rounding alone, as a force on a flat road may.
+    """
     from scipy import signal
 
     frequency, power = signal.periodogram(values, 1 / step, "hann", detrend="constant", axis=0)
+    power = np.where(
+        np.ptp(values, axis=0) > _ROUNDING * np.abs(values).max(initial=0.0), power, 0.0
+    )
     if rate:
         power = power * (2 * np.pi * frequency[:, None]) ** 2
     if weighted:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tireroad.contact.results.levels import nominal
-from tireroad.contact.results.spectra import deviation
+from tireroad.contact.results.spectra import SILENT, deviation
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.read import Absent, Results
 from tireroad.runs.report.quantities import bounded, digits, quantity
@@ -95,12 +95,15 @@ def _levels(results: Results, _: Given) -> list[Fact]:
         level = results.optional("spectra.h5", f"third_octave/{key}")
         if level is None:
             continue
-        text = _summed(level, results.optional("spectra.h5", f"third_octave/{key}_error"))
-        text = f"{text} dB re 1 N"
-        weighted = results.optional("spectra.h5", f"third_octave/{key}_a_weighted")
-        if weighted is not None:
-            text += f", {_summed(weighted, None)} dB(A)"
-        found.insert(-1 if end else len(found), (f"{what} z, {band}", text))
+        fact = f"{what} z", "constant: no level"
+        if level[:, 2].max() > SILENT:
+            error = results.optional("spectra.h5", f"third_octave/{key}_error")
+            text = f"{_summed(level, error)} dB re 1 N"
+            weighted = results.optional("spectra.h5", f"third_octave/{key}_a_weighted")
+            if weighted is not None:
+                text += f", {_summed(weighted, None)} dB(A)"
+            fact = f"{what} z, {band}", text
+        found.insert(-1 if end else len(found), fact)
     return found
 
 

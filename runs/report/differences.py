@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tireroad.contact.results.levels import nominal
+from tireroad.contact.results.spectra import SILENT
 from tireroad.runs.files.reader import RunResults
 
 Array = NDArray[np.float64]
@@ -101,7 +102,8 @@ def _bands(runs: Sequence[RunResults], quantity: str, path: str, unit: str) -> l
         if path in run and centre in run and len(run[centre]):
             level = run[path].reshape(len(run[centre]), -1)  # some have components
             for band, parts in zip(nominal(run[centre]), level, strict=True):
-                own |= {(axis, float(band)): float(v) for axis, v in enumerate(parts)}
+                heard = ((axis, float(v)) for axis, v in enumerate(parts) if v > SILENT)
+                own |= {(axis, float(band)): v for axis, v in heard}
         found.append(own)
     keys = sorted({key for own in found for key in own})
     several = any(axis for axis, _ in keys)

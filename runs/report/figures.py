@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tireroad.contact.results.levels import nominal
+from tireroad.contact.results.spectra import SILENT
 from tireroad.runs.report.thinned import envelope, peak_hold
 
 COMPONENTS = ("x, forward", "y, along the axle", "z, up")
@@ -45,7 +46,6 @@ RANGE_DB = 100.0  # dB: lines further below the highest one of a spectrum are no
 LEAST_RANGE_DB = 20.0  # dB: on a smaller range, tiny differences between bars look large
 
 
-SILENT = -1000.0  # dB: level of zero, up to rounding
 LEAST_BANDS = 8  # least number of bands that get space
 
 

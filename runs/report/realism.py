@@ -6,7 +6,7 @@ wrong.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -17,6 +17,12 @@ from tireroad.runs.report.quantities import digits, quantity
 _LOWEST = 6  # modes whose damping is checked
 _DIFFERS = 0.05  # relative to the static load; above it the mean force while rolling is explained
 _OBSTACLES = ("step", "cleat", "iso8608")  # roads with heights of their own
+# why the load depends on the road: on a held axle, and on springs to the ground
+_HELD = "the axle is held at its static height, so that the road's height decides"
+_GROUNDED = (
+    "the springs of the axle end at the ground (no axle.body_mass), so that the load follows the mean height of the "
+    "road, in a longer run too"
+)
 
 
 def unusual(results: Results) -> str | None:
@@ -102,16 +108,27 @@ def _tread(results: Results) -> Iterator[str]:
 
 
 def _damping(results: Results) -> Iterator[str]:
-    """Damping of the lowest modes: half critical or more is beyond that of rubber."""
-    value = results.array("rotating.h5", "eigenvalue")
-    value = value[np.abs(value) > 1.0]
-    lowest = value[np.argsort(np.abs(value))][: 2 * _LOWEST]
-    share = -lowest.real / np.abs(lowest) if len(lowest) else np.zeros(1)
-    if share.max() > 0.5:
+    """Damping of the tire's lowest modes: half critical or more is beyond that of rubber.
+
+    From [damping] or the loss factors, not from the eigenvalues of the rolling tire: those contain
+    the wheel's dampers, and rotation shifts their frequencies without damping them.
+    """
+    rigid = int(_number(results, "modes.h5", "rigid_modes"))
+    lowest = slice(rigid, rigid + _LOWEST)
+    omega = 2 * np.pi * results.array("modes.h5", "frequency")[lowest]
+    given = results.scene.get("damping")
+    if given is None:
+        parts = {"loss_factor": results.array("modes.h5", "loss_factor")[lowest] / 2}
+    else:
+        mass, stiffness = given.get("mass", 0.0), given.get("stiffness", 0.0)
+        parts = {"[damping] mass": mass / (2 * omega), "[damping] stiffness": stiffness * omega / 2}
+    share = np.sum(list(parts.values()), axis=0)
+    if len(omega) and share.max() > 0.5:
         text = (
             f"{100 * share.max():.0f} % of critical" if share.max() < 0.999 else "beyond critical"
         )
-        yield f"damping of the lowest modes up to {text} (0.5 to 10 %): look at [damping] mass"
+        key = max(parts, key=lambda name: parts[name][share.argmax()])
+        yield f"damping of the lowest modes up to {text} (0.5 to 10 %): look at {key}"
 
 
 def _road(results: Results) -> Iterator[str]:
@@ -142,18 +159,43 @@ def mean_load(results: Results) -> str | None:
         f"The mean vertical force while rolling, {quantity(float(force.mean()), 'N')}, is "
         f"{100 * abs(share):.0f} % {'above' if share > 0 else 'below'} the {quantity(load, 'N')} at rest: "
     )
-    road, axle = results.scene.get("road", {}), results.scene.get("axle", {})
-    if axle.get("kind", "fixed") == "corner":
-        return (
-            text
-            + "wheel and body have not come to rest; a longer run, or run-in, shows the load itself."
-        )
-    reason = "the axle is held at its static height, so that the road's height decides"
+    return text + _reason(results.scene)
+
+
+def _reason(scene: Mapping) -> str:
+    """Why the mean load differs, by the support of the wheel and the road."""
+    axle = scene.get("axle", {})
+    kind = "fixed" if "z" in axle.get("locked", ()) else axle.get("kind", "fixed")
+    if kind == "fixed":
+        return _by_road(scene, _HELD, '[axle] kind = "corner" with a body_mass keeps the load')
+    if kind == "corner" and not axle.get("body_mass"):
+        return _by_road(scene, _GROUNDED, "axle.body_mass keeps the load")
+    what = "wheel and body have" if kind == "corner" else "the wheel has"
+    return f"{what} not come to rest; a longer run, or run-in, shows the load itself."
+
+
+def _by_road(scene: Mapping, reason: str, keeps: str) -> str:
+    """`reason` with what the road adds to it, and what `keeps` the load."""
+    road = scene.get("road", {})
     if road.get("kind", "flat") == "flat":
-        return text + reason + "; on a flat road what is left is the settling on the points' grid."
-    if road.get("datum") == "mean":
+        return f"{reason}; {_of_flat(scene)}."
+    if reason == _HELD and road.get("datum") == "mean":
         reason += (
             "; its mean lies on the static road plane (road.datum), and as the tire rests on its highest parts, they "
             "press in more than the deep ones let go"
         )
-    return text + reason + '. [axle] kind = "corner" keeps the load; road.offset lowers the road.'
+    return f"{reason}. {keeps}; road.offset lowers the road."
+
+
+def _of_flat(scene: Mapping) -> str:
+    """What changes the load on a flat road."""
+    road = scene.get("road", {})
+    moved = {
+        "its motion (road.motion)": road.get("motion", {}).get("kind", "none") != "none",
+        "its height (road.offset)": bool(road.get("offset")),
+        "the grooves of the tread ([pattern])": bool(scene.get("pattern")),
+    }
+    causes = [cause for cause, there in moved.items() if there]
+    if causes:
+        return f"on this flat road it comes from {' and '.join(causes)}"
+    return "on a flat road what is left is the settling on the points' grid"

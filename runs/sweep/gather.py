@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.results.levels import nominal
+from tireroad.contact.results.spectra import SILENT
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.reader import RunResults
@@ -100,7 +101,8 @@ def _figures(run: RunResults) -> dict[tuple[str, str], float]:
         level = run["spectra/third_octave/level"]
         for centre, parts in zip(centres, level, strict=True):
             for axis, value in zip("xyz", parts, strict=True):
-                found[f"axle force {axis}, {centre:g} Hz", "dB re 1 N"] = float(value)
+                if value > SILENT:
+                    found[f"axle force {axis}, {centre:g} Hz", "dB re 1 N"] = float(value)
         if "spectra/third_octave/level_error" in run:
             errors = run["spectra/third_octave/level_error"]
             for centre, parts in zip(centres, errors, strict=True):

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tireroad.contact.results.levels import FEW, nominal
+from tireroad.contact.results.spectra import SILENT
 from tireroad.runs.files.read import Results, Section, Table
 from tireroad.runs.report import figures, live
 from tireroad.runs.report.quantities import quantity
@@ -103,7 +104,7 @@ def _show_bands(
 ) -> None:
     """Add levels (b, 3) dB over band centres (b,) Hz, with their errors (b, 3) dB."""
     label = f"{of}, rms, in {reference}"
-    heard = np.where(level > figures.SILENT, level, np.nan)
+    heard = np.where(level > SILENT, level, np.nan)
     series = {
         name: (heard[:, n], None if error is None else error[:, n])
         for n, name in enumerate(figures.COMPONENTS)
@@ -162,7 +163,7 @@ def _table(
 
 
 def _texts(level: NDArray) -> list[str]:
-    return [f"{v:.1f}".replace("-", "−") if v > figures.SILENT else "none" for v in level]
+    return [f"{v:.1f}".replace("-", "−") if v > SILENT else "none" for v in level]
 
 
 def densities(results: Results, section: Section) -> None:

@@ -1,6 +1,7 @@
 """Cost of a scene's stages: operations, and seconds on one core."""
 
 from tireroad.runs.scene.extent.sizes import Sizes
+from tireroad.runs.scene.extent.static_state import tangents_with_friction
 from tireroad.runs.scene.tables.scene import Scene
 
 # Error bars, of the time of all else: 0.49 in quickstart.toml and 0.35 in passenger.toml
@@ -10,6 +11,9 @@ _BARS = 0.42
 # cost more than their operations. Measured with 44 to 113 points that touch (2026-11-25): 7.2 to
 # 10 ms with a tread that shears, 4.4 ms with a brush alone.
 _SHEARED, _BRISTLES = 8e-3, 4.4e-3
+# One tangent with friction, of the frictionless static state: its factor has two triangles, and is
+# of the whole ring. Measured on the built-in tire (2026-11-25): 0.2 standing, 0.24 and 0.26 rolling.
+_RUBBING = 0.25
 
 
 def seconds(
@@ -44,7 +48,7 @@ def operations(
     """
     count, pairs = size.modes / 200, size.coordinates / 200
     mesh = (size.free / 27_900) ** 1.2 * column / 9
-    parts = {"static": 8.0 * mesh}
+    parts = {"static": 8.0 * mesh * (1 + _RUBBING * tangents_with_friction(scene))}
     if "modes" not in left_out:
         parts["modes"] = 7.0 * mesh * count
     if "rotating" not in left_out:

@@ -1,12 +1,18 @@
 """Estimates of a scene's memory, disk and time before anything is computed."""
 
-import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from tireroad.runs.scene.extent.cost import operations, seconds
+from tireroad.runs.scene.extent.matrices import factor, matrices, unknowns_through
 from tireroad.runs.scene.extent.sizes import Sizes, road_memory, sizes
+from tireroad.runs.scene.extent.static_state import (
+    COLUMNS,
+    FRICTION,
+    LOAD_ERROR,
+    TANGENTS,
+    beside_tangents,
+    turning,
+)
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.tables.scene import Scene
 
@@ -16,14 +22,6 @@ MATRICES = 5
 """Sparse matrices held at peak: K, its scaled copy and parts, those of rotation (measured,
 including the rest: 0.6 to 0.83 GB for the quickstart, 1.1 to 1.4 GB for passenger.toml, 2.3 to 2.8
 GB for a passenger tire of 102,060 unknowns on one process, 1.6 to 1.8 GB on each of two)."""
-TANGENTS = 4
-"""Matrices held in the static state: the whole ring's tangent, half of it folded, index maps."""
-COLUMNS = 250
-"""Columns of a tangent's inverse that solving the contact set takes, held twice.
-
-At most 400 (fem.static.linear_contact). A torus of 220,500 unknowns took 2.3 GB on each of two
-processes; the estimate is 1.8, 1.4 without them. Released before the modes.
-"""
 BASES = 3
 """Copies of all modes held at peak: slices, the sorted vectors, their products."""
 ANSWERS = 6 * 64
@@ -46,15 +44,13 @@ on texture)."""
 
 FOOTPRINT = "columns of the footprint"
 FACTOR = "factor of the stiffness"
-LOAD_ERROR = "estimate of the load's error"
-HIGHEST = 3
-"""Highest element order, as in fem.static.load_error, which is not imported just to estimate."""
 
 # Keys that determine the size of each part.
 KEYS = {
     "matrices": "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     FACTOR: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     LOAD_ERROR: "static.error_estimate, and the mesh",
+    FRICTION: "static.friction, and the mesh",
     "modes": "modal.count or modal.up_to, and the mesh",
     FOOTPRINT: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     "rotating pencil": "modal.count or modal.up_to",
@@ -88,7 +84,7 @@ class Estimate:
 def estimate(scene: Scene, until: str | None = None) -> Estimate:
     """Demand of the stages up to `until`; memory within 1.5 where measured, the rest rougher."""
     size, left_out = sizes(scene), skipped(scene, until)
-    column = _unknowns_through(scene.tire.proportions().through, scene.tire.order)
+    column = unknowns_through(scene.tire.proportions().through, scene.tire.order)
     dense = "contact" not in left_out and bool(_matrices_of_points(scene, size))
     work = operations(scene, size, left_out, column, dense)
     return Estimate(
@@ -105,27 +101,16 @@ def memory(scene: Scene) -> dict[str, float]:
     return estimate(scene).memory
 
 
-def turning(scene: Scene) -> bool:
-    """Whether the wheel turns."""
-    return scene.rotation is not None and scene.rotation.speed > 0
-
-
 def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
-    """Peak bytes by part.
-
-    The factor of the stiffness is that of nested dissection on a surface: 31/4 N log2 N entries for
-    N columns of nodes (George 1973, doi 10.1137/0710032), each a dense block of the unknowns of one
-    column, one triangle stored. For 27,225 and 59,697 unknowns of second order MUMPS took 84 and
-    194 MB; this gives 88 and 211 MB. The factor for a rotating tire's responses has both triangles.
-    """
+    """Peak bytes by part. The factor for a rotating tire's responses has both triangles."""
     tire, free, count = scene.tire, size.free, size.coordinates
     through = tire.proportions().through
-    tangents = _matrices(TANGENTS, free, through, tire.order)
+    tangents = matrices(TANGENTS, free, through, tire.order)
     parts = {
         "program": PROGRAM,
-        "matrices": _matrices(MATRICES, free, through, tire.order),
+        "matrices": matrices(MATRICES, free, through, tire.order),
         FACTOR: (2 if turning(scene) and "greens" not in left_out else 1)
-        * _factor(free, through, tire.order),
+        * factor(free, through, tire.order),
     }
     if "modes" in left_out:
         parts["matrices"] = tangents
@@ -133,10 +118,8 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
             parts[FOOTPRINT] = 8.0 * 2 * COLUMNS * free
     else:
         parts["modes"] = 8.0 * BASES * free * count
-    if scene.static.on_road and scene.static.error_estimate:
-        # Released before the modes, whose matrices and vectors may take as much.
-        later = parts["matrices"] - tangents + parts.get("modes", 0.0)
-        parts[LOAD_ERROR] = max(_companions(free, through, tire.order) - later, 0.0)
+    later = parts["matrices"] - tangents + parts.get("modes", 0.0)
+    parts |= beside_tangents(scene, free, later)
     if "rotating" not in left_out:
         parts["rotating pencil"] = 16.0 * 4 * (2 * count) ** 2
     if "contact" not in left_out:
@@ -147,34 +130,6 @@ def _memory(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, fl
         parts["receptances"] = 16.0 * 5 * size.frequencies * k**2
         parts["time series"] = 8.0 * size.steps * (4 * k + 3 * _each_step(scene, k) + 6) * 2
     return parts
-
-
-def _factor(free: float, through: int, order: int) -> float:
-    """Bytes of one triangle of a factor; `free` unknowns, `through` elements through the wall."""
-    block = _unknowns_through(through, order)
-    columns = max(free / block, 2.0)
-    return 4.0 * 7.75 * columns * math.log2(columns) * block**2
-
-
-def _matrices(count: int, free: float, through: int, order: int) -> float:
-    coupled = _layers_coupled(through, order) * _columns_coupled(order)
-    return 12.0 * count * (3 * free) * coupled
-
-
-def _companions(free: float, through: int, order: int) -> float:
-    """Bytes of the two companions of the load's error (fem.static.load_error), on half of the ring.
-
-    One has elements halved at the footprint, which doubles their number; the other has another
-    order everywhere, a higher one on half as many elements around.
-    """
-    other = order + 1 if order < HIGHEST else order - 1
-    layers = _unknowns_through(through, other) / _unknowns_through(through, order)
-    share = 0.25 if other > order else 0.5
-    rest = share * free * (other / order) ** 2 * layers
-    return sum(
-        _matrices(TANGENTS, one, through, p) + _factor(one, through, p)
-        for one, p in ((free, order), (rest, other))
-    )
 
 
 def _each_step(scene: Scene, points: int) -> int:
@@ -226,20 +181,3 @@ def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, floa
             size.steps * (4 * k + 3 + _each_step(scene, k)) + 2 * size.frequencies * k * k
         )
     return parts
-
-
-def _unknowns_through(through: int, order: int) -> int:
-    return 3 * (through * order + 1)
-
-
-def _columns_coupled(order: int) -> float:
-    """Columns of nodes sharing an element with a given one, averaged over an element's columns."""
-    own = np.full(order, order + 1.0)  # inside an element
-    own[0] = 2 * order + 1  # between two elements
-    return float(np.outer(own, own).mean())
-
-
-def _layers_coupled(through: int, order: int) -> float:
-    """Nodes of one column that share an element with a given one, on average."""
-    inside = through * (order - 1) * (order + 1)
-    return (inside + 2 * (order + 1) + (through - 1) * (2 * order + 1)) / (through * order + 1)

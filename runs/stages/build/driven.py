@@ -52,7 +52,7 @@ class Driven:
 
     @property
     def whole(self) -> Response:
-        """`response`, then the moments (3) on the axle if it is held and its force wanted."""
+        """`response`, then the moments (3) on the axle: of a wheel that moves without contact only."""
         return self.greens.product.force
 
     def moments(self, frequency: Array) -> Array | None:

@@ -144,7 +144,7 @@ def probes(job: Job, state: StaticState, setup: ContactSetup | None) -> Probes:
     loads, readings = driven_points(job) if job.scene.force else (None, None)
     more = corner.readings(job)
     if setup is None:
-        return _driven_alone(loads, readings, 0 if job.axle else more)
+        return _driven_alone(loads, readings, min(more, corner.MOMENTS))
     count, index = len(state.points), setup.patch.index
     frames = state.frames
     parts = [

@@ -9,6 +9,7 @@ from tireroad.contact.results import levels
 from tireroad.contact.results.spectra import (
     FORCE,
     MOMENT,
+    SILENT,
     VELOCITY,
     density,
     off_middle,
@@ -30,8 +31,9 @@ _KINDS = {
 WEIGHTED = "_a_weighted"
 # dB by which the window may change the mean square of a force without a warning: an impact in the
 # middle adds 4.26, a short rough record loses up to 5. A force that varies by less than this share
-# varies by rounding.
-_LOWER, _HIGHER, _ROUNDING = -6.0, 4.0, 1e-6
+# needs none.
+_LOWER, _HIGHER, _SLIGHT = -6.0, 4.0, 1e-6
+_CONSTANT = "none: it does not vary", "-"
 _ONE = {  # common to all
     "third_octave/centre": "Hz",
     "third_octave/nominal": "Hz",
@@ -114,10 +116,9 @@ def describe(
             continue
         vertical = forces[name][:, 2:]
         for kind, letter in (("level", ""), ("A-weighted level", "(A)")):
-            total = total_level(vertical, history.step, up_to, weighted=bool(letter))
+            total = float(total_level(vertical, history.step, up_to, weighted=bool(letter))[0])
             record.headline[f"{kind} of the vertical {what}"] = (
-                float(total[0]),
-                f"dB{letter} re 1 N",
+                (total, f"dB{letter} re 1 N") if total > SILENT else _CONSTANT
             )
         _warn_of_window(record, vertical, what)
     narrow = levels.nominal(found["third_octave/too_narrow"])
@@ -128,7 +129,7 @@ def describe(
 def _warn_of_window(record: Record, force: np.ndarray, what: str) -> None:
     """Warn where an impact near an end of the record, or in its middle, sets its level."""
     off = float(off_middle(force)[0])
-    if not _LOWER < off < _HIGHER and force.std() > _ROUNDING * np.abs(force).max():
+    if not _LOWER < off < _HIGHER and force.std() > _SLIGHT * np.abs(force).max():
         where, change = ("near an end", "lower") if off < 0 else ("in the middle", "higher")
         record.warnings.append(
             f"most of what the {what} varies lies {where} of the record, where the Hann window of spectra and "

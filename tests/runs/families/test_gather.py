@@ -101,3 +101,14 @@ def test_a_search_leaves_the_scene_that_it_chose(folder: Path) -> None:
         if summary.path.parent.name == sweep.members[0].name:  # the other misses its target
             write_text(own / "scene.toml", signed(chosen))
     assert gather(sweep, folder).missing == ()
+
+
+def test_a_level_of_nothing_is_not_gathered(folder: Path) -> None:
+    """A force that is constant across the road had -3076.5 dB in the table."""
+    before = family(folder, 40.0)
+    for one in begin(before, folder):
+        finish(one)
+        with h5py.File(one.path.parent / "spectra.h5", "a") as file:
+            file["third_octave/level"][0, 1] = -3076.5
+    names = [column.name for column in gather(before, folder).columns]
+    assert "axle force x, 100 Hz" in names and "axle force y, 100 Hz" not in names

@@ -12,8 +12,9 @@ import pytest
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.checksum import signed
+from tireroad.runs.files.reader import RunResults
 from tireroad.runs.report.compare import compare
-from tireroad.runs.report.differences import assurance, scene_rows
+from tireroad.runs.report.differences import assurance, level_rows, scene_rows
 
 
 def write(folder: Path, load: float, level: float, frequencies: list[float], turn: bool) -> Path:
@@ -110,3 +111,13 @@ def test_assurance_criterion() -> None:
     assert np.allclose(np.diag(assurance(shapes, -3.0 * shapes)), 1.0)
     apart = assurance(np.eye(3).reshape(3, 1, 3), np.eye(3).reshape(3, 1, 3))
     assert np.allclose(apart, np.eye(3))
+
+
+def test_a_level_of_nothing_is_left_out(tmp_path: Path) -> None:
+    """The vertical force of one run is constant: it had -3076.5 dB, and a difference of 3000 dB."""
+    runs = [write(tmp_path / name, 300.0, 5.0, [1.0, 2.0, 3.0], False) for name in ("a", "b")]
+    with h5py.File(runs[1] / "spectra.h5", "a") as file:
+        file["third_octave/level"][:, 2] = -3076.5
+    found = level_rows([RunResults(run) for run in runs])
+    (row,) = (row for row in found if (row.group, row.name) == ("axle force z", "100 Hz"))
+    assert row.values == (5.0, None)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic_results import sealed, write_results
+from synthetic_results import put, sealed, write_results
 
 from tireroad.runs.files.read import Results
 from tireroad.runs.report.realism import mean_load, unusual
@@ -23,9 +23,8 @@ def folder(tmp_path: Path) -> Path:
         file.attrs["footprint_area"] = 4000.0 / 2.6e5
         force = file["contact/force"]
         force[:, 2] *= 4000.0 / force[:, 2].sum()
-    with sealed(directory / "rotating.h5", "a") as file:
-        value = file["eigenvalue"][:]
-        file["eigenvalue"][:] = 1j * value.imag - 0.05 * np.abs(value.imag)
+    with sealed(directory / "modes.h5", "a") as file:
+        put(file, "loss_factor", np.full(6, 0.1), "-")
     with sealed(directory / "contact.h5", "a") as file:
         file["total_force"][:, 2] *= 4000.0 / file["total_force"][:, 2].mean()
         file.attrs["road_relief"] = 0.002
@@ -68,9 +67,25 @@ def test_the_tread_the_road_and_the_damping(folder: Path) -> None:
     scene = {"tire": {"thickness": 0.012}, "road": {"kind": "grid"}}
     assert "is the file in millimetres" in told(folder, **scene)
     assert told(folder, **scene | {"road": {"kind": "step"}}) is None
+
+
+def test_the_damping_is_that_of_the_tire(folder: Path) -> None:
+    """Neither a wheel's damper (beyond critical: 2400 N s/m, 25 kN/m, 24 kg) nor a frequency that rotation shifts
+    to zero is damping of the tire; the lowest mode has 60 Hz."""
     with sealed(folder / "rotating.h5", "a") as file:
-        file["eigenvalue"][0] = -250.0 + 200.0j
-    assert "damping of the lowest modes up to 78 % of critical" in told(folder)
+        file["eigenvalue"][:4] = [-10.0, -500.0, -20.0 + 1.0j, -20.0 - 1.0j]
+    assert told(folder, axle={"kind": "corner"}) is None
+    for given, said in (
+        ({"mass": 500.0}, "up to 66 % of critical (0.5 to 10 %): look at [damping] mass"),
+        (
+            {"mass": 10.0, "stiffness": 0.004},
+            "up to beyond critical (0.5 to 10 %): look at [damping] stiffness",
+        ),
+    ):
+        assert said in told(folder, damping=given)
+    with sealed(folder / "modes.h5", "a") as file:
+        file["loss_factor"][0] = 1.2
+    assert "up to 60 % of critical (0.5 to 10 %): look at loss_factor" in told(folder)
 
 
 def test_the_mean_load_is_explained_where_it_differs(folder: Path) -> None:
@@ -78,12 +93,42 @@ def test_the_mean_load_is_explained_where_it_differs(folder: Path) -> None:
         assert mean_load(results) is None
     with sealed(folder / "contact.h5", "a") as file:
         file["total_force"][:, 2] *= 1.2
-    with Results(folder, {"road": {"kind": "cobblestones", "datum": "mean"}}) as results:
-        text = mean_load(results)
+    text = explained(folder, road={"kind": "cobblestones", "datum": "mean"})
     assert "20 % above the 4" in text
-    assert "held at its static height" in text
-    with Results(folder, {"axle": {"kind": "corner"}, "road": {"kind": "sine"}}) as results:
-        assert "have not come to rest" in mean_load(results)
+    assert "held at its static height" in text and "with a body_mass keeps the load" in text
+
+
+def explained(folder: Path, **scene: dict) -> str:
+    with Results(folder, scene) as results:
+        return mean_load(results)
+
+
+SPRUNG = {"kind": "corner", "locked": ["x", "y"], "body_mass": 400.0}
+GROUND = {"kind": "corner", "locked": ["x", "y"]}
+RAMP = {"kind": "flat", "motion": {"kind": "ramp"}}
+
+
+@pytest.mark.parametrize(
+    ("scene", "said", "unsaid"),
+    [
+        ({"axle": SPRUNG, "road": {"kind": "sine"}}, "wheel and body have not come to rest", "held"),
+        ({"axle": {"kind": "free"}, "road": {"kind": "sine"}}, "the wheel has not come to rest", "held"),
+        ({"axle": GROUND, "road": {"kind": "sine"}}, "follows the mean height of the road, in a longer", "to rest;"),
+        ({"axle": SPRUNG | {"locked": ["z"]}, "road": {"kind": "sine"}}, "axle is held", "to rest;"),
+        ({"road": RAMP}, "on this flat road it comes from its motion (road.motion).", "settling"),
+        ({"axle": GROUND, "road": RAMP}, "it comes from its motion", "settling"),
+        ({"road": {"offset": 1e-3}, "pattern": {"pitches": 60}}, "(road.offset) and the grooves", "settling"),
+        ({"road": {"motion": {"kind": "none"}}}, "settling on the points' grid", "it comes from"),
+    ],
+)  # fmt: skip
+def test_the_reason_is_that_of_axle_and_road(
+    folder: Path, scene: dict, said: str, unsaid: str
+) -> None:
+    """On springs to the ground no run is long enough; a road that moves is no settling."""
+    with sealed(folder / "contact.h5", "a") as file:
+        file["total_force"][:, 2] *= 1.2
+    text = explained(folder, **scene)
+    assert said in text and unsaid not in text
 
 
 def test_missing_files_are_no_remark(tmp_path: Path) -> None:

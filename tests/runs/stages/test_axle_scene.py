@@ -5,11 +5,14 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.tables.axle import axle_of
 from tireroad.runs.stages.build import corner
+from tireroad.runs.stages.pipeline import run_scene
 
 SCENE = """
 [tire]
@@ -35,6 +38,24 @@ wavelength = 0.2
 [time]
 duration = 0.04
 step = 2e-4
+"""
+POINT_FORCE = """
+[tire]
+segments = 12
+elements_arc = 5
+[tire.material]
+youngs_modulus = 48e6
+[modal]
+count = 20
+[[force]]
+angle = 40.0
+arc = 10.0
+amplitude = 10.0
+frequency = 40.0
+direction = [0.3, 1.0, 1.0]
+[time]
+duration = 0.03
+step = 5e-4
 """
 CAR = """
 [axle]
@@ -183,6 +204,32 @@ def test_moments_are_read_where_they_are_known(tmp_path, change: str, known: boo
     scene = load(tmp_path / "scene.toml", [change] if change else [])
     job = SimpleNamespace(scene=scene, axle=None)
     assert (corner.readings(job) > 0) == known
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("speed", [0.0, 50.0])
+def test_the_hub_moment_of_point_forces_is_that_of_a_held_axle_in_the_limit(
+    tmp_path, speed
+) -> None:
+    """On a corner response.h5 had none; on stiff springs it is that of a wheel that is held."""
+    (tmp_path / "scene.toml").write_text(POINT_FORCE)
+    stiff = 'axle={kind="corner",locked=[],damping=[0,0,0,0,0,0],stiffness=[1e12,1e12,1e12,1e11,1e11,1e11]}'
+    found = []
+    for name, more in (("held", []), ("corner", [stiff])):
+        scene = load(tmp_path / "scene.toml", [f"rotation.speed={speed}", *more])
+        with observe.quiet():
+            run_scene(
+                scene,
+                tmp_path / name,
+                MPI.COMM_SELF,
+                until="response",
+                fresh=False,
+                petsc_options=[],
+            )
+        with h5py.File(tmp_path / name / "response.h5") as file:
+            found.append(file["hub_moment"][:])
+    assert np.abs(found[0]).max(axis=0).min() > 1.0
+    assert np.abs(found[1] - found[0]).max() < 1e-4
 
 
 @pytest.mark.long

@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tireroad.contact.results.spectra import SILENT
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.stored import levels
 from tireroad.runs.stages.stored.contact_file import ContactHistory
@@ -97,6 +98,31 @@ def test_totals_count_lines_of_bands_too_narrow_for_a_level(history: ContactHist
     value = record.headline["level of the vertical contact force"][0]
     assert value == pytest.approx(10 * np.log10(0.5), abs=2.0)
     assert not record.warnings
+
+
+def test_a_force_that_does_not_vary_has_no_level(history: ContactHistory) -> None:
+    """On a flat road it had -3076.5 dB re 1 N, or -247 dB with rounding."""
+    record, force = Record(), np.full((5000, 3), [0.0, 0.0, 4000.0])
+    noisy = force + 1e-12 * np.random.default_rng(1).standard_normal(force.shape)
+    flat = replace(
+        history,
+        time=1e-4 * np.arange(5000),
+        total_force=force,
+        axle_force=noisy,
+        driven=None,
+        wheel={},
+    )
+    found = levels.levels_of(flat, 0, 400.0)
+    for name in ("contact_level", "level", "level_a_weighted"):
+        assert (found[f"third_octave/{name}"] < SILENT).all(), name
+    levels.describe(record, found, flat, 0, 400.0)
+    for what in ("contact force", "force on the axle"):
+        for kind in ("level", "A-weighted level"):
+            assert record.headline[f"{kind} of the vertical {what}"][0] == "none: it does not vary"
+    small = replace(flat, axle_force=force + 2e-6 * np.sin(np.arange(5000))[:, None])
+    levels.describe(record, levels.levels_of(small, 0, 400.0), small, 0, 2000.0)
+    value = record.headline["level of the vertical force on the axle"][0]
+    assert value == pytest.approx(10 * np.log10(2e-12), abs=0.1)
 
 
 @pytest.mark.parametrize(("at", "words"), [(0.02, "near an end"), (0.25, "in the middle")])
