@@ -19,6 +19,7 @@ from mpi4py import MPI
 from tireroad.fem import compat, kinematics
 from tireroad.fem.sections import reference
 from tireroad.fem.tire.body import Body
+from tireroad.fem.tire.cords import TAUT
 from tireroad.fem.tire.face_rule import edge_rule, face_points
 from tireroad.fem.tire.mesh import position
 from tireroad.fem.tire.plies import RULE, Sheet
@@ -87,7 +88,7 @@ def _read(body: Body, sheet: Sheet, number: int, chain: np.ndarray, values: np.n
     # A face's area is |J^-T n| |det J| per unit of the reference face.
     area = face.area * abs(ufl.det(ufl.Jacobian(tire.mesh)))
     stretch, area = (compat.evaluate(e, points, tire.mesh, cells) for e in (stretch, area))
-    modulus = np.where(stretch < 1, cords.compression, 1.0) * cords.youngs_modulus
+    modulus = np.where(stretch < TAUT, cords.compression, 1.0) * cords.youngs_modulus
     force = modulus * cords.area * (stretch - 1)
     area = area * np.outer(weight, weight).ravel()
     segment = np.asarray(tire.mesh.topology.original_cell_index)[cells] // len(place)

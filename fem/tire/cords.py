@@ -4,7 +4,8 @@
 
 a being the cord's unit direction in the surface of the ply, a = cos(alpha) e_circ + sin(alpha)
 e_arc: e_circ around the axle towards growing ring angle, e_arc along the section from -y to +y.
-Below lambda = 1 the modulus is multiplied by `compression`; W_c and its slope stay continuous.
+Below lambda = 1 the modulus is multiplied by `compression`; W_c and its slope stay continuous. A
+cord without strain, as in a tire without inflation, has its full modulus.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ import ufl
 from ufl.core.expr import Expr
 
 from tireroad.fem.errors import InputError
+
+TAUT = 1 - 1e-10  # stretch below which a cord is compressed: strain of 1e-10 is rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,10 +89,13 @@ class Woven:
     sine: np.ndarray
 
 
+def _modulus(stretch: Expr, stiffness: Expr, slack: Expr) -> Expr:
+    return stiffness * ufl.conditional(ufl.lt(stretch, TAUT), slack, 1.0)
+
+
 def tension(stretch: Expr, stiffness: Expr, slack: Expr) -> Expr:
     """dW_c/dlambda, N/m, in UFL."""
-    modulus = stiffness * ufl.conditional(ufl.lt(stretch, 1.0), slack, 1.0)
-    return modulus * (stretch - 1)
+    return _modulus(stretch, stiffness, slack) * (stretch - 1)
 
 
 def energy(stretch: Expr, stiffness: Expr, slack: Expr) -> Expr:
@@ -106,5 +112,4 @@ def tension_over_stretch(square: Expr, stiffness: Expr, slack: Expr) -> Expr:
 def tension_over_stretch_rate(square: Expr, stiffness: Expr, slack: Expr) -> Expr:
     """Derivative of `tension_over_stretch` with respect to lambda^2, N/m."""
     stretch = ufl.sqrt(square)
-    modulus = stiffness * ufl.conditional(ufl.lt(stretch, 1.0), slack, 1.0)
-    return modulus / (2 * stretch**3)
+    return _modulus(stretch, stiffness, slack) / (2 * stretch**3)

@@ -40,7 +40,7 @@ class Static:
         "-",
         "coefficient of Coulomb friction between tire and road in the static state; absent: none. A standing tire sticks "
         "and slips as it is pressed on the road, a rolling one as its tread passes through the contact, with a wheel "
-        "that rolls freely except for contact.slip and rotation.slip_angle",
+        "that turns as it would roll freely without contact.slip and rotation.slip_angle",
         least=0,
         most=10,
     )
