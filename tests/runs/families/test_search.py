@@ -216,11 +216,24 @@ def test_check_tells_of_the_search_and_its_bounds(file) -> None:
         (["output.axle_force=false"], "output.axle_force = true"),
         (["accuracy.up_to=20"], "four periods"),
         (["accuracy.target=2"], "accuracy.target"),
+        (["contact.brush_stiffness=2e4"], "take brush_stiffness_per_area"),
+        (
+            ['contact.tread="none"', "contact.youngs_modulus="],
+            "works on the nodes of the mesh only",
+        ),
     ],
 )
 def test_a_target_that_cannot_be_is_refused(file, sets, said) -> None:
     with pytest.raises(InputError, match=said):
         load(file, sets)
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [["contact.brush_stiffness=2e4"], ['contact.tread="none"', "contact.youngs_modulus="]],
+)
+def test_contact_on_the_nodes_may_be_judged_against_a_target(file, sets) -> None:
+    assert load(file, [*sets, "accuracy.search=false"]).accuracy.aimed
 
 
 @pytest.mark.long
