@@ -8,7 +8,9 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.contact.results.error_bars import orders
-from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.errors import ConvergenceError, InputError, UnsuitedSettings
+from tireroad.runs.files.disk import Refused
+from tireroad.runs.files.folder import check_kept_scene
 from tireroad.runs.process import observe
 from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.check import explain
@@ -17,6 +19,7 @@ from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sections.kinds import torus
 from tireroad.runs.search import search as searching
 from tireroad.runs.search.journal import Journal, Trial
+from tireroad.runs.search.kept import to_resume
 from tireroad.runs.search.search import Search
 from tireroad.runs.search.settings import CAUSES, MARGIN, Ladders, Settings, applied, size_ratio
 from tireroad.runs.search.shares import Found, worst
@@ -158,7 +161,49 @@ def test_limits_end_it_with_what_was_reached(file, search, sets, why) -> None:
         started(sets)
     assert len(tried) == 1
     assert final == [applied(load(file, [sets]), tried[0])]
-    assert load(file.parent / "out" / "scene.toml").accuracy.searches
+
+
+def test_a_folder_has_the_scene_of_its_results_and_resume_that_of_the_search(
+    file, search, monkeypatch
+):
+    started, _, _ = search
+    out = file.parent / "out"
+    started()
+    loose = (out / "scene.toml").read_text()
+    assert (out / "chosen.toml").exists() and to_resume(out) == out / "scene.toml"
+    (out / "summary.json").write_text("{}")  # the stages' results, which the model leaves out
+    with pytest.raises(ConvergenceError):
+        started("accuracy.target=0.001", "accuracy.trials=2")
+    assert not (out / "chosen.toml").exists()
+    assert (out / "scene.toml").read_text() == loose
+    check_kept_scene(to_resume(out))
+    again = load(to_resume(out))
+    assert again == load(file, ["accuracy.target=0.001", "accuracy.trials=2"])
+    for name in ("run_scene", "_tell"):
+        monkeypatch.setattr(searching, name, lambda *given, **options: None)
+    plain = load(file, ["accuracy.search=false"])
+    searching.run(plain, out, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])
+    assert to_resume(out) == out / "scene.toml"
+
+
+def test_what_is_no_fault_of_the_settings_ends_the_search_and_is_not_kept(file, monkeypatch):
+    raised: Exception = InputError("0.02 GB of disk")
+
+    def failing(*args, **options):
+        raise raised
+
+    monkeypatch.setattr(searching, "run_scene", failing)
+    out = file.parent / "out"
+    out.mkdir()
+    for raised in (InputError("0.02 GB of disk"), Refused("the disk is full")):
+        with observe.quiet(), pytest.raises(type(raised), match="disk"):
+            Search(load(file), out, MPI.COMM_SELF, []).run()
+        assert Journal(out, load(file)).trials == []
+    for number, raised in enumerate((UnsuitedSettings("grid"), ConvergenceError("static"))):
+        sets = ["accuracy.trials=1", f"road.amplitude={2 + number}e-4"]
+        with observe.quiet(), pytest.raises(ConvergenceError, match=f"no trial .*{raised}"):
+            Search(load(file, sets), out, MPI.COMM_SELF, []).run()
+        assert [one.failed for one in Journal(out, load(file, sets)).trials] == [str(raised)]
 
 
 def test_an_estimate_without_margin_does_where_limits_end_the_search(file, search) -> None:
