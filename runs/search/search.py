@@ -153,12 +153,12 @@ class Search:
         chosen = applied(self.scene, trial.settings)
         on_root(self.comm, lambda: write_text(self.directory / kept.CHOSEN, signed(dumps(chosen))))
         observe.say(f"  chosen: {trial.settings}; {self.directory / kept.CHOSEN} needs no search")
-        self._final(chosen)
+        _tell(chosen, self._final(chosen))
         on_root(self.comm, lambda: kept.forget(self.directory))
 
-    def _final(self, scene: Scene) -> None:
+    def _final(self, scene: Scene) -> Finished:
         """Compute the results of tried settings in the result folder. Collective."""
-        done = run_scene(
+        return run_scene(
             scene,
             self.directory,
             self.comm,
@@ -167,7 +167,6 @@ class Search:
             petsc_options=self.petsc_options,
             cache=self._cache,
         )
-        _tell(scene, done)
 
     def _give_up(self, tried: list[Trial], best: Trial, why: str) -> None:
         """Compute the best trial's results, then raise ConvergenceError. Collective."""
