@@ -25,7 +25,7 @@ from tireroad.contact.patch import Patch
 from tireroad.contact.rolling import looking_ahead
 from tireroad.contact.solver.conditions import ContactSolver
 from tireroad.contact.tread.kernel import GridPlaces
-from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.errors import ConvergenceError, UnsuitedSettings
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 
 # Points of the largest grid that is laid out before the patch is known.
@@ -77,7 +77,7 @@ def make_grid_patch(
     taken = (taken.ravel() | near) & found
     place = np.flatnonzero(taken)
     if len(place) == 0:
-        raise InputError("contact.points: no grid point near the road; take a finer grid")
+        raise UnsuitedSettings("contact.points: no grid point near the road; take a finer grid")
     weights = over_cells(
         surface, np.stack([x, y], axis=-1)[place], spacing, ring[place], arc[place]
     )
@@ -120,11 +120,11 @@ def over_cells(
 def _check_count(
     ends: Sequence[tuple[float, float]], spacing: tuple[float, float], reach: float
 ) -> None:
-    """InputError for a grid of more than MOST_POINTS, before it is laid out."""
+    """UnsuitedSettings for a grid of more than MOST_POINTS, before it is laid out."""
     sizes = [high - low for low, high in ends]
     counts = [np.floor(size / step) for size, step in zip(sizes, spacing, strict=True)]
     if counts[0] * counts[1] > MOST_POINTS:
-        raise InputError(
+        raise UnsuitedSettings(
             f"contact.points: dx = {spacing[0]:g} m, dy = {spacing[1]:g} m make {counts[0]:.3g} x "
             f"{counts[1]:.3g} points on the {sizes[0]:.3g} m x {sizes[1]:.3g} m within contact.reach = "
             f"{reach:.3g} m, more than {MOST_POINTS}: take a coarser grid or a smaller contact.reach"

@@ -13,7 +13,7 @@ from tireroad.contact.tread.creep import TreadMemory, steady
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.contact.tread.law import TreadLaw
 from tireroad.contact.tread.shear import KernelShear, MatrixShear, Shear
-from tireroad.fem.errors import InputError
+from tireroad.fem.errors import InputError, UnsuitedSettings
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def check_creeps(patch: Patch) -> None:
             "contact.tread: a viscoelastic tread needs a grid of points: contact.points = { dx, dy }"
         )
     if len(patch.points) > MOST_DENSE:
-        raise InputError(
+        raise UnsuitedSettings(
             f"contact.tread: a viscoelastic tread takes at most {MOST_DENSE} points, here are "
             f"{len(patch.points)}: take a coarser contact.points or a smaller contact.reach"
         )
@@ -120,7 +120,7 @@ def step_solver(spec: Spec, patch: Patch, tire: Array, at_once: float = 1.0) -> 
         product = _product(spec, patch, tire, at_once)
         return make_solver(name, product)
     if count > MOST_DENSE:
-        raise InputError(
+        raise UnsuitedSettings(
             f'contact: solver "{name}" on these points keeps a matrix, which is for at most '
             f"{MOST_DENSE} of them, here are {count}: take fewer points, or a grid of points with "
             'solver = "auto"'

@@ -5,6 +5,13 @@ class InputError(ValueError):
     """Invalid input: a key, a range, a file or a folder. The program ends with status 2."""
 
 
+class UnsuitedSettings(InputError):
+    """Elements or contact points on which the problem cannot be solved; others may do.
+
+    A search for settings counts it as their result and tries others.
+    """
+
+
 class ConvergenceError(RuntimeError):
     """A solver failed; the message says what, where and what to try. Exit status 3."""
 

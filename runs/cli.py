@@ -58,7 +58,7 @@ def _run_inside(args: argparse.Namespace, petsc_options: list[str], comm) -> Non
 
     _check_processes(args, comm.size)
     if getattr(args, "resumed", False):
-        check_kept_scene(args.out)
+        check_kept_scene(args.scene)
     remarks: list[str] = []
     scene = load(args.scene, args.set, remarks.append, args.until)
     directory = args.out if args.out is not None else Path("results") / scene.name
@@ -110,8 +110,10 @@ def _reproduce(args: argparse.Namespace, comm) -> None:
 
 def _resumed(args: argparse.Namespace) -> argparse.Namespace:
     """Turn `resume DIR` into a `run` of the scene stored in DIR."""
+    from tireroad.runs.search.kept import to_resume
+
     args.resumed = True
-    args.command, args.scene, args.out = "run", args.directory / "scene.toml", args.directory
+    args.command, args.scene, args.out = "run", to_resume(args.directory), args.directory
     args.set, args.until, args.fresh = [], None, False
     return args
 

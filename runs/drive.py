@@ -26,6 +26,8 @@ from tireroad.greens.response import Response
 from tireroad.runs.library import RollingTire
 from tireroad.runs.scene.rules.scene import barred_from_contact
 from tireroad.runs.stages.build.rolling.loop import make_loop
+from tireroad.runs.stages.build.rolling.run_in import grown
+from tireroad.runs.typed import typed
 
 Array = NDArray[np.float64]
 _TURN = 0.3  # rad: default turn of the fastest mode per step; its phase error is below 1 %
@@ -38,7 +40,11 @@ class History:
 
     `time` (n,) s; `force` (n, c) N of each contact point; `axle_force` (n, 3) N; `displacement`
     (n, c) m of the tire at the points; `gap` (n, c) m; `patch`: the contact points; `limit`: the
-    highest frequency up to which the results are valid.
+    highest frequency up to which the results are valid; `run_in` s: until then the road grows from
+    flat under a part of the patch.
+
+    Figures of the road alone begin with a `start` (s) of `run_in`; by default they are of the whole
+    record, with what the run-in excites.
     """
 
     time: Array
@@ -48,6 +54,7 @@ class History:
     gap: Array
     patch: Patch
     limit: Limit
+    run_in: float
 
     @property
     def total_force(self) -> Array:
@@ -59,18 +66,27 @@ class History:
         """Time step, s: the first instant is one step after the state at rest."""
         return float(self.time[0])
 
-    def spectrum(self) -> tuple[Array, NDArray[np.complex128]]:
-        """Frequencies (f,) Hz up to the limit, axle-force amplitudes (f, 3) N (contact.results)."""
-        frequency, amplitude = amplitudes(self.axle_force, self.step)
+    def spectrum(self, start: float = 0.0) -> tuple[Array, NDArray[np.complex128]]:
+        """Frequencies (f,) Hz up to the limit, axle-force amplitudes (f, 3) N (contact.results).
+
+        From `start` s on.
+        """
+        frequency, amplitude = amplitudes(self._from(start), self.step)
         below = frequency <= self.limit.frequency
         return frequency[below], amplitude[below]
 
-    def third_octaves(self) -> tuple[Array, Array]:
+    def third_octaves(self, start: float = 0.0) -> tuple[Array, Array]:
         """Axle force: third-octave centres (b,) Hz to the limit, levels (b, 3) dB re 1 N rms.
 
-        A run of one step has no band.
+        From `start` s on. A run of one step has no band.
         """
-        return third_octaves(self.axle_force, self.step, self.limit.frequency)
+        return third_octaves(self._from(start), self.step, self.limit.frequency)
+
+    def _from(self, start: float) -> Array:
+        """Axle force (k, 3) N of the instants from `start` s on. InputError if there are none."""
+        if not 0.0 <= start <= self.time[-1]:
+            raise InputError(f"start = {start:g} s must be from 0 to the end, {self.time[-1]:g} s")
+        return self.axle_force[np.searchsorted(self.time, start) :]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +97,7 @@ class _Spec:
     sheared: bool = False
 
 
+@typed
 def drive(
     tire: RollingTire,
     road: RoadUnderTire,
@@ -97,9 +114,9 @@ def drive(
     contact.tread.laws, by default a half-space of 10 MPa. `spacing` (m, or m, m along and across) of
     a grid of contact points, by default the nodes of the mesh. Frictionless.
 
-    Raises InputError for times that are not positive and finite, a tire that is off the road, modes
-    with a free rim or a held road, and a `spacing` with less than two points along or across the
-    footprint; ConvergenceError if the road touches the tire outside the patch of contact points.
+    Raises InputError for arguments of the wrong kind, times that are not positive and finite, a tire
+    that is off the road, modes with a free rim or a held road, and a `spacing` with less than two
+    points along or across the footprint; ConvergenceError if the road touches the tire outside the patch of contact points.
     Collective.
     """
     check_times(duration, duration if step is None else step)
@@ -123,7 +140,7 @@ def drive(
     instants = _instants(spec, setup, response, chosen, motions.body.comm)
     highest = tire.states.highest / (2 * np.pi)
     bounds = limits(step=chosen.size, highest=highest, pitch=pitch(setup.patch), speed=rolled.speed)
-    return _history(setup.patch, instants, lowest(bounds))
+    return _history(setup.patch, instants, lowest(bounds), grown(setup, road.run_in))
 
 
 def _check_motions(motions: SmallMotions) -> None:
@@ -183,7 +200,7 @@ def _instants(
     return list(roll(loop.tire, loop.solver, *given, memory=loop.memory))
 
 
-def _history(patch: Patch, instants: list[Instant], limit: Limit) -> History:
+def _history(patch: Patch, instants: list[Instant], limit: Limit, run_in: float) -> History:
     """Stack the instants. Raises ConvergenceError if the road touches the edge of the patch."""
     kept = {
         name: np.stack([getattr(instant, name) for instant in instants])
@@ -194,4 +211,4 @@ def _history(patch: Patch, instants: list[Instant], limit: Limit) -> History:
             "drive: the road touches the edge of the patch of contact points: it rises above the highest "
             "point that it states; take a smoother road or smaller steps"
         )
-    return History(**kept, patch=patch, limit=limit)
+    return History(**kept, patch=patch, limit=limit, run_in=run_in)

@@ -42,6 +42,7 @@ from tireroad.modal.standing import standing_modes
 from tireroad.runs.scene.sections.kinds.torus import TorusSection
 from tireroad.runs.scene.tables.tire import Tire
 from tireroad.runs.stages.build.turning import rolling_shape
+from tireroad.runs.typed import typed
 
 Array = NDArray[np.float64]
 
@@ -106,6 +107,7 @@ def _check_ranges(torus: Torus) -> None:
     )
 
 
+@typed
 def press(
     tire: TireModel,
     *,
@@ -119,7 +121,8 @@ def press(
 
     Give one of: the load (N), the deflection (m) from first contact, or the road height
     (m, negative); without any of them there is no road. `turning` adds the inertia and damping
-    forces of steady rolling. Raises ConvergenceError if no equilibrium is found.
+    forces of steady rolling. Raises InputError for arguments of the wrong kind, ConvergenceError if
+    no equilibrium is found.
     """
     return press_tire(
         tire,
@@ -144,6 +147,7 @@ class Standing:
         return self.basis.frequency
 
 
+@typed
 def modes(
     tire: TireModel,
     static: StaticState,
@@ -159,7 +163,7 @@ def modes(
     `rim` "fixed" or "free". `road` "forces": the road is replaced by its contact forces; "held":
     the touching nodes are held in height. `turning`: how the wheel will rotate; the shapes that
     belts couple to then join the modes (modal.rotation_shapes), as in a run. Raises InputError for
-    a static state of another tire, and unless one of `count` and `up_to` is given, within its range.
+    arguments of the wrong kind, a static state of another tire, and unless one of `count` and `up_to` is given, within its range.
     """
     _check_state(tire, static)
     motions = SmallMotions(tire, static, rim=rim, road=road)
@@ -228,7 +232,11 @@ class RollingTire:
         return self.respond(probes, probes, residual)
 
 
+@typed
 def roll(standing: Standing, turning: Turning) -> RollingTire:
-    """The states of the rotating tire in the non-rotating frame; at speed 0, those of the modes."""
+    """The states of the rotating tire in the non-rotating frame; at speed 0, those of the modes.
+
+    InputError for arguments of the wrong kind.
+    """
     comm = standing.motions.body.comm
     return RollingTire(standing=standing, states=rolling_modes(standing.basis, turning, comm))

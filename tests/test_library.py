@@ -128,6 +128,44 @@ def test_a_run_of_one_step_has_no_band(rolling) -> None:
     assert centre.shape == (0,) and level.shape == (0, 3)
 
 
+def test_objects_of_the_wrong_kind_are_named_with_what_makes_the_right_ones(
+    tire, static, rolling
+) -> None:
+    flat = tr.make_road(kind="flat")
+    for call, message in (
+        (lambda: tr.press("tire", inflation=2e5), "press: tire is of the type str: .*torus"),
+        (lambda: tr.press(tire, inflation=2e5, turning=50.0), "turning .* float: .*Turning"),
+        (lambda: tr.modes(tire, rolling, count=4), "static .* RollingTire: .*press"),
+        (lambda: tr.modes(tire, static, count=4, turning=50), "turning .* int"),
+        (lambda: tr.roll(static, tr.Turning()), "standing .* StaticState: .*modes"),
+        (lambda: tr.roll(rolling.standing, None), "turning .* NoneType"),
+        (lambda: tr.drive(rolling.standing, flat, duration=0.01), "tire .* Standing: .*roll"),
+        (lambda: tr.drive(rolling, {"kind": "flat"}, duration=0.01), "road .* dict: .*make_road"),
+        (lambda: tr.make_road({"kind": "flat"}), "make_road: .* give keys by name"),
+        (lambda: tr.make_road(5), "make_road: 5 is no road"),
+    ):
+        with pytest.raises(tr.InputError, match=message):
+            call()
+
+
+def test_figures_may_begin_after_the_run_in(rolling) -> None:
+    """A growing road lifts the mean: in the whole record this outweighs a band below the tone."""
+    road = tr.make_road(kind="sine", amplitude=2e-4, offset=1e-3, wavelength=0.2)
+    run = tr.drive(rolling, road, duration=0.1, step=5e-4, spacing=0.01)
+    patch = np.ptp(run.patch.points[:, 0])
+    speed = rolling.states.turning.speed * rolling.standing.motions.static.rolling_radius()
+    assert run.run_in == pytest.approx((0.1 + patch) / speed, rel=0.2)
+    frequency, _ = run.spectrum(start=run.run_in)
+    assert frequency[1] == pytest.approx(1 / (0.1 - run.run_in), rel=0.02)
+    whole, later = run.spectrum(), run.spectrum(start=run.run_in)
+    assert abs(later[1][1, 2]) < 0.5 * abs(whole[1][1, 2])
+    assert len(run.third_octaves(start=run.run_in)[0]) <= len(run.third_octaves()[0])
+    assert tr.drive(rolling, tr.make_road(kind="flat"), duration=0.01).run_in == 0.0
+    for start in (-0.1, 0.2, float("nan")):
+        with pytest.raises(tr.InputError, match="must be from 0 to the end, 0.1 s"):
+            run.third_octaves(start=start)
+
+
 def test_one_spacing_is_that_of_both_ways(rolling) -> None:
     road = tr.make_road(kind="sine", amplitude=2e-4)
     one, two = (

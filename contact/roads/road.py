@@ -19,6 +19,11 @@ def make_road(spec: Any = None, /, **keys: Any) -> RoadUnderTire:
     taken as it is. Use `placed` to reuse a road already made from a file. InputError for an unknown
     kind or key, a value out of its range or a file that cannot be used.
     """
+    if spec is not None and not hasattr(spec, "__dict__"):
+        raise InputError(
+            f"make_road: {spec!r:.60} is no road of a scene: give keys by name, such as "
+            'make_road(kind="sine", wavelength=0.2)'
+        )
     if spec is None or not hasattr(spec, "surface"):
         given = keys if spec is None else vars(spec)
         placement, surface = _read({k: v for k, v in given.items() if v is not None})

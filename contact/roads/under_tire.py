@@ -85,7 +85,7 @@ class RoadUnderTire:
         if drum_radius is not None and np.isfinite(road.spacing):
             road = Repeated(road, 2 * np.pi * drum_radius)
         self.road, self._datum, self.drum = road, datum, drum
-        self._lateral, self._run_in, self._offset = lateral, run_in, offset
+        self._lateral, self.run_in, self._offset = lateral, run_in, offset
         self._longest_wave = longest_wave
 
     def prepare(self, x0: float, x1: float, y0: float, y1: float) -> "PreparedRoad":
@@ -111,7 +111,7 @@ class RoadUnderTire:
             level=self._level(road, strip),
             offset=self._offset,
             reach=(x0, x1),
-            run_in=self._run_in,
+            run_in=self.run_in,
         )
         if self._moved:
             prepared.notes += (moved_start(self._start),)

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.errors import ConvergenceError, InputError, UnsuitedSettings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -59,7 +59,7 @@ def checked_compliance(matrix: Array) -> Array:
         np.linalg.cholesky(symmetric)
     except np.linalg.LinAlgError:
         eigenvalues = np.linalg.eigvalsh(symmetric)
-        raise InputError(
+        raise UnsuitedSettings(
             "contact: the compliance is not positive definite (eigenvalues of its symmetric part "
             f"from {eigenvalues[0]:.3g} to {eigenvalues[-1]:.3g} m/N), so the contact forces are "
             "not unique; add tread compliance ([contact] tread) or a residual flexibility "

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tireroad.fem.errors import InputError
+from tireroad.fem.errors import InputError, UnsuitedSettings
 
 Array = NDArray[np.float64]
 # m/N at offsets x, y (m) from rectangles of half sizes a, b (m), under a unit force.
@@ -163,7 +163,7 @@ def _check_positive_definite(compliance: Array) -> None:
         np.linalg.cholesky(compliance)
     except np.linalg.LinAlgError:
         eigenvalues = np.linalg.eigvalsh(compliance)
-        raise InputError(
+        raise UnsuitedSettings(
             "tread: the contact points' rectangles overlap or differ so much in size "
             f"that the compliance is not positive definite (smallest eigenvalue "
             f"{eigenvalues[0]:.3g} m/N, "

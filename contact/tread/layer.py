@@ -6,7 +6,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import j1
 
 from tireroad.contact.tread.compliance import half_space_influence
-from tireroad.fem.errors import InputError
+from tireroad.fem.errors import InputError, UnsuitedSettings
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ class LayerInfluence:
         corners += self._corner(x - p, y - q) - self._corner(x + p, y - q)
         total = half_space + h * corners / (np.pi * self._modulus * 4.0 * a * b)
         if np.any(total[(x == 0) & (y == 0)] < STIFFEST * half_space[(x == 0) & (y == 0)]):
-            raise InputError(
+            raise UnsuitedSettings(
                 f"layer tread: for points {2e3 * np.min(a):.3g} x {2e3 * np.min(b):.3g} mm wide a layer of "
                 f"{1e3 * h:.3g} mm is nearly rigid: take closer contact.points, or a smaller contact.poisson_ratio"
             )

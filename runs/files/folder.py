@@ -43,13 +43,14 @@ def _earlier(directory: Path) -> dict[str, Any] | None:
     return found
 
 
-def check_kept_scene(directory: Path) -> None:
-    """Raise InputError if the folder's scene.toml has changed since the run: no `resume` then."""
-    path = directory / "scene.toml"
+def check_kept_scene(path: Path) -> None:
+    """Raise InputError if a run's scene has changed since it was written: no `resume` then."""
     try:
         text = path.read_text(encoding="utf-8")
     except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{directory}: there is no run to resume: it has no scene.toml") from None
+        raise InputError(
+            f"{path.parent}: there is no run to resume: it has no scene.toml"
+        ) from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     if not is_as_signed(text):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import time
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +10,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.fem.errors import ConvergenceError, InputError, UnsuitedSettings
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
@@ -20,14 +19,12 @@ from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.plan import STAGES
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.search import kept
 from tireroad.runs.search.journal import Journal, Trial
 from tireroad.runs.search.planning import planned
 from tireroad.runs.search.settings import MARGIN, MARGINAL, Ladders, Settings, aim, applied
 from tireroad.runs.search.shares import CAUSES, Found, shown, worst
 from tireroad.runs.stages.pipeline import Finished, run_scene
-
-CHOSEN = "chosen.toml"
-FOLDER = "search"
 
 
 @dataclass(frozen=True)
@@ -80,11 +77,11 @@ class Search:
     @property
     def _cache(self) -> Cache:
         """The cache of the trials' stages."""
-        return self.cache.of_family(self.directory / FOLDER / "cache")
+        return self.cache.of_family(self.directory / kept.FOLDER / "cache")
 
     def _begin(self) -> None:
-        """Write the scene as given, until settings are found. Root process only."""
-        write_text(self.directory / "scene.toml", signed(dumps(self.scene)))
+        """Keep the scene as given, until settings are found. Root process only."""
+        kept.begin(self.directory, dumps(self.scene))
         _ = self._journal
 
     def _next(self, last: Trial) -> Settings | None:
@@ -107,9 +104,13 @@ class Search:
         return f"error {shown(trial.found.over(self.scene.accuracy), self.scene.accuracy)}; scheme {trial.scheme}; {cost}"
 
     def _tried(self, settings: Settings) -> Trial:
-        """Run the scene with these settings up to its error bars, in its own folder. Collective."""
+        """Run the scene with these settings up to its error bars, in its own folder. Collective.
+
+        A failure that other settings may avoid is a result. Any other, such as a full disk, is
+        raised: it says nothing of the settings, and must not be kept as if it did.
+        """
         began = time.perf_counter()
-        folder = self.directory / FOLDER / "trial"
+        folder = self.directory / kept.FOLDER / "trial"
         on_root(self.comm, lambda: folder.mkdir(parents=True, exist_ok=True))
         try:
             with observe.only_log():
@@ -123,9 +124,12 @@ class Search:
                     cache=self._cache,
                 )
                 product, scheme = done.done["accuracy"].product, done.done["contact"].product.scheme
-        except (ConvergenceError, InputError) as error:
+        except (ConvergenceError, UnsuitedSettings) as error:
             spent = self.comm.bcast(time.perf_counter() - began)
             return Trial(settings, {}, spent, failed=str(error))
+        except InputError:
+            observe.say("    not finished; the trials before it are kept: run again, or resume")
+            raise
         cost = on_root(self.comm, lambda: seconds(folder))
         spent = self.comm.bcast(time.perf_counter() - began)
         return Trial(settings, cost, spent, Found.of(product, self.scene.accuracy), scheme)
@@ -147,14 +151,14 @@ class Search:
     def _keep(self, trial: Trial) -> None:
         """Complete the run with a trial's settings from its stages; write its scene. Collective."""
         chosen = applied(self.scene, trial.settings)
-        on_root(self.comm, lambda: write_text(self.directory / CHOSEN, signed(dumps(chosen))))
-        observe.say(f"  chosen: {trial.settings}; {self.directory / CHOSEN} needs no search")
-        self._final(chosen)
-        on_root(self.comm, lambda: shutil.rmtree(self.directory / FOLDER, ignore_errors=True))
+        on_root(self.comm, lambda: write_text(self.directory / kept.CHOSEN, signed(dumps(chosen))))
+        observe.say(f"  chosen: {trial.settings}; {self.directory / kept.CHOSEN} needs no search")
+        _tell(chosen, self._final(chosen))
+        on_root(self.comm, lambda: kept.forget(self.directory))
 
-    def _final(self, scene: Scene) -> None:
+    def _final(self, scene: Scene) -> Finished:
         """Compute the results of tried settings in the result folder. Collective."""
-        done = run_scene(
+        return run_scene(
             scene,
             self.directory,
             self.comm,
@@ -163,7 +167,6 @@ class Search:
             petsc_options=self.petsc_options,
             cache=self._cache,
         )
-        _tell(scene, done)
 
     def _give_up(self, tried: list[Trial], best: Trial, why: str) -> None:
         """Compute the best trial's results, then raise ConvergenceError. Collective."""
@@ -175,7 +178,6 @@ class Search:
         over = best.found.over(wanted)
         largest = CAUSES[int(over[:, worst(over)[1]].argmax())]
         self._final(applied(self.scene, best.settings))
-        on_root(self.comm, lambda: self._begin())
         raise ConvergenceError(
             f"accuracy: the target is not met: {why}. Reached {shown(over, wanted)} with {best.settings}; largest part: "
             f"{largest}. Its results are in {self.directory}; take a larger target, or raise accuracy.trials or "
@@ -208,6 +210,7 @@ def run(
     `fresh`: reuse nothing of earlier runs and trials. Collective.
     """
     if not scene.accuracy.searches or (until and STAGES.index(until) < STAGES.index("accuracy")):
+        on_root(comm, lambda: kept.leave(directory))
         done = run_scene(
             scene,
             directory,
@@ -240,5 +243,5 @@ def _tell(scene: Scene, done: Finished) -> None:
 
 def _forget(directory: Path) -> None:
     """Remove the trials and their stages. Root process only."""
-    shutil.rmtree(directory / FOLDER, ignore_errors=True)
+    kept.forget(directory)
     Journal.forget(directory)

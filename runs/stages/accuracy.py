@@ -14,6 +14,7 @@ from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.fem.static.state import StaticState
 from tireroad.modal.rolling import RollingModes
+from tireroad.runs.files.disk import Refused
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
@@ -107,6 +108,8 @@ class AccuracyStage(Computed[Accuracy]):
             try:
                 with record.timing(cause):
                     told = companions(cause, given)
+            except Refused:
+                raise  # a full disk is no property of the run: it must not be kept as one
             except (ConvergenceError, InputError) as error:
                 absent[cause] = str(error)
                 continue

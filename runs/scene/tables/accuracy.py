@@ -94,3 +94,22 @@ def check_accuracy(scene: Scene, raw: dict[str, Any], error: Where) -> None:
             ("accuracy", "up_to"),
             f"= {wanted.up_to:g} Hz is not seen in {scene.time.duration:g} s: four periods at least",
         )
+    if wanted.searches:
+        _check_points(scene, error)
+
+
+def _check_points(scene: Scene, error: Where) -> None:
+    """Raise an error for contact that does not exist, or is another, on grids of a search."""
+    assert scene.contact is not None
+    if scene.contact.brush_stiffness is not None:
+        raise error(
+            ("contact", "brush_stiffness"),
+            "is that of a point: a search for accuracy chooses grids of points, and would change the tread with them; take "
+            "brush_stiffness_per_area (N/m³), or accuracy.search = false and your own contact.points",
+        )
+    if not scene.contact.law.compliant:
+        raise error(
+            ("contact", "tread"),
+            f'= "{scene.contact.tread}" has no compliance of its own, so it works on the nodes of the mesh only, and a '
+            'search for accuracy chooses grids of points: take another, e.g. "half-space", or accuracy.search = false',
+        )

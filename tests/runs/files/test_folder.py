@@ -73,18 +73,18 @@ def test_stopped_run_goes_on(tmp_path: Path) -> None:
 
 def test_a_changed_scene_is_not_resumed(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no run to resume"):
-        check_kept_scene(tmp_path)
+        check_kept_scene(tmp_path / "scene.toml")
     (tmp_path / "contact.h5").write_text("")
     with pytest.raises(InputError, match="no run to resume"):
-        check_kept_scene(tmp_path / "contact.h5")
+        check_kept_scene(tmp_path / "contact.h5" / "scene.toml")
     path = tmp_path / "scene.toml"
     path.write_text(signed("load = 300.0\n"))
-    check_kept_scene(tmp_path)
+    check_kept_scene(path)
     whole = path.read_text()
     for changed in (whole.replace("300", "700"), "load = 300.0\n", "load = 30"):
         path.write_text(changed)
         with pytest.raises(InputError, match="has changed since the run wrote it"):
-            check_kept_scene(tmp_path)
+            check_kept_scene(path)
 
 
 def test_a_changed_summary_is_not_believed(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Error bars of a run: companions that are the runs they stand for, and where the bars go."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import h5py
@@ -11,6 +12,7 @@ from mpi4py import MPI
 from tireroad.contact.results.error_bars import CAUSES, bars, measured
 from tireroad.contact.tread.kernel import KernelTread
 from tireroad.fem.errors import InputError
+from tireroad.runs.files.disk import Refused
 from tireroad.runs.process import observe
 from tireroad.runs.scene.load import load
 from tireroad.runs.stages.base.job import Job
@@ -177,6 +179,19 @@ def test_bars_are_in_the_summary_and_beside_the_bands(whole):
     with h5py.File(folder / "spectra.h5") as file:
         shape = file["third_octave/level"].shape
         assert file["third_octave/level_error"].shape == shape
+
+
+@pytest.mark.long
+def test_a_full_disk_is_no_lack_of_a_companion(run, whole, monkeypatch):
+    """Kept as a result, it would stay after space was made."""
+
+    def full(cause, given):
+        raise Refused("the disk is full")
+
+    monkeypatch.setattr("tireroad.runs.stages.accuracy.companions", full)
+    shutil.copytree(whole[0], whole[0].with_name("full"))
+    with pytest.raises(Refused, match="the disk is full"):
+        run("full", "accuracy", "accuracy.up_to=300")
 
 
 @pytest.mark.long

@@ -15,11 +15,16 @@ def run_in(setup: ContactSetup, road: Road) -> float:
     There is none either where the road is level up to its end, as before a cleat: nothing grows,
     and the impact would be left out with it.
     """
-    speed, grown = setup.rolled.speed, setup.road.grown
+    return 0.0 if road.kind == "flat" else grown(setup, road.run_in)
+
+
+def grown(setup: ContactSetup, length: float) -> float:
+    """The same for a run-in of this length (m) on a road of any kind."""
+    speed, whole = setup.rolled.speed, setup.road.grown
     x0, x1, y0, y1 = setup.patch.extent
-    if speed == 0 or road.kind == "flat" or is_level(setup.road, min(x0, grown), grown, y0, y1):
+    if speed == 0 or is_level(setup.road, min(x0, whole), whole, y0, y1):
         return 0.0
-    return (road.run_in + x1 - x0) / speed
+    return (length + x1 - x0) / speed
 
 
 def first_step(setup: ContactSetup, road: Road, time: np.ndarray) -> int:
