@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tireroad.runs.scene.extent.cost import operations, seconds
+from tireroad.runs.scene.extent.files import disk
 from tireroad.runs.scene.extent.sizes import Sizes, road_memory, sizes
 from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.tables.scene import Scene
@@ -40,9 +41,6 @@ MOST = 1000
 """Touching points up to which "auto" takes the active set (contact.model.MOST_TOUCHING)."""
 PIVOT = 5
 """Copies of the matrix of the touching points during pivoting (contact.solver.pivot)."""
-PACKED = 0.3
-"""Size of contact.h5 relative to its raw numbers: most forces are 0 (measured: 0.24 on stones, 0.29
-on texture)."""
 
 FOOTPRINT = "columns of the footprint"
 FACTOR = "factor of the stiffness"
@@ -65,6 +63,8 @@ KEYS = {
     "contact.h5": "time.duration, time.step, contact.points",
     "contact loop": "time.duration, time.step, contact.points",
     "modes.h5": "modal.count, and the mesh",
+    "vibration.h5": "output.vibration, time.duration, and the mesh",
+    "motion.h5": "output.fields, and the mesh",
     "error bars": "accuracy.estimate",
 }
 
@@ -94,7 +94,7 @@ def estimate(scene: Scene, until: str | None = None) -> Estimate:
     return Estimate(
         sizes=size,
         memory=_memory(scene, size, left_out),
-        disk=_disk(scene, size, left_out),
+        disk=disk(scene, size, left_out),
         work=work,
         seconds=seconds(work, size, column, bars="accuracy" not in left_out),
     )
@@ -207,25 +207,6 @@ def _matrices_of_points(scene: Scene, size: Sizes) -> int:
     if scene.contact.solver == "auto":
         by_product = size.points > 2 * MOST  # about half of them touch
     return 0 if by_product else PIVOT
-
-
-def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
-    """Bytes of the files; a checkpoint is a copy of contact.h5 so far."""
-    through = scene.tire.proportions().through
-    face = size.free / (3 * (through * scene.tire.order + 1)) * 3
-    parts = {"static.h5": 40.0 * size.free}
-    if "modes" not in left_out:
-        parts["modes.h5"] = 8.0 * size.coordinates * (face + 5 * size.coordinates)
-    if "contact" not in left_out:
-        numbers = size.points * (3 + 2 * (scene.contact.rubs)) + 10
-        parts["contact.h5"] = 2 * PACKED * 8.0 * size.steps * numbers
-        parts["greens.h5"] = 16.0 * 2 * size.nodes * (2 * size.coordinates + size.nodes)
-    if "response" not in left_out:
-        k = max(size.driven, 1)
-        parts["response.h5"] = 8.0 * (
-            size.steps * (4 * k + 3 + _each_step(scene, k)) + 2 * size.frequencies * k * k
-        )
-    return parts
 
 
 def _unknowns_through(through: int, order: int) -> int:
