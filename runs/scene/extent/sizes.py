@@ -25,6 +25,9 @@ SHAPES = 0.7, 0.1  # rotation shapes per mode: with cords, and without (modal.ro
 # The fastest state with rotation shapes, over the highest mode: 1.3 to 2.5, on average 1.75, in 35
 # runs of tori with 8 to 300 modes at 20 to 100 rad/s and of a belted tire (2026-11-25).
 FASTEST_SHAPE = 1.75
+# Footprint over what a membrane with the same load would flatten: 0.58 in a torus, 0.66 in the radial
+# tire of passenger.toml.
+PRESSED = 0.6
 MARGIN = 5e-3  # m: reach of the patch beyond the road's height (stages.greens)
 
 
@@ -33,7 +36,7 @@ class Sizes:
     """Sizes of a scene.
 
     `free` unknowns; `modes`; `coordinates`: modes plus the rotation shapes that join them; contact
-    `points` on `nodes`; time `steps`; `frequencies` of receptances; `speeds` of a Campbell diagram;
+    `points` on `nodes`, `touching` at rest; time `steps`; `frequencies` of receptances; `speeds` of a Campbell diagram;
     `driven` points.
     """
 
@@ -42,6 +45,7 @@ class Sizes:
     coordinates: int
     nodes: int
     points: int
+    touching: int
     steps: int
     frequencies: int
     speeds: int
@@ -52,7 +56,7 @@ def sizes(scene: Scene) -> Sizes:
     """The sizes of a scene."""
     free = scene.tire.free_unknowns()
     modes = _modes(scene, free)
-    nodes, points = _points(scene, free)
+    nodes, points, touching = _points(scene, free)
     rotation = scene.rotation
     campbell = rotation.campbell if rotation else None
     return Sizes(
@@ -61,6 +65,7 @@ def sizes(scene: Scene) -> Sizes:
         coordinates=modes + _shapes(scene, modes),
         nodes=nodes,
         points=points,
+        touching=touching,
         steps=_steps(scene, modes),
         frequencies=sum(kind.frequencies() for _, kind in scene.output.kinds),
         speeds=round(campbell.to / campbell.step) + 1 if campbell else 0,
@@ -131,10 +136,11 @@ def road_memory(scene: Scene) -> dict[str, float]:
     return {"making the road": taken} if taken else {}
 
 
-def _points(scene: Scene, free: int) -> tuple[int, int]:
-    """Nodes and points of the patch, where the tire is within reach of the road."""
+def _points(scene: Scene, free: int) -> tuple[int, int, int]:
+    """Nodes and points of the patch, where the tire is within reach of the road, and points that
+    touch."""
     if not scene.in_contact:
-        return 0, 0
+        return 0, 0, 0
     static, contact, mesh = scene.static, scene.contact, scene.tire
     tire = mesh.proportions()
     round_ = math.sqrt(tire.outer_radius * tire.height)
@@ -143,7 +149,9 @@ def _points(scene: Scene, free: int) -> tuple[int, int]:
     if static.load is not None and static.inflation > 0:
         # A membrane carries its load by the pressure on the flattened area.
         deflection = min(static.load / (2 * math.pi * static.inflation * round_), tire.height)
-    area = _area_within(mesh.ring().section, reach + deflection)
+    section = mesh.ring().section
+    area = _area_within(section, reach + deflection)
+    share = PRESSED * _area_within(section, deflection) / area
     graded = math.sqrt(mesh.footprint_size)  # the patch extends beyond the finest elements
     around = 2 * math.pi * tire.outer_radius / (mesh.segments * mesh.order) * graded
     along = 2 * math.radians(tire.half_angle) * tire.height
@@ -151,14 +159,15 @@ def _points(scene: Scene, free: int) -> tuple[int, int]:
     within = area / (around * along)
     nodes = max(min(int(within), free // 6), 9)
     if contact.on_nodes:
-        return nodes, nodes
+        return nodes, nodes, int(share * nodes)
     # A grid is carried by all nodes of the elements that it meets: one more element, half of it on
     # either side, and the node that closes the row.
     carrying = max(min(int((math.sqrt(within) + mesh.order + 1) ** 2), free // 6), 9)
     pitch = contact.points
+    points = ON_A_NODE**2 * nodes
     if isinstance(pitch, Pitch):
-        return carrying, int(area / (pitch.dx * pitch.dy))
-    return carrying, int(ON_A_NODE**2 * nodes)
+        points = area / (pitch.dx * pitch.dy)
+    return carrying, int(points), int(share * points)
 
 
 def _area_within(section: SectionMesh, depth: float) -> float:

@@ -68,5 +68,5 @@ def wall_of(scene: Scene) -> Wall:
         bending=youngs * tire.thickness**3 / (12 * (1 - poisson**2)),
         tension=scene.static.inflation * tire.height,
         slowness2=0.0 if cords else plane,
-        curved2=0.0 * curved if cords else youngs / density * curved**2,
+        curved2=np.zeros(DIRECTIONS) if cords else youngs / density * curved**2,
     )
