@@ -19,7 +19,7 @@ class Wall:
     count. A wave across which the wall is curved stretches it, and there is none below its
     ω_c = c (cos²θ / r + sin²θ / R), where c is the speed of sound in a rod, r and R the radii of the
     section and of the crown, θ the direction from the circumference (318 Hz at θ = 0 in a torus of
-    48 MPa and r = 0.1 m; the flat plate had its first 60 modes below 210 Hz, true are 313).
+    48 MPa and r = 0.1 m, whose 60th mode is at 313 Hz: 294 Hz by this, 210 Hz in a flat plate).
 
     `area` A m², `mass` ρh kg/m², `bending` B N m, `tension` T N/m, `slowness2` s² (s/m)²,
     `curved2` ω_c² (1/s²) by direction.
