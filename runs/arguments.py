@@ -3,6 +3,7 @@
 import argparse
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,7 +39,6 @@ SET_HELP = (
     " force.0.amplitude=2; an empty value removes the key: static.load=. Where it chooses a kind, keys"
     " of the file that only other kinds have are dropped. May be repeated"
 )
-
 
 Arguments = Callable[[argparse.ArgumentParser], object]
 
@@ -171,13 +171,10 @@ def _count(text: str) -> int:
 
 
 def _days(text: str) -> float:
-    try:
-        found = float(text)
-    except ValueError:
-        found = math.nan
-    if not 0 <= found < math.inf:
-        raise argparse.ArgumentTypeError(f"{text}: must be a number of days, 0 or more")
-    return found
+    with suppress(ValueError):
+        if 0 <= (days := float(text)) < math.inf:
+            return days
+    raise argparse.ArgumentTypeError(f"{text}: must be a number of days, 0 or more")
 
 
 def _folder(text: str) -> Path:

@@ -141,8 +141,7 @@ def _points(scene: Scene, free: int) -> tuple[int, int, int]:
     touch."""
     if not scene.in_contact:
         return 0, 0, 0
-    static, contact, mesh = scene.static, scene.contact, scene.tire
-    tire = mesh.proportions()
+    static, contact, mesh, tire = scene.static, scene.contact, scene.tire, scene.tire.proportions()
     round_ = math.sqrt(tire.outer_radius * tire.height)
     reach = contact.reach or 1.5 * road_height(scene) + MARGIN
     deflection = static.deflection or 0.01
@@ -164,9 +163,7 @@ def _points(scene: Scene, free: int) -> tuple[int, int, int]:
     # either side, and the node that closes the row.
     carrying = max(min(int((math.sqrt(within) + mesh.order + 1) ** 2), free // 6), 9)
     pitch = contact.points
-    points = ON_A_NODE**2 * nodes
-    if isinstance(pitch, Pitch):
-        points = area / (pitch.dx * pitch.dy)
+    points = area / (pitch.dx * pitch.dy) if isinstance(pitch, Pitch) else ON_A_NODE**2 * nodes
     return carrying, int(points), int(share * points)
 
 
