@@ -41,8 +41,9 @@ class Key:
     """One parameter: how to read a value, its unit, meaning and allowed values.
 
     `values` describes in words what is allowed, unless `choices` lists the allowed words; `limits`:
-    range of numbers; `optional`: may be absent (None); `is_file`: a file name; `only_for`: (name of
-    the selecting key, its values) for a parameter that only some kinds of its table have.
+    range of numbers; `optional`: may be absent (None); `is_file`: a file name; `is_whole`: an integer;
+    `only_for`: (name of the selecting key, its values) for a parameter that only some kinds of its
+    table have.
     """
 
     read: Callable[[Any], Any]
@@ -54,6 +55,7 @@ class Key:
     limits: Limits | None = None
     choices: Iterable[str] = ()
     is_file: bool = False
+    is_whole: bool = False
 
     @property
     def allowed(self) -> str:

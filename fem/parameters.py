@@ -109,6 +109,7 @@ def integer(
         optional=optional,
         only_for=only_for,
         limits=limits,
+        is_whole=True,
     )
     return parameter(key, default)
 

@@ -1,7 +1,9 @@
 """The command line's commands, options and help texts."""
 
 import argparse
+import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,7 +39,6 @@ SET_HELP = (
     " force.0.amplitude=2; an empty value removes the key: static.load=. Where it chooses a kind, keys"
     " of the file that only other kinds have are dropped. May be repeated"
 )
-
 
 Arguments = Callable[[argparse.ArgumentParser], object]
 
@@ -106,7 +107,7 @@ def _file(info: argparse.ArgumentParser) -> None:
 
 def _sweep(sweep: argparse.ArgumentParser) -> None:
     sweep.add_argument("sweep", type=Path, metavar="SWEEP.toml")
-    sweep.add_argument("--local", type=int, default=1, metavar="K", help="K members at a time")
+    sweep.add_argument("--local", type=_count, default=1, metavar="K", help="K members at a time")
     sweep.add_argument("--slurm", action="store_true", help="write job scripts and submit them")
     sweep.add_argument("--gather", action="store_true", help="only gather existing results")
     sweep.add_argument(
@@ -125,8 +126,7 @@ def _cache(cache: argparse.ArgumentParser) -> None:
     )
     cache.add_argument(
         "--unused-for",
-        type=float,
-        default=0.0,
+        type=_days,
         metavar="DAYS",
         help="with --clear: only those unused for so long",
     )
@@ -166,8 +166,15 @@ def _test(test: argparse.ArgumentParser) -> None:
 
 def _count(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 9999:
-        raise argparse.ArgumentTypeError(f"{text}: must be a number of processes, 1 to 9999")
+        raise argparse.ArgumentTypeError(f"{text}: must be a whole number, 1 to 9999")
     return int(text)
+
+
+def _days(text: str) -> float:
+    with suppress(ValueError):
+        if 0 <= (days := float(text)) < math.inf:
+            return days
+    raise argparse.ArgumentTypeError(f"{text}: must be a number of days, 0 or more")
 
 
 def _folder(text: str) -> Path:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+AT_ONCE = 64  # steps of which the work is computed at a time: it takes nine arrays of their size
+
 
 class Work:
     """Work (J) of the changes of the contact forces on the tire, summed over the steps.
@@ -19,6 +21,11 @@ class Work:
 
     def add(self, change: np.ndarray, moved: np.ndarray) -> None:
         """Count n steps: `change` (n, k) N and `moved` (n, k) m of contact.rolling.Instant."""
+        for first in range(0, len(change), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            self._add(change[some], moved[some])
+
+    def _add(self, change: np.ndarray, moved: np.ndarray) -> None:
         force = np.concatenate([np.broadcast_to(self._force, (1, change.shape[1])), change])
         place = np.concatenate([np.broadcast_to(self._moved, (1, moved.shape[1])), moved])
         mean, way = 0.5 * (force[1:] + force[:-1]), np.diff(place, axis=0)
@@ -27,7 +34,7 @@ class Work:
         for work, more in np.stack([mean * way, ahead * way]).sum(axis=2).T.tolist():
             self.total += work
             self.lead += more
-        self._force, self._moved = change[-1], moved[-1]
+        self._force, self._moved = change[-1].copy(), moved[-1].copy()  # not the whole block
 
     def state(self) -> dict[str, np.ndarray]:
         """The state that a checkpoint keeps."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from tireroad.runs.files.disk import replacing
 from tireroad.runs.files.reader import RunResults
 from tireroad.runs.files.store import sealed
 from tireroad.runs.scene.derived import with_modal
+from tireroad.runs.scene.locate import parts
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.search.journal import NAME, read_trials
 from tireroad.runs.search.settings import applied
@@ -39,7 +41,10 @@ class Column:
 
 @dataclass(frozen=True)
 class Gathered:
-    """The table: `settings` per axis and member, `columns` of results, members without (`missing`)."""
+    """The table: `settings` per axis and member, `columns` of results, members without (`missing`).
+
+    A setting is None where the member's scene has no value; third octaves are in ascending order.
+    """
 
     names: tuple[str, ...]
     settings: Mapping[str, tuple[Any, ...]]
@@ -63,16 +68,48 @@ def gather(sweep: Sweep, folder: Path) -> Gathered:
             rows.append({})
         if not rows[-1]:
             missing.append(member.name)
-    keys = list(dict.fromkeys(key for row in rows for key in row))
+    keys = sorted(dict.fromkeys(key for row in rows for key in row), key=_place)
+    settings = [_settings(sweep, member) for member in sweep.members]
     return Gathered(
         names=tuple(member.name for member in sweep.members),
-        settings={key: tuple(m.settings.get(key) for m in sweep.members) for key in sweep.axes},
+        settings={key: tuple(one[key] for one in settings) for key in sweep.axes},
         columns=tuple(
             Column(name, unit, np.array([row.get((name, unit), np.nan) for row in rows]))
             for name, unit in keys
         ),
         missing=tuple(missing),
     )
+
+
+def _place(key: tuple[str, str]) -> tuple[int, float]:
+    """Sorts headline numbers before levels before errors, and both of these by their band.
+
+    Members may have different bands: their first appearance is in no order.
+    """
+    what, _, band = key[0].rpartition(", ")
+    for order, kind in enumerate(("axle force ", "error of the axle force "), start=1):
+        if what.startswith(kind):
+            return order, float(band.removesuffix(" Hz"))
+    return 0, 0.0
+
+
+def _settings(sweep: Sweep, member: Member) -> dict[str, Any]:
+    """The member's value of every axis; where it sets none, that of its resolved scene."""
+    found = dict(member.settings)
+    if len(found) < len(sweep.axes):
+        scene = tomllib.loads(dumps(sweep.load(member)))
+        found = {key: _value(scene, parts(key)) for key in sweep.axes} | found
+    return found
+
+
+def _value(scene: Any, path: Sequence[str]) -> Any:
+    """The value of a key; None if the scene has none."""
+    for part in path:
+        try:
+            scene = scene[int(part) if isinstance(scene, list) else part]
+        except (LookupError, TypeError, ValueError):
+            return None
+    return scene
 
 
 def _scenes(sweep: Sweep, member: Member, run: RunResults) -> list[str]:
@@ -128,17 +165,22 @@ def write(table: Gathered, folder: Path) -> None:
     with replacing(folder / "sweep.h5") as part, sealed(part) as file:
         file["member"] = list(table.names)
         for key, values in table.settings.items():
-            numbers = all(isinstance(v, int | float) for v in values)
-            file[f"axis/{key}"] = np.array(values, float) if numbers else [str(v) for v in values]
+            texts = ["" if v is None else str(v) for v in values]
+            file[f"axis/{key}"] = np.array(values, float) if _numbers(values) else texts
         for number, column in enumerate(table.columns):
             data = file.create_dataset(f"result/{number:03d}", data=column.values)
             data.attrs["name"], data.attrs["unit"] = column.name, column.unit
 
 
 def numeric(settings: Mapping[str, Sequence[Any]]) -> dict[str, Array]:
-    """The axes whose values are numbers."""
+    """The axes whose values are numbers; NaN where a member has none."""
     return {
         key: np.array(values, float)
         for key, values in settings.items()
-        if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+        if _numbers(values) and not any(isinstance(v, bool) for v in values)
     }
+
+
+def _numbers(values: Sequence[Any]) -> bool:
+    given = [v for v in values if v is not None]
+    return bool(given) and all(isinstance(v, int | float) for v in given)

@@ -1,4 +1,4 @@
-"""Third octaves of a sweep's members in dB relative to the first, with their uncertainty.
+"""Third octaves of a sweep's members in dB relative to the first with any, with their uncertainty.
 
 Members that differ only in a seed are samples of one road: their powers are averaged, and the mean
 power lies within t s / sqrt(n) of that of all roads in 95 of 100 cases (Student's t with n - 1
@@ -36,21 +36,27 @@ class Levels:
     level: Array
     error: Array
 
+    @property
+    def with_bands(self) -> tuple[int, ...]:
+        """The groups that have a level in any band."""
+        return tuple(np.flatnonzero(np.isfinite(self.level).any(axis=1)).tolist())
+
     def differences(self) -> tuple[Array, Array]:
-        """Differences (g - 1, b) dB from the first group, and their errors."""
-        both = np.sqrt(self.error[1:] ** 2 + self.error[0] ** 2)
-        return self.level[1:] - self.level[0], both
+        """Differences (g, b) dB from the first group that has bands, and their errors."""
+        first = self.with_bands[0]
+        both = np.sqrt(self.error**2 + self.error[first] ** 2)
+        return self.level - self.level[first], both
 
 
 def levels(table: Gathered) -> Levels | None:
-    """Levels of the vertical axle force; None if no member has bands."""
+    """Levels of the vertical axle force; None if no member has a finite one."""
     columns = {column.name: column.values for column in table.columns}
     bands = tuple(
         name.removeprefix(LEVEL) for name in columns if name.startswith(LEVEL) and "Hz" in name
     )
-    if not bands:
+    level = np.array([columns[LEVEL + band] for band in bands]).T
+    if not np.isfinite(level).any():
         return None
-    level = np.stack([columns[LEVEL + band] for band in bands], axis=1)
     nothing = np.full(len(level), np.nan)
     error = np.stack([columns.get(ERROR + band, nothing) for band in bands], axis=1)
     groups = _alike(table)

@@ -17,6 +17,8 @@ from scipy.stats import qmc
 from tireroad.fem.errors import InputError
 from tireroad.fem.keys import described, finite
 from tireroad.runs.scene.resolved import literal
+from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.scene.walk import walk
 
 MOST = 10_000
 PLANS = {
@@ -118,7 +120,8 @@ def _listed(path: Path, raw: Mapping[str, Any]) -> tuple[tuple[str, ...], list[M
 def _values(where: str, axis: Mapping[str, Any]) -> list[Any]:
     """The values of an axis of a grid: a list, or `count` values over a `range`.
 
-    Of a range of whole numbers the whole values are integers, as keys of counts need them.
+    Of a range of whole numbers the whole values are integers, and for a key of whole numbers all
+    are.
     """
     if "values" in axis:
         values = axis["values"]
@@ -131,10 +134,23 @@ def _values(where: str, axis: Mapping[str, Any]) -> list[Any]:
         return values
     low, high = _range(where, axis)
     count = whole(where, axis, "count", 0, 2, MOST)
-    values = np.linspace(low, high, count).tolist()
+    values = np.linspace(low, high, count)
+    if _counts(axis):
+        if count > high - low + 1:
+            raise InputError(
+                f"{where}: count = {count}, and {axis['range']} has fewer whole numbers"
+            )
+        return np.rint(values).astype(int).tolist()
     if all(isinstance(end, int) for end in axis["range"]):
-        return [int(value) if value.is_integer() else value for value in values]
-    return values
+        return [int(value) if value.is_integer() else value for value in values.tolist()]
+    return values.tolist()
+
+
+def _counts(axis: Mapping[str, Any]) -> bool:
+    """Whether the values of a range are whole: both ends are, and so are the key's in a scene."""
+    name = re.sub(r"\.\d+(?=\.)", "[]", str(axis["key"]))
+    known = any(key.is_whole for dotted, *_, key in walk(Scene) if dotted == name)
+    return known and all(isinstance(end, int) for end in axis["range"])
 
 
 def _hypercube(
@@ -142,9 +158,15 @@ def _hypercube(
 ) -> list[tuple[Any, ...]]:
     samples = whole(str(path), raw, "samples", 0, 1, MOST)
     seed = whole(str(path), raw, "seed", 0, 0, 2**32 - 1)
-    bounds = np.array([_range(f"{path}: axis {axis['key']}", axis) for axis in axes])
     unit = qmc.LatinHypercube(d=len(axes), seed=seed).random(samples)
-    return [tuple(row) for row in qmc.scale(unit, bounds[:, 0], bounds[:, 1]).tolist()]
+    columns = []
+    for share, axis in zip(unit.T, axes, strict=True):
+        low, high = _range(f"{path}: axis {axis['key']}", axis)
+        if _counts(axis):  # each whole number has the same share of the layers
+            columns.append((low + np.floor(share * (high - low + 1))).astype(int).tolist())
+        else:
+            columns.append((low + share * (high - low)).tolist())
+    return list(zip(*columns, strict=True))
 
 
 def _range(where: str, axis: Mapping[str, Any]) -> tuple[float, float]:

@@ -18,7 +18,9 @@ from tireroad.runs.sweep.levels import Levels, levels
 from tireroad.runs.version import PROGRAM, VERSION
 
 Array = NDArray[np.float64]
+TOTAL = "spectra: level of the vertical force on the axle"  # over all lines, whatever the bands
 SHOWN = (
+    TOTAL,
     "static: deflection",
     "static: load",
     "contact: mean load",
@@ -56,11 +58,11 @@ def _figures(table: Gathered) -> list[tuple[str, str]]:
             text += f" The first {CURVES} of {len(table.names)} members."
         found.append((_spectra(bands, table.names), text))
     compared = levels(table)
-    if compared is not None and len(compared.names) > 1:
+    if compared is not None and len(compared.with_bands) > 1:
         found.append((_differences(compared), _about(compared)))
-    chosen = [c for c in _with_level(table, bands) if np.isfinite(c.values).sum() > 1]
+    chosen = _chosen(table)
     for key, values in axes.items():
-        if len(set(values.tolist())) > 1:
+        if chosen and len(set(values[np.isfinite(values)].tolist())) > 1:
             found.append((_against(key, values, chosen), f"Results over {key}."))
     if len(axes) == 2:
         for column in chosen[:2]:
@@ -69,16 +71,12 @@ def _figures(table: Gathered) -> list[tuple[str, str]]:
     return found
 
 
-def _with_level(table: Gathered, bands: Sequence[Column]) -> list[Column]:
-    """The columns to be drawn; first the overall level of the vertical axle force."""
-    columns = [
-        c for c in table.columns if c.name in SHOWN and np.ptp(c.values[np.isfinite(c.values)])
-    ]
-    if not bands:
-        return columns
-    power = np.nansum([10 ** (c.values / 10) for c in bands], axis=0)
-    level = 10 * np.log10(np.where(power > 0, power, np.nan))
-    return [Column("axle force z, all bands", "dB re 1 N", level), *columns]
+def _chosen(table: Gathered) -> list[Column]:
+    """The columns that are drawn over the axes, in the order of `SHOWN`: those that vary."""
+    finite = {c.name: c.values[np.isfinite(c.values)] for c in table.columns if c.name in SHOWN}
+    vary = {name for name, values in finite.items() if len(values) > 1 and np.ptp(values) > 0}
+    columns = [c for c in table.columns if c.name in vary]
+    return sorted(columns, key=lambda c: SHOWN.index(c.name))
 
 
 @styled
@@ -87,7 +85,8 @@ def _spectra(bands: Sequence[Column], names: Sequence[str]) -> str:
     place = np.arange(len(bands))
     for number, name in enumerate(names[:CURVES]):
         levels = [column.values[number] for column in bands]
-        axes[0, 0].plot(place, levels, marker="o", ms=3, label=name, **pen(number))
+        if np.isfinite(levels).any():
+            axes[0, 0].plot(place, levels, marker="o", ms=3, label=name, **pen(number))
     axes[0, 0].set(ylabel="dB re 1 N, rms", xlabel="third-octave band")
     axes[0, 0].set_xticks(place, [c.name.partition(", ")[2] for c in bands], rotation=45)
     axes[0, 0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=7)
@@ -96,25 +95,25 @@ def _spectra(bands: Sequence[Column], names: Sequence[str]) -> str:
 
 @styled
 def _differences(compared: Levels) -> str:
-    """Differences in dB from the first, with error bars."""
+    """Differences in dB from the first that has bands, with error bars."""
     figure, axes = canvas(9.5, 3.2)
     level, error = compared.differences()
     place = np.arange(len(compared.bands))
-    for number in range(min(len(level), CURVES - 1)):
-        aside = place + 0.3 * ((number + 1) / min(len(level) + 1, CURVES) - 0.5)
-        bars = np.nan_to_num(error[number])
+    first, *others = compared.with_bands[:CURVES]
+    for order, number in enumerate(others, start=1):
+        there = np.isfinite(level[number])
         axes[0, 0].errorbar(
-            aside,
-            level[number],
-            bars,
+            (place + 0.3 * (order / (len(others) + 1) - 0.5))[there],
+            level[number, there],
+            np.nan_to_num(error[number, there]),
             marker="o",
             ms=3,
             capsize=2,
-            label=compared.names[number + 1],
-            **pen(number + 1),
+            label=compared.names[number],
+            **pen(number),
         )
     axes[0, 0].axhline(0.0, color="#52606d", lw=0.8)
-    axes[0, 0].set(ylabel=f"dB of {compared.names[0]}", xlabel="third-octave band")
+    axes[0, 0].set(ylabel=f"dB of {compared.names[first]}", xlabel="third-octave band")
     axes[0, 0].set_xticks(place, compared.bands, rotation=45)
     axes[0, 0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=7)
     return encode(figure)
@@ -123,7 +122,8 @@ def _differences(compared: Levels) -> str:
 def _about(compared: Levels) -> str:
     """Caption of the figure of differences."""
     text = (
-        "Vertical axle force, difference from the first in dB, with what the runs' error bars tell of it; "
+        "Vertical axle force, difference from the first that has bands, "
+        f"{compared.names[compared.with_bands[0]]}, in dB, with what the runs' error bars tell of it; "
         "where there is no bar nothing is known."
     )
     if max(compared.seeds) > 1:
@@ -141,7 +141,8 @@ def _against(key: str, values: Array, columns: Sequence[Column]) -> str:
     figure, axes = canvas(9.5, 2.0 * count + 0.4, count, sharex=True)
     order = np.argsort(values, kind="stable")
     for here, column in zip(axes[:, 0], columns, strict=False):
-        here.plot(values[order], column.values[order], "o-", ms=4, lw=0.8, color="#0072b2")
+        there = order[np.isfinite(values[order]) & np.isfinite(column.values[order])]
+        here.plot(values[there], column.values[there], "o-", ms=4, lw=0.8, color="#0072b2")
         here.set(title=column.name, ylabel=column.unit)
     axes[-1, 0].set_xlabel(key)
     return encode(figure)
@@ -151,7 +152,9 @@ def _against(key: str, values: Array, columns: Sequence[Column]) -> str:
 def _map(first: str, a: Array, second: str, b: Array, column: Column) -> str:
     """A result over two axes, coloured at the grid's points."""
     figure, axes = canvas(6.5, 4.2)
-    drawn = axes[0, 0].scatter(a, b, c=column.values, s=320, marker="s", cmap="cividis")
+    there = np.isfinite(a) & np.isfinite(b) & np.isfinite(column.values)
+    shown = {"c": column.values[there], "s": 320, "marker": "s", "cmap": "cividis"}
+    drawn = axes[0, 0].scatter(a[there], b[there], **shown)
     axes[0, 0].set(xlabel=first, ylabel=second)
     axes[0, 0].margins(0.15)
     figure.colorbar(drawn, ax=axes, label=f"{column.name}, {column.unit}")

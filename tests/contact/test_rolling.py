@@ -1,5 +1,7 @@
 """The time loop with a made-up tire: rest, orders of convergence, energy, processes, refusals."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -191,3 +193,15 @@ def test_work_of_contact_is_the_energy_of_an_undamped_tire() -> None:
         errors.append(abs(work.total - held) / max(i.change @ i.moved for i in instants))
     assert errors[1] < 1e-3
     assert errors[1] < 0.35 * errors[0]
+
+
+def test_the_work_of_a_block_takes_little_memory() -> None:
+    """Arrays of the whole block took four times what the block itself takes."""
+    change, moved = np.ones((512, 2000)), np.ones((512, 2000))
+    tracemalloc.start()
+    try:
+        Work().add(change, moved)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 0.7 * (change.nbytes + moved.nbytes)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from tireroad.runs.scene.extent.cost import operations, seconds
+from tireroad.runs.scene.extent.files import disk
 from tireroad.runs.scene.extent.matrices import factor, matrices, unknowns_through
 from tireroad.runs.scene.extent.sizes import Sizes, road_memory, sizes
 from tireroad.runs.scene.extent.static_state import (
@@ -34,13 +35,17 @@ DENSE = 1000
 """Number of contact points up to which a tread's matrix is stored (contact.model.DENSE_POINTS)."""
 BLOCK = 512
 """Steps of contact results held between two writes (stages.stored.contact_file)."""
+PIECE = 64
+"""Steps of which the work is computed at a time (contact.results.energy)."""
 MOST = 1000
 """Touching points up to which "auto" takes the active set (contact.model.MOST_TOUCHING)."""
-PIVOT = 5
-"""Copies of the matrix of the touching points during pivoting (contact.solver.pivot)."""
-PACKED = 0.3
-"""Size of contact.h5 relative to its raw numbers: most forces are 0 (measured: 0.24 on stones, 0.29
-on texture)."""
+PIVOT, PIVOTED, USUAL = 5, 2, 3
+"""Copies of the matrix of the usual set during pivoting and afterwards (contact.solver.pivot), and its
+size over the number of points that touch at rest: 3,094 of 958 (2026-11-25)."""
+SLIPPING = 16
+"""Copies of the matrix of the touching points while the largest unique friction is found: the tread's
+kernels and their indices 7, the normal forces' 1, of twice its width the lifts 2, the coupling 1, its
+singular values 1 (contact.solver.friction). Not during pivoting."""
 
 FOOTPRINT = "columns of the footprint"
 FACTOR = "factor of the stiffness"
@@ -61,6 +66,8 @@ KEYS = {
     "contact.h5": "time.duration, time.step, contact.points",
     "contact loop": "time.duration, time.step, contact.points",
     "modes.h5": "modal.count, and the mesh",
+    "vibration.h5": "output.vibration, time.duration, and the mesh",
+    "motion.h5": "output.fields, and the mesh",
     "error bars": "accuracy.estimate",
 }
 
@@ -90,7 +97,7 @@ def estimate(scene: Scene, until: str | None = None) -> Estimate:
     return Estimate(
         sizes=size,
         memory=_memory(scene, size, left_out),
-        disk=_disk(scene, size, left_out),
+        disk=disk(scene, size, left_out),
         work=work,
         seconds=seconds(work, size, column, bars="accuracy" not in left_out),
     )
@@ -145,8 +152,7 @@ def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
         "flexibility of the patch": 8.0 * size.free * (ANSWERS + shapes * loads),
         "contact": 16.0 * 4 * loads * 2 * size.coordinates
         + 8.0 * 3 * loads**2
-        + 8.0 * _matrices_of_points(scene, size) * size.points**2
-        + 8.0 * BLOCK * size.points * (3 + directions),
+        + 8.0 * _in_the_loop(scene, size, directions),
         "time series": 8.0 * size.steps * 24,
     }
     if scene.time.scheme == "convolution":
@@ -154,30 +160,28 @@ def _contact_memory(scene: Scene, size: Sizes) -> dict[str, float]:
     return parts
 
 
+def _in_the_loop(scene: Scene, size: Sizes, directions: int) -> float:
+    """Numbers held at most: while matrices are made, or while a block of steps is counted.
+
+    A step has the normal force, gap and displacement, the horizontal force, and change and motion
+    in each of the `directions`. All but the displacement, a view, are held twice in the count, as
+    steps and as arrays of them, with two more for checks and nine for the work of a piece.
+    """
+    dense = _matrices_of_points(scene, size)
+    slipping = SLIPPING * size.touching**2 if scene.contact.rubs else 0
+    each = 2 + (2 if scene.contact.rubs else 0) + 2 * directions
+    steps = min(size.steps, BLOCK) * size.points
+    pieces = min(size.steps, PIECE) * size.points * 9 * directions
+    counted = dense * PIVOTED / PIVOT + (2 * each + 1 + 2) * steps + pieces
+    return max(max(dense, slipping) + each * steps, counted)
+
+
 def _matrices_of_points(scene: Scene, size: Sizes) -> int:
-    """Number of matrices of the contact points held at once."""
+    """Numbers in the matrices of the contact points held at once."""
     if scene.contact.on_nodes or size.points <= DENSE:
-        return 3
+        return 3 * size.points**2
     by_product = scene.contact.solver == "projected-cg"
     if scene.contact.solver == "auto":
-        by_product = size.points > 2 * MOST  # about half of them touch
-    return 0 if by_product else PIVOT
-
-
-def _disk(scene: Scene, size: Sizes, left_out: dict[str, str]) -> dict[str, float]:
-    """Bytes of the files; a checkpoint is a copy of contact.h5 so far."""
-    through = scene.tire.proportions().through
-    face = size.free / (3 * (through * scene.tire.order + 1)) * 3
-    parts = {"static.h5": 40.0 * size.free}
-    if "modes" not in left_out:
-        parts["modes.h5"] = 8.0 * size.coordinates * (face + 5 * size.coordinates)
-    if "contact" not in left_out:
-        numbers = size.points * (3 + 2 * (scene.contact.rubs)) + 10
-        parts["contact.h5"] = 2 * PACKED * 8.0 * size.steps * numbers
-        parts["greens.h5"] = 16.0 * 2 * size.nodes * (2 * size.coordinates + size.nodes)
-    if "response" not in left_out:
-        k = max(size.driven, 1)
-        parts["response.h5"] = 8.0 * (
-            size.steps * (4 * k + 3 + _each_step(scene, k)) + 2 * size.frequencies * k * k
-        )
-    return parts
+        by_product = size.touching > 1.5 * MOST  # the estimate may be half too high
+    usual = min(size.points, USUAL * size.touching)
+    return 0 if by_product else PIVOT * usual**2

@@ -1,6 +1,6 @@
 """Sizes of the parts of a scene, estimated before anything is computed.
 
-Modes from their density in a plate under tension, contact points from the footprint, steps from the
+Modes from their density in a shell under tension, contact points from the footprint, steps from the
 automatic step. Each is within a factor of about two of what a run finds.
 """
 
@@ -14,12 +14,20 @@ from tireroad.contact.roads.placement import begun_at
 from tireroad.contact.spacing import ON_A_NODE
 from tireroad.fem.errors import InputError
 from tireroad.fem.sections.mesh2d import SectionMesh
+from tireroad.runs.scene.extent.wall import wall_of
 from tireroad.runs.scene.rules.road import least_travel, made
 from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.scene import Scene
 
 TURN = 0.3  # radians of the fastest mode per automatic step (stages.build.rolling.stepping)
+LEAST_STEPS = 200  # of an automatic step (ibid.)
 SHAPES = 0.7, 0.1  # rotation shapes per mode: with cords, and without (modal.rotation_shapes)
+# The fastest state with rotation shapes, over the highest mode: 1.3 to 2.5, on average 1.75, in 35
+# runs of tori with 8 to 300 modes at 20 to 100 rad/s and of a belted tire (2026-11-25).
+FASTEST_SHAPE = 1.75
+# Footprint over what a membrane with the same load would flatten: 0.58 in a torus, 0.66 in the radial
+# tire of passenger.toml.
+PRESSED = 0.6
 MARGIN = 5e-3  # m: reach of the patch beyond the road's height (stages.greens)
 
 
@@ -28,7 +36,7 @@ class Sizes:
     """Sizes of a scene.
 
     `free` unknowns; `modes`; `coordinates`: modes plus the rotation shapes that join them; contact
-    `points` on `nodes`; time `steps`; `frequencies` of receptances; `speeds` of a Campbell diagram;
+    `points` on `nodes`, `touching` at rest; time `steps`; `frequencies` of receptances; `speeds` of a Campbell diagram;
     `driven` points.
     """
 
@@ -37,6 +45,7 @@ class Sizes:
     coordinates: int
     nodes: int
     points: int
+    touching: int
     steps: int
     frequencies: int
     speeds: int
@@ -47,7 +56,7 @@ def sizes(scene: Scene) -> Sizes:
     """The sizes of a scene."""
     free = scene.tire.free_unknowns()
     modes = _modes(scene, free)
-    nodes, points = _points(scene, free)
+    nodes, points, touching = _points(scene, free)
     rotation = scene.rotation
     campbell = rotation.campbell if rotation else None
     return Sizes(
@@ -56,6 +65,7 @@ def sizes(scene: Scene) -> Sizes:
         coordinates=modes + _shapes(scene, modes),
         nodes=nodes,
         points=points,
+        touching=touching,
         steps=_steps(scene, modes),
         frequencies=sum(kind.frequencies() for _, kind in scene.output.kinds),
         speeds=round(campbell.to / campbell.step) + 1 if campbell else 0,
@@ -63,58 +73,11 @@ def sizes(scene: Scene) -> Sizes:
     )
 
 
-@dataclass(frozen=True)
-class _Wall:
-    """The wall as a flat plate under tension: N = A/4π (k² + s² ω²) modes up to ω.
-
-    k is the wave number of bending waves, ρh ω² = B k⁴ + T k², and s² the sum of the squared
-    slownesses of the two in-plane waves, which cords make too fast to count. `area` A m², `mass` ρh
-    kg/m², `bending` B N m, `tension` T N/m, `slowness2` s² (s/m)².
-    """
-
-    area: float
-    mass: float
-    bending: float
-    tension: float
-    slowness2: float
-
-    def modes_below(self, frequency: float) -> float:
-        """Number of modes below a frequency (Hz)."""
-        omega2 = (2 * math.pi * frequency) ** 2
-        driving = self.mass * omega2
-        root = math.sqrt(self.tension**2 + 4 * self.bending * driving)
-        k2 = 2 * driving / (self.tension + root)
-        return self.area * (k2 + self.slowness2 * omega2) / (4 * math.pi)
-
-    def frequency_of(self, modes: float) -> float:
-        """Frequency (Hz) below which there are that many modes, by bisection in its logarithm."""
-        low, high = 1e-3, 1e9
-        while high > 1.001 * low:
-            middle = math.sqrt(low * high)
-            low, high = (middle, high) if self.modes_below(middle) < modes else (low, middle)
-        return low
-
-
-def _wall(scene: Scene) -> _Wall:
-    """The wall, from the section's height and thickness; tension as in a circle of that radius."""
-    tire, shape = scene.tire.proportions(), scene.tire.shape
-    youngs, poisson, density = shape.rubber(scene.tire)
-    plane = density * (1 - poisson**2 + 2 * (1 + poisson)) / youngs
-    middle = tire.outer_radius - 0.5 * tire.height
-    return _Wall(
-        area=2 * math.pi * middle * 2 * math.radians(tire.half_angle) * tire.height,
-        mass=density * tire.thickness,
-        bending=youngs * tire.thickness**3 / (12 * (1 - poisson**2)),
-        tension=scene.static.inflation * tire.height,
-        slowness2=0.0 if shape.angles(scene.tire) else plane,
-    )
-
-
 def _modes(scene: Scene, free: int) -> int:
     """Number of modes."""
     if scene.modes.up_to is None:
         return scene.modes.count
-    return max(min(int(_wall(scene).modes_below(scene.modes.up_to)), free // 3), 1)
+    return max(min(int(wall_of(scene).modes_below(scene.modes.up_to)), free // 3), 1)
 
 
 def _shapes(scene: Scene, modes: int) -> int:
@@ -126,7 +89,23 @@ def _shapes(scene: Scene, modes: int) -> int:
 
 def highest_frequency(scene: Scene, modes: int) -> float:
     """Frequency (Hz) of the highest mode, from the same mode density."""
-    return scene.modes.up_to or _wall(scene).frequency_of(modes)
+    return scene.modes.up_to or wall_of(scene).frequency_of(modes)
+
+
+def fastest_state(scene: Scene, modes: int) -> float:
+    """Largest absolute eigenvalue (1/s) of the wheel's states: of a rotation shape if they join.
+
+    Of two real eigenvalues of an overdamped state it is the larger. Those of a moving wheel on
+    stiff springs are left out.
+    """
+    rotation, damping = scene.rotation, scene.damping
+    if rotation and rotation.method == "full":
+        modes = rotation.count
+    rate = 2 * math.pi * highest_frequency(scene, modes)
+    if rotation and rotation.speed and scene.joins_shapes:
+        rate *= FASTEST_SHAPE
+    half = 0.5 * (damping.mass + damping.stiffness * rate**2) if damping else 0.0
+    return half + math.sqrt(half**2 - rate**2) if half > rate else rate
 
 
 def road_height(scene: Scene) -> float:
@@ -157,28 +136,35 @@ def road_memory(scene: Scene) -> dict[str, float]:
     return {"making the road": taken} if taken else {}
 
 
-def _points(scene: Scene, free: int) -> tuple[int, int]:
-    """Nodes and points of the patch, where the tire is within reach of the road."""
+def _points(scene: Scene, free: int) -> tuple[int, int, int]:
+    """Nodes and points of the patch, where the tire is within reach of the road, and points that
+    touch."""
     if not scene.in_contact:
-        return 0, 0
-    static, contact, mesh = scene.static, scene.contact, scene.tire
-    tire = mesh.proportions()
+        return 0, 0, 0
+    static, contact, mesh, tire = scene.static, scene.contact, scene.tire, scene.tire.proportions()
     round_ = math.sqrt(tire.outer_radius * tire.height)
     reach = contact.reach or 1.5 * road_height(scene) + MARGIN
     deflection = static.deflection or 0.01
     if static.load is not None and static.inflation > 0:
         # A membrane carries its load by the pressure on the flattened area.
         deflection = min(static.load / (2 * math.pi * static.inflation * round_), tire.height)
-    area = _area_within(mesh.ring().section, reach + deflection)
+    section = mesh.ring().section
+    area = _area_within(section, reach + deflection)
+    share = PRESSED * _area_within(section, deflection) / area
     graded = math.sqrt(mesh.footprint_size)  # the patch extends beyond the finest elements
     around = 2 * math.pi * tire.outer_radius / (mesh.segments * mesh.order) * graded
     along = 2 * math.radians(tire.half_angle) * tire.height
     along *= graded / (tire.along * mesh.order)
-    nodes = max(min(int(area / (around * along)), free // 6), 9)
+    within = area / (around * along)
+    nodes = max(min(int(within), free // 6), 9)
+    if contact.on_nodes:
+        return nodes, nodes, int(share * nodes)
+    # A grid is carried by all nodes of the elements that it meets: one more element, half of it on
+    # either side, and the node that closes the row.
+    carrying = max(min(int((math.sqrt(within) + mesh.order + 1) ** 2), free // 6), 9)
     pitch = contact.points
-    if isinstance(pitch, Pitch):
-        return nodes, int(area / (pitch.dx * pitch.dy))
-    return nodes, nodes if contact.on_nodes else int(ON_A_NODE**2 * nodes)
+    points = area / (pitch.dx * pitch.dy) if isinstance(pitch, Pitch) else ON_A_NODE**2 * nodes
+    return carrying, int(points), int(share * points)
 
 
 def _area_within(section: SectionMesh, depth: float) -> float:
@@ -199,13 +185,21 @@ def _steps(scene: Scene, modes: int) -> int:
         return 0
     if not isinstance(time.step, str):
         return math.ceil(time.duration / time.step)
-    step = min(time.duration / 200, TURN / (2 * math.pi * highest_frequency(scene, modes)))
+    step = min(time.duration / LEAST_STEPS, TURN / fastest_state(scene, modes))
     travel = least_travel(scene)
     if scene.in_contact and travel > 0:
         spacing, points = made(scene.road.surface).spacing, scene.contact.points
         spacing = max(spacing, points.dx) if isinstance(points, Pitch) else spacing
         step = min(step, spacing / 8 / (travel / time.duration))
-    fastest = max((force.frequency for force in scene.force), default=0.0)
-    if scene.road is not None and scene.road.motion.kind == "sine":
-        fastest = max(fastest, scene.road.motion.frequency)
-    return math.ceil(time.duration / min(step, 1 / (16 * fastest) if fastest else math.inf))
+    return math.ceil(time.duration / min(step, _shortest_period(scene) / 16))
+
+
+def _shortest_period(scene: Scene) -> float:
+    """Shortest period (s) of the forces and of the road's motion; infinite if there is none."""
+    periods = [1 / force.frequency for force in scene.force if force.frequency]
+    motion = scene.road.motion if scene.road else None
+    if motion and motion.kind == "sine":
+        periods.append(1 / motion.frequency)
+    elif motion and motion.kind == "ramp":
+        periods.append(motion.duration)
+    return min(periods, default=math.inf)

@@ -15,7 +15,7 @@ from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.search.journal import Journal, Trial
 from tireroad.runs.search.settings import Ladders, applied
 from tireroad.runs.sweep.definition import Sweep, read
-from tireroad.runs.sweep.gather import gather
+from tireroad.runs.sweep.gather import gather, write
 
 BASE = "[static]\nload = 300.0\n[rotation]\nspeed = {speed}\n"
 FAMILY = 'scene = "base.toml"\n[[axis]]\nkey = "static.load"\nvalues = [300.0, 500.0]\n'
@@ -43,14 +43,14 @@ def begin(sweep: Sweep, folder: Path) -> list[Summary]:
     return found
 
 
-def finish(summary: Summary, skipped: bool = False) -> None:
+def finish(summary: Summary, skipped: bool = False, bands: tuple[float, ...] = (100.0,)) -> None:
     summary.record("static", "computed", headline={"load": (300.0, "N")})
     summary.record("spectra", "skipped" if skipped else "computed")
     summary.record("report", "computed")
     if not skipped:
         with h5py.File(summary.path.parent / "spectra.h5", "w") as file:
-            file["third_octave/centre"] = np.array([100.0])
-            file["third_octave/level"] = np.array([[1.0, 2.0, 3.0]])
+            file["third_octave/centre"] = np.array(bands)
+            file["third_octave/level"] = np.array([[1.0, 2.0, 3.0]] * len(bands))
 
 
 def test_results_of_an_earlier_base_are_not_gathered(folder: Path) -> None:
@@ -112,3 +112,34 @@ def test_a_level_of_nothing_is_not_gathered(folder: Path) -> None:
             file["third_octave/level"][0, 1] = -3076.5
     names = [column.name for column in gather(before, folder).columns]
     assert "axle force x, 100 Hz" in names and "axle force y, 100 Hz" not in names
+
+
+def test_bands_are_in_ascending_order(folder: Path) -> None:
+    """Members may have different ones: a short run lacks the lower."""
+    sweep = family(folder, 40.0)
+    for one, bands in zip(begin(sweep, folder), ((125.0, 160.0), (100.0, 125.0)), strict=True):
+        finish(one, bands=bands)
+    names = [c.name for c in gather(sweep, folder).columns if "force z" in c.name]
+    assert names == [f"axle force z, {band} Hz" for band in (100, 125, 160)]
+
+
+def test_what_a_member_does_not_set_has_its_value_in_the_scene(folder: Path) -> None:
+    text = "".join(
+        f'[[member]]\nname = "{name}"\nset = {{ "{key}" = {value} }}\n'
+        for name, key, value in (
+            ("heavy", "static.load", 500.0),
+            ("few", "modal.count", 8),
+            ("plain", "rotation.speed", 40.0),
+            ("worn", "rotation.campbell.to", 80.0),
+        )
+    )
+    (folder / "family.toml").write_text('scene = "base.toml"\n' + text)
+    sweep = family(folder, 40.0)
+    table = gather(sweep, folder)
+    assert table.settings["static.load"] == (500.0, 300.0, 300.0, 300.0)
+    assert table.settings["modal.count"] == (500, 8, 500, 500)
+    write(table, folder)
+    with h5py.File(folder / "sweep.h5") as file:
+        assert file["axis/modal.count"][:].tolist() == [500, 8, 500, 500]
+        assert np.isnan(file["axis/rotation.campbell.to"][:]).tolist() == [True] * 3 + [False]
+    assert "heavy,500.0,500,40.0,\n" in (folder / "sweep.csv").read_text()

@@ -82,6 +82,20 @@ def test_a_range_of_whole_numbers_suits_a_count(folder: Path) -> None:
     assert [member.settings["static.load"] for member in sweep.members] == [100, 100.5, 101]
 
 
+@pytest.mark.parametrize(
+    "text",
+    ['plan = "latin-hypercube"\nsamples = 24\n{}', "{}count = 4\n"],
+)
+def test_a_range_of_whole_numbers_is_whole_for_a_count(folder: Path, text: str) -> None:
+    axis = '[[axis]]\nkey = "modal.count"\nrange = [3, 8]\n'
+    found = [m.settings["modal.count"] for m in sweep_of(folder, text.format(axis)).members]
+    assert all(isinstance(count, int) for count in found) and (min(found), max(found)) == (3, 8)
+    assert found.count(5) == len(found) // 6 or len(found) == 4
+    loads = text.format('[[axis]]\nkey = "static.load"\nrange = [100, 102]\n')
+    real = [m.settings["static.load"] for m in sweep_of(folder, loads).members]
+    assert len(set(real)) == len(real)
+
+
 def test_tables_and_lists_vary(folder: Path) -> None:
     text = '[[axis]]\nkey = "contact.points"\nvalues = ["nodes", { dx = 0.01, dy = 0.02 }]\n'
     with (folder / "base.toml").open("a") as file:
@@ -149,6 +163,7 @@ def test_a_list_names_its_members(folder: Path) -> None:
         ('plan = "latin-hypercube"\nsamples = 3\n' + LOADS, "unknown key values"),
         ('[[axis]]\nkey = "static.load"\nrange = [0.0, inf]\ncount = 2\n', "finite number"),
         ('[[axis]]\nkey = "static.load"\nvalues = [nan]\n', "finite number, not nan"),
+        ('[[axis]]\nkey = "modal.count"\nrange = [4, 6]\ncount = 4\n', "fewer whole numbers"),
         (MANY.format("static.load") + MANY.format("static.inflation"), "100000000 members"),
     ],
 )

@@ -6,7 +6,7 @@ from scipy import stats
 
 from tireroad.runs.sweep.gather import Column, Gathered
 from tireroad.runs.sweep.levels import levels
-from tireroad.runs.sweep.page import _figures
+from tireroad.runs.sweep.page import TOTAL, _chosen, _figures
 
 LOUD = np.array([[0.0, 10.0], [1.0, 12.0], [-1.0, 11.0], [0.5, 10.5]])
 
@@ -38,16 +38,16 @@ def test_seeds_are_samples_of_one_road() -> None:
     top = stats.t.interval(0.95, 3, power.mean(axis=0), stats.sem(power, axis=0))[1]
     np.testing.assert_allclose(found.level[0] + found.error[0], 10 * np.log10(top))
     apart, sure = found.differences()
-    np.testing.assert_allclose(apart, 3.0)
-    np.testing.assert_allclose(sure[0], np.sqrt(2) * found.error[0])
+    np.testing.assert_allclose(apart[1], 3.0)
+    np.testing.assert_allclose(sure[1], np.sqrt(2) * found.error[0])
 
 
 def test_what_runs_tell_of_their_errors_adds_up() -> None:
     error = np.array([[0.3, np.nan], [0.4, np.nan]])
     found = levels(table({"static.load": (1.0, 2.0)}, LOUD[:2], error))
     apart, sure = found.differences()
-    np.testing.assert_allclose(apart, LOUD[1:2] - LOUD[:1])
-    assert sure[0, 0] == pytest.approx(0.5) and np.isnan(sure[0, 1])
+    np.testing.assert_allclose(apart[1], LOUD[1] - LOUD[0])
+    assert sure[1, 0] == pytest.approx(0.5) and np.isnan(sure[1, 1])
 
 
 def test_a_member_without_results_is_left_out_of_the_mean() -> None:
@@ -62,3 +62,19 @@ def test_a_member_without_results_is_left_out_of_the_mean() -> None:
 def test_the_page_draws_the_differences() -> None:
     shown = _figures(table({"static.load": (1.0, 2.0, 3.0, 4.0)}, LOUD, None))
     assert any("difference from the first" in text for _, text in shown)
+
+
+def test_members_without_bands_are_drawn_as_far_as_they_go(recwarn) -> None:
+    """A short run has a level over all lines and no bands; the next is what others differ from."""
+    level = LOUD.copy()
+    level[0], level[2, 1] = np.nan, np.nan
+    given = {"modal.count": (40, 40, 100, 100), "time.duration": (0.1, 0.5, 0.1, 0.5)}
+    bands = table(given, level, None)
+    total = Column(TOTAL, "dB re 1 N", np.array([35.3, 35.2, 35.4, np.nan]))
+    full = Gathered(bands.names, given, (total, *bands.columns), ())
+    apart, _ = levels(full).differences()
+    np.testing.assert_allclose(apart[:, 0], [np.nan, 0.0, -2.0, -0.5])
+    assert _chosen(full) == [total]
+    shown = [text for _, text in _figures(full)]
+    assert any("first that has bands, m1, in dB" in text for text in shown)
+    assert sum(TOTAL in text for text in shown) == 1 and not recwarn.list

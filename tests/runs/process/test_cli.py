@@ -85,12 +85,31 @@ def test_bad_scene_touches_nothing(launch, scene: Path, tmp_path: Path) -> None:
         ["run", "x.toml", "-n", "many"],
         ["report", "nowhere"],
         ["export", "nowhere"],
+        ["sweep", "x.toml", "--local", "0"],
+        ["sweep", "x.toml", "--local", "-1"],
+        ["cache", "--clear", "--unused-for", "-1"],
+        ["cache", "--clear", "--unused-for", "nan"],
+        ["cache", "--unused-for", "3"],
     ],
 )
 def test_wrong_commands_end_with_two(launch, tmp_path: Path, command: list[str]) -> None:
     done = launch("-m", "runs", *command, cwd=tmp_path)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr and done.stderr.count("error: ") == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (["sweep", "x.toml", "--local", "0"], "--local: 0: must be a whole number, 1 to 9999"),
+        (["cache", "--clear", "--unused-for", "-1"], "-1: must be a number of days, 0 or more"),
+        (["cache", "--unused-for", "3"], "--unused-for belongs to --clear"),
+    ],
+)
+def test_a_wrong_number_is_named(capsys, monkeypatch, command: list[str], words: str) -> None:
+    monkeypatch.setenv("TIREROAD_CACHE", "off")
+    assert cli.main(command) == 2
+    assert words in capsys.readouterr().err
 
 
 def test_wrong_process_count_is_explained(launch, scene: Path) -> None:

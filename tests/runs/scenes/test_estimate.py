@@ -57,7 +57,8 @@ def test_passenger_is_as_measured(root: Path) -> None:
     product = estimate(load(scene, ["accuracy.estimate=false", 'contact.solver="projected-cg"']))
     pivoted = wanted
     matrix = 8.0 * pivoted.sizes.points**2
-    assert pivoted.memory["contact"] - product.memory["contact"] > 3 * matrix
+    # The results of a block are counted at another time than it pivots.
+    assert pivoted.memory["contact"] - product.memory["contact"] > 2 * matrix
 
 
 @pytest.mark.parametrize(
