@@ -15,6 +15,7 @@ from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
+from tireroad.runs.files.summary import Summary
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.plan import STAGES
@@ -84,7 +85,7 @@ class Search:
 
     def _begin(self) -> None:
         """Write the scene as given, until settings are found. Root process only."""
-        write_text(self.directory / "scene.toml", signed(dumps(self.scene)))
+        Summary(self.directory, self.scene.name, self.comm.size, dumps(self.scene)).begin()
         _ = self._journal
 
     def _next(self, last: Trial) -> Settings | None:
@@ -175,7 +176,8 @@ class Search:
         over = best.found.over(wanted)
         largest = CAUSES[int(over[:, worst(over)[1]].argmax())]
         self._final(applied(self.scene, best.settings))
-        on_root(self.comm, lambda: self._begin())
+        given = signed(dumps(self.scene))  # what `resume` goes on with
+        on_root(self.comm, lambda: write_text(self.directory / "scene.toml", given))
         raise ConvergenceError(
             f"accuracy: the target is not met: {why}. Reached {shown(over, wanted)} with {best.settings}; largest part: "
             f"{largest}. Its results are in {self.directory}; take a larger target, or raise accuracy.trials or "
