@@ -162,8 +162,13 @@ def _validate(args: argparse.Namespace) -> None:
 
 
 def _results(directory: Path) -> Path:
+    """The folder, if it is one of results; says which of its files are left out."""
     if not (directory / "summary.json").is_file():
         raise InputError(f"{directory}: no result folder: it has no summary.json")
+    from tireroad.runs.files.present import remarks
+
+    for text in remarks(directory):
+        print(f"note: {text}", file=sys.stderr)
     return directory
 
 
@@ -181,7 +186,7 @@ def _cache(args: argparse.Namespace) -> None:
 def _compare(args: argparse.Namespace) -> None:
     from tireroad.runs.report.compare import compare
 
-    print(compare(args.directories, args.out))
+    print(compare([_results(directory) for directory in args.directories], args.out))
 
 
 def _sweep(args: argparse.Namespace) -> None:

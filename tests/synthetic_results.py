@@ -186,7 +186,7 @@ def summary() -> dict[str, object]:
         extra = {"status": "computed", "reason": "", "warnings": [], "cost": {}} | more
         return {"seconds": seconds, **named, **extra}
 
-    skipped = {"status": "skipped", "reason": "the scene has no [[force]] table"}
+    skipped = {"status": "skipped", "reason": "the scene has no [stiffness] table"}
     stages = {
         "static": stage(
             14.2,
@@ -203,7 +203,8 @@ def summary() -> dict[str, object]:
         ),
         "rotating": stage(0.4, {"basis condition": (42.0, "-")}, {"identity": (4e-11, "-")}),
         "greens": stage(1.2, {"contact points": (250, "-")}, {"reciprocity": (1e-10, "-")}),
-        "response": stage(0.0, {}, {}, **skipped),
+        "stiffness": stage(0.0, {}, {}, **skipped),
+        "response": stage(0.3, {}, {}),
         "contact": stage(
             8.3,
             {"steps": (10000, "-"), "greatest force": (731.2, "N"), "step": (2.5e-5, "s")},

@@ -12,6 +12,7 @@ from tireroad.contact.results.levels import nominal
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import xdmf
 from tireroad.runs.files.disk import replacing
+from tireroad.runs.files.present import left_out
 from tireroad.runs.files.store import opened
 
 AXES = ("x", "y", "z")
@@ -23,6 +24,13 @@ NAMES = {  # levels in third_octave/ whose names do not give the quantity
     "contact_level_a_weighted": "contact force level a weighted",
     "contact_level_error": "error of the contact force level",
 }
+MADE = {
+    *(f"{name}.csv" for name in ("footprint", "modes", "contact_force", "spectra", "third_octave")),
+    *(f"{name}.csv" for name in ("density", "response", "receptance", "vibration")),
+    *(f"{name}.xdmf" for name in ("static", "modes", "contact", "motion")),
+    *(f"{name}_fields.h5" for name in ("static", "modes", "contact", "motion")),
+}
+"""The names of all files that an export may write."""
 Columns = dict[str, NDArray]  # heading with unit -> values (n)
 
 
@@ -30,15 +38,17 @@ def export(directory: Path) -> list[Path]:
     """Write directory/export/*.csv and *.xdmf from the existing result files; returns the paths.
 
     XDMF files refer to the HDF5 results beside `export` and copy no data: do not move that folder.
-    Every CSV column names its unit. Each file is written to a temporary name and renamed. Not
-    collective: call it on one process. Raises InputError if there is nothing to export, a result
-    file is damaged (then nothing is written), or `export` cannot be written.
+    Every CSV column names its unit. Each file is written to a temporary name and renamed. Results
+    of an earlier run in the folder are left out, and what an earlier export made of them is
+    removed. Not collective: call it on one process. Raises InputError if there is nothing to
+    export, a result file is damaged (then nothing is written), or `export` cannot be written.
     """
     if not directory.is_dir():
         raise InputError(f"{directory} is no folder: give the result folder of a run")
     files: dict[str, Callable[[Path], object]] = {}
+    others = left_out(directory)
     for name, reader in READERS.items():
-        if (directory / name).is_file():
+        if (directory / name).is_file() and name not in others:
             files |= _read(directory / name, reader)
     if not files:
         raise InputError(
@@ -53,6 +63,8 @@ def export(directory: Path) -> list[Path]:
     for name, write in files.items():
         with replacing(folder / name) as part:
             write(part)
+    for name in MADE - files.keys():
+        (folder / name).unlink(missing_ok=True)
     return [folder / name for name in files]
 
 

@@ -1,8 +1,7 @@
-"""The result folder: its owner, whether it is writable, and its summary."""
+"""The result folder: its owner, and whether it is writable."""
 
 import fcntl
 import json
-import math
 import os
 import tempfile
 import tomllib
@@ -12,16 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed, signed_table, text_digest
-from tireroad.runs.files.disk import explained, remove_leftovers, write_text
-from tireroad.runs.files.store import plain
+from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
+from tireroad.runs.files.disk import explained, remove_leftovers
 from tireroad.runs.scene.resolved import MARK
 from tireroad.runs.version import PROGRAM, RESULT_FORMAT, VERSION
 
 OTHER = "choose another folder with --out, or remove this one; nothing was written"
 
 
-def _earlier(directory: Path) -> dict[str, Any] | None:
+def earlier_summary(directory: Path) -> dict[str, Any] | None:
     """The summary of an earlier run, or None. Raises InputError if it is unreadable or damaged."""
     path = directory / "summary.json"
     try:
@@ -83,7 +81,7 @@ def _check_scene(directory: Path, scene_name: str) -> None:
 
 def check_owner(directory: Path, scene_name: str) -> None:
     """Raise InputError if the folder holds results of another scene or another version."""
-    found = _earlier(directory)
+    found = earlier_summary(directory)
     if found is None:
         _check_scene(directory, scene_name)
         return
@@ -160,69 +158,3 @@ def _unusable(directory: Path, error: OSError) -> InputError:
         f"{directory}: cannot be written: {error.strerror}; choose another with --out"
     )
     return InputError(str(clear))
-
-
-class Summary:
-    """`summary.json`: one entry per stage, rewritten completely after each. Root process only.
-
-    Until the first stage of a run has ended, the file is that of an earlier run: the hash of the
-    resolved scene, `scene_text`, tells them apart.
-    """
-
-    def __init__(
-        self, directory: Path, scene_name: str, processes: int, scene_text: str = ""
-    ) -> None:
-        self.path = directory / "summary.json"
-        self.earlier: dict[str, Any] = (_earlier(directory) or {"stages": {}})["stages"]
-        self.data: dict[str, Any] = {
-            "program": {"name": PROGRAM, "version": VERSION, "format": RESULT_FORMAT},
-            "scene": scene_name,
-            "resolved_scene": text_digest(scene_text),
-            "processes": processes,
-            "stages": {},
-        }
-
-    def record(
-        self,
-        stage: str,
-        status: str,
-        *,
-        reason: str = "",
-        seconds: float = 0.0,
-        headline: dict[str, tuple[Any, str]] | None = None,
-        indicators: dict[str, tuple[Any, str]] | None = None,
-        warnings: list[str] | None = None,
-        cost: dict[str, float] | None = None,
-    ) -> None:
-        """Enter a stage and write the file. Figures are given as name: (value, unit).
-
-        A reused stage keeps the figures of the run that computed it.
-        """
-        kept = self.earlier.get(stage, {}) if status == "reused" else {}
-        self.data["stages"][stage] = {
-            "status": status,
-            "reason": reason,
-            "seconds": seconds,
-            "headline": _figures(headline) or kept.get("headline", {}),
-            "indicators": _figures(indicators) or kept.get("indicators", {}),
-            "warnings": warnings or kept.get("warnings", []),
-            "cost": cost or kept.get("cost", {}),
-        }
-        data = json.loads(json.dumps(_finite(self.data), default=plain))
-        text = json.dumps(signed_table(data), indent=1, ensure_ascii=False)
-        write_text(self.path, text + "\n")
-
-
-def _figures(given: dict[str, tuple[Any, str]] | None) -> dict[str, Any]:
-    return {name: {"value": value, "unit": unit} for name, (value, unit) in (given or {}).items()}
-
-
-def _finite(value: Any) -> Any:
-    """Replace infinities and NaN, which JSON does not have, by null."""
-    if isinstance(value, dict):
-        return {key: _finite(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(part) for part in value]
-    if hasattr(value, "item") and getattr(value, "ndim", 1) == 0:
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files import store
+from tireroad.runs.files.present import left_out
 from tireroad.runs.report.quantities import quantity
 
 
@@ -52,6 +53,7 @@ class Results:
 
     def __init__(self, directory: Path, scene: Mapping) -> None:
         self.directory, self.scene = directory, scene
+        self.left_out = left_out(directory)
         self._open: dict[str, h5py.File] = {}
 
     def __enter__(self) -> "Results":
@@ -62,9 +64,14 @@ class Results:
             file.close()
 
     def file(self, name: str) -> h5py.File:
-        """The open HDF5 file. Raises Absent if it does not exist, InputError if it is damaged."""
+        """The open HDF5 file. Raises InputError if it is damaged.
+
+        Raises Absent if it does not exist, or is of an earlier run.
+        """
         if name not in self._open:
             path = self.directory / name
+            if name in self.left_out:
+                raise Absent(self.left_out[name])
             if not path.is_file():
                 raise Absent(f"there is no {name}")
             store.verify(path)

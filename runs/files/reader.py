@@ -19,6 +19,7 @@ from tireroad.runs.files.checksum import (
     signed,
     text_digest,
 )
+from tireroad.runs.files.present import left_out
 from tireroad.runs.files.store import AGAIN, verify
 
 
@@ -28,7 +29,8 @@ class RunResults(Mapping[str, NDArray[Any]]):
     `run["contact/total_force"]` is the dataset `total_force` of `contact.h5`; `unit(name)` is its
     unit; `attributes(file)` are a file's attributes (for example
     `run.attributes("static")["load"]`, N); `scene` is the resolved scene, `summary` the stages as
-    in `summary.json`. No file stays open. Raises InputError for a folder without results and for an
+    in `summary.json`; `left_out` are the files that an earlier run of another scene left in the
+    folder, which are not read, each with the reason. No file stays open. Raises InputError for a folder without results and for an
     unreadable or damaged file; KeyError, with the names available, for a dataset that does not exist.
     """
 
@@ -36,6 +38,7 @@ class RunResults(Mapping[str, NDArray[Any]]):
         self.directory = Path(directory)
         if not (self.directory / "summary.json").is_file():
             raise InputError(f"{self.directory}: no result folder: it has no summary.json")
+        self.left_out = left_out(self.directory)
         self._units: dict[str, str] | None = None
 
     @property
@@ -82,7 +85,8 @@ class RunResults(Mapping[str, NDArray[Any]]):
         return len(self._listed())
 
     def __repr__(self) -> str:
-        return f"RunResults({str(self.directory)!r}: {len(self)} datasets)"
+        without = f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
+        return f"RunResults({str(self.directory)!r}: {len(self)} datasets{without})"
 
     def _scene_text(self) -> str:
         text = self._text("scene.toml")
@@ -116,6 +120,7 @@ class RunResults(Mapping[str, NDArray[Any]]):
     def _known(self, name: str) -> None:
         if name not in self._listed():
             file = name.partition("/")[0]
+            self._counted(file)
             near = [known for known in self._listed() if known.startswith(f"{file}/")]
             raise KeyError(f"{name}; there are {', '.join(near or self._listed())}")
 
@@ -123,13 +128,20 @@ class RunResults(Mapping[str, NDArray[Any]]):
         """The unit of every dataset, by name."""
         if self._units is None:
             found: dict[str, str] = {}
-            for path in sorted(self.directory.glob("*.h5")):
+            paths = sorted(self.directory.glob("*.h5"))
+            for path in (path for path in paths if path.name not in self.left_out):
                 with self._opened(path.stem) as opened:
                     found |= {f"{path.stem}/{name}": unit for name, unit in _units(opened)}
             self._units = found
         return self._units
 
+    def _counted(self, stem: str) -> None:
+        """KeyError for a file that is left out."""
+        if (why := self.left_out.get(f"{stem}.h5")) is not None:
+            raise KeyError(f"{stem}.h5 in {self.directory} is left out: {why}")
+
     def _opened(self, stem: str) -> h5py.File:
+        self._counted(stem)
         path = self.directory / f"{stem}.h5"
         if not path.is_file():
             raise KeyError(f"{stem}.h5 is not in {self.directory}")

@@ -71,13 +71,21 @@ def _rolling(results: Results, given: Given) -> list[Fact]:
         given("accuracy", f"error of the {part} contact force")
         for part in ("mean", "deviation of the")
     )
-    end, step = results.attribute("spectra.h5", "limit"), results.attribute("contact.h5", "step")
+    end, step = _limit(results), results.attribute("contact.h5", "step")
     varies = deviation(force[:, None], float(step or 1.0), float(end or np.inf))[0]
     what = "its standard deviation" + (f" up to {quantity(end, 'Hz')}" if end else "")
     return [
         ("vertical force, rolling (mean)", bounded(float(force.mean()), mean, "N")),
         (what, bounded(float(varies), spread, "N")),
     ]
+
+
+def _limit(results: Results) -> Any:
+    """Upper frequency limit of the model, Hz; None in a run without spectra."""
+    try:
+        return results.attribute("spectra.h5", "limit")
+    except Absent:
+        return None
 
 
 def _levels(results: Results, _: Given) -> list[Fact]:

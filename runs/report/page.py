@@ -9,6 +9,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tireroad.fem.errors import InputError
+from tireroad.runs.files import present
 from tireroad.runs.files.checksum import is_as_signed, is_table_as_signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.read import Absent, Results, Section
@@ -175,8 +176,9 @@ def build_sections(
                 sections.append(build(results))
                 provenance = provenance or short_attributes(results, name)
             except Absent as absence:
-                reason = stages.get(name.removesuffix(".h5"), {}).get("reason")
-                left_out.append((name, reason or str(absence)))
+                skipped = stages.get(name.removesuffix(".h5"), {}).get("reason")
+                reason = results.left_out.get(name) or skipped or str(absence)
+                left_out.append((name, reason))
             except InputError as error:
                 problems.append(f"{name} is damaged and left out: {error}")
                 left_out.append((name, "the file is damaged"))
@@ -195,7 +197,8 @@ def short_attributes(results: Results, name: str) -> list[tuple[str, str]]:
 
 def computed(directory: Path) -> str:
     """Time of the newest result, UTC."""
-    files = [directory / name for name in (*SECTIONS, "summary.json", "scene.toml")]
+    names = {*SECTIONS, "summary.json", "scene.toml"} - present.left_out(directory).keys()
+    files = [directory / name for name in names]
     newest = max(file.stat().st_mtime for file in files if file.is_file())
     return datetime.fromtimestamp(newest, UTC).strftime("%Y-%m-%d %H:%M UTC")
 

@@ -17,9 +17,9 @@ from tireroad.greens.coupling import Wheel
 from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.cache import NO_CACHE, Cache
-from tireroad.runs.files.checksum import signed
-from tireroad.runs.files.disk import FACTORS, remove_factors, write_text
-from tireroad.runs.files.folder import Summary, make_folder
+from tireroad.runs.files.disk import FACTORS, remove_factors
+from tireroad.runs.files.folder import make_folder
+from tireroad.runs.files.summary import Summary
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import factors_on_disk, forget_peak, peak_memory
 from tireroad.runs.process.mpi import on_root
@@ -99,9 +99,7 @@ def run_scene(
     forget_peak()  # of an earlier member of a sweep in the same process
     job = Job(scene, directory, comm, fresh, cache)
     on_root(comm, lambda: make_folder(directory))
-    text = dumps(scene)
-    summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size, text))
-    on_root(comm, lambda: write_text(directory / "scene.toml", signed(text)))
+    summary = on_root(comm, lambda: Summary(directory, scene.name, comm.size, dumps(scene)))
     if scene.road is not None:
         # Report an unusable road file before hours of solving, not after.
         share(scene.road.surface, comm)
@@ -110,6 +108,7 @@ def run_scene(
     on_disk = on_root(comm, lambda: out_of_core(wanted, comm.size))
     each = 1e-9 * sum(memory_of(wanted, comm.size, on_disk).values()) / comm.size
     _say_demand(wanted, each, directory, comm)
+    on_root(comm, summary.begin)  # not before: a scene that is refused replaces nothing
     reasons = skipped(scene, until)
     if petsc_options:
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
@@ -181,7 +180,7 @@ def _run(stage: Stage, summary: Summary) -> Done:
     record = found.record
     if record is None:
         observe.say(f"{name:9s} reused: computed from the same inputs {found.reused}")
-        known = {"reason": "same inputs", **found.known}
+        known = {"reason": "same inputs", "input_hash": found.done.key, **found.known}
         on_root(job.comm, lambda: summary.record(name, "reused", **known))
         return found.done
     record.indicators["largest memory of a process so far"] = (_peak(job.comm), "GB")
@@ -189,7 +188,7 @@ def _run(stage: Stage, summary: Summary) -> Done:
     for text in record.warnings:
         observe.warn(f"{name}: {text}")
     observe.say(f"{name:9s} done in {seconds:.1f} s: {record.line()}")
-    figures = vars(record)
+    figures = {"input_hash": found.done.key, **vars(record)}
     on_root(job.comm, lambda: summary.record(name, "computed", seconds=seconds, **figures))
     return found.done
 

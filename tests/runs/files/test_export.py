@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from synthetic_results import sealed, write_results
 
 from tireroad.fem.errors import InputError
-from tireroad.runs.files.export import export
+from tireroad.runs.files.export import MADE, export
 from tireroad.runs.files.xdmf import INSTANTS, SHAPES
 
 CSV = {
@@ -70,6 +70,7 @@ def test_all_files_are_written_and_nothing_else(results: Path) -> None:
     again = export(results)
     assert {path.name for path in again} == CSV | XDMF
     assert {path.name for path in (results / "export").iterdir()} == CSV | XDMF
+    assert CSV | XDMF <= MADE, "what a later export without them removes"
 
 
 @pytest.mark.parametrize("name", sorted(CSV))

@@ -23,7 +23,8 @@ def folder(tmp_path: Path) -> Path:
         file["contact/points"].attrs["unit"] = "m"
     with h5py.File(tmp_path / "static.h5", "w") as file:
         file.attrs["load"] = 500.0
-    (tmp_path / "summary.json").write_text(json.dumps({"stages": {"static": {"seconds": 1.5}}}))
+    stages = {"static": {"seconds": 1.5}, "contact": {}}
+    (tmp_path / "summary.json").write_text(json.dumps({"stages": stages}))
     (tmp_path / "scene.toml").write_text(signed('name = "a"\n'))
     return tmp_path
 
@@ -43,7 +44,7 @@ def test_what_is_not_there_is_named(folder: Path) -> None:
         run["contact/axle_force"]
     with pytest.raises(InputError, match=r"summary\.json"):
         tireroad.load(folder / "nothing")
-    (folder / "modes.h5").write_bytes(b"no HDF5")
+    (folder / "static.h5").write_bytes(b"no HDF5")
     with pytest.raises(InputError, match="damaged"):
         len(tireroad.load(folder))
 

@@ -23,6 +23,7 @@ def write(folder: Path, load: float, level: float, frequencies: list[float], tur
     (folder / "scene.toml").write_text(signed(text))
     headline = {"load": {"value": load, "unit": "N"}}
     stages = {"static": {"seconds": 1.0, "headline": headline}}
+    stages |= {name: {} for name in ("modes", "spectra", "vibration")}
     (folder / "summary.json").write_text(json.dumps({"stages": stages}))
     shape = np.random.default_rng(1).standard_normal((3, 20, 3))
     points = np.random.default_rng(2).random((20, 3))

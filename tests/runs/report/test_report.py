@@ -91,7 +91,7 @@ def test_numbers_carry_units(results: Path) -> None:
         assert shown in text, shown
     assert f">{3.6 * 50 * 0.316:.4g} km/h<" in text
     assert "of [[force]]" not in text
-    assert "the scene has no [[force]] table" in text
+    assert "the scene has no [stiffness] table" in text
     assert "same mesh, load and material as before" in text
 
 
