@@ -131,9 +131,7 @@ def _figures(run: RunResults) -> dict[tuple[str, str], float]:
             value = entry.get("value")
             if isinstance(value, int | float) and not isinstance(value, bool):
                 found[f"{stage}: {name}", entry.get("unit", "-")] = float(value)
-    # Where the run has no spectra, a file of them is an earlier run's.
-    skipped = run.summary.get("spectra", {}).get("status") == "skipped"
-    if not skipped and "spectra/third_octave/level" in run:
+    if "spectra/third_octave/level" in run:
         centres = nominal(run["spectra/third_octave/centre"])
         level = run["spectra/third_octave/level"]
         for centre, parts in zip(centres, level, strict=True):

@@ -202,22 +202,12 @@ def _summary(found: list[Outcome], failed: Sequence[str] = ()) -> Table:
     ratio = [one.cost / one.best for one in solved if one.best]
     whole = [one.search / one.best for one in solved if one.best]
     met = 100 * float(np.mean([float(one.met) for one in found] or [np.nan]))
-    rows = (
-        [
-            ["target met, of the cases", met, ASKED["met"], "%"],
-            ["cost over the least, median", float(np.median(ratio)), ASKED["cost"], "-"],
-            ["cost over the least, largest", float(np.max(ratio)), ASKED["cost"], "-"],
-            [
-                "with the search over the least, median",
-                float(np.median(whole)),
-                ASKED["search"],
-                "-",
-            ],
-            ["with the search over the least, largest", float(np.max(whole)), ASKED["search"], "-"],
-        ]
-        if ratio
-        else [["target met, of the cases", met, ASKED["met"], "%"]]
-    )
+    rows = [["target met, of the cases", met, ASKED["met"], "%"]]
+    for what, values, asked in (("cost", ratio, "cost"), ("with the search", whole, "search")):
+        for kind, figure in (("median", np.median), ("largest", np.max)) if values else ():
+            rows.append(
+                [f"{what} over the least, {kind}", float(figure(values)), ASKED[asked], "-"]
+            )
     notes = [
         f"{len(found)} cases; {100 * TARGET:g} % of the axle force up to {UP_TO:g} Hz, {DURATION:g} s. True error: against "
         f"{told_settings(FINE, 'fine')}. The exhaustive search takes rungs of the same ladders. Costs are processor seconds; "
