@@ -3,9 +3,11 @@
 Normal: f >= 0, g = A_zz (f - f_static) + A_zh t + q >= 0, f . g = 0. Tangential, at the touching
 points: t = -K_b (share u + past) limited to |t| <= mu f, u = u_free + A_hz (f - f_static) + A_hh t.
 With a tread that shears (contact.tread.shear), A includes its part; its rubber is then in series
-with the bristles or, with K_b infinite, alone. Without slip this is block Gauss-Seidel on a
-positive definite problem and always converges; with slip convergence is certain for mu ||A_zz^-1
-A_zh|| < 1, where the solution is unique too.
+with the bristles or, with K_b infinite, alone. While the same points touch and stick this is block
+Gauss-Seidel on a positive definite problem and converges; with slip convergence is certain for
+mu ||A_zz^-1 A_zh|| < 1, where the solution is unique too. Without a friction coefficient there may
+be no solution: a point at the edge may bear a force that lifts it off the road, where it bears
+none. In such a step its bristle bears none.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from tireroad.greens.residual.sparse_columns import LoadedColumns
 Array = NDArray[np.float64]
 
 TURNS = 100
+PATIENCE = 10  # turns after which a point that still comes and goes is lifted off by its bristle
 TOLERANCE = 1e-8  # change in an iteration, relative to the largest normal force
 # Accuracy of stick and slip in the first iteration, in later ones relative to the last change, and
 # the finest.
@@ -90,12 +93,13 @@ class Friction:
         """
         share, past = self._brush.offer()
         horizontal = 2.0 * self.horizontal - self._before  # linear extrapolation saves an iteration
-        within = ROUGHLY
+        within, lifts = ROUGHLY, _Lifting(self._brush.law.friction is None)
         for self.turns in range(1, TURNS + 1):
             force = normal.solve(q + self._lift(horizontal), guess, reference=static)
             guess = None
             moved = free.reshape(2, -1).T + self._pushed(force, static)
-            new = self._stick_slip(force, moved, (share, past), horizontal, within)
+            bearing = lifts.bearing(force, self.turns)
+            new = self._stick_slip(bearing, moved, (share, past), horizontal, within)
             change, largest = np.abs(new - horizontal).max(), force.max(initial=0.0)
             horizontal = new
             # A guess within a coarse tolerance changes nothing; only an accurate solution proves
@@ -105,10 +109,16 @@ class Friction:
             if close and change <= TOLERANCE * largest:
                 self._finish(force, moved, horizontal)
                 return force, horizontal
-        raise ConvergenceError(
-            f"contact: normal and horizontal forces do not converge in {TURNS} iterations; the friction "
-            "is too large for this step: lower contact.friction, the brush's stiffness or "
-            "time.step"
+        raise self._unsolved()
+
+    def _unsolved(self) -> ConvergenceError:
+        unbounded = self._brush.law.friction is None
+        key = (
+            "give contact.friction, which bounds them," if unbounded else "lower contact.friction,"
+        )
+        return ConvergenceError(
+            f"contact: normal and horizontal forces do not converge in {TURNS} iterations; the horizontal forces "
+            f"are too large for this step: {key} the brush's stiffness or time.step"
         )
 
     def _lift(self, horizontal: Array) -> Array:
@@ -174,6 +184,23 @@ class Friction:
             tread = None if self._shear is None else self._shear.between(index)
             self._carried, self._key = (self._hh.between(both, both), own, tread), key
         return self._carried
+
+
+class _Lifting:
+    """Points whose own bristle lifts them off the road, where nothing else bounds its force."""
+
+    def __init__(self, unbounded: bool) -> None:
+        self._unbounded = unbounded
+        self._before: Mask | None = None
+        self._lifted: Mask | bool = False
+
+    def bearing(self, force: Array, turn: int) -> Array:
+        """The normal forces (c,) N, zero where the bristles bear none."""
+        touching = force > 0
+        if self._unbounded and turn > PATIENCE and self._before is not None:
+            self._lifted = self._lifted | (touching != self._before)
+        self._before = touching
+        return np.where(self._lifted, 0.0, force)
 
 
 def _complex(plane: Array) -> NDArray[np.complex128]:

@@ -194,6 +194,19 @@ def test_friction_beyond_any_answer_is_refused() -> None:
         run(BrushLaw(3e7, 2.0, (0.1, 0.0)), 50, tire=tire)
 
 
+def test_a_point_that_its_own_bristle_lifts_off_bears_nothing() -> None:
+    """Without a friction coefficient: touching it would bear a force that lifts it, apart it would touch."""
+    tire = 1e-6 * np.array([[1.0, 0.3, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    one = np.zeros(1)
+    for pushed, bears in ((-4e-6, False), (4e-6, True)):
+        brush = Brush(BrushLaw(1e6, kind="spring"), one, np.zeros(1, int), 10.0, 1e-4)
+        brush.begin(np.ones(1, bool))
+        friction, solver = Friction(brush, tire, None), ActiveSet(tire[:1, :1])
+        force, t = friction.solve(solver, one - 1e-8, None, one, np.array([pushed, 0.0]))
+        assert force[0] == pytest.approx(0.01 - (0.3 * t[0, 0] if bears else 0.0))
+        assert (t[0, 0] != 0) == bears
+
+
 @pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("iterative", [False, True])
