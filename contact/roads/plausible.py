@@ -25,13 +25,14 @@ def check_plausible(
     source: str,
     *,
     lengths: bool = True,
-    heights: bool = True,
+    heights: str | None = "m",
 ) -> None:
     """InputError if a road cannot be in the unit in which it was read.
 
     `extent` (m) along and across, `steps` (m) between points, `rows` of heights (m), of which 64
-    are read. `lengths`, `heights`: whether the unit was assumed rather than given; the message then
-    names the keys that give it. Heights beyond 10 km are refused in any case.
+    are read. `lengths`: whether their unit was assumed rather than given; `heights`: the unit that
+    was assumed for them, None: it was given. The message then names the keys that give it. Heights
+    beyond 10 km are refused in any case.
     """
     if lengths and extent[1] > WIDEST:
         raise InputError(
@@ -50,10 +51,10 @@ def check_plausible(
     relief = np.ptp(z[~np.isnan(z).any(axis=1)], axis=1)
     if heights and (_median(slope) > STEEPEST or _median(relief) > ROUGHEST * extent[1]):
         raise InputError(
-            f"{source}: heights were read as metres, and in the median they differ by "
+            f"{source}: heights were read as {heights}, and in the median they differ by "
             f"{_median(slope) * steps[1]:.3g} m between neighbours {steps[1]:.3g} m apart, by "
-            f"{_median(relief):.3g} m across the road's {extent[1]:.3g} m: if they are in millimetres "
-            'say height_unit = "mm" in [road]; if they really are in metres say height_unit = "m"'
+            f"{_median(relief):.3g} m across the road's {extent[1]:.3g} m: say in [road] what they "
+            f'are in, height_unit = "mm" or "um"; if they really are in {heights} say height_unit = "{heights}"'
         )
 
 

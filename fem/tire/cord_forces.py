@@ -89,7 +89,8 @@ def _read(body: Body, sheet: Sheet, number: int, chain: np.ndarray, values: np.n
     area = face.area * abs(ufl.det(ufl.Jacobian(tire.mesh)))
     stretch, area = (compat.evaluate(e, points, tire.mesh, cells) for e in (stretch, area))
     modulus = np.where(stretch < TAUT, cords.compression, 1.0) * cords.youngs_modulus
-    force = modulus * cords.area * (stretch - 1)
+    strain = np.where(np.abs(stretch - 1) > 1 - TAUT, stretch - 1, 0.0)  # else rounding
+    force = modulus * cords.area * strain
     area = area * np.outer(weight, weight).ravel()
     segment = np.asarray(tire.mesh.topology.original_cell_index)[cells] // len(place)
     along = np.where(_ascends(body, chain)[edge][:, None], np.arange(n), np.arange(n)[::-1])

@@ -10,6 +10,8 @@ from tireroad.runs.files.checksum import is_table_as_signed, signed
 from tireroad.runs.files.store import opened
 from tireroad.runs.scene.plan import STAGES
 
+CHOSEN = "chosen.toml"
+"""The scene with the settings that a search has found."""
 UNFINISHED = ("checkpoint.h5", "static_last.h5")
 """Files of a stage that has not ended: no entry of the summary tells of them."""
 
@@ -39,7 +41,16 @@ def left_out(directory: Path) -> dict[str, str]:
     for name in UNFINISHED:
         if (directory / name).is_file() and not _is_of_scene(directory, name):
             found[name] = "it is of another scene"
+    if _read(directory / CHOSEN) not in (None, _read(directory / "scene.toml")):
+        found[CHOSEN] = "it was chosen for another scene"
     return found
+
+
+def _read(path: Path) -> bytes | None:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return None
 
 
 def remarks(directory: Path) -> list[str]:

@@ -12,9 +12,9 @@ from pathlib import Path
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.files.folder import make_folder
+from tireroad.runs.files.present import CHOSEN
 
 FOLDER = "search"
-CHOSEN = "chosen.toml"
 _SCENE = "scene.toml"
 
 

@@ -14,6 +14,7 @@ from tireroad.fem.errors import ConvergenceError, InputError, UnsuitedSettings
 from tireroad.runs.files.cache import NO_CACHE, Cache
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.disk import write_text
+from tireroad.runs.files.present import CHOSEN
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
 from tireroad.runs.scene.plan import STAGES
@@ -151,8 +152,8 @@ class Search:
     def _keep(self, trial: Trial) -> None:
         """Complete the run with a trial's settings from its stages; write its scene. Collective."""
         chosen = applied(self.scene, trial.settings)
-        on_root(self.comm, lambda: write_text(self.directory / kept.CHOSEN, signed(dumps(chosen))))
-        observe.say(f"  chosen: {trial.settings}; {self.directory / kept.CHOSEN} needs no search")
+        on_root(self.comm, lambda: write_text(self.directory / CHOSEN, signed(dumps(chosen))))
+        observe.say(f"  chosen: {trial.settings}; {self.directory / CHOSEN} needs no search")
         _tell(chosen, self._final(chosen))
         on_root(self.comm, lambda: kept.forget(self.directory))
 

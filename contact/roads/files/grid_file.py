@@ -60,7 +60,7 @@ def read_grid(
             rows,
             source,
             lengths=length_unit is None,
-            heights=length_unit is None and height_unit is None,
+            heights=None if height_unit else length_unit or "m",
         )
     except UNREADABLE as error:
         raise InputError(f"{source}: cannot be read ({error}); is it complete?") from error

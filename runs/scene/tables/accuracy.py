@@ -56,7 +56,8 @@ class Accuracy:
     budget: float | None = number(
         None,
         "s",
-        "duration of a search, including its part before an interruption, after which no further settings are tried",
+        "duration of the finished trials of a search, also of those before an interruption, after which no further settings "
+        "are tried",
         least=1,
         most=1e8,
     )

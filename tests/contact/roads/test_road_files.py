@@ -51,6 +51,14 @@ def test_heights_take_the_unit_of_lengths_where_they_have_none(tmp_path: Path) -
     assert road.highest(0, 0.1, 0, 0.05) == pytest.approx(Grid(X, Y, Z).highest(0, 0.1, 0, 0.05))
 
 
+def test_heights_in_micrometres_are_not_taken_for_millimetres(tmp_path: Path) -> None:
+    """A laser's file: to give the unit of lengths alone is the ordinary mistake."""
+    file = saved(tmp_path / "um.npz", 1e3, 1e6)
+    with pytest.raises(InputError, match='read as mm.*height_unit = "mm" or "um"'):
+        read_grid(file, length_unit="mm")
+    read_grid(file, length_unit="mm", height_unit="um")
+
+
 def test_smooth_road_in_millimetres_is_noticed_by_its_relief(tmp_path: Path) -> None:
     y = np.linspace(0.0, 0.4, 401)
     z = np.tile(5e-3 * np.sin(2 * np.pi * y / 0.2), (400, 1))

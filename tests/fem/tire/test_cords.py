@@ -18,6 +18,7 @@ from tireroad.fem.matrices.operators import ROTATION, Operators
 from tireroad.fem.sections.grid import PlyLine
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.virtual_work import Rolling, static_residual, tangent
+from tireroad.fem.tire.cord_forces import cord_forces
 from tireroad.fem.tire.face_rule import Face
 
 
@@ -70,6 +71,7 @@ def test_cords_without_strain_have_their_full_modulus(belted):
         body.u.x.array[:] = size * np.random.default_rng(1).standard_normal(len(body.u.x.array))
         tangents.append(Operators(body, 0.0).stiffness.getValuesCSR()[2])
     assert np.abs(tangents[1] - tangents[0]).max() < 1e-9 * np.abs(tangents[0]).max()
+    assert [one.compressed for one in cord_forces(body).values()] == [0.0] * 3
 
 
 def test_the_tangent_is_the_derivative_of_the_force(belted):

@@ -57,6 +57,13 @@ def until(folder: Path, text: str, key: str) -> None:
         summary.record(stage, "skipped", reason="--until static")
 
 
+def test_what_a_search_chose_for_another_scene_is_left_out(folder: Path) -> None:
+    (folder / "chosen.toml").write_bytes((folder / "scene.toml").read_bytes())
+    assert left_out(folder) == {}
+    finish(folder, OTHER)
+    assert left_out(folder) == {"chosen.toml": "it was chosen for another scene"}
+
+
 def test_a_finished_run_leaves_out_nothing(folder: Path) -> None:
     assert left_out(folder) == {}
     assert {name.partition("/")[0] for name in tireroad.load(folder)} == set(STAGES) - {"greens"}
