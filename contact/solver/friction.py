@@ -196,8 +196,10 @@ class _Lifting:
 
     def bearing(self, force: Array, turn: int) -> Array:
         """The normal forces (c,) N, zero where the bristles bear none."""
+        if not self._unbounded:
+            return force
         touching = force > 0
-        if self._unbounded and turn > PATIENCE and self._before is not None:
+        if turn > PATIENCE and self._before is not None:
             self._lifted = self._lifted | (touching != self._before)
         self._before = touching
         return np.where(self._lifted, 0.0, force)
