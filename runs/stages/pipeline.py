@@ -32,6 +32,7 @@ from tireroad.runs.scene.rules.road import check_road
 from tireroad.runs.scene.tables.scene import Scene
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.stage import Done, Part, Shared, Stage
+from tireroad.runs.stages.build.setup import Setup
 from tireroad.runs.stages.build.shared_road import share
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.parts import PARTS
@@ -130,6 +131,8 @@ def _parts(job: Job, reasons: Mapping[str, str], summary: Summary) -> dict[str, 
         if (found := _done(job, kind, done, reasons, summary)) is not None:
             done[kind.name] = found
         job.settle(done)
+        if found is not None and kind is Setup and "contact" not in reasons:
+            _ = found.product  # a road too narrow for the footprint is refused before the modes
     return done
 
 

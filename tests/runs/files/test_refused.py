@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 from synthetic_results import write_results
@@ -43,3 +44,15 @@ def test_a_refused_scene_writes_nothing_over(
     with pytest.raises(InputError, match="refused"):
         pipeline.run_scene(scene, folder, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_road_narrower_than_the_footprint_is_refused_before_the_modes(tmp_path: Path) -> None:
+    x, y = np.linspace(-1.0, 3.0, 81), np.linspace(-0.01, 0.01, 3)
+    np.savez(tmp_path / "road.npz", x=x, y=y, z=np.zeros((len(x), len(y))))
+    text = SCENE.partition("[road]")[0] + '[road]\nkind = "grid"\nfile = "road.npz"\n'
+    (tmp_path / "scene.toml").write_text(text + "[time]\nduration = 0.01\n")
+    scene, folder = load(tmp_path / "scene.toml"), tmp_path / "run"
+    with pytest.raises(InputError, match="the tire needs y from .* the road has -0.01 to 0.01 m"):
+        pipeline.run_scene(scene, folder, MPI.COMM_SELF, until=None, fresh=False, petsc_options=[])
+    assert (folder / "static.h5").exists()
+    assert not (folder / "modes.h5").exists()
