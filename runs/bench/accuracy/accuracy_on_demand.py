@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.contact.results.error_bars import Measured, bars, measured
 from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.timing import by_processor
 from tireroad.runs.bench.parts.kept import Records, every_case
@@ -22,13 +21,13 @@ from tireroad.runs.bench.parts.rolling_cases import (
     TIRES,
     Case,
     Driven,
-    Recorded,
     by_wheel,
     driven,
     recorded,
     sets,
     told_settings,
 )
+from tireroad.runs.bench.parts.truth import Truth
 from tireroad.runs.files.cache import Cache
 from tireroad.runs.measure.tabulate import Table
 from tireroad.runs.process import observe
@@ -107,13 +106,13 @@ def _outcome(folder: Path, case: Case, grid: Mapping, forces: Path) -> Outcome:
     ended, trials = _searched(folder / case.road, scene)
     last = min(trials, key=lambda trial: worst(trial.found.over(scene.accuracy))[0])
     chosen = _driven(folder, ladders, last.settings)
-    truth = _Truth(exact, run_in(chosen.done.setup, scene.road))
+    truth = Truth(exact, run_in(chosen.done.setup, scene.road), UP_TO)
     true, best = truth.error(chosen), _cheapest(folder, ladders, grid, truth)
     estimated = TARGET * worst(last.found.over(scene.accuracy))[0]
     return Outcome(str(case), ended, estimated, true, _cost(last.seconds), best, _spent(trials))
 
 
-def _cheapest(folder: Path, ladders: Ladders, grid: Mapping, truth: _Truth) -> float | None:
+def _cheapest(folder: Path, ladders: Ladders, grid: Mapping, truth: Truth) -> float | None:
     """Seconds of the cheapest settings in the grid that meet the target, or None.
 
     Tried in the order of their estimated cost. Cost grows with every rung, so settings are skipped
@@ -177,24 +176,6 @@ def _spent(trials: list[Trial]) -> float:
             rungs = trial.settings.rungs
             once[stage, *(rungs[cause] for cause in DEPENDS.get(stage, rungs))] = value
     return sum(once.values())
-
-
-@dataclass(frozen=True)
-class _Truth:
-    """An `exact` run, and the time (s) from which runs are compared, as for error bars."""
-
-    exact: Recorded
-    since: float
-
-    def error(self, run: Recorded) -> float:
-        """The error that the target limits: the larger one of the axle force's history and mean."""
-        one, other = self._measured(self.exact), self._measured(run)
-        far = bars(one, other, 1.0)
-        return float(max(far.history[2], far.mean[2] / abs(one.mean[2])))
-
-    def _measured(self, run: Recorded) -> Measured:
-        force = run.forces["axle_force"]
-        return measured(force[round(self.since / run.step) :], run.step, UP_TO, UP_TO)
 
 
 def _summary(found: list[Outcome], failed: Sequence[str] = ()) -> Table:
