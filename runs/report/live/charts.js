@@ -67,7 +67,7 @@ function drawChart(given, box, key) {
   const plot = new uPlot({
     width: box.clientWidth, height: given.height,
     scales: { x: { time: false, distr: given.log ? 3 : 1, range: given.log ? (_, low, high) => [low, high] : undefined } },
-    axes: [{ ...axis(given.labels[0]), size: 34, ...(given.log ? { splits: round, filter: (_, ticks) => ticks } : {}) }, { ...axis(given.labels[1]), size: 52 }],
+    axes: [{ ...axis(given.labels[0]), size: 34, ...(given.log ? { splits: round, filter: (_, ticks) => ticks } : {}) }, { ...axis(given.labels[1]), size: 52, space: 16 }],
     series: [{ label: given.labels[0], value: (_, v) => digits(v) }, ...series],
     legend: { show: given.legend }, cursor: { sync: { key }, drag: { x: true, y: false } },
     hooks: readout ? { setCursor: [u => nearest(u, readout, given)] } : {},
