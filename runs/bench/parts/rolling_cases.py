@@ -4,6 +4,8 @@ runs, whose forces are stored so that a benchmark can resume and others share th
 from __future__ import annotations
 
 import hashlib
+import json
+import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -234,7 +236,8 @@ def recorded(scene: Scene, folder: Path, kept: Path, cache: Cache = NO_CACHE) ->
     """The forces of a run in a separate process, or those of the same scene that a benchmark stored
     in the folder `kept` (used whatever program version computed them, until deleted)."""
     bare = replace(scene, accuracy=Accuracy(estimate=False))
-    file = kept / f"{hashlib.sha256(dumps(bare).encode()).hexdigest()[:16]}.npz"
+    values = json.dumps(tomllib.loads(dumps(bare)), sort_keys=True)  # without the keys' comments
+    file = kept / f"{hashlib.sha256(values.encode()).hexdigest()[:16]}.npz"
     if not file.exists():
         apart(_record, bare, folder, file, cache)  # frees the memory of a fine run
     with np.load(file) as found:
