@@ -6,6 +6,8 @@ import sys
 import threading
 import time
 from contextlib import suppress
+from importlib.machinery import ExtensionFileLoader
+from types import FrameType
 from typing import Any
 
 _UNDER_NOHUP = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
@@ -75,13 +77,16 @@ def stop_on_signals() -> None:
 def raised() -> str:
     """The name of the signal for which `Stopped` was raised, or "".
 
-    Needed because an exception raised while a library loads its compiled part appears as that
-    library's own error.
+    Needed because an exception raised while a library is imported may appear as that library's own
+    error.
     """
     return _Heard.raised
 
 
-def _stop(number: int, _frame: Any) -> None:
+def _stop(number: int, frame: FrameType | None) -> None:
+    if _in_compiled_import(frame):
+        _repeat(number)
+        return
     now, before = time.monotonic(), _Heard.at
     if now - before < TOGETHER:
         return
@@ -97,13 +102,27 @@ def _stop(number: int, _frame: Any) -> None:
     current.asked = name
 
 
+def _in_compiled_import(frame: FrameType | None) -> bool:
+    """Whether the compiled part of a library is being loaded: an exception from Python code that
+    it calls meanwhile would pass through C++ and abort the process (nanobind)."""
+    while frame is not None:
+        if isinstance(frame.f_locals.get("self"), ExtensionFileLoader):
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _repeat(number: int) -> None:
+    """Send the signal to this process again in a moment."""
+    again = threading.Timer(0.1, os.kill, (os.getpid(), number))
+    again.daemon = True
+    again.start()
+
+
 def _not_lost(unraisable: Any) -> None:
     """Repeat a request that arrived where nothing can be raised (in a finaliser)."""
     if isinstance(unraisable.exc_value, Stopped):
         _Heard.at = -1e9
-        number = signal.Signals[str(unraisable.exc_value)]
-        again = threading.Timer(0.1, os.kill, (os.getpid(), number))
-        again.daemon = True
-        again.start()
+        _repeat(signal.Signals[str(unraisable.exc_value)])
     else:
         sys.__unraisablehook__(unraisable)
