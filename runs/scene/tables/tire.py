@@ -75,7 +75,9 @@ class Region:
         most=1,
     )
     material: Material | None = table(
-        Material, "material of the region; absent: that of the file", optional=True
+        Material,
+        "material of the region; absent: that of the file, or of [tire.material] in a torus",
+        optional=True,
     )
     dynamic: float = _dynamic()
     loss_factor: float = _loss_factor()

@@ -14,7 +14,7 @@ from tireroad.fem.sections.grid import Patch, PlyLine
 from tireroad.fem.sections.ring import Ring
 from tireroad.fem.sections.torus import Torus
 from tireroad.runs.scene.sections.kind import Proportions, SectionKind, section_kind
-from tireroad.runs.scene.sections.parts import cords_of
+from tireroad.runs.scene.sections.parts import cords_of, losses_of
 from tireroad.runs.scene.source import Source
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ class TorusSection(SectionKind):
 
     def rubbers(self, tire: Tire) -> dict[str, Material]:
         return {"wall": rubber(tire)} | {
-            patch(i, region).name: rubber(region) for i, region in enumerate(tire.region)
+            patch(i, region).name: rubber(tire, region) for i, region in enumerate(tire.region)
         }
 
     def cords(self, tire: Tire) -> list[Cords]:
@@ -230,12 +230,13 @@ def patch(which: int, region: Region) -> Patch:
     return Patch(f"tire.region {which}", arcs, region.depth)
 
 
-def rubber(part: Tire | Region) -> Material:
-    """The compound of the wall or of one of its regions."""
+def rubber(tire: Tire, region: Region | None = None) -> Material:
+    """The compound of the wall, or of one of its regions, which has from [tire] what it does not
+    say."""
     from tireroad.fem.tire.material import Material
     from tireroad.runs.scene.tables.tire import Material as Table
 
-    table = part.material or Table()
-    return Material(
-        law=table.law, density=table.density, dynamic=part.dynamic, loss_factor=part.loss_factor
-    )
+    own = None if region is None else region.material
+    table = own or tire.material or Table()
+    losses = {"dynamic": tire.dynamic, "loss_factor": tire.loss_factor} | losses_of(region)
+    return Material(law=table.law, density=table.density, **losses)
