@@ -181,6 +181,10 @@ class PreparedRoad:
         s = np.minimum(np.maximum(ahead / self._run_in, 0.0), 1.0)
         return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
+    def share(self, along: float) -> float:
+        """The share of its height that the run-in leaves at x = `along` (m) of the road itself."""
+        return float(self._share(np.array(along - self._shift[0] - self._lead)))
+
     @property
     def grown(self) -> float:
         """x (m) from which on the heights are whole, behind the run-in."""

@@ -8,12 +8,14 @@ from tireroad.contact.results.relief import Relief, nothing_met, relief_seen
 from tireroad.contact.setup import ContactSetup
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.scene.rules.road import without_relief
+from tireroad.runs.scene.rules.road import foot, within_run_in, without_relief
 from tireroad.runs.scene.tables.road import Road
 from tireroad.runs.stages.base.record import Record
 
 # Share of the road's standard deviation that the points have to see.
 _SEEN = 0.5
+# Share of its height from which on an obstacle counts as whole.
+_WHOLE = 0.98
 
 
 def describe(record: Record, setup: ContactSetup, road: Road) -> None:
@@ -28,6 +30,8 @@ def describe(record: Record, setup: ContactSetup, road: Road) -> None:
         record.headline["mean profile depth"] = (texture.depth, "m")
     if road.kind != "flat" and nothing_met(setup):
         record.warnings.append(without_relief(road, *setup.road.passed))
+    elif (share := setup.road.share(foot(road))) < _WHOLE:
+        record.warnings.append(within_run_in(road, share))
     elif (relief := relief_seen(setup)) is not None:
         _describe_smoothing(record, setup, relief)
 

@@ -148,3 +148,12 @@ def test_texture_never_repeats_and_keeps_its_variance_along() -> None:
     spectrum = np.abs(np.fft.rfft(rows, 2 * len(x), axis=1)) ** 2
     correlation = np.fft.irfft(spectrum.mean(axis=0))[: len(x) // 2] / len(x)
     assert np.abs(correlation[round(0.1 / pitch) :]).max() < 0.15
+
+
+def test_the_share_of_its_height_that_the_run_in_leaves() -> None:
+    """A cleat within it is met lower: a tenth of its force, without a word."""
+    cleat = make_road(kind="cleat", height=2e-3, position=0.13, run_in=0.1, start=0.02)
+    road = cleat.prepare(0.08, 1.0, -0.1, 0.1)
+    top = 0.14  # of the cleat, along the road itself
+    assert road.share(top) == pytest.approx(road.height(np.array([0.12]), np.zeros(1))[0] / 2e-3)
+    assert 0 < road.share(top) < 0.5 and road.share(0.05) == 0.0 and road.share(0.21) == 1.0

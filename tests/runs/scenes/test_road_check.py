@@ -81,6 +81,25 @@ def test_check_says_that_a_cleat_is_out_of_reach(scene: Path, more: list[str], s
     assert ('warning: the road (kind = "cleat") has no relief under the run' in told) == said
 
 
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["position=0.07"], True),
+        (["position=0.07", "run_in=0"], False),
+        (["position=0.6"], False),
+        (["position=0.07", "start=-1"], False),
+        (["position=0.07", "drum_radius=1.0"], False),  # met whole in the next turn
+    ],
+)
+def test_check_says_that_a_cleat_lies_in_the_run_in(
+    scene: Path, more: list[str], said: bool
+) -> None:
+    text = SCENE.replace('"grid"', '"cleat"').replace('file = "road.npz"\n', "")
+    scene.write_text(text.replace("speed = 50", "speed = 50\nrolling_radius = 0.3"))
+    told = explain(load(scene, [f"road.{one}" for one in more]))
+    assert ("warning: the cleat at x = 0.07 m lies in the run-in" in told) == said
+
+
 def test_check_opens_the_file(scene: Path) -> None:
     (scene.parent / "road.npz").write_bytes(b"PK\x03\x04 no more")
     with pytest.raises(InputError, match=r"road\.npz: cannot be read"):
