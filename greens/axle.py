@@ -106,5 +106,6 @@ def by_momentum(response: Response, total: np.ndarray, frequency: np.ndarray) ->
         output=response.momentum,
         block_output=response.block_momentum,
         residual=nothing if response.left_out is None else response.left_out,
+        slope=None,
     )
     return from_moment(total, moment.receptance(frequency), frequency)

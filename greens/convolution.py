@@ -36,9 +36,12 @@ class Convolution:
         self._kernel = step * response.impulse(times)
         self._momentum = step * response.momentum_rate(times)
         self._direct = response.direct_momentum_rate()
+        # Answers to the rate of the force: of the outputs, and of the momentum's rate.
+        slope = 0.0 if response.slope is None else response.slope / step
+        self._slope = np.zeros((outputs + 3, forces)) + slope
         self._history = np.zeros((steps + 1, forces))
         self._n = 0
-        self.same_step, self.comm = response.residual, MPI.COMM_SELF
+        self.same_step, self.comm = response.residual + self._slope[:-3], MPI.COMM_SELF
 
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N that is already there at t = 0."""
@@ -47,7 +50,8 @@ class Convolution:
     def predict(self) -> np.ndarray:
         """Displacement (r,) m at the end of the step due to all earlier forces."""
         self._n += 1
-        return _convolve(self._kernel[: self._n], self._history[: self._n])
+        past = _convolve(self._kernel[: self._n], self._history[: self._n])
+        return past - self._slope[:-3] @ self._history[self._n - 1]
 
     def advance(self, force: np.ndarray) -> None:
         """Set the force (k,) N at the end of the step."""
@@ -65,7 +69,8 @@ class Convolution:
     def inertia_force(self) -> np.ndarray:
         """Rate of change of the tire's momentum (3,), N."""
         past = _convolve(self._momentum[: self._n], self._history[: self._n])
-        return past + self._direct @ self._history[self._n]
+        change = self._history[self._n] - self._history[max(self._n - 1, 0)]
+        return past + self._direct @ self._history[self._n] + self._slope[-3:] @ change
 
 
 def _convolve(kernel: np.ndarray, history: np.ndarray) -> np.ndarray:

@@ -4,8 +4,8 @@
 
 with A as in modal.corner.Corner.moments, and u the motion of the states and of what follows a force
 statically. States z' = s z + P f with coordinates q = C z (real part) have the rates
-q' = C s z + C P f  and  q'' = C s^2 z + C s P f.  The term C P f', which vanishes for a complete
-set of states, is omitted, as for the momentum (Response.direct_momentum_rate).
+q' = C s z + C P f  and  q'' = C s^2 z + C s P f + C P f'.  C P vanishes for a complete set of states; what it
+is where some are made static is the response's slope (residual.made_static).
 """
 
 from __future__ import annotations
@@ -73,4 +73,5 @@ def reading(
         output=response.output + wanted @ by_state,
         block_output=response.block_output + wanted @ by_block,
         residual=response.residual + wanted @ direct,
+        moments=np.diff(wanted.tocsr().indptr) > 0,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 
 from tireroad.greens.response import Response
 
@@ -95,3 +95,17 @@ def _series(x: np.ndarray, order: int) -> np.ndarray:
     for k in range(14, -1, -1):
         out = out * x + 1 / math.factorial(k + order)
     return out
+
+
+def late_answers(response: Response, step: float, scheme: str) -> sparse.csr_matrix | None:
+    """What the outputs and the rate of momentum (r + 3, k) still answer to the step's first force.
+
+    It is missing in the answer to its last force: a pulse one step long responds to the mean of a
+    linear force over the step, and a slope (Response.slope) to the difference of both.
+    """
+    late = np.zeros((len(response.residual) + 3, response.residual.shape[1]))
+    if response.pulse and scheme == "linear":
+        late[: response.pulse] = response.residual[: response.pulse] / 2
+    if response.slope is not None:
+        late -= response.slope / step
+    return sparse.csr_matrix(late) if late.any() else None

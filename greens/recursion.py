@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.greens.one_step import NO_BLOCK, Block, weights
+from tireroad.greens.one_step import NO_BLOCK, Block, late_answers, weights
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 from tireroad.greens.response import Response
 from tireroad.greens.spread import Spread
@@ -70,12 +70,10 @@ class Recursion:
         self._add_same_step(response, into)
         self.ahead = self if self._idle else None
         self._next = self._answers_next(into) if self._idle else None
-        self._late = None
-        if response.pulse and scheme == "linear":
-            # A pulse one step long responds to the mean of a linear force over the step.
-            self._late = response.residual / 2
-            self._late[response.pulse :] = 0.0
-            self.same_step -= self._late
+        self._late = late_answers(response, step, scheme)
+        if self._late is not None:
+            self.same_step -= self._late[:-3].toarray()
+            self._into_rate -= self._late[-3:].toarray()
         self._force = np.zeros(response.residual.shape[1])
         self._rate = np.zeros(3)
         # Outputs at the end of this step; this process's and all known parts of the next step's.
@@ -138,9 +136,9 @@ class Recursion:
             self._out = self._reduce(self._seen())
         elif self._next is not None:
             self._out = self._known + self._next @ self._unknown
-        self._rate = self._out[-3:]
-        out = self._out[:-3]
-        return out if self._late is None else out + self._late @ self._force
+        out = self._out if self._late is None else self._out + self._late @ self._force
+        self._rate = out[-3:]
+        return out[:-3]
 
     def _move(self) -> None:
         """Advance the states to the end of the step, without a new force."""

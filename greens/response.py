@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg
 
 from tireroad.greens.hub import at_once, rates
-from tireroad.greens.residual.parted import parted
+from tireroad.greens.residual.made_static import block_made_static, poles_made_static
 from tireroad.modal.states import StateModes, growing
 
 # Radians a state may rotate in a step and stay dynamic. Undamped, bouncing on a stiff tread, up to
@@ -49,6 +49,8 @@ class Response:
     pulse: int = 0
     rigid: int = 0
     left_out: np.ndarray | None = None
+    moments: np.ndarray | None = None
+    slope: np.ndarray | None = None
 
     def impulse(self, times: np.ndarray) -> np.ndarray:
         """Green's functions g (t, r, k), m/(N s), without the residual's delta at t = 0."""
@@ -84,12 +86,14 @@ class Response:
             if len(self.block):
                 shifted = s * np.eye(len(self.block)) - self.block
                 H[k] += self.block_output @ np.linalg.solve(shifted, self.block_input)
+            if self.slope is not None:
+                H[k] += s * self.slope[:-3]
         return H
 
     def static(self) -> np.ndarray:
         """Displacement (r, k) per constant force, m/N, of the poles alone: H at 0 Hz."""
         static = -((self.output / self.eigenvalue) @ self.input).real
-        block, output, push = self._held_block()
+        block, output, push = self.held_block()
         if len(block):
             static -= output @ np.linalg.solve(block, push)
         return static
@@ -105,7 +109,7 @@ class Response:
         grows = growing(values)
         return int(grows.sum()), float(values.real[grows].max(initial=0.0))
 
-    def _held_block(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def held_block(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The block, its output and input, without rigid states, which are last and decoupled."""
         k = len(self.block) - self.rigid
         return self.block[:k, :k], self.block_output[:, :k], self.block_input[:k]
@@ -113,61 +117,27 @@ class Response:
     def spectral_moment(self) -> np.ndarray:
         """-dH/ds (r, k) at s = 0, m s/N: the first-order effect of damping under a slow force."""
         first = ((self.output / self.eigenvalue**2) @ self.input).real
-        block, output, push = self._held_block()
+        block, output, push = self.held_block()
         if len(block):
             first += output @ np.linalg.solve(block, np.linalg.solve(block, push))
         return first
 
     def keeping(self, keep: np.ndarray) -> Response:
         """The poles where `keep` (q,) is true stay dynamic; the others follow statically."""
-        if keep.all():
-            return self
-        following = self.input[~keep] / self.eigenvalue[~keep, None]
-        gone, left_out = self.output[:, ~keep] @ following, self.left_out
-        if left_out is not None:
-            left_out = left_out - (self.momentum[:, ~keep] @ following).real
-        return replace(
-            self,
-            left_out=left_out,
-            eigenvalue=self.eigenvalue[keep],
-            output=self.output[:, keep],
-            input=self.input[keep],
-            momentum=self.momentum[:, keep],
-            residual=self.residual - gone.real,
-        )
+        return self if keep.all() else poles_made_static(self, keep)
 
     @property
     def every(self) -> np.ndarray:
         """All eigenvalues but the rigid ones, the block's last: (q + b - rigid,) 1/s."""
-        return np.concatenate([self.eigenvalue, np.linalg.eigvals(self._held_block()[0])])
+        return np.concatenate([self.eigenvalue, np.linalg.eigvals(self.held_block()[0])])
 
     def keeping_where(self, wanted: Callable[[np.ndarray], np.ndarray]) -> Response:
         """Keep states of `wanted` eigenvalues, and rigid ones; the others follow statically."""
         values = self.every
         stays = wanted(values)
-        poles = self.keeping(stays[: len(self.eigenvalue)])
-        return poles._block_keeping(values[len(self.eigenvalue) :], stays[len(self.eigenvalue) :])
-
-    def _block_keeping(self, values: np.ndarray, stays: np.ndarray) -> Response:
-        """The same for the block alone."""
-        if stays.all():
-            return self
-        held, output, push = self._held_block()
-        momentum = self.block_momentum[:, : len(held)]
-        kept = parted(held, values, stays)
-        following = kept.following(push)
-        k, left_out = len(held), self.left_out
-        if left_out is not None:
-            left_out = left_out - momentum @ following
-        return replace(
-            self,
-            block=linalg.block_diag(kept.block, self.block[k:, k:]),
-            block_output=np.hstack([output @ kept.right, self.block_output[:, k:]]),
-            block_input=np.vstack([kept.left @ push, self.block_input[k:]]),
-            block_momentum=np.hstack([momentum @ kept.right, self.block_momentum[:, k:]]),
-            residual=self.residual - output @ following,
-            left_out=left_out,
-        )
+        count = len(self.eigenvalue)
+        poles, of_block = self.keeping(stays[:count]), stays[count:]
+        return poles if of_block.all() else block_made_static(poles, values[count:], of_block)
 
     def slow(self, step: float, limit: float = RESOLVED) -> np.ndarray:
         """Mask (q,) of the poles that `resolved` keeps."""
@@ -189,6 +159,8 @@ class Response:
             block_output=self.block_output @ self.block,
             residual=(self.output @ self.input).real + self.block_output @ self.block_input,
             pulse=0,
+            moments=None,
+            slope=None,
         )
 
     def between(self, outputs: slice, forces: slice) -> Response:
@@ -202,7 +174,14 @@ class Response:
             residual=self.residual[outputs, forces],
             pulse=sum(k < self.pulse for k in range(len(self.residual))[outputs]),
             left_out=None if self.left_out is None else self.left_out[:, forces],
+            moments=None if self.moments is None else self.moments[outputs],
+            slope=None if self.slope is None else self.slope[self._with_rates(outputs), forces],
         )
+
+    def _with_rates(self, outputs: slice) -> np.ndarray:
+        """Rows of some outputs and of the rate of momentum, of all of both."""
+        r = len(self.residual)
+        return np.append(np.arange(r)[outputs], [r, r + 1, r + 2])
 
     def joined(self, other: Response) -> Response:
         """Both sets of states between the same outputs and forces; no rigid `other`."""
@@ -218,7 +197,13 @@ class Response:
             block_momentum=np.hstack([other.block_momentum, self.block_momentum]),
             pulse=self.pulse,
             rigid=self.rigid,
+            moments=self.moments,
+            slope=_sum(self.slope, other.slope),
         )
+
+
+def _sum(one: np.ndarray | None, other: np.ndarray | None) -> np.ndarray | None:
+    return other if one is None else one if other is None else one + other
 
 
 def couple(

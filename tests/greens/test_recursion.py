@@ -144,6 +144,36 @@ def test_inertia_force_is_the_rate_of_momentum() -> None:
     assert np.abs(mean - second).max() < 1e-5 * np.abs(second).max()
 
 
+def test_the_axle_feels_fast_states_that_follow_statically() -> None:
+    """The states that stay are no complete set: what they lack answers to the rate of the force."""
+    whole = make(m=12, speed=60.0).response()
+    lowest, fastest = np.sort(np.abs(whole.eigenvalue))[[0, -2]]
+    response = whole.keeping_where(lambda s: np.abs(s) < fastest)
+    step, steps = 2e-3, 2000  # 4 s: the free vibration, damped by 4 1/s, is over at the end
+    phase = 0.1 * lowest * step * np.arange(steps + 1)
+    last = slice(steps - round(2 * np.pi / (phase[1])), None)
+
+    def rate(tire) -> np.ndarray:
+        """The rate of momentum in the last period."""
+        tire.start(np.zeros(4))
+        found = []
+        for new in np.sin(phase[1:])[:, None] * np.eye(4)[0]:
+            tire.predict()
+            tire.advance(new)
+            found.append(tire.inertia_force())
+        return np.array(found)[last]
+
+    def recursion(of) -> Recursion:
+        return Recursion(response=of, step=step, scheme="linear", comm=MPI.COMM_SELF)
+
+    bare = replace(response, slope=None)
+    exact, found, before = (rate(recursion(of)) for of in (whole, response, bare))
+    off, was = (np.abs(one - exact).max() / np.abs(exact).max() for one in (found, before))
+    assert off < 0.02 and was > 0.08
+    convolved = [rate(Convolution(response=of, step=step, steps=steps)) for of in (response, bare)]
+    assert convolved[0] - convolved[1] == pytest.approx(found - before, rel=1e-9, abs=1e-12)
+
+
 def test_too_long_a_convolution_is_refused() -> None:
     with pytest.raises(InputError, match="needs no history"):
         Convolution(response=make().response(), step=1e-6, steps=10**8)

@@ -18,6 +18,8 @@ _UNITS = {
     "momentum": "kg^1/2",
     "block_momentum": "kg^1/2",
 }
+# Of the rate of momentum, the last three rows of the slope, in s instead.
+_KNOWN = {"left_out": "kg m/N", "moments": "-", "slope": "m s/N"}
 
 
 def fill_response(file: h5py.File, name: str, response: Response, points: int) -> None:
@@ -30,8 +32,9 @@ def fill_response(file: h5py.File, name: str, response: Response, points: int) -
         put(file, f"{name}/{key}", getattr(response, key), unit)
     flexibility = (response.residual + response.static())[:points]
     put(file, f"{name}/static_flexibility", flexibility, "m/N")
-    if response.left_out is not None:
-        put(file, f"{name}/left_out", response.left_out, "kg m/N")
+    for key, unit in _KNOWN.items():
+        if (value := getattr(response, key)) is not None:
+            put(file, f"{name}/{key}", value, unit)
     file[name].attrs["rigid_states"] = response.rigid
     file[name].attrs["pulse"] = response.pulse
 
@@ -43,7 +46,7 @@ def read_responses(file: h5py.File) -> dict[str, Response]:
             **{key: group[key][:] for key in _UNITS},
             pulse=int(group.attrs["pulse"]),
             rigid=int(group.attrs["rigid_states"]),
-            left_out=group["left_out"][:] if "left_out" in group else None,
+            **{key: group[key][:] for key in _KNOWN if key in group},
         )
         for name, group in file.items()
         if "output" in group
