@@ -76,7 +76,7 @@ def load(
 def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:
     """Dataclass `of` from a raw table; bad values are noted and replaced by their defaults."""
     if not isinstance(raw, dict):
-        source.add(path, f"must be a table, not {described(raw)}")
+        source.add(path, _no_table(path, raw))
         return of()
     before = len(source.problems)
     values = {}
@@ -102,6 +102,14 @@ def _table(of: type, raw: Any, path: tuple[str, ...], source: Source) -> Any:
         return of()
     _check_kinds(result, raw, path, source)
     return result
+
+
+def _no_table(path: tuple[str, ...], raw: Any) -> str:
+    """What a value that is not a table must be."""
+    if isinstance(raw, list) and raw and all(isinstance(one, dict) for one in raw):
+        header = ".".join(part for part in path if not part.isdigit())
+        return f"must be written [{header}] in the scene, and once"
+    return f"must be a table, not {described(raw)}"
 
 
 _WRONG = object()

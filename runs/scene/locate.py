@@ -35,9 +35,14 @@ def _paths(text: str) -> list[tuple[int, tuple[str, ...]]]:
 
 
 def line_of(text: str, path: tuple[str, ...]) -> int | None:
-    """The line of `path` (table, …, key), or of the innermost table that contains it."""
+    """The line of `path` (table, …, key), or of the innermost table that contains it.
+
+    A list of tables is where its first one is.
+    """
     best: tuple[int, int] | None = None
     for line_number, found in _paths(text):
+        if found == (*path, "0"):
+            found = path
         if path[: len(found)] == found and (best is None or len(found) > best[1]):
             best = (line_number, len(found))
     return best[0] if best else None

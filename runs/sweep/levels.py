@@ -26,7 +26,7 @@ _SURE = 0.95
 class Levels:
     """Levels of groups of members that differ in seeds only.
 
-    `names`; number of `seeds`; `level` (g, b) dB re 1 N and its `error` (g, b) dB at the `bands`,
+    `names`; number of `seeds` that have a level in any band; `level` (g, b) dB re 1 N and its `error` (g, b) dB at the `bands`,
     NaN where nothing is known.
     """
 
@@ -63,7 +63,9 @@ def levels(table: Gathered) -> Levels | None:
     found = [_mean(level[members], error[members]) for members in groups.values()]
     return Levels(
         names=tuple(groups),
-        seeds=tuple(len(members) for members in groups.values()),
+        seeds=tuple(
+            int(np.isfinite(level[members]).any(axis=1).sum()) for members in groups.values()
+        ),
         bands=bands,
         level=np.array([one for one, _ in found]),
         error=np.array([off for _, off in found]),

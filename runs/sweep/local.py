@@ -11,10 +11,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from tireroad.runs.process import observe
 from tireroad.runs.process.memory import available_memory
 from tireroad.runs.scene.extent.estimate import memory
+from tireroad.runs.stages.base import failed
 from tireroad.runs.sweep.definition import Sweep
 from tireroad.runs.sweep.members import Member
 
@@ -56,8 +58,16 @@ def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
 
     Each of the workers (runs.sweep.worker) takes one member after the other. They share a cache of
     finished stages, so that equal inputs are computed once: a member waits while another computes
-    what it needs. A worker that crashes is replaced; a stop signal ends all of them.
+    what it needs. What fails is not tried again for another member with the same inputs. A worker
+    that crashes is replaced; a stop signal ends all of them.
     """
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(prefix="failures-", dir=folder) as failures:
+        return _run(sweep, folder, at_a_time, Path(failures))
+
+
+def _run(sweep: Sweep, folder: Path, at_a_time: int, failures: Path) -> list[Ended]:
+    """As `run`; stages that fail are noted in the empty folder `failures`."""
     waiting = list(sweep.members)
     workers: list[_Worker] = []
     started = 0
@@ -69,7 +79,7 @@ def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
                 one.close()
             while waiting and len(workers) < at_a_time:
                 started += 1
-                workers.append(_Worker(sweep, folder, started))
+                workers.append(_Worker(sweep, folder, started, failures))
             for one in workers:
                 if not one.member and waiting:
                     one.take(waiting.pop(0))
@@ -90,12 +100,13 @@ def run(sweep: Sweep, folder: Path, at_a_time: int) -> list[Ended]:
 class _Worker:
     """A process, or mpirun with several, that computes one `member` at a time; None when idle."""
 
-    def __init__(self, sweep: Sweep, folder: Path, number: int) -> None:
+    def __init__(self, sweep: Sweep, folder: Path, number: int, failures: Path) -> None:
         self.member: Member | None = None
         self._sweep, self._folder, self._logs = sweep, folder, folder / "logs"
         self._logs.mkdir(parents=True, exist_ok=True)
         settings = {
             "TIREROAD_CACHE": str((folder / "cache").resolve()),
+            failed.VARIABLE: str(failures.resolve()),
             "OPENBLAS_NUM_THREADS": "1",  # as a run alone: runs.start
             "OMP_NUM_THREADS": "1",
         }

@@ -126,10 +126,12 @@ def _about(compared: Levels) -> str:
         f"{compared.names[compared.with_bands[0]]}, in dB, with what the runs' error bars tell of it; "
         "where there is no bar nothing is known."
     )
-    if max(compared.seeds) > 1:
+    least, most = (f([compared.seeds[k] for k in compared.with_bands]) for f in (min, max))
+    if most > 1:
+        number = f"{most}" if least == most else f"{least} to {most}"
         text += (
-            f" Mean power over {min(compared.seeds)} to {max(compared.seeds)} seeds; the bars hold the true mean of "
-            "all seeds in 95 of 100 cases."
+            f" Mean power over {number} seeds; the bars hold the true mean of all seeds in 95 of "
+            "100 cases."
         )
     return text
 

@@ -228,6 +228,7 @@ class Loader:
         show: Show,
         start: float = 0.0,
         fall: Attempt | None = None,
+        enough: Callable[[], bool] = lambda: False,
     ) -> None:
         """`path.stepping.march` that counts all steps and reports the converged ones."""
 
@@ -241,7 +242,7 @@ class Loader:
 
             return tried
 
-        march(seen(attempt), start, end, first, show, fall and seen(fall))
+        march(seen(attempt), start, end, first, show, fall and seen(fall), enough)
 
     def tell(self, what: str, value: float, unit: str, step: Step) -> None:
         loads = self.equilibrium.load(), self.equilibrium.points()

@@ -36,11 +36,13 @@ def march(
     first: float,
     show: Show,
     fall: Attempt | None = None,
+    enough: Callable[[], bool] = lambda: False,
 ) -> None:
     """From a converged `start` to `end` in steps, the first of size `first`. Collective.
 
-    If steps keep failing, `fall` searches for a state not near the last one (path.snap). Raises
-    LoadingStopped if steps of a ten-thousandth of the first do not converge either.
+    If steps keep failing, `fall` searches for a state not near the last one (path.snap). Ends
+    before `end` after a converged step that is `enough`. Raises LoadingStopped if steps of a
+    ten-thousandth of the first do not converge either.
     """
     done, size, failures = start, first, 0
     while True:
@@ -52,7 +54,7 @@ def march(
             step = fall(target)
         if step.converged:
             done, failures = target, 0
-            if done == end:
+            if done == end or enough():
                 return
             size = min(_LARGEST * first, 2 * size) if step.iterations <= _EASY else size
             continue

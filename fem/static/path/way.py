@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 LOAD_TOLERANCE = 1e-9  # of the requested load; a tenth of the tolerance of other comparisons
 _REACH = 2.2  # times the largest deflection so far: limit of the next trial
 _NEAR = 0.1  # of a requested load: residual allowed in intermediate states
+_CLOSED, _JUMP = 1e-6, 0.01  # of a deflection: bracket, across which that part of a load is a jump
 
 
 @dataclass(frozen=True)
@@ -59,23 +60,17 @@ class Way:
         self._body.u.x.array[:] = self._known[0].displacement
         trial = 0.4 * self._body.ring.thickness
         for _ in range(60):
-            self.to(trial, allowed)
-            rounding = self._equilibrium.rounding
-            if not allowed and abs(self._known[-1].load - load) <= max(
-                LOAD_TOLERANCE * load, rounding
-            ):
-                return trial
+            self.to(trial, allowed, load)
+            last, rounding = self._known[-1], self._equilibrium.rounding
+            if not allowed and abs(last.load - load) <= max(LOAD_TOLERANCE * load, rounding):
+                return last.deflection
             trial = self._next_deflection(load)
             if trial < 0.99 * _REACH * max(k.deflection for k in self._known):
                 if self._meet(load, trial):
                     return self._loader.deflection
                 if allowed:  # from here on the bracket must close
                     self._known, allowed = self._known[:1], 0.0
-        nearest = min(self._known, key=lambda k: abs(k.load - load))
-        raise ConvergenceError(
-            f"static: the load of {load:g} N was not met in 60 trials; nearest is {nearest.load:g} N. "
-            "Give static.deflection instead, or refine the mesh."
-        )
+        raise self._not_met(load, "in 60 trials")
 
     def _meet(self, load: float, trial: float) -> bool:
         """Solve for state and road height at the given load, from the estimate at `trial`."""
@@ -92,16 +87,18 @@ class Way:
 
     def _guess(self, trial: float) -> bool:
         """Extrapolate from the two known states nearest to a deflection; False without two."""
-        near = sorted(self._known, key=lambda k: abs(k.deflection - trial))[:2]
-        if len(near) < 2:
+        near, *others = sorted(self._known, key=lambda k: abs(k.deflection - trial))
+        apart = [k for k in others if k.deflection != near.deflection]  # `visit` may repeat one
+        if not apart:
             return False
-        reach = (trial - near[0].deflection) / (near[0].deflection - near[1].deflection)
-        change = near[0].displacement - near[1].displacement
-        self._body.u.x.array[:] = near[0].displacement + reach * change
+        reach = (trial - near.deflection) / (near.deflection - apart[0].deflection)
+        change = near.displacement - apart[0].displacement
+        self._body.u.x.array[:] = near.displacement + reach * change
         return True
 
-    def to(self, trial: float, allowed: float = 0.0) -> None:
-        """Solve at the trial deflection from the estimate, otherwise in steps.
+    def to(self, trial: float, allowed: float = 0.0, load: float = np.inf) -> None:
+        """Solve at the trial deflection from the estimate, otherwise in steps, which end early at
+        a state with more than `load` (N).
 
         Converged states, with up to `allowed` (N) of residual, are recorded as known.
         """
@@ -113,29 +110,65 @@ class Way:
                 return
         below = max((k for k in self._known if k.deflection <= trial), key=lambda k: k.deflection)
         self._body.u.x.array[:] = below.displacement
-        self._raise_road(below.deflection, trial, allowed)
+        self._raise_road(below.deflection, trial, allowed, load)
 
     def _next_deflection(self, load: float) -> float:
         """Next trial: secant through the two loads nearest to the requested one, kept inside the
         bracket."""
-        below = max((k for k in self._known if k.load <= load), key=lambda k: k.deflection)
-        above = [k.deflection for k in self._known if k.load > load]
+        below, above = self._bracket(load)
         far, near = sorted(self._known, key=lambda k: -abs(k.load - load))[-2:]
         rise, run = near.load - far.load, near.deflection - far.deflection
         slope = rise / run if run else 0.0
         secant = near.deflection + (load - near.load) / slope if slope > 0 else np.inf
         if above:
-            low, high = below.deflection, min(above)
+            low, high = below.deflection, above.deflection
             return secant if low < secant < high else (low + high) / 2
         farthest = self._loader.farthest
         if below.deflection >= farthest:
             raise ConvergenceError(
                 f"static: the tire carries {below.load:.4g} N at {below.deflection:.4g} m of deflection, where the "
-                f"road reaches the rim; {load:g} N is out of reach. Lower static.load or raise static.inflation."
+                f"road reaches the rim; {load:g} N is out of reach{self._fall(load)}. Lower static.load, raise "
+                "static.inflation, or give static.deflection instead."
             )
         # Beyond the deflections tried the curve is unknown.
         least, most = np.minimum(np.array([1.01, _REACH]) * below.deflection, farthest)
         return float(np.clip(secant, least, most))
+
+    def _bracket(self, load: float) -> tuple[_Known, _Known | None]:
+        """The states around the first crossing: behind a snap, the load may fall below the requested
+        one again."""
+        deep = sorted(self._known, key=lambda k: k.deflection)
+        first = next((place for place, k in enumerate(deep) if k.load > load), None)
+        if first is None:
+            return deep[-1], None
+        below, above = deep[first - 1], deep[first]
+        width, jump = above.deflection - below.deflection, above.load - below.load
+        if width <= _CLOSED * above.deflection and jump > _JUMP * load:
+            raise self._not_met(load, f"at {above.deflection:.6g} m of deflection, where it jumps")
+        return below, above
+
+    def _not_met(self, load: float, where: str) -> ConvergenceError:
+        nearest = min(self._known, key=lambda k: abs(k.load - load))
+        return ConvergenceError(
+            f"static: the load of {load:g} N was not met {where}; nearest is {nearest.load:g} N"
+            f"{self._fall(load)}. Give static.deflection instead, or refine the mesh."
+        )
+
+    def _fall(self, load: float) -> str:
+        """Where the load falls most from a known state to the next deeper one, for a message.
+
+        Nothing for a fall that the residual of intermediate states may feign.
+        """
+        path = sorted(self._known, key=lambda k: k.deflection)
+        one, next_ = max(
+            zip(path, path[1:], strict=False), key=lambda two: two[0].load - two[1].load
+        )
+        if one.load - next_.load <= _NEAR * load:
+            return ""
+        return (
+            f"; the load falls with deflection (snap-through), from {one.load:.4g} N at {one.deflection:.4g} m "
+            f"to {next_.load:.4g} N at {next_.deflection:.4g} m"
+        )
 
     def _learnt(self, step: Step, deflection: float) -> Step:
         """The step itself; if it converged, its state is recorded as known. Collective."""
@@ -144,8 +177,11 @@ class Way:
             self._known.append(_Known(deflection, load, field.copy()))
         return step
 
-    def _raise_road(self, start: float, end: float, allowed: float) -> None:
-        """Raise the road in steps and record each state."""
+    def _raise_road(self, start: float, end: float, allowed: float, load: float = np.inf) -> None:
+        """Raise the road in steps, until it carries more than `load` (N), and record each state.
+
+        Steps beyond that load would lead through a snap, to states of no use.
+        """
 
         field, road = self._body.u.x, self._equilibrium.road
 
@@ -164,4 +200,8 @@ class Way:
             return self._learnt(fall(self._equilibrium, height, allowed), deflection)
 
         largest = 0.25 * self._body.ring.thickness
-        self._loader.march(attempt, end, largest, Show("deflection", 1.0, "m"), start, let_go)
+        show = Show("deflection", 1.0, "m")
+        self._loader.march(attempt, end, largest, show, start, let_go, lambda: self._above(load))
+
+    def _above(self, load: float) -> bool:
+        return self._known[-1].load > load

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
+from tireroad.fem.errors import ConvergenceError
 from tireroad.fem.garbage import collect
 from tireroad.runs.files import store
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
+from tireroad.runs.stages.base import failed
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.solver_settings import solver_settings
 from tireroad.runs.stages.base.stage import Done, Stage
+
+P = TypeVar("P")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,11 +46,21 @@ def obtained(stage: Stage) -> Obtained:
         if settings := solver_settings(name, job.scene):
             observe.log(settings)
         record = Record()
-        product = stage.produce(key, record)
+        product = _produced(stage, key, record)
         collect(job.comm)
         figures = vars(record).copy()
         on_root(job.comm, lambda: job.cache.keep(name, key, path, figures))
     return Obtained(done=Done(key, lambda: product), record=record)
+
+
+def _produced(stage: Stage[P], key: str, record: Record) -> P:
+    """The computed product; a failure is kept for the other members of a sweep. Collective."""
+    try:
+        return stage.produce(key, record)
+    except ConvergenceError as error:
+        if stage.job.comm.rank == 0:  # not on_root: other processes need not have failed
+            failed.remember(stage.name, key, stage.job.scene.name, error)
+        raise
 
 
 def _looked_up(stage: Stage, key: str, claim: ExitStack) -> tuple[str, str, dict[str, Any]]:
@@ -54,7 +68,8 @@ def _looked_up(stage: Stage, key: str, claim: ExitStack) -> tuple[str, str, dict
 
     Returns why the stage has to be computed ("" if not), by which run the product was computed, and
     the figures that this folder's summary lacks. A stage to be computed is claimed: another run
-    that needs it waits until it is in the cache. Root process only.
+    that needs it waits until it is in the cache. Raises ConvergenceError if another member of the
+    sweep failed to compute it. Root process only.
     """
     job, name = stage.job, stage.name
     if job.fresh:
@@ -66,5 +81,6 @@ def _looked_up(stage: Stage, key: str, claim: ExitStack) -> tuple[str, str, dict
     claim.enter_context(job.cache.claimed(name, key))
     figures = job.cache.fetch(name, key, path)
     if figures is None:
+        failed.check(name, key)
         return reason, "", {}
     return "", "by another run", figures

@@ -183,7 +183,7 @@ def test_a_second_sweep_into_the_same_folder_is_refused(folder: Path) -> None:
 
 def test_a_sweep_runs_gathers_and_shares(folder: Path, launch) -> None:
     path = folder / "family.toml"
-    members = {"light": "2e5", "same": "2e5", "burst": "1e8"}
+    members = {"light": "2e5", "same": "2e5", "burst": "1e8", "again": "1e8"}
     text = "".join(
         f'[[member]]\nname = "{name}"\nset = {{ "static.inflation" = {pressure}, "damping.mass" = {k}.0 }}\n'
         for k, (name, pressure) in enumerate(members.items())
@@ -194,13 +194,17 @@ def test_a_sweep_runs_gathers_and_shares(folder: Path, launch) -> None:
     # A pressure that the tire does not hold fails; the others are kept, and the failure is named.
     assert done.returncode == 3 and "light: done" in done.stdout
     assert "burst: a solver gave up" in done.stdout
+    # Nor is a failure computed twice: the second says whose it is.
+    assert "again: a solver gave up" in done.stdout and "(as in burst, which failed" in done.stdout
+    assert not list(out.glob("failures-*"))
     with (out / "sweep.csv").open() as file:
         rows = {row["member"]: row for row in csv.DictReader(file)}
     # Damping takes no part in the static state and the modes: computed once for both.
     assert rows["light"]["modes: lowest (Hz)"] == rows["same"]["modes: lowest (Hz)"] != ""
     assert rows["burst"]["modes: lowest (Hz)"] == ""
     logs = {name: (out / "logs" / f"{name}.txt").read_text() for name in members}
+    assert "inflation" in logs["burst"] and "  inflation" not in logs["again"]
     assert "modes     done" in logs["light"] and "modes     reused" in logs["same"]
     with h5py.File(out / "sweep.h5") as file:
-        assert file["axis/static.inflation"][:].tolist() == [2e5, 2e5, 1e8]
+        assert file["axis/static.inflation"][:].tolist() == [2e5, 2e5, 1e8, 1e8]
     assert (out / "sweep.html").read_text().count("did not end well") == 1

@@ -56,7 +56,17 @@ def test_a_member_without_results_is_left_out_of_the_mean() -> None:
     found = levels(table({"road.seed": (1, 2, 3, 4)}, level, None))
     kept = 10 ** (LOUD[[0, 2, 3]] / 10)
     np.testing.assert_allclose(found.level[0], 10 * np.log10(kept.mean(axis=0)))
+    assert found.seeds == (3,)
     assert levels(Gathered(("a",), {}, (), ())) is None
+
+
+def test_the_caption_counts_the_seeds_that_have_levels() -> None:
+    """It counted failed seeds too: "3 to 3 seeds" of a mean over two."""
+    level = np.vstack([LOUD[:3], LOUD[:3] + 3.0, np.full((3, 2), np.nan)])
+    given = {"damping.mass": (1,) * 3 + (2,) * 3 + (3,) * 3, "road.seed": (1, 2, 3) * 3}
+    assert any("over 3 seeds" in text for _, text in _figures(table(given, level, None)))
+    level[1] = np.nan
+    assert any("over 2 to 3 seeds" in text for _, text in _figures(table(given, level, None)))
 
 
 def test_the_page_draws_the_differences() -> None:

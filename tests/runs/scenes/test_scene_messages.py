@@ -1,5 +1,6 @@
 """All that is wrong with a scene is said at once, short, with what to do."""
 
+import pytest
 from full_scene import FULL, refused
 
 from tireroad.runs.scene.load import load
@@ -117,3 +118,20 @@ def test_a_spread_force_that_reaches_beyond_the_bead_names_the_key(scene_file) -
     assert "force.0.spread" in (said := refused(scene_file(force.format(arc=110.0))))
     assert "10 at most" in said
     assert load(scene_file(force.format(arc=-109.0))).force[0].spread == (12.0, 11.0)
+
+
+@pytest.mark.parametrize(
+    "table", ["road", "tire", "static", "axle", "contact", "road.motion", "tire.material"]
+)
+def test_a_table_written_as_a_list_is_said_with_its_line(scene_file, table: str) -> None:
+    """It said "must be a table, not [{..." and of the first level no line."""
+    message = refused(scene_file(f"name = 'a'\n\n[[{table}]]\n"))
+    assert f", line 3: {table} must be written [{table}] in the scene" in message
+    assert message.count("\n") == 0
+
+
+def test_a_list_written_as_a_table_is_said_with_its_line(scene_file) -> None:
+    message = refused(scene_file("name = 'a'\n\n[force]\n"))
+    assert ", line 3: force must be written [[force]] in the scene" in message
+    inner = "[[tire.region]]\n[[tire.region.material]]\n"
+    assert "must be written [tire.region.material]" in refused(scene_file(inner))

@@ -1,0 +1,36 @@
+"""Failures of stages during one sweep, so that members that share a stage do not repeat them.
+
+The environment variable TIREROAD_FAILURES names a folder with a file for each stage that has
+failed, by its name and the hash of its inputs. A sweep on this machine gives its workers an empty
+one. Without it nothing is remembered: a run by itself may be tried again.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from tireroad.fem.errors import ConvergenceError
+from tireroad.runs.files.disk import write_text
+
+VARIABLE = "TIREROAD_FAILURES"
+
+
+def remember(stage: str, key: str, run: str, error: ConvergenceError) -> None:
+    """Keep why the stage of a `run` failed, if failures are kept. Root process only."""
+    if (file := _file(stage, key)) and not file.exists():
+        with suppress(OSError):
+            write_text(file, f"{error} (as in {run}, which failed first and has the same inputs)")
+
+
+def check(stage: str, key: str) -> None:
+    """Raise ConvergenceError if the stage has failed on these inputs. Root process only."""
+    file = _file(stage, key)
+    if file and file.exists():
+        raise ConvergenceError(file.read_text(encoding="utf-8"))
+
+
+def _file(stage: str, key: str) -> Path | None:
+    folder = os.environ.get(VARIABLE)
+    return Path(folder) / f"{stage}-{key}.txt" if folder else None
