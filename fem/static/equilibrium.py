@@ -90,7 +90,7 @@ class Equilibrium(Forces):
         loop: a dof is held if f - c gap > 0 with its own stiffness c, which is complementarity for
         any c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Each new
         tangent settles the set (LinearContact) and is reused while each step leaves at most a fifth
-        of the error.
+        of the error, or what a new one would leave (`lag`).
         """
         field = self.body.u.x
         kept, self._contact = (field.array.copy(), self.road.kept()), None
@@ -105,7 +105,7 @@ class Equilibrium(Forces):
                 return self.solved(Step(True, tangents, error, reason))
             closing = None
             changed = changed or bool(self._contact and self._contact.changed)
-            if not reason and (changed or not error < _SERVES * last):
+            if not reason and (changed or not error < max(_SERVES, self.lag) * last):
                 tangents += 1
                 reason = "" if self._take_tangent() else "the tangent is singular"
                 closing = self._system.closing
@@ -174,8 +174,9 @@ class Equilibrium(Forces):
         with self.cost("assembly"):
             self._assemble_tangent()
             along = self._in_its_coordinates
-            matrix = self.matrix if along is None else along.tangent(self.matrix)
-        taken = self._system.take(matrix, self.road.held, *self.road.steps())
+            if along is not None:
+                along.tangent(self.matrix)
+        taken = self._system.take(self.matrix, self.road.held, *self.road.steps())
         self._contact = self._make_contact() if taken else None
         return taken
 

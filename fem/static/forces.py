@@ -47,6 +47,11 @@ class Forces:
         self._work = fem.petsc.create_vector(self._residual)
         self._rim = (3 * body.rim[body.rim < body.nodes, None] + np.arange(3)).ravel()
 
+    @property
+    def lag(self) -> float:
+        """Most of an error that a Newton step leaves because its tangent is incomplete."""
+        return self._damping.lag if self._damping else 0.0
+
     def _assemble_residual(self) -> np.ndarray:
         """Residual forces at the owned dofs, N; 0 on the rim, where the wheel takes them."""
         if self._damping:
@@ -67,7 +72,7 @@ class Forces:
         if self.drag:
             self.drag.stiffen(self._local_tangent)
         if self._damping:
-            self.matrix = self._damping.added_to(self._local_tangent)
+            self.matrix = self._damping.completed(self._local_tangent)
 
     def _inside_out(self) -> bool:
         """Whether det F <= 0 at some Gauss point: the energy does not distinguish J from -J."""
