@@ -90,8 +90,7 @@ class Equilibrium(Forces):
         loop: a dof is held if f - c gap > 0 with its own stiffness c, which is complementarity for
         any c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Each new
         tangent settles the set (LinearContact) and is reused while each step leaves at most a fifth
-        of the error, or what a new one would leave (`lag`).
-        """
+        of the error, or what a new one would leave (`lag`)."""
         field = self.body.u.x
         kept, self._contact = (field.array.copy(), self.road.kept()), None
         self.road.height = -np.inf if road_height is None else road_height
@@ -131,9 +130,7 @@ class Equilibrium(Forces):
 
     def _predict(self, road_height: float) -> bool:
         """Move from the last solution to the estimate for `road_height` (m) by the last tangent and
-        its active sets. False if there is none, the body has left that state or the step fails.
-        Collective.
-        """
+        its sets. False if there is none, the body has left that state or it fails. Collective."""
         moved = np.abs(self._solved - self.body.u.x.array).max(initial=0.0)
         stays = bool(moved <= _STAYS * self.body.ring.thickness)
         if self._contact is None or not self.body.comm.allreduce(stays, op=MPI.LAND):
@@ -173,8 +170,7 @@ class Equilibrium(Forces):
         """Assemble and factorise the tangent at the present state, held dofs moving to the road."""
         with self.cost("assembly"):
             self._assemble_tangent()
-            along = self._in_its_coordinates
-            if along is not None:
+            if (along := self._in_its_coordinates) is not None:
                 along.tangent(self.matrix)
         taken = self._system.take(self.matrix, self.road.held, *self.road.steps())
         self._contact = self._make_contact() if taken else None
@@ -202,7 +198,11 @@ class Equilibrium(Forces):
         self._before.x.array[:] = self.body.u.x.array
         if not self._take_tangent():
             return float("nan")
-        force = self._system.solve(np.zeros(len(self._work.array_r)), self._system.raising)[1]
+        raising, lacking = self._system.raising, np.zeros(len(self._work.array_r))
+        for _ in range(self.rounds):
+            change, force = self._system.solve(-lacking, raising)
+            force += lacking[self.road.held]
+            lacking = self.lacking(change, self._in_its_coordinates)
         return self.body.comm.allreduce(self.road.upward(force))
 
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:

@@ -52,6 +52,7 @@ class ShapeDamping:
         self.lag = _MARGIN * radius if radius < _WEAK else 0.0
         self._stiffness_form = compat.form(ufl.derivative(elastic, body.u, body.trial))
         self._stiffness: PETSc.Mat | None = None
+        self._assembled = False
         self._product: PETSc.Mat | None = None
 
     def update(self) -> None:
@@ -63,17 +64,33 @@ class ShapeDamping:
 
     def completed(self, tangent: PETSc.Mat) -> PETSc.Mat:
         """tangent + gamma2 Omega K M^-1 B, always in the same matrix; the tangent if it lags."""
+        self._assembled = False
         if self.lag:
             return tangent
-        if self._stiffness is None:
-            self._stiffness = fem.petsc.create_matrix(self._stiffness_form)
-        self._stiffness.zeroEntries()
-        fem.petsc.assemble_matrix(self._stiffness, self._stiffness_form, bcs=self._clamp)
-        self._stiffness.assemble()
-        self._product = self._stiffness.matMult(self._rate_matrix, result=self._product)
+        stiffness = self._tangent_stiffness()
+        self._product = stiffness.matMult(self._rate_matrix, result=self._product)
         self._product.scale(self._factor)
         self._product.axpy(1.0, tangent, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         return self._product
+
+    def lacking(self, change: np.ndarray) -> np.ndarray:
+        """Forces gamma2 Omega K M^-1 B change (N) at the owned unknowns that the last tangent lacks;
+        `change` in m."""
+        self._in.array[:] = change
+        self._rate_matrix.mult(self._in, self._out)
+        self._tangent_stiffness().mult(self._out, self._in)
+        return self._factor * self._in.array_r
+
+    def _tangent_stiffness(self) -> PETSc.Mat:
+        """K at the displacement of the last tangent, of which it is a part."""
+        if self._stiffness is None:
+            self._stiffness = fem.petsc.create_matrix(self._stiffness_form)
+        if not self._assembled:
+            self._stiffness.zeroEntries()
+            fem.petsc.assemble_matrix(self._stiffness, self._stiffness_form, bcs=self._clamp)
+            self._stiffness.assemble()
+            self._assembled = True
+        return self._stiffness
 
 
 def _rates(body: Body, clamp: list[fem.DirichletBC]) -> tuple[PETSc.Mat, float]:

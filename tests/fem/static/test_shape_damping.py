@@ -9,6 +9,7 @@ from scipy.sparse.linalg import eigs
 from tireroad.fem.static import shape_damping
 from tireroad.fem.static.curved.shape import FLAT, RoadShape
 from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.friction.press import Friction
 from tireroad.fem.static.path.loading import Loader
 from tireroad.fem.static.press import place
 from tireroad.fem.static.virtual_work import Rolling
@@ -43,8 +44,14 @@ def test_a_step_leaves_the_spectral_radius_of_the_rate(make_body, csr) -> None:
     assert problem(make_body, 0.0).lag == 0.0
 
 
-@pytest.mark.mpi
-@pytest.mark.parametrize("road", [FLAT, RoadShape(camber=np.radians(2.0))], ids=["flat", "camber"])
+TILTED = RoadShape(camber=np.radians(2.0))
+
+
+@pytest.mark.parametrize(
+    "road",
+    [FLAT, pytest.param(TILTED, marks=[pytest.mark.long, pytest.mark.mpi])],
+    ids=["flat", "camber"],
+)
 def test_the_state_is_that_of_the_complete_tangent(make_body, monkeypatch, road) -> None:
     """Close to the most damping that the tangent does without: nearly half of an error remains."""
     found = []
@@ -56,10 +63,31 @@ def test_the_state_is_that_of_the_complete_tangent(make_body, monkeypatch, road)
         loader.inflate(2e5)
         place(loader, 800.0, None, None)
         body = equilibrium.body
-        found.append((body.displacement(), body.everywhere(equilibrium.contact_force())))
-    (motion, force), (other, reference) = found
+        state = body.displacement(), body.everywhere(equilibrium.contact_force())
+        found.append((*state, equilibrium.road_stiffness()))
+    (motion, force, stiffness), (other, reference, complete) = found
     np.testing.assert_allclose(motion, other, atol=1e-9 * np.abs(other).max())
     np.testing.assert_allclose(force, reference, atol=1e-9 * reference.max())
+    assert stiffness == pytest.approx(complete, rel=1e-7)
+
+
+def test_what_a_step_with_friction_gains_is_that_of_the_complete_tangent(
+    make_body, monkeypatch
+) -> None:
+    """Horizontal forces after a small change of the travel per radian."""
+    found = []
+    for weak in (shape_damping._WEAK, 0.0):
+        monkeypatch.setattr(shape_damping, "_WEAK", weak)
+        loader = Loader(problem(make_body, 1.2e-3), lambda progress: None)
+        loader.inflate(2e5)
+        friction = Friction(coefficient=0.5, radius=0.31, slip=(0.01, 0.005))
+        rubbing = place(loader, 800.0, None, None, friction).equilibrium
+        before = rubbing.road.pull.sum(axis=0)
+        rubbing.road.sliding.radius *= 1 + 1e-4
+        found.append((before, rubbing.nudged(800.0) - before))
+    (pull, gained), (whole, complete) = found
+    np.testing.assert_allclose(pull, whole, rtol=1e-7)
+    np.testing.assert_allclose(gained, complete, rtol=1e-3)
 
 
 @pytest.mark.parametrize("damping", [0.0, 1e-2])
