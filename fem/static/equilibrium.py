@@ -90,8 +90,7 @@ class Equilibrium(Forces):
         loop: a dof is held if f - c gap > 0 with its own stiffness c, which is complementarity for
         any c > 0 (Hintermueller, Ito, Kunisch 2003, doi 10.1137/S1052623401383558). Each new
         tangent settles the set (LinearContact) and is reused while each step leaves at most a fifth
-        of the error.
-        """
+        of the error, or what a new one would leave (`lag`)."""
         field = self.body.u.x
         kept, self._contact = (field.array.copy(), self.road.kept()), None
         self.road.height = -np.inf if road_height is None else road_height
@@ -105,7 +104,7 @@ class Equilibrium(Forces):
                 return self.solved(Step(True, tangents, error, reason))
             closing = None
             changed = changed or bool(self._contact and self._contact.changed)
-            if not reason and (changed or not error < _SERVES * last):
+            if not reason and (changed or not error < max(_SERVES, self.lag) * last):
                 tangents += 1
                 reason = "" if self._take_tangent() else "the tangent is singular"
                 closing = self._system.closing
@@ -131,9 +130,7 @@ class Equilibrium(Forces):
 
     def _predict(self, road_height: float) -> bool:
         """Move from the last solution to the estimate for `road_height` (m) by the last tangent and
-        its active sets. False if there is none, the body has left that state or the step fails.
-        Collective.
-        """
+        its sets. False if there is none, the body has left that state or it fails. Collective."""
         moved = np.abs(self._solved - self.body.u.x.array).max(initial=0.0)
         stays = bool(moved <= _STAYS * self.body.ring.thickness)
         if self._contact is None or not self.body.comm.allreduce(stays, op=MPI.LAND):
@@ -173,9 +170,9 @@ class Equilibrium(Forces):
         """Assemble and factorise the tangent at the present state, held dofs moving to the road."""
         with self.cost("assembly"):
             self._assemble_tangent()
-            along = self._in_its_coordinates
-            matrix = self.matrix if along is None else along.tangent(self.matrix)
-        taken = self._system.take(matrix, self.road.held, *self.road.steps())
+            if (along := self._in_its_coordinates) is not None:
+                along.tangent(self.matrix)
+        taken = self._system.take(self.matrix, self.road.held, *self.road.steps())
         self._contact = self._make_contact() if taken else None
         return taken
 
@@ -201,7 +198,11 @@ class Equilibrium(Forces):
         self._before.x.array[:] = self.body.u.x.array
         if not self._take_tangent():
             return float("nan")
-        force = self._system.solve(np.zeros(len(self._work.array_r)), self._system.raising)[1]
+        raising, lacking = self._system.raising, np.zeros(len(self._work.array_r))
+        for _ in range(self.rounds):
+            change, force = self._system.solve(-lacking, raising)
+            force += lacking[self.road.held]
+            lacking = self.lacking(change, self._in_its_coordinates)
         return self.body.comm.allreduce(self.road.upward(force))
 
     def sinking(self, weights: np.ndarray, load: float) -> tuple[float, float]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
 from tireroad.fem import compat
+from tireroad.fem.static.curved.unrolled import Unrolled
 from tireroad.fem.static.drag import Drag
 from tireroad.fem.static.shape_damping import ShapeDamping
 from tireroad.fem.static.virtual_work import (
@@ -47,6 +50,26 @@ class Forces:
         self._work = fem.petsc.create_vector(self._residual)
         self._rim = (3 * body.rim[body.rim < body.nodes, None] + np.arange(3)).ravel()
 
+    @property
+    def lag(self) -> float:
+        """Most of an error that a Newton step leaves because its tangent is incomplete."""
+        return self._damping.lag if self._damping else 0.0
+
+    @property
+    def rounds(self) -> int:
+        """Solutions of a linear problem that complete it to 1e-9: 1 with a complete tangent."""
+        return 1 + math.ceil(math.log(1e-9) / math.log(self.lag)) if self.lag else 1
+
+    def lacking(self, change: np.ndarray, along: Unrolled | None) -> np.ndarray:
+        """Forces (N) of a `change` (m) that the tangent lacks, both in the road's coordinates
+        `along` or the wheel's axes. Collective."""
+        if not (self._damping and self.lag):
+            return np.zeros_like(change)
+        forces = self._damping.lacking(change if along is None else along.spread(change))
+        if along is not None:
+            along.turn(forces)
+        return forces
+
     def _assemble_residual(self) -> np.ndarray:
         """Residual forces at the owned dofs, N; 0 on the rim, where the wheel takes them."""
         if self._damping:
@@ -67,7 +90,7 @@ class Forces:
         if self.drag:
             self.drag.stiffen(self._local_tangent)
         if self._damping:
-            self.matrix = self._damping.added_to(self._local_tangent)
+            self.matrix = self._damping.completed(self._local_tangent)
 
     def _inside_out(self) -> bool:
         """Whether det F <= 0 at some Gauss point: the energy does not distinguish J from -J."""

@@ -93,7 +93,7 @@ class HeldSystem:
             self.raising = self._moved(matrix, raising)
             matrix.zeroRowsColumns(rows, 1.0)
         with self._timing("factorisation"):
-            self._ksp.setOperators(matrix)  # may differ from the first one (fem.static.curved)
+            self._ksp.setOperators(matrix)  # may differ from the first one (fem.static.friction)
             self._ksp.getPC().setUp()
         return self._checked()
 

@@ -32,7 +32,6 @@ class Unrolled:
     def __init__(self, body: Body, road: Road) -> None:
         self._body, self._road = body, road
         self._blocks = 3 * body.tread[:, None] + np.arange(3)
-        self._tangent: PETSc.Mat | None = None
 
     def _basis(self) -> Array:
         """B (n, 3, 3), its columns along the last axis."""
@@ -51,30 +50,33 @@ class Unrolled:
         change[self._blocks] = np.einsum("nij,nj->ni", self._basis(), change[self._blocks])
         return change
 
-    def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """B^T K B plus the stiffness of the rotating normal forces; valid until the next call."""
-        if self._tangent is not None:
-            self._tangent.destroy()
-        transform = self._transform(matrix)
-        self._tangent = turned = matrix.ptap(transform)
-        transform.destroy()
+    def tangent(self, matrix: PETSc.Mat) -> None:
+        """Replace K by B^T K B plus the stiffness of the rotating normal forces, in place.
+
+        B - 1 has entries of the tread only, so rows and columns are added: a general triple product
+        takes longer than the factorisation where the matrix has many entries in a row.
+        """
+        same, off = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN, self._basis() - np.eye(3)
+        for blocks, first in ((off.transpose(0, 2, 1), True), (off, False)):
+            turning = self._in_blocks(matrix, blocks)
+            added = turning.matMult(matrix) if first else matrix.matMult(turning)
+            matrix.axpy(1.0, added, same)
+            added.destroy()
+            turning.destroy()
         road = self._road
         x, y, _ = road.places().T
         normal = road.pressing() * road.shape.stretch(x, y) * road.active
-        diagonal = turned.getDiagonal()
+        diagonal = matrix.getDiagonal()
         diagonal.array[self._blocks[:, 0]] += road.shape.bending(x) * normal
-        turned.setDiagonal(diagonal)
+        matrix.setDiagonal(diagonal)
         diagonal.destroy()
-        return turned
 
-    def _transform(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """B, in rows of this process's unknowns."""
-        sizes = matrix.getSizes()
-        (count, whole), first = sizes[0], matrix.getOwnershipRange()[0]
-        others = np.setdiff1d(np.arange(count), self._blocks)
+    def _in_blocks(self, matrix: PETSc.Mat, blocks: Array) -> PETSc.Mat:
+        """A matrix with the blocks (n, 3, 3) of the tread's nodes and no other entries."""
+        sizes, first = matrix.getSizes(), matrix.getOwnershipRange()[0]
         rows = np.repeat(self._blocks, 3, axis=1).ravel()
-        columns = np.tile(self._blocks, 3).ravel()
-        entries = np.concatenate([np.ones(len(others)), self._basis().ravel()])
-        places = np.concatenate([others, rows]), np.concatenate([others, columns]) + first
-        local = sparse.csr_matrix((entries, places), shape=(count, whole))
+        columns = np.tile(self._blocks, 3).ravel() + first
+        local = sparse.csr_matrix(
+            (blocks.ravel(), (rows, columns)), shape=(sizes[0][0], sizes[0][1])
+        )
         return from_local_rows(local, sizes, self._body.comm)

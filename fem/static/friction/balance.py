@@ -49,6 +49,9 @@ class RubbingEquilibrium(Equilibrium):
         self._out()
         if not self._take_tangent() or self._move(self._system.closing, load):
             raise ConvergenceError("static: the tangent of a state with friction is singular")
+        for _ in range(1, self.rounds):  # what an incomplete tangent left
+            self._out()
+            self._move(None, load)
         pulled = self.body.comm.allreduce(self.road.pull.sum(axis=0))
         field.array[:] = kept[0]
         self.road.put_back(kept[1])

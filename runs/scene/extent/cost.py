@@ -1,7 +1,7 @@
 """Cost of a scene's stages: operations, and seconds on one core."""
 
 from tireroad.runs.scene.extent.sizes import Sizes
-from tireroad.runs.scene.extent.static_state import tangents_with_friction
+from tireroad.runs.scene.extent.static_state import WIDE, holds_damping, tangents_with_friction
 from tireroad.runs.scene.tables.scene import Scene
 
 # Error bars, of the time of all else: 0.49 in quickstart.toml and 0.35 in passenger.toml
@@ -49,6 +49,8 @@ def operations(
     count, pairs = size.modes / 200, size.coordinates / 200
     mesh = (size.free / 27_900) ** 1.2 * column / 9
     parts = {"static": 8.0 * mesh * (1 + _RUBBING * tangents_with_friction(scene))}
+    if holds_damping(scene):
+        parts["static"] *= WIDE
     if "modes" not in left_out:
         parts["modes"] = 7.0 * mesh * count
     if "rotating" not in left_out:

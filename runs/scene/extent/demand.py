@@ -6,13 +6,22 @@ from pathlib import Path
 from tireroad.fem.errors import InputError
 from tireroad.runs.process.memory import available_memory
 from tireroad.runs.scene.extent.estimate import FACTOR, FOOTPRINT, KEYS, Estimate
-from tireroad.runs.scene.extent.static_state import FRICTION, LOAD_ERROR
+from tireroad.runs.scene.extent.static_state import DAMPING, FRICTION, LOAD_ERROR
 
 # The estimate is within a factor of 1.5: above CERTAIN a run cannot succeed, above DOUBTFUL it may
 # not.
 CERTAIN, DOUBTFUL = 1.5, 0.8
 # Parts that the processes of a run share by rows; of everything else each process has its own.
-SPREAD = ("matrices", FACTOR, FOOTPRINT, LOAD_ERROR, FRICTION, "modes", "flexibility of the patch")
+SPREAD = (
+    "matrices",
+    FACTOR,
+    FOOTPRINT,
+    LOAD_ERROR,
+    FRICTION,
+    DAMPING,
+    "modes",
+    "flexibility of the patch",
+)
 # Share of a factor that MUMPS keeps on disk out of core: with 54,000 and 108,000 unknowns, 26 and
 # 22 % of the memory were still taken.
 ON_DISK = 0.7

@@ -8,6 +8,7 @@ from tireroad.runs.scene.extent.matrices import factor, matrices, unknowns_throu
 from tireroad.runs.scene.extent.sizes import Sizes, road_memory, sizes
 from tireroad.runs.scene.extent.static_state import (
     COLUMNS,
+    DAMPING,
     FRICTION,
     LOAD_ERROR,
     TANGENTS,
@@ -56,6 +57,7 @@ KEYS = {
     FACTOR: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     LOAD_ERROR: "static.error_estimate, and the mesh",
     FRICTION: "static.friction, and the mesh",
+    DAMPING: "damping.stiffness, and the mesh",
     "modes": "modal.count or modal.up_to, and the mesh",
     FOOTPRINT: "tire.segments, tire.elements_arc, tire.elements_thickness, tire.order",
     "rotating pencil": "modal.count or modal.up_to",

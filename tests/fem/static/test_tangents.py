@@ -100,13 +100,13 @@ def fresh(equilibrium):
 
 
 def test_damping_by_the_stiffness_has_a_full_tangent(make_body, csr):
-    """Speed 100 rad/s, gamma2 = 1e-4 s: a hundredth of the stiffness of a strain per radian."""
+    """Speed 100 rad/s, gamma2 = 0.01 s: too much to leave it out (test_shape_damping)."""
     body = make_body(segments=8, arc=4)
     direction = deformed(body)
     rim = (3 * body.rim[:, None] + np.arange(3)).ravel()
     body.u.x.array[rim] = direction[rim] = 0.0
     found = {}
-    for damping in (1e-4, 0.0):
+    for damping in (1e-2, 0.0):
         equilibrium = Equilibrium(
             body, Rolling(speed=100.0, damping=0.0, stiffness_damping=damping)
         )
@@ -119,4 +119,4 @@ def test_damping_by_the_stiffness_has_a_full_tangent(make_body, csr):
         scale = np.linalg.norm(numeric[free])
         assert np.linalg.norm((exact - numeric)[free]) < 1e-6 * scale
         found[damping] = exact
-    assert np.linalg.norm(found[1e-4] - found[0.0]) > 1e-3 * scale
+    assert np.linalg.norm(found[1e-2] - found[0.0]) > 0.1 * scale
