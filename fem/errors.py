@@ -16,6 +16,10 @@ class ConvergenceError(RuntimeError):
     """A solver failed; the message says what, where and what to try. Exit status 3."""
 
 
+class NearlySingular(ConvergenceError):
+    """A linear system that has no accurate solution; only its owner knows why."""
+
+
 class LoadingStopped(ConvergenceError):
     """The load steps became too small; `fact` says where, without advice."""
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
-from tireroad.fem.errors import InputError
+from tireroad.fem.errors import ConvergenceError, InputError, NearlySingular
 from tireroad.greens.coupling import Basis, Wheel
 from tireroad.greens.residual.state_selection import keep
 from tireroad.greens.residual.truncation import Cutoff, estimate, estimate_axle, relative
@@ -84,9 +85,9 @@ def make_response(
         found = fields()
         if found is not rolling.basis:  # a new solution: its states must be its own too
             rolling = rolling_modes(found, rolling.turning, wheel().operators.body.comm)
-        response = wheel().respond(Basis.of(rolling), found.modes, outputs, loads, residual)
+        response = _completed(wheel(), rolling, found.modes, outputs, loads, residual)
     else:
-        response = wheel().respond(Basis.of(rolling), None, outputs, loads, residual)
+        response = _completed(wheel(), rolling, None, outputs, loads, residual)
     if residual in ("static", "dirac"):
         return _made(response)
     highest = cutoff(rolling)
@@ -95,6 +96,19 @@ def make_response(
     static = len(response.every) - len(kept.every)
     what = f"residual states faster than {_FASTEST:g} times the highest mode, made static"
     return _made(kept, {what: (static, "-")})
+
+
+def _completed(wheel: Wheel, rolling: RollingModes, *given: Any) -> Response:
+    """`Wheel.respond` of these states, which names the speed if K_Omega is singular. Collective."""
+    try:
+        return wheel.respond(Basis.of(rolling), *given)
+    except NearlySingular as error:
+        if not wheel.speed:
+            raise
+        raise ConvergenceError(
+            f"greens: the stiffness of the tire that turns at {wheel.speed:.6g} rad/s is singular or nearly so, as "
+            f"at a critical speed ({error}). Lower the speed."
+        ) from None
 
 
 def _made(response: Response, figures: Figures | None = None) -> Made:

@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.errors import NearlySingular
 
 _CHUNK = 64  # right-hand sides per solve: enough for BLAS 3 in MUMPS, little memory
 RESIDUAL_TOLERANCE = 1e-8
@@ -71,7 +71,7 @@ def factorise(stiffness: PETSc.Mat) -> PETSc.PC:
 def _solve(factor: PETSc.Mat, stiffness: PETSc.Mat, loads: np.ndarray) -> np.ndarray:
     """Own rows of stiffness^-1 loads. Collective.
 
-    Raises ConvergenceError for a relative residual above RESIDUAL_TOLERANCE."""
+    Raises NearlySingular for a relative residual above RESIDUAL_TOLERANCE."""
     right = _dense(loads, stiffness.comm)
     solution = right.duplicate()
     factor.matSolve(right, solution)
@@ -85,9 +85,10 @@ def _solve(factor: PETSc.Mat, stiffness: PETSc.Mat, loads: np.ndarray) -> np.nda
     comm, defect = stiffness.comm.tompi4py(), multiply(stiffness, out @ signs) - given
     worst, scale = comm.allreduce(np.array([(defect**2).sum(), (given**2).sum()]))
     if not worst <= (RESIDUAL_TOLERANCE**2) * max(scale, np.finfo(float).tiny):
-        raise ConvergenceError(
-            f"greens: static flexibility has a relative residual of {np.sqrt(worst / scale):.1e}: the "
-            "stiffness of the rotating tire is singular or nearly so (critical speed). Lower the speed."
+        raise NearlySingular(
+            f"greens: a static or harmonic solution has a relative residual of {np.sqrt(worst / scale):.1e}: the "
+            "matrix is singular or nearly so. Use elements of more equal size, and loads under which "
+            "the tire is stable."
         )
     return out
 

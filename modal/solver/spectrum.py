@@ -17,13 +17,13 @@ from mpi4py import MPI
 from scipy import sparse
 
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.matrices.inertia_relief import RIGID
 from tireroad.fem.static.path.journal import Entry, Journal
 from tireroad.modal.solver.boundaries import between, merged, onward
 from tireroad.modal.solver.shifted import Shifted
 from tireroad.modal.solver.slices import Interval, eigenpairs
 from tireroad.modal.solver.team import Team
 
-ZERO = 1e-12  # of the matrix norm: eigenvalues nearer to zero are rigid modes, rounding is 1e-16
 # Eigenvalues per slice and matrix: fewest, where teams wait for work, and most, to limit the basis.
 _SLICE = 64, 160
 _PROBES = 8
@@ -110,7 +110,7 @@ class Spectrum:
 
     def bottom(self) -> Bottom:
         """Negative eigenvalues by inertia, and estimates of the lowest. Collective."""
-        zero = ZERO * self.bound
+        zero = RIGID * self.bound
 
         def work(part: Part) -> np.ndarray:
             shifted = Shifted(part.matrix, -zero, self.team)

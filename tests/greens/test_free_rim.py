@@ -8,8 +8,11 @@ import pytest
 from mpi4py import MPI
 from scipy import sparse
 
+from tireroad.fem.collective import summed
 from tireroad.fem.matrices import probe
-from tireroad.fem.matrices.inertia_relief import rigid_space
+from tireroad.fem.matrices.compliance import on_own_rows
+from tireroad.fem.matrices.direct import multiply
+from tireroad.fem.matrices.inertia_relief import relieved, rigid_space
 from tireroad.fem.matrices.operators import Operators
 from tireroad.fem.matrices.rim_motion import RimMotion, rim_motion
 from tireroad.fem.matrices.support import Support
@@ -123,6 +126,36 @@ def test_static_answer_is_the_pseudo_inverse() -> None:
     exact = shape / modes.squares[modes.rigid :] @ shape.T
     assert np.abs(found.residual + found.static() - exact).max() < 1e-9 * np.abs(exact).max()
     assert np.abs(found.residual).max() < 1e-9 * np.abs(exact).max()
+
+
+@pytest.mark.mpi
+def test_a_force_of_the_round_shape_is_no_stiffness() -> None:
+    """The doppler inertia's Omega^2 S_B u of a ring of few elements: K R is 1e-9 of K, R^T K R rounding.
+
+    Three rotations were taken for soft ones, and the singular K was factorised.
+    """
+    rolling = Rolling(speed=80.0, damping=60.0, inertia="doppler")
+    made = Body(COMM, thesis_torus(segments=8, elements_arc=2), RUBBER)
+    Loader(Equilibrium(made, rolling), lambda progress: None).inflate(2e5)
+    operators = Operators(made, 2e5, Support("free"), rolling)
+    rigid, mass = rigid_space(operators), operators.mass[:, None]
+    assert rigid.shape[1] == 6
+    force = multiply(operators.stiffness, rigid) / np.sqrt(mass)
+    force = np.sqrt(summed(COMM, np.einsum("ij,ij->j", force, force)))
+    assert np.count_nonzero(force > 0.1) == 3  # 1/s2: 6 and 11, against 8e-4 from rounding
+    columns = on_own_rows(operators, loads())
+    found = relieved(operators, columns)
+    assert np.abs(summed(COMM, (mass * rigid).T @ found)).max() < 1e-12
+    left = columns.toarray() - multiply(operators.stiffness, found)
+    left -= mass * (rigid @ summed(COMM, rigid.T @ left))
+    assert np.sqrt(summed(COMM, (left**2).sum(keepdims=True))) < 1e-8
+
+
+@pytest.mark.mpi
+def test_centrifugal_forces_hold_rotations() -> None:
+    """They do not turn with the tire: a rotation has a stiffness of Omega^2 M, a translation has none."""
+    operators = Operators(body(60.0), 2e5, Support("free"), Rolling(speed=60.0))
+    assert rigid_space(operators).shape[1] == 3
 
 
 @pytest.mark.long

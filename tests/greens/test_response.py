@@ -1,10 +1,14 @@
 """Green's functions in time and frequency against the full equations of small systems."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import linalg
 from systems import make
 
+from tireroad.fem.errors import ConvergenceError, NearlySingular
+from tireroad.greens import responses
 from tireroad.greens.response import RESOLVED
 
 TIMES = np.array([0.0, 1e-4, 3e-3, 0.02, 0.1])
@@ -130,3 +134,17 @@ def test_mobility_is_i_omega_times_receptance() -> None:
     for found, power in ((velocity, 1), (velocity.rate(), 2)):
         exact = H * (2j * np.pi * frequency[:, None, None]) ** power
         assert np.abs(found.receptance(frequency) - exact).max() < 1e-9 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize(("speed", "names_it"), [(0.0, False), (244.0, True)])
+def test_only_a_turning_tire_is_told_of_the_critical_speed(monkeypatch, speed, names_it) -> None:
+    """A free rim's singular K was blamed on the speed, which is not in it."""
+
+    def respond(*given):
+        raise NearlySingular("the matrix is singular")
+
+    monkeypatch.setattr(responses.Basis, "of", lambda rolling: None)
+    wheel, rolling = SimpleNamespace(speed=speed, respond=respond), SimpleNamespace()
+    with pytest.raises(ConvergenceError, match="the matrix is singular") as told:
+        responses.make_response(lambda: wheel, rolling, None, None, "static", lambda: None)
+    assert ("critical speed" in str(told.value)) == names_it
