@@ -1,5 +1,5 @@
-"""The cases for estimated errors and searches: 3 tires, 4 roads, 2 speeds, and their reference
-runs, whose forces are stored so that a benchmark can resume and others share them."""
+"""The cases for estimated errors and searches: 3 tires, 4 roads, 2 speeds, and their reference runs,
+whose forces are stored for benchmarks that resume, or share them."""
 
 from __future__ import annotations
 
@@ -99,8 +99,7 @@ FINE: dict[str, Any] = {
     "pitch": 0.003,
     "step": 1e-4,
 }
-# m, of the patch: the same on every road, so that stages before the loop are shared
-REACH = 0.012
+REACH = 0.012  # m, of the patch: alike on every road, so that stages before the loop are shared
 SCENE = """
 name = "case"
 {tire}
@@ -219,22 +218,16 @@ def driven(scene: Scene, folder: Path, until: str, cache: Cache = NO_CACHE) -> D
     folder.mkdir(parents=True, exist_ok=True)
     with observe.quiet():
         done = run_scene(
-            scene,
-            folder,
-            MPI.COMM_WORLD,
-            until=until,
-            fresh=False,
-            petsc_options=[],
-            cache=cache,
+            scene, folder, MPI.COMM_WORLD, until=until, fresh=False, petsc_options=[], cache=cache
         )
     with h5py.File(folder / "contact.h5") as file:
-        forces = {name: file[name][:] for name in NAMES}
-    return Driven(forces, done.done["contact"].product.step, done)
+        step, forces = done.done["contact"].product.step, {name: file[name][:] for name in NAMES}
+    return Driven(forces, step, done)
 
 
 def recorded(scene: Scene, folder: Path, kept: Path, cache: Cache = NO_CACHE) -> Recorded:
-    """The forces of a run in a separate process, or those of the same scene that a benchmark stored
-    in the folder `kept` (used whatever program version computed them, until deleted)."""
+    """The forces of a run in a separate process, or those stored in the folder `kept` for the same
+    scene (used whatever program version computed them, until deleted)."""
     bare = replace(scene, accuracy=Accuracy(estimate=False))
     values = json.dumps(tomllib.loads(dumps(bare)), sort_keys=True)  # without the keys' comments
     file = kept / f"{hashlib.sha256(values.encode()).hexdigest()[:16]}.npz"
@@ -247,7 +240,7 @@ def recorded(scene: Scene, folder: Path, kept: Path, cache: Cache = NO_CACHE) ->
 def _record(scene: Scene, folder: Path, file: Path, cache: Cache) -> None:
     """Write the forces of a run to a file. On one process."""
     run = driven(scene, folder, "contact", cache)
+    forces = np.array([run.forces[name] for name in NAMES])
     file.parent.mkdir(parents=True, exist_ok=True)
     with replacing(file) as part, part.open("wb") as opened:
-        forces = [run.forces[name] for name in NAMES]
-        np.savez_compressed(opened, step=run.step, forces=np.array(forces))
+        np.savez_compressed(opened, step=run.step, forces=forces)

@@ -1,4 +1,4 @@
-"""Processor time before it is taken, and what friction takes: against measured runs, and in its growth."""
+"""Processor time before it is taken, and what friction and damping by the stiffness take: against measured runs, and in its growth."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import pytest
 
 from tireroad.runs.scene.extent.demand import memory_of
 from tireroad.runs.scene.extent.estimate import Estimate, estimate
-from tireroad.runs.scene.extent.static_state import FRICTION, LOAD_ERROR
+from tireroad.runs.scene.extent.static_state import DAMPING, FRICTION, LOAD_ERROR
 from tireroad.runs.scene.load import load
 
 SMALL = ["tire.segments=26", "tire.elements_arc=8", "modal.count=100"]
@@ -31,6 +31,18 @@ inflation = 2.2e5
 load = 3000.0
 friction = 0.8
 error_estimate = false
+"""
+DAMPED = """
+[tire]
+segments = 22
+elements_arc = 10
+order = 2
+[static]
+inflation = 1.31e5
+load = 313.0
+error_estimate = false
+[rotation]
+speed = 100.0
 """
 RUBBING_FINE = ["tire.segments=24", "tire.elements_arc=12", "rotation.speed=40.0"]
 
@@ -139,3 +151,26 @@ def test_the_larger_of_friction_and_the_load_s_error_counts(scene: Path) -> None
     assert len(both.keys() & {FRICTION, LOAD_ERROR}) == 1
     alone = static(scene)
     assert memory_of(alone, 4)[FRICTION] == alone.memory[FRICTION]
+
+
+def damped(folder: Path, *settings: str) -> Estimate:
+    file = folder / "scene.toml"
+    file.write_text(DAMPED)
+    return estimate(load(file, list(settings)), until="static")
+
+
+def test_much_damping_is_as_measured(tmp_path: Path) -> None:
+    """Processor time of one core beside other work, and memory (2026-11-25); told were 2 s and 0.31 GB."""
+    much = damped(tmp_path, "damping.stiffness=1e-3")
+    assert 0.514 / 1.5 < sum(much.memory.values()) / 1e9 < 0.514 * 1.5
+    assert 8.8 / 2 < much.seconds["static"] < 8.8 * 2
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [["damping.stiffness=1e-5"], ["damping.stiffness=1e-3", "static.steady_rolling=false"]],
+)
+def test_little_damping_or_a_state_at_rest_adds_nothing(tmp_path: Path, settings: list) -> None:
+    given, none = damped(tmp_path, *settings), damped(tmp_path)
+    assert DAMPING not in given.memory
+    assert (given.memory, given.seconds) == (none.memory, none.seconds)
