@@ -73,9 +73,9 @@ def remarks(scene: Scene) -> list[str]:
 
 def foot(road: Table) -> float:
     """The foot (m) of a step's or cleat's first edge; NaN for other roads, and on a drum."""
-    surface = road.surface
-    one = isinstance(surface, Edges) and road.drum_radius is None
-    return surface.position if one else math.nan
+    if isinstance(road.surface, Edges) and road.drum_radius is None:
+        return road.surface.position
+    return math.nan
 
 
 def within_run_in(road: Table, share: float | None = None) -> str:
