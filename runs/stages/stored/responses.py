@@ -19,7 +19,7 @@ _UNITS = {
     "block_momentum": "kg^1/2",
 }
 # Of the rate of momentum, the last three rows of the slope, in s instead.
-_KNOWN = {"left_out": "kg m/N", "moments": "-", "slope": "m s/N"}
+_KNOWN = {"left_out": "kg m/N", "moments": "-", "slope": "m s"}
 
 
 def fill_response(file: h5py.File, name: str, response: Response, points: int) -> None:
