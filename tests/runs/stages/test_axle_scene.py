@@ -1,5 +1,6 @@
 """A wheel that moves through all stages: limits, what is written and told, what is reused and refused."""
 
+import json
 from types import SimpleNamespace
 
 import h5py
@@ -168,6 +169,8 @@ def test_a_travel_speed_is_the_speed_over_the_road(tmp_path, launch):
         speed, radius = file.attrs["rolling_speed"], file.attrs["rolling_radius"]
     assert speed * radius == pytest.approx(20.0, rel=2e-6)
     assert load(folder / "scene.toml").rotation.travel_speed == 20.0
+    stage = json.loads((folder / "summary.json").read_text())["stages"]["static"]
+    assert sum(stage["cost"].values()) > 0.8 * stage["seconds"]  # of all solutions, not of the last
     scene.write_text(SCENE.replace("speed = 50.0", "speed = 50.0\ntravel_speed = 20.0"))
     with pytest.raises(InputError, match="twice"):
         load(scene)
