@@ -142,6 +142,6 @@ def describe(record: Record, rolling: RollingModes) -> None:
     first = first[part[first] >= min(_MOSTLY, part[first[0]])]
     first = first[np.argsort(frequency[first])]
     record.headline |= {
-        "states mostly of air": (_listed(frequency[first] / (2 * np.pi)), "Hz"),
+        "states with most air": (_listed(frequency[first] / (2 * np.pi)), "Hz"),
         "their share of air": (_listed(part[first]), "-"),
     }

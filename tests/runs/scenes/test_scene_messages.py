@@ -22,7 +22,7 @@ def test_cords_are_read_and_kept_inside_the_wall(scene_file):
     assert "at most tire.thickness = 0.012 m" in refused(scene_file(CORDS + "depth = 0.013"))
     assert "beyond the beads" in refused(scene_file(CORDS + "arc = [-121.0, 10.0]"))
     assert "must ascend" in refused(scene_file(CORDS + "arc = [10.0, -10.0]"))
-    assert "is taken" in refused(scene_file(CORDS.replace('"belt"', '"ply"')))
+    assert "of an earlier line" in refused(scene_file(CORDS.replace('"belt"', '"ply"')))
     assert 'must hold no "/"' in refused(scene_file(CORDS.replace('"belt"', '"a/b"')))
 
 

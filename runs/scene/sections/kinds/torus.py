@@ -149,7 +149,11 @@ class TorusSection(SectionKind):
                 f"= {cords.area:g} m² every {cords.spacing:g} m is more cord than the wall of "
                 f"{self.thickness:g} m has room for",
             ),
-            ("name", cords.name in taken, f'= "{cords.name}" is taken: give each line its own'),
+            (
+                "name",
+                cords.name in taken,
+                f'= "{cords.name}" is that of an earlier line (absent: "ply"): give each line its own',
+            ),
             (
                 "name",
                 "/" in cords.name or cords.name in (".", ".."),
