@@ -208,8 +208,7 @@ class Loader:
     def carry(self, load: float) -> float:
         """Raise the road until it carries `load` (N) by bracketed secants; the deflection (m).
 
-        Intermediate states may have a residual; the state that an error leaves has none.
-        """
+        Intermediate states may have a residual; the state that an error leaves has none."""
         if load <= 0:
             raise InputError(f"static.load = {load:g} N: a road carries a positive load")
         if not self._by_half(lambda half: Way(half).carry(load)):
@@ -245,5 +244,7 @@ class Loader:
         march(seen(attempt), start, end, first, show, fall and seen(fall), enough)
 
     def tell(self, what: str, value: float, unit: str, step: Step) -> None:
-        loads = self.equilibrium.load(), self.equilibrium.points()
+        upright = self.equilibrium.shape.upright  # told along the road's normal, as in the results
+        value *= upright if what == "deflection" else 1.0
+        loads = self.equilibrium.load() / upright, self.equilibrium.points()
         self.report(Progress(what, value, unit, *loads, step))
