@@ -66,23 +66,23 @@ def remarks(scene: Scene) -> list[str]:
     end = start + AHEAD + least_travel(scene) / LEAST_RADIUS
     if scene.road.kind != "flat" and _level(scene.road, road, start, end):
         notes.append(f"warning: {without_relief(scene.road, start, end)}")
-    elif start < foot(scene.road) < start + scene.road.run_in:
-        notes.append(f"warning: {within_run_in(scene.road)}")
+    elif (place := foot(scene.road)) is not None and start < place < start + scene.road.run_in:
+        notes.append(f"warning: {within_run_in(scene.road, place)}")
     return notes
 
 
-def foot(road: Table) -> float:
-    """The foot (m) of a step's or cleat's first edge; NaN for other roads, and on a drum."""
+def foot(road: Table) -> float | None:
+    """The foot (m) of a step's or cleat's first edge; None for other roads, and on a drum."""
     if isinstance(road.surface, Edges) and road.drum_radius is None:
         return road.surface.position
-    return math.nan
+    return None
 
 
-def within_run_in(road: Table, share: float | None = None) -> str:
-    """A warning of an obstacle that is met at a `share` of its height only."""
+def within_run_in(road: Table, place: float, share: float | None = None) -> str:
+    """A warning of an obstacle at x = `place` (m) that is met at a `share` of its height only."""
     met = "less" if share is None else f"{100 * share:.2g} %"
     return (
-        f"the {road.kind} at x = {shown(foot(road))} m lies in the run-in, over which the road grows from flat: it is "
+        f"the {road.kind} at x = {shown(place)} m lies in the run-in, over which the road grows from flat: it is "
         f"met at {met} of its height; raise road.position, or shorten road.run_in ({road.run_in:g} m; 0: none)"
     )
 

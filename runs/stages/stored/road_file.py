@@ -30,8 +30,8 @@ def describe(record: Record, setup: ContactSetup, road: Road) -> None:
         record.headline["mean profile depth"] = (texture.depth, "m")
     if road.kind != "flat" and nothing_met(setup):
         record.warnings.append(without_relief(road, *setup.road.passed))
-    elif (share := setup.road.share(foot(road))) < _WHOLE:
-        record.warnings.append(within_run_in(road, share))
+    elif (place := foot(road)) is not None and (share := setup.road.share(place)) < _WHOLE:
+        record.warnings.append(within_run_in(road, place, share))
     elif (relief := relief_seen(setup)) is not None:
         _describe_smoothing(record, setup, relief)
 

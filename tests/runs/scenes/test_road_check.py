@@ -8,6 +8,7 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.scene.check import explain
 from tireroad.runs.scene.load import load
+from tireroad.runs.scene.rules.road import foot
 
 SCENE = """
 [static]
@@ -98,6 +99,11 @@ def test_check_says_that_a_cleat_lies_in_the_run_in(
     scene.write_text(text.replace("speed = 50", "speed = 50\nrolling_radius = 0.3"))
     told = explain(load(scene, [f"road.{one}" for one in more]))
     assert ("warning: the cleat at x = 0.07 m lies in the run-in" in told) == said
+
+
+def test_a_road_without_edges_has_no_foot(scene: Path) -> None:
+    """NaN for one lay "in the run-in" of every road without a run-in."""
+    assert foot(load(scene, ["road.run_in=0"]).road) is None
 
 
 def test_check_opens_the_file(scene: Path) -> None:
