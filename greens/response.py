@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg
 
 from tireroad.greens.hub import at_once, rates
-from tireroad.greens.residual.made_static import block_made_static, poles_made_static
+from tireroad.greens.residual.made_static import added, block_made_static, poles_made_static
 from tireroad.modal.states import StateModes, growing
 
 # Radians a state may rotate in a step and stay dynamic. Undamped, bouncing on a stiff tread, up to
@@ -198,12 +198,8 @@ class Response:
             pulse=self.pulse,
             rigid=self.rigid,
             moments=self.moments,
-            slope=_sum(self.slope, other.slope),
+            slope=added(self.slope, other.slope),
         )
-
-
-def _sum(one: np.ndarray | None, other: np.ndarray | None) -> np.ndarray | None:
-    return other if one is None else one if other is None else one + other
 
 
 def couple(

@@ -41,7 +41,7 @@ def poles_made_static(response: Response, keep: np.ndarray) -> Response:
         input=response.input[keep],
         momentum=response.momentum[:, keep],
         residual=response.residual - gone.real,
-        slope=_less(response.slope, slope.real),
+        slope=added(response.slope, -slope.real),
     )
 
 
@@ -64,7 +64,7 @@ def block_made_static(response: Response, values: np.ndarray, stays: np.ndarray)
         block_momentum=np.hstack([momentum @ kept.right, response.block_momentum[:, k:]]),
         residual=response.residual - output @ following,
         left_out=left_out,
-        slope=_less(response.slope, slope),
+        slope=added(response.slope, -slope),
     )
 
 
@@ -76,5 +76,6 @@ def _rates(response: Response, output: np.ndarray, inertia: np.ndarray) -> np.nd
     return np.vstack([own, inertia])
 
 
-def _less(slope: np.ndarray | None, more: np.ndarray) -> np.ndarray:
-    return -more if slope is None else slope - more
+def added(one: np.ndarray | None, other: np.ndarray | None) -> np.ndarray | None:
+    """The sum of two slopes, where None is none."""
+    return other if one is None else one if other is None else one + other
