@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
 
 from tireroad.fem.errors import InputError
 from tireroad.fem.model import TireModel
@@ -42,16 +45,56 @@ def press(
     return static_state(loader.equilibrium, loader.touch)
 
 
+@dataclass(frozen=True)
+class Near:
+    """A state on the road to start from, of the same body under almost the same loads.
+
+    `inflated` and `pressed`: `u` of the body; `force` (nodes,) N of the road on own nodes, at
+    `height` (m); None without a road.
+    """
+
+    inflated: np.ndarray
+    pressed: np.ndarray
+    force: np.ndarray
+    height: float | None
+
+    @classmethod
+    def of(cls, loader: Loader, pressed: Loader) -> Near:
+        """The present state of the body that `loader` inflated and `place` pressed."""
+        equilibrium = pressed.equilibrium
+        field = loader.body.u.x.array.copy()
+        return cls(loader.inflated, field, equilibrium.contact_force(), equilibrium.road_height)
+
+    def reaches(self, loader: Loader, load: float | None, rise: float | None) -> bool:
+        """Solve for the `load` (N) or the road's `rise` (m) from here; on failure False and the
+        old state. Collective."""
+        assert self.height is not None, "there is no road"
+        equilibrium, field = loader.equilibrium, loader.body.u.x.array
+        kept = field.copy(), equilibrium.road.kept()
+        field[:] = self.pressed
+        equilibrium.road.take(self.force, self.height)
+        step = equilibrium.solve(self.height if rise is None else loader.touch + rise, load)
+        loader.newton_steps += step.iterations
+        if step.converged:
+            loader.tell("deflection", loader.deflection, "m", step)
+        else:
+            field[:] = kept[0]
+            equilibrium.road.put_back(kept[1])
+        return step.converged
+
+
 def place(
     loader: Loader,
     load: float | None,
     deflection: float | None,
     road_height: float | None,
     friction: Friction | None = None,
+    near: Near | None = None,
 ) -> Loader:
     """Press the inflated tire on the road as in `press`; load and deflection along its normal.
 
-    Returns the loader of the state found, which is another one with friction. Collective.
+    Starts from the state `near`, if there is one and Newton's method converges from it. Returns the
+    loader of the state found, which is another one with friction. Collective.
     """
     given = {"load": load, "deflection": deflection, "road_height": road_height}
     named = [name for name, value in given.items() if value is not None]
@@ -60,13 +103,24 @@ def place(
     for name, value in given.items():
         if value is not None and not math.isfinite(value):
             raise InputError(f"{name} = {value:g} must be finite")
-    inflated = loader.body.u.x.array.copy()
-    if load is not None:
-        loader.carry(load * loader.equilibrium.shape.upright)
-    elif deflection is not None:
-        loader.deflect(deflection / loader.equilibrium.shape.upright)
-    elif road_height is not None:
-        loader.deflect(road_height - loader.touch)
-    if friction is None or not named or not loader.load():
+    if not named:
         return loader
-    return with_friction(loader, inflated, load, friction)
+    upright, rise = loader.equilibrium.shape.upright, None
+    if deflection is not None:
+        rise = deflection / upright
+    elif road_height is not None:
+        rise = road_height - loader.touch
+    carried = None if load is None else load * upright
+    if near is None or not near.reaches(loader, carried, rise):
+        _raise_road(loader, carried, rise)
+    if friction is None or not loader.load():
+        return loader
+    return with_friction(loader, loader.inflated, load, friction)
+
+
+def _raise_road(loader: Loader, load: float | None, rise: float | None) -> None:
+    """Raise the road from first touch until it carries `load` (N), or by `rise` (m). Collective."""
+    if load is not None:
+        loader.carry(load)
+    elif rise is not None:
+        loader.deflect(rise)

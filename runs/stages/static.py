@@ -14,7 +14,7 @@ from tireroad.fem.static.footprint import Footprint
 from tireroad.fem.static.load_error import UNKNOWN, load_error
 from tireroad.fem.static.path.history import History
 from tireroad.fem.static.path.loading import Loader
-from tireroad.fem.static.press import place
+from tireroad.fem.static.press import Near, place
 from tireroad.fem.static.state import StaticState, static_state
 from tireroad.fem.static.virtual_work import AT_REST, Rolling
 from tireroad.fem.timing import Timing
@@ -75,15 +75,17 @@ class StaticStage(Computed[StaticState]):
 
     def _at_speed(self, record: Record, history: History) -> tuple[StaticState, Loader]:
         """The state at the wheel's speed. Collective."""
-        speed = self.job.speed
+        speed, near, steps = self.job.speed, None, 0
         for _ in range(_SPEEDS):
-            state, loader = self._solved(record, speed, history)
+            state, loader, near = self._solved(record, speed, history, near)
+            steps += loader.newton_steps
             before, speed = speed, self.job.free_speed(state)
             if abs(speed - before) <= _SAME_SPEED * speed or not state.rolling.speed:
                 break
             observe.say(
                 f"  rolling radius {state.rolling_radius():.6g} m: again at {speed:.6g} rad/s"
             )
+        loader.newton_steps = steps
         return state, loader
 
     def _concluded(self, record: Record, state: StaticState, loader: Loader) -> StaticState:
@@ -97,8 +99,11 @@ class StaticStage(Computed[StaticState]):
         observe.say(f"  {record.shares}")
         return state
 
-    def _solved(self, record: Record, speed: float, history: History) -> tuple[StaticState, Loader]:
-        """Solve in load steps up to the state at `speed` rad/s. Collective."""
+    def _solved(
+        self, record: Record, speed: float, history: History, near: Near | None
+    ) -> tuple[StaticState, Loader, Near]:
+        """Solve up to the state at `speed` rad/s: in load steps, or from a state `near`, that of
+        another speed. Collective."""
         rolling = steady_rolling(self.job, speed)
         with record.timing("mesh and forms"):
             equilibrium = Equilibrium(self.job.tire.body, rolling, road_shape(self.job.scene))
@@ -106,7 +111,7 @@ class StaticStage(Computed[StaticState]):
         loader = Loader(equilibrium, _show)
         began = Timing.clock()
         try:
-            pressed = self._press(loader, rolling)
+            pressed = self._press(loader, rolling, near)
         except ConvergenceError as error:
             kept = self._keep_last(loader)
             cause = with_cause(error, loader, rolling, lambda other: self._press(other, rolling))
@@ -117,14 +122,15 @@ class StaticStage(Computed[StaticState]):
         spent = equilibrium.cost
         spent["other"] = Timing.clock() - began - sum(spent.values())
         record.cost.take(spent)  # at a travel speed that of each solution
-        return static_state(pressed.equilibrium, loader.touch), loader
+        state = static_state(pressed.equilibrium, loader.touch)
+        return state, loader, Near.of(loader, pressed)
 
-    def _press(self, loader: Loader, rolling: Rolling) -> Loader:
+    def _press(self, loader: Loader, rolling: Rolling, near: Near | None = None) -> Loader:
         """Inflate the tire and press it on the road; returns the final loader. Collective."""
         wanted = self.job.scene.static
-        loader.inflate(wanted.inflation)
+        loader.inflate(wanted.inflation, None if near is None else near.inflated)
         placed = wanted.load, wanted.deflection, wanted.road_height
-        return place(loader, *placed, friction_of(self.job.scene, rolling))
+        return place(loader, *placed, friction_of(self.job.scene, rolling), near)
 
     def _keep_last(self, loader: Loader) -> str:
         """Write the last converged state, if any; returns a sentence saying where. Collective."""

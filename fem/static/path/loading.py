@@ -20,7 +20,7 @@ from tireroad.fem.static.tread_surface import TreadSurface
 
 @dataclass(frozen=True)
 class Progress:
-    """A completed load step: quantity, value, unit, road force (N), points in contact."""
+    """A completed load step; load (N) and a deflection (m) are along the road's normal."""
 
     what: str
     value: float
@@ -39,24 +39,27 @@ class _Half:
 
 
 class Loader:
-    """Brings one equilibrium problem to the requested state. All methods are collective."""
+    """Brings one problem to the requested state. Collective. `inflated`: `u` without the road."""
 
     def __init__(self, equilibrium: Equilibrium, report: Callable[[Progress], None]) -> None:
         self.equilibrium = equilibrium
         self.body = equilibrium.body
         self.report = report
-        self.newton_steps = 0
+        self.newton_steps, self.inflated = 0, self.body.u.x.array.copy()
         self._touch: float | None = None
         self._half_ring: _Half | None = None
 
-    def inflate(self, pressure: float) -> None:
-        """Inflate from 0 to `pressure` (Pa) without a road, with the steady-rolling loads.
+    def inflate(self, pressure: float, near: np.ndarray | None = None) -> None:
+        """Inflate to `pressure` (Pa) without a road, with the steady-rolling loads.
 
-        With cords, from the axisymmetric shape of one section if close enough; else in steps.
+        From a `u` that is `near`, else from 0: with cords from the axisymmetric shape of one
+        section if close enough, otherwise in steps.
         """
-        if not (self.body.plies.cords and self._start_round(pressure)):
+        if near is not None:
+            self.body.u.x.array[:] = near
+        if near is not None or not (self.body.plies.cords and self._start_round(pressure)):
             self._inflate_in_steps(pressure)
-        self._touch = self.lowest()
+        self.inflated, self._touch = self.body.u.x.array.copy(), self.lowest()
 
     def _start_round(self, pressure: float) -> bool:
         """Solve from the axisymmetric shape; on failure False and the old state. Collective."""
@@ -87,12 +90,8 @@ class Loader:
         self._touch, self.newton_steps = other.touch, other.newton_steps
 
     def _inflate_in_steps(self, pressure: float) -> None:
-        self.march(
-            lambda part: self._solve_at(part * pressure),
-            1.0,
-            1.0,
-            Show("inflation", pressure, "Pa"),
-        )
+        show = Show("inflation", pressure, "Pa")
+        self.march(lambda part: self._solve_at(part * pressure), 1.0, 1.0, show)
 
     def _solve_at(self, pressure: float) -> Step:
         before = float(self.equilibrium.pressure.value)
@@ -190,8 +189,7 @@ class Loader:
 
     def _by_half(self, press: Callable[[Loader], object]) -> bool:
         """Press half of the ring if symmetry allows; whether that solved the whole. Collective.
-        After an error the whole is left in the half's last state.
-        """
+        After an error the whole is left in the half's last state."""
         half, start = self._half(), self.body.u.x.array.copy()
         if half is None:
             return False
@@ -245,6 +243,6 @@ class Loader:
 
     def tell(self, what: str, value: float, unit: str, step: Step) -> None:
         upright = self.equilibrium.shape.upright  # told along the road's normal, as in the results
-        value *= upright if what == "deflection" else 1.0
+        value *= upright if unit == "m" else 1.0
         loads = self.equilibrium.load() / upright, self.equilibrium.points()
         self.report(Progress(what, value, unit, *loads, step))

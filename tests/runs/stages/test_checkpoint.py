@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import json
+import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +15,7 @@ import pytest
 from mpi4py import MPI
 
 from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.timing import Timing
 from tireroad.modal.solver import spectrum
 from tireroad.modal.solver.spectrum import Spectrum
 from tireroad.runs.process.signals import Stopped
@@ -212,3 +217,30 @@ def test_what_has_no_bytes_tells_nothing_of_the_disk(tmp_path: Path, monkeypatch
     for number in range(3):
         kept.keep(number, {"vectors": np.zeros((0, 4))})
     assert written == [1, 2, 3]
+
+
+def test_between_two_speeds(folder: Path, monkeypatch, capsys) -> None:
+    """At a travel speed the wheel's speed is found in turns. Each was solved from zero; now it goes on
+    from the last one's state, also after a stop between them, and its cost counts."""
+    scene = scene_of(folder, damping=200.0)
+    scene = replace(scene, rotation=replace(scene.rotation, travel_speed=9.0))
+    solved = counted(monkeypatch, Equilibrium, "_solve")
+    assembled = [counted(monkeypatch, Equilibrium, name) for name in ("_error", "_take_tangent")]
+    with monkeypatch.context() as patch:
+        patch.setattr(Timing, "clock", itertools.count().__next__)  # every part takes a second
+        run(scene, folder / "whole", "static")
+    if COMM.rank == 0:
+        first, *further = capsys.readouterr().out.split("again at")
+        told = re.compile(r"(\d+) Newton steps")
+        assert len(told.findall(first)) > 2 and len(further) >= 2
+        assert {len(told.findall(text)) for text in further} == {2}, "inflated, and pressed"
+        stage = json.loads((folder / "whole" / "summary.json").read_text())["stages"]["static"]
+        every = sum(int(steps) for text in (first, *further) for steps in told.findall(text))
+        assert stage["indicators"]["Newton steps"]["value"] == every
+        assert stage["cost"]["assembly"] == sum(map(len, assembled))
+    whole = len(solved)
+    stopped(monkeypatch, scene, folder / "broken", "static", whole - 2)  # one turn is left
+    solved.clear()
+    run(scene, folder / "broken", "static")
+    assert len(solved) < whole
+    assert_same(folder / "whole" / "static.h5", folder / "broken" / "static.h5", ROUNDING)
