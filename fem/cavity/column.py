@@ -70,10 +70,10 @@ def make_column(
     inflation: float,
     temperature: float,
     speed: float,
-    up_to: float,
+    up_to: float | None,
     loss_factor: float | None = None,
 ) -> Column:
-    """The air of a body at its static state, with modes below `up_to` Hz. Collective.
+    """The air of a body at its static state, with modes up to `up_to` Hz or, None, `duct.WAVES`. Collective.
 
     `inflation` Pa above atmospheric pressure, `temperature` K; `loss_factor` as in
     fem.cavity.duct.modes.

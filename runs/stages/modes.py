@@ -82,7 +82,7 @@ class ModesStage(Computed[ModalBasis]):
             teams = self._teams(record)
             modes = solved(operators, **wanted.asked, teams=teams, journal=journal)
         with record.timing("air"):
-            air = cavity.make_air(self.job, motions, float(modes.frequency[-1]))
+            air = cavity.make_air(self.job, motions)
         with record.timing("projection and rotation shapes"):
             given = air, self.job.axle, shapes_of(self.job)
             basis = projected(motions, modes, self.job.speed != 0, *given)

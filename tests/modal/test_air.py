@@ -101,6 +101,23 @@ def test_pressure_on_the_enclosure_is_the_rate_of_momentum_of_the_air():
     assert np.abs(own.momentum[1]).max() == 0.0
 
 
+@pytest.mark.parametrize("n", [2, 3, 8])
+def test_waves_far_above_the_band_add_their_mass_to_the_wall(n):
+    """Area q cos(n theta) of the wall: pi r rho0 c^2 s^2 / (A (w_n^2 + s^2)), by the wave equation.
+
+    Cut at the tire's highest mode, the air gave these motions no mass.
+    """
+    own = duct.modes(profile()[0], GAS, None, 0.0)
+    assert len(own.circular) == 2 * duct.WAVES
+    flux = np.zeros((49, 1))
+    flux[2 * n - 1] = np.pi * RADIUS
+    e, s = own.coupling(flux), 2j * np.pi * 80.0
+    found = (e.T @ own.dynamic_stiffness(s, 0.0) @ e).item()
+    bulk, circular = GAS.density * GAS.sound_speed**2, n * GAS.sound_speed / RADIUS
+    expected = np.pi * RADIUS * bulk / AREA * s**2 / (circular**2 + s**2)
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
 def coupled(depth=0.2, m=6, seed=4):
     """A tire of m modes in the narrowed duct, its flux of the size of a passenger tire's."""
     rng = np.random.default_rng(seed)

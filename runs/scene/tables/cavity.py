@@ -33,7 +33,7 @@ class Cavity:
     up_to: float | None = number(
         None,
         "Hz",
-        "highest frequency of its modes; absent: that of the tire's modes, at most 1000",
+        "highest frequency of its modes; absent: all of up to eight waves around the ring, about 1700 Hz",
         least=1,
         most=5000,
     )

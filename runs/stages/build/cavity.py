@@ -22,7 +22,6 @@ from tireroad.runs.stages.base.stage import Done, Shared
 if TYPE_CHECKING:
     from tireroad.fem.cavity.column import Column
 
-LIMIT = 1000.0  # Hz: above it the section exceeds half a wavelength: no one-dimensional duct
 _SHOWN = 4
 _MOSTLY = 0.3  # share of a state's energy above which it counts as an air resonance
 _UNITS = {
@@ -50,8 +49,8 @@ def inputs(job: Job) -> dict | None:
     return asdict(job.scene.tire.cavity) if has_air(job.scene) else None
 
 
-def make_air(job: Job, motions: SmallMotions, highest: float) -> Column | None:
-    """The air inside the deformed wall, or None; `highest` mode's frequency (Hz). Collective."""
+def make_air(job: Job, motions: SmallMotions) -> Column | None:
+    """The air inside the deformed wall, or None. Collective."""
     if not has_air(job.scene):
         return None
     from tireroad.fem.cavity.column import make_column
@@ -63,7 +62,7 @@ def make_air(job: Job, motions: SmallMotions, highest: float) -> Column | None:
         static.inflation,
         wanted.temperature,
         job.speed,
-        wanted.up_to or min(highest, LIMIT),
+        wanted.up_to,
         wanted.loss_factor,
     )
 
@@ -81,7 +80,7 @@ class AirColumn(Shared["Column | None"]):
         basis = self.modes.product
         if basis.column is not None:
             return basis.column
-        return make_air(self.job, self.motions.product, float(basis.frequency[-1]))
+        return make_air(self.job, self.motions.product)
 
 
 def describe_air(record: Record, air: Air) -> None:
@@ -136,11 +135,11 @@ def share(rolling: RollingModes) -> np.ndarray:
 
 
 def describe(record: Record, rolling: RollingModes) -> None:
-    """Record the states with the largest share of air: the cavity resonances."""
+    """Record the lowest states with a large share of air: the cavity resonances."""
     frequency, part = rolling.states.eigenvalue.imag, share(rolling)
-    first = np.argsort(-part * (frequency > 0))[:_SHOWN]
-    first = first[part[first] >= min(_MOSTLY, part[first[0]])]
-    first = first[np.argsort(frequency[first])]
+    above = np.flatnonzero(frequency > 0)
+    lowest = above[np.argsort(frequency[above])]
+    first = lowest[part[lowest] >= min(_MOSTLY, part[lowest].max())][:_SHOWN]
     record.headline |= {
         "states with most air": (_listed(frequency[first] / (2 * np.pi)), "Hz"),
         "their share of air": (_listed(part[first]), "-"),
