@@ -15,6 +15,7 @@ from tireroad.runs.report.quantities import bounded, digits, quantity
 
 Fact = tuple[str, str]
 _MODES = 4
+_SPREAD = "error of the deviation of the"
 
 
 def answer(results: Results, stages: Mapping[str, Any]) -> list[Fact]:
@@ -63,27 +64,34 @@ def _standing(results: Results, given: Given) -> list[Fact]:
 
 
 def _rolling(results: Results, given: Given) -> list[Fact]:
-    """The vertical contact force while rolling."""
-    force = results.array("contact.h5", "total_force")[:, 2]
+    """The vertical contact force while rolling, after the run-in as in the spectra.
+
+    Errors are estimated on part of that time: that of the deviation as a share of it there.
+    """
+    step = float(results.attribute("contact.h5", "step") or 1.0)
+    start = round((_of_spectra(results, "left_out") or 0.0) / step)
+    force = results.array("contact.h5", "total_force")[start:, 2]
     if not len(force):
         return []
-    mean, spread = (
-        given("accuracy", f"error of the {part} contact force")
-        for part in ("mean", "deviation of the")
+    end = _of_spectra(results, "limit")
+    varies = float(deviation(force[:, None], step, float(end or np.inf))[0])
+    error, spread = (
+        given("accuracy", f"{what} contact force") for what in ("error of the mean", _SPREAD)
     )
-    end, step = _limit(results), results.attribute("contact.h5", "step")
-    varies = deviation(force[:, None], float(step or 1.0), float(end or np.inf))[0]
+    there = given("accuracy", "deviation of the contact force")
+    off = spread / there * varies if spread and there else spread
+    after = f" from {quantity(start * step, 's')} on" if start else ""
     what = "its standard deviation" + (f" up to {quantity(end, 'Hz')}" if end else "")
     return [
-        ("vertical force, rolling (mean)", bounded(float(force.mean()), mean, "N")),
-        (what, bounded(float(varies), spread, "N")),
+        (f"vertical force, rolling (mean{after})", bounded(float(force.mean()), error, "N")),
+        (what, bounded(varies, off, "N")),
     ]
 
 
-def _limit(results: Results) -> Any:
-    """Upper frequency limit of the model, Hz; None in a run without spectra."""
+def _of_spectra(results: Results, name: str) -> Any:
+    """`limit` of the model (Hz) or `left_out` (s) as run-in; None in a run without spectra."""
     try:
-        return results.attribute("spectra.h5", "limit")
+        return results.attribute("spectra.h5", name)
     except Absent:
         return None
 

@@ -29,7 +29,10 @@ from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 SHARE = 0.33  # of the run's own cost: budget of all companion runs together
-_FEWEST = 64  # least number of steps that a companion run repeats
+_FEWEST, _PERIODS = (
+    64,
+    2,
+)  # least steps after the run-in that companions repeat, and periods of `up_to`
 _LOOPS = 3.5  # cost of five companion runs, in time loops per repeated step
 _COARSE = 0.14  # cost on elements of twice the size, as a share of the run's cost before the loop
 FORCES = ("contact_force", "axle_force")
@@ -91,11 +94,12 @@ class AccuracyStage(Computed[Accuracy]):
             return self._none("nothing excites the tire: its forces vary by rounding only")
         start = first_step(setup, self.job.scene.road, history.time)
         start += start % 2  # even: where a step of the companion with twice the step begins
-        steps = self._window(start, len(history.time))
-        if steps - start < 2:
-            return self._none("the run is too short for a companion run with twice the step")
         limit = model_limit(setup, self.rotating.product, history.step).frequency
         up_to = min(limit, self.job.scene.accuracy.up_to)
+        least = max(_FEWEST, int(np.ceil(_PERIODS / (up_to * history.step))))
+        steps = self._window(start + least, len(history.time))
+        if steps - start < 2:
+            return self._none("the run is too short for a companion run with twice the step")
         given = self._given(steps)
         runs = {"contact_force": history.total_force, "axle_force": history.axle_force}
         runs = {name: values[start:steps] for name, values in runs.items() if values is not None}
@@ -124,6 +128,8 @@ class AccuracyStage(Computed[Accuracy]):
             by_cause=found,
             absent=absent,
         )
+        record.indicators["errors are estimated from"] = (start * history.step, "s")
+        record.indicators["errors are estimated up to"] = (product.window, "s")
         _describe(record, product, exact, limit)
         return product
 
@@ -147,13 +153,13 @@ class AccuracyStage(Computed[Accuracy]):
             centre=np.zeros(0), window=0.0, up_to=0.0, mean={}, by_cause={}, absent=absent
         )
 
-    def _window(self, start: int, steps: int) -> int:
-        """Last step of the companion runs, for `SHARE` of the run's estimated cost."""
+    def _window(self, least: int, steps: int) -> int:
+        """Last of `steps` in companion runs: `least`, more for `SHARE` of the run's estimated cost."""
         work = estimate(self.job.scene).work
         loop = work["contact loop"]
         before = sum(work.values()) - loop
         part = (SHARE * (before + loop) - _COARSE * before) / (_LOOPS * loop)
-        count = int(np.clip(round(part * steps), min(start + _FEWEST, steps), steps))
+        count = int(np.clip(round(part * steps), min(least, steps), steps))
         return count - count % 2
 
     def _given(self, steps: int) -> Given:

@@ -1,13 +1,15 @@
-"""The summary of a run: what it says of levels."""
+"""The summary of a run: what it says of forces, their errors and levels."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from synthetic_results import sealed, write_results
 
 from tireroad.runs.files.read import Results
 from tireroad.runs.report.answer import answer
+from tireroad.runs.report.quantities import quantity
 
 
 def test_a_constant_force_has_no_level(tmp_path: Path) -> None:
@@ -22,3 +24,26 @@ def test_a_constant_force_has_no_level(tmp_path: Path) -> None:
         told = dict(answer(results, {}))
     assert told["blocked axle force z"] == "constant: no level"
     assert not any("dB re 1 N" in text for text in told.values())
+
+
+def test_an_error_stands_beside_the_figure_it_is_of(tmp_path: Path) -> None:
+    """A deviation of all times, run-in included, had the error of that of a few milliseconds."""
+    directory = write_results(tmp_path / "run", steps=64, modes=6)
+    with sealed(directory / "contact.h5", "a") as file:
+        step, time = float(file.attrs["step"]), np.arange(64)
+        varying = 500.0 + 20.0 * np.sin(2 * np.pi * time / 8)
+        file["total_force"][:, 2] = np.where(time < 16, 900.0, varying)
+    with sealed(directory / "spectra.h5", "a") as file:
+        file.attrs["left_out"], file.attrs["limit"] = 16 * step, 0.5 / step
+    window = {
+        "error of the mean contact force": 3.0,
+        "deviation of the contact force": 10.0,
+        "error of the deviation of the contact force": 0.5,
+    }
+    headline = {name: {"value": value, "unit": "N"} for name, value in window.items()}
+    with Results(directory, {}) as results:
+        told = answer(results, {"accuracy": {"headline": headline}})
+    (what, mean), (_, spread) = (fact for fact in told if "±" in fact[1])
+    assert what == f"vertical force, rolling (mean from {quantity(16 * step, 's')} on)"
+    assert mean == "500 ± 3 N"
+    assert spread == "14.14 ± 0.71 N"  # 5 %, as in the window
