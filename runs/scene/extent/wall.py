@@ -37,7 +37,7 @@ class Wall:
         omega2 = (2 * math.pi * frequency) ** 2
         driving = self.mass * np.maximum(omega2 - self.curved2, 0.0)
         root = np.sqrt(self.tension**2 + 4 * self.bending * driving)
-        k2 = float(np.mean(2 * driving / (self.tension + root)))
+        k2 = float(np.mean((root - self.tension) / (2 * self.bending)))
         return self.area * (k2 + self.slowness2 * omega2) / (4 * math.pi)
 
     def frequency_of(self, modes: float) -> float:

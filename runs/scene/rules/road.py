@@ -64,11 +64,23 @@ def remarks(scene: Scene) -> list[str]:
     start = begun_at(road, scene.road.start)
     notes = [f"road: {moved_start(start)}"] if start != (scene.road.start or 0.0) else []
     end = start + AHEAD + least_travel(scene) / LEAST_RADIUS
-    if scene.road.kind != "flat" and _level(scene.road, road, start, end):
+    if least_travel(scene) == 0.0:
+        notes += [f"warning: {text}" for text in never_met(scene.road)]
+    elif scene.road.kind != "flat" and _level(scene.road, road, start, end):
         notes.append(f"warning: {without_relief(scene.road, start, end)}")
     elif (place := foot(scene.road)) is not None and start < place < start + scene.road.run_in:
         notes.append(f"warning: {within_run_in(scene.road, place)}")
     return notes
+
+
+def never_met(road: Table) -> list[str]:
+    """A warning of a road with heights under a wheel that stands, at the start of the run-in."""
+    if road.kind == "flat" and not road.offset:
+        return []
+    return [
+        "the wheel stands: it meets a road by rolling out of its run-in, so that the heights of this one and "
+        "road.offset have no effect; give [rotation] a speed, or move the whole road by [road.motion]"
+    ]
 
 
 def foot(road: Table) -> float | None:

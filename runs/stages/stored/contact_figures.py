@@ -48,17 +48,22 @@ def alternation(record: Record, worst: float, scheme: Chosen) -> None:
 
 
 def points(record: Record, patch: Patch, extent: Footprint, relief: float) -> None:
-    """Record the static footprint's size in point spacings; warn if too few on a rough road."""
+    """Record the static footprint's size in point spacings; warn if too few on a rough road.
+
+    That of the finite elements, or the distance of the outermost points that touch, which is longer
+    where the tread is the softer part.
+    """
     spacing = patch.spacing
     if not spacing.all():
         return
-    long, wide = np.array([extent.length, extent.width]) / spacing
+    size = np.maximum([extent.length, extent.width], (patch.touching - 1) * spacing)
+    long, wide = size / spacing
     record.indicators["length of the footprint over the points' spacing"] = (float(long), "-")
     record.indicators["width of the footprint over the points' spacing"] = (float(wide), "-")
     if relief and 0 < min(long, wide) < FEW:
         record.warnings.append(
-            f"contact points are {1e3 * spacing[0]:.3g} × {1e3 * spacing[1]:.3g} mm apart on a footprint of {1e3 * extent.length:.3g} × "
-            f"{1e3 * extent.width:.3g} mm: on a rough road forces of so few may vary by a third too much; take a quarter "
+            f"contact points are {1e3 * spacing[0]:.3g} × {1e3 * spacing[1]:.3g} mm apart on a footprint of {1e3 * size[0]:.3g} × "
+            f"{1e3 * size[1]:.3g} mm: on a rough road forces of so few may vary by a third too much; take a quarter "
             "of its width and length or less (contact.points)"
         )
 

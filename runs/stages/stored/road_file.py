@@ -8,7 +8,7 @@ from tireroad.contact.results.relief import Relief, nothing_met, relief_seen
 from tireroad.contact.setup import ContactSetup
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
-from tireroad.runs.scene.rules.road import foot, within_run_in, without_relief
+from tireroad.runs.scene.rules.road import foot, never_met, within_run_in, without_relief
 from tireroad.runs.scene.tables.road import Road
 from tireroad.runs.stages.base.record import Record
 
@@ -28,8 +28,11 @@ def describe(record: Record, setup: ContactSetup, road: Road) -> None:
     texture = setup.road.texture
     if texture is not None and texture.depth is not None:
         record.headline["mean profile depth"] = (texture.depth, "m")
-    if road.kind != "flat" and nothing_met(setup):
-        record.warnings.append(without_relief(road, *setup.road.passed))
+    first, last = setup.road.passed
+    if last <= first:
+        record.warnings.extend(never_met(road))
+    elif road.kind != "flat" and nothing_met(setup):
+        record.warnings.append(without_relief(road, first, last))
     elif (place := foot(road)) is not None and (share := setup.road.share(place)) < _WHOLE:
         record.warnings.append(within_run_in(road, place, share))
     elif (relief := relief_seen(setup)) is not None:

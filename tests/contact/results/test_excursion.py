@@ -72,3 +72,11 @@ def test_a_footprint_of_few_points_is_told_where_the_road_has_heights() -> None:
     assert "15 × 20 mm apart on a footprint of 80 × 40 mm" in record.warnings[0]
     points(record, replace(patch, force=0 * patch.force), few, 1e-3)
     assert len(record.warnings) == 1
+
+
+def test_points_that_touch_on_a_soft_tread_are_counted_as_they_settled() -> None:
+    """Under a stiff tire the finite elements' footprint is a fraction of that of a soft tread."""
+    patch, record = oval_patch((9, 9), (0.01, 0.01), 500.0), Record()
+    points(record, patch, Footprint(0.005, 0.004, 1e-5), 1e-3)
+    assert patch.touching.tolist() == [5, 5]
+    assert not record.warnings

@@ -77,6 +77,15 @@ def test_a_curved_wall_has_few_slow_modes(
     assert highest_frequency(scene, count) == pytest.approx(found, rel=0.25)
 
 
+def test_a_curved_wall_without_tension(tmp_path: Path) -> None:
+    """Waves below their cut-on were 0/0: a traceback with up_to, and a highest mode at 1 mHz."""
+    slack = torus(tmp_path, "static.inflation=0", "modal.count=60")
+    nearly = torus(tmp_path, "static.inflation=1", "modal.count=60")
+    assert highest_frequency(slack, 60) == pytest.approx(highest_frequency(nearly, 60), rel=1e-3)
+    few = torus(tmp_path, "static.inflation=0", "modal.count=", "modal.up_to=200")
+    assert 0 < estimate(few).sizes.modes < 60
+
+
 @pytest.mark.parametrize(
     ("overrides", "written"),
     [

@@ -119,3 +119,25 @@ def test_run_refuses_before_it_solves(scene: Path, launch, tmp_path: Path) -> No
     )
     assert done.returncode == 2 and "2.72 m" in done.stderr
     assert not list((tmp_path / "out").glob("*.h5"))
+
+
+@pytest.mark.parametrize(
+    ("road", "said"),
+    [
+        ('kind = "sine"\namplitude = 2e-3\nwavelength = 0.05', True),
+        ('kind = "cleat"\nposition = 0.07', True),
+        ('kind = "flat"\noffset = 3e-3', True),
+        ('kind = "flat"', False),
+    ],
+)
+def test_check_says_that_a_standing_wheel_meets_no_heights(
+    scene: Path, road: str, said: bool
+) -> None:
+    """They stayed in the run-in for ever, without a word; of a cleat the position was blamed."""
+    text = SCENE.replace('kind = "grid"\nfile = "road.npz"', road).replace(
+        "speed = 50", "speed = 0"
+    )
+    scene.write_text(text)
+    told = explain(load(scene, []))
+    assert ("warning: the wheel stands" in told) == said
+    assert "no relief" not in told
