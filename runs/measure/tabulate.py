@@ -7,6 +7,7 @@ import inspect
 import io
 import json
 import pkgutil
+import tempfile
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -15,6 +16,7 @@ from types import ModuleType
 from tireroad.fem.errors import ConvergenceError, InputError
 from tireroad.runs.files.disk import write_text
 from tireroad.runs.process import observe
+from tireroad.runs.process.signals import Stopped
 from tireroad.runs.version import PROGRAM, VERSION
 
 
@@ -51,10 +53,11 @@ def modules(package: str) -> dict[str, ModuleType]:
 
 
 def run_all(package: str, names: list[str], out: Path | None, large: bool = False) -> None:
-    """Run the named modules of a package (all by default), show their tables and save them.
+    """Run the named modules of a package (all by default), show their tables; save them after each.
 
-    `large`: run only modules with a full-size version, in that version. Raises ConvergenceError at
-    the end if something could not be measured.
+    `large`: run only modules with a full-size version, in that version. Raises InputError before
+    anything runs if `out` cannot be written, ConvergenceError at the end if something could not be
+    measured.
     """
     known = modules(package)
     if large:
@@ -62,20 +65,58 @@ def run_all(package: str, names: list[str], out: Path | None, large: bool = Fals
     for name in names:
         if name not in known:
             raise InputError(f"{name!r} is none of: {', '.join(known)}")
-    results = {}
-    for name in names or known:
-        observe.say(f"{name}: {known[name].ABOUT}")
-        began = time.perf_counter()
-        tables = known[name].run_large() if large else _run(known[name], out)
-        for table in tables:
-            show(table)
-        observe.say(f"{name}: {time.perf_counter() - began:.1f} s\n")
-        results[name] = tables
     if out is not None:
-        _keep(results, {name: known[name].ABOUT for name in results}, out)
+        _check(out)
+    results: dict[str, list[Table]] = {}
+    try:
+        for name in names or known:
+            results[name] = _measured(known[name], name, out, large)
+            if out is not None:
+                _keep(results, {name: known[name].ABOUT for name in results}, out)
+    except Stopped as stop:
+        stop.kept = _left(results, out)
+        raise
+    if out is not None:
+        observe.say(f"{out} and {out.with_suffix('.html')}")
     failed = [line for tables in results.values() for table in tables for line in table.failed]
     if failed:
         raise ConvergenceError(f"not measured: {'; '.join(failed)}")
+
+
+def _check(out: Path) -> None:
+    """Make the folder of `out`; InputError if no file of that name can be written there."""
+    if out.is_dir():
+        raise InputError(f"--out {out} is a folder: name a file, such as {out / 'measured.json'}")
+    if out.suffix == ".html":
+        raise InputError(f"--out {out}: a page of this name is written beside it; end it in .json")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out.parent):
+            pass
+    except OSError as error:
+        raise InputError(f"--out {out} cannot be written: {error.strerror}") from None
+
+
+def _left(results: dict[str, list[Table]], out: Path | None) -> str:
+    """What a stop leaves, in words."""
+    if out is None:
+        return "nothing is kept; with --out FILE.json what is finished is written there"
+    finished = f"{', '.join(results)} in {out}" if results else "nothing in the file of --out"
+    kept = out.with_suffix(".kept")
+    if kept.is_dir():
+        return f"kept are {finished}, and cases of the last one in {kept}: the same command goes on"
+    return f"kept are {finished}; name those that remain, with another --out"
+
+
+def _measured(module: ModuleType, name: str, out: Path | None, large: bool) -> list[Table]:
+    """Run a module and show its tables."""
+    observe.say(f"{name}: {module.ABOUT}")
+    began = time.perf_counter()
+    tables = module.run_large() if large else _run(module, out)
+    for table in tables:
+        show(table)
+    observe.say(f"{name}: {time.perf_counter() - began:.1f} s\n")
+    return tables
 
 
 def _run(module: ModuleType, out: Path | None) -> list[Table]:
@@ -118,6 +159,4 @@ def _keep(results: dict[str, list[Table]], about: dict[str, str], out: Path) -> 
     data = {name: [asdict(table) for table in tables] for name, tables in results.items()}
     head = {"program": PROGRAM, "version": VERSION, "machine": machine()}
     write_text(out, json.dumps(head | {"results": data}, indent=1) + "\n")
-    beside = out.with_suffix(".html")
-    write_text(beside, page(results, about))
-    observe.say(f"{out} and {beside}")
+    write_text(out.with_suffix(".html"), page(results, about))

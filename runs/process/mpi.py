@@ -53,10 +53,7 @@ def _judged(function: Callable[[], None]) -> tuple[int, str]:
     except InputError as error:
         return INPUT, f"error: {error}"
     except Stopped as stop:
-        return (
-            STOPPED,
-            f"stopped by {stop}: what was finished is kept, the same command or resume goes on",
-        )
+        return STOPPED, f"stopped by {stop}: {stop.kept}"
     except MemoryError as error:
         return GAVE_UP, f"error: out of memory ({error}): use a coarser mesh, fewer modes or points"
     except FailedOnRoot:

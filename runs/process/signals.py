@@ -24,8 +24,11 @@ send one to a process, its group and its parent, which forwards it."""
 class Stopped(BaseException):
     """The user or the batch system requested a stop: exit status 4.
 
-    Not an Exception, so that no solver callback mistakes it for its own failure.
+    Not an Exception, so that no solver callback mistakes it for its own failure. `kept`: what the
+    user is told of the work so far.
     """
+
+    kept = "what was finished is kept, the same command or resume goes on"
 
 
 class Deferred:

@@ -52,12 +52,11 @@ def figure(name: str, title: str, thesis: str) -> Callable:
 def chosen(names: Sequence[str], known: dict[str, Figure]) -> list[Figure]:
     """The figures with these names, each once, in the order of the thesis; all without names.
 
-    Raises InputError for an unknown name, suggesting the nearest one.
+    Raises InputError for an unknown name, suggesting one like it.
     """
     for name in names:
         if name not in known:
-            near = difflib.get_close_matches(name, known, 1, 0.0)
-            raise InputError(
-                f"reproduce: there is no {name!r}: did you mean {near[0]}? There are {', '.join(known)}"
-            )
+            near = difflib.get_close_matches(name, known, 1, 0.6)
+            hint = f" did you mean {near[0]}?" if near else ""
+            raise InputError(f"reproduce: there is no {name!r}:{hint} there are {', '.join(known)}")
     return [one for name, one in known.items() if name in names or not names]

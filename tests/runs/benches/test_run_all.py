@@ -1,0 +1,44 @@
+"""Benchmarks and validations one after the other: where they are written, and what a stop leaves."""
+
+import json
+
+import pytest
+
+from tireroad.fem.errors import InputError
+from tireroad.runs.measure import tabulate
+from tireroad.runs.measure.tabulate import Table
+from tireroad.runs.process.mpi import judged
+from tireroad.runs.process.signals import Stopped
+from tireroad.runs.process.statuses import STOPPED
+
+
+def test_a_stop_says_what_is_kept(tmp_path, monkeypatch) -> None:
+    """Tables were written at the end only, while the message spoke of what was kept."""
+
+    def stopped(kept=None):
+        raise Stopped("SIGTERM")
+
+    done = type("M", (), {"ABOUT": "it", "run": staticmethod(lambda: [Table("t", [], [])])})
+    late = type("M", (), {"ABOUT": "late", "run": staticmethod(stopped)})
+    monkeypatch.setattr(tabulate, "modules", lambda package: {"done": done, "late": late})
+    out = tmp_path / "not yet" / "out.json"
+    for at, told in ((out, f"kept are done in {out}; "), (None, "nothing is kept; with --out")):
+        status, text = judged(lambda at=at: tabulate.run_all("tireroad.runs.bench", [], at))
+        assert status == STOPPED and f"stopped by SIGTERM: {told}" in text
+    assert list(json.loads(out.read_text())["results"]) == ["done"]
+    out.with_suffix(".kept").mkdir()
+    assert (
+        "the same command goes on"
+        in judged(lambda: tabulate.run_all("tireroad.runs.bench", [], out))[1]
+    )
+
+
+@pytest.mark.parametrize("name", ["page.html", ".", "file/out.json"])
+def test_a_name_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path, monkeypatch, name
+) -> None:
+    (tmp_path / "file").touch()
+    module = type("M", (), {"ABOUT": "it", "run": staticmethod(lambda: pytest.fail("it ran"))})
+    monkeypatch.setattr(tabulate, "modules", lambda package: {"it": module})
+    with pytest.raises(InputError, match="--out"):
+        tabulate.run_all("tireroad.runs.bench", [], tmp_path / name)
