@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from tireroad.fem.errors import ConvergenceError
+from tireroad.fem.garbage import collect
 from tireroad.fem.static.diagnosis import with_cause
 from tireroad.fem.static.equilibrium import Equilibrium
 from tireroad.fem.static.footprint import Footprint
@@ -75,18 +76,19 @@ class StaticStage(Computed[StaticState]):
 
     def _at_speed(self, record: Record, history: History) -> tuple[StaticState, Loader]:
         """The state at the wheel's speed. Collective."""
-        speed, near, steps = self.job.speed, None, 0
-        for _ in range(_SPEEDS):
+        speed, near, steps, turns = self.job.speed, None, 0, 0
+        while True:
             state, loader, near = self._solved(record, speed, history, near)
-            steps += loader.newton_steps
+            steps, turns = steps + loader.newton_steps, turns + 1
             before, speed = speed, self.job.free_speed(state)
-            if abs(speed - before) <= _SAME_SPEED * speed or not state.rolling.speed:
-                break
-            observe.say(
-                f"  rolling radius {state.rolling_radius():.6g} m: again at {speed:.6g} rad/s"
-            )
-        loader.newton_steps = steps
-        return state, loader
+            same = abs(speed - before) <= _SAME_SPEED * speed or not state.rolling.speed
+            if same or turns == _SPEEDS:
+                loader.newton_steps = steps
+                return state, loader
+            radius = state.rolling_radius()
+            observe.say(f"  rolling radius {radius:.6g} m: again at {speed:.6g} rad/s")
+            del loader  # its matrices and factors, before the next ones are formed
+            collect(self.job.comm)
 
     def _concluded(self, record: Record, state: StaticState, loader: Loader) -> StaticState:
         """Add error estimate and the finer elements' footprint; record the figures. Collective."""

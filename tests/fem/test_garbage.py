@@ -1,6 +1,7 @@
 """Memory of one tire after the other."""
 
 import ctypes
+import weakref
 
 import numpy as np
 import pytest
@@ -10,6 +11,12 @@ import tireroad
 from tireroad.fem.garbage import collect
 from tireroad.fem.matrices.operators import ROTATION
 from tireroad.fem.model import SmallMotions
+from tireroad.fem.static.curved.shape import FLAT
+from tireroad.fem.static.equilibrium import Equilibrium
+from tireroad.fem.static.path.history import History
+from tireroad.fem.static.path.journal import Journal
+from tireroad.fem.static.path.loading import Loader
+from tireroad.fem.static.virtual_work import AT_REST
 
 
 class _Heap(ctypes.Structure):
@@ -62,3 +69,17 @@ def test_a_tire_that_is_let_go_takes_its_matrices_with_it() -> None:
         seen.append(_memory())
     # The median: tables of Python and buffers of MPI double now and then, 2 MB at once.
     assert np.median(np.diff(seen)) < 1.0 / MPI.COMM_WORLD.size, seen
+
+
+def test_a_record_of_solutions_keeps_no_solved_problem(make_body) -> None:
+    """Matrices and factors of every wheel speed tried stayed: twice the memory estimated."""
+    body, history = make_body(), History(Journal())
+    first, second = (Equilibrium(body, AT_REST, FLAT) for _ in range(2))
+    for problem in [first, second]:
+        problem.history = history
+        Loader(problem, lambda progress: None).inflate(1e5)
+    one, other = weakref.ref(first), weakref.ref(second)
+    del first
+    collect(body.comm)
+    assert one() is None and other() is not None
+    assert history._number(second) == 1

@@ -9,6 +9,7 @@ where it began.
 from __future__ import annotations
 
 import hashlib
+import weakref
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,7 @@ class History:
 
     def __init__(self, journal: Journal | None) -> None:
         self._journal = journal
-        self._problems: list[Equilibrium] = []
+        self._problems: list[weakref.ref[Equilibrium]] = []  # a past one may be freed
         self._predicted: list[bool] = []
         found = journal.found if journal else []
         last = {int(entry["problem"]): k for k, entry in enumerate(found)}
@@ -69,9 +70,9 @@ class History:
 
     def _number(self, problem: Equilibrium) -> int:
         for k, one in enumerate(self._problems):
-            if one is problem:
+            if one() is problem:
                 return k
-        self._problems.append(problem)
+        self._problems.append(weakref.ref(problem))
         return len(self._problems) - 1
 
 
