@@ -28,7 +28,7 @@ _DIRECTIVE = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
 SLURM = """\
 #!/bin/bash
 #SBATCH --job-name=$name
-#SBATCH --output=$logs/$name-%A_%a.txt
+#SBATCH --output=$logs/$name-%j.txt
 #SBATCH --open-mode=append
 #SBATCH --ntasks=$processes
 #SBATCH --signal=B:USR1@$warning

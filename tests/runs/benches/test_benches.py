@@ -65,7 +65,12 @@ def check_page(tables: list[Table], images: int) -> str:
 
 @pytest.mark.long
 def test_pareto_names_its_front(tmp_path, monkeypatch) -> None:
-    for name, value in (("STEPS", (2e-4, 4e-4)), ("DURATION", 0.04), ("FINEST", 1e-4)):
+    for name, value in (
+        ("STEPS", (2e-4, 4e-4)),
+        ("DURATION", 0.04),
+        ("FINEST", 1e-4),
+        ("ORDER", 2),
+    ):
         monkeypatch.setattr(pareto, name, value)
     first, meshes, every = pareto.tables(
         tmp_path, (TINY, Mesh(12, 5, 0.5)), (8, 16), 24, (4e-4,), Mesh(12, 4, 0.5)
