@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -115,7 +115,8 @@ def run_scene(
         observe.say(f"PETSc options: {' '.join(petsc_options)}")
     with _factors(on_disk, directory, comm):
         done = _parts(job, reasons, summary)
-    _check_options(petsc_options)
+    stages = on_root(comm, lambda: summary.data["stages"])
+    _check_options(petsc_options, [k for k, one in stages.items() if one["status"] == "reused"])
     observe.say(f"memory: {_peak(comm):.2g} GB of a process at most, {each:.2g} GB estimated")
     if "report" in reasons:
         on_root(comm, lambda: summary.record("report", "skipped", reason=reasons["report"]))
@@ -215,11 +216,12 @@ def _report(directory: Path, summary: Summary) -> None:
         observe.warn(strange)
 
 
-def _check_options(petsc_options: list[str]) -> None:
-    """Warn of options that PETSc never read: most likely they are misspelt."""
+def _check_options(petsc_options: list[str], reused: Sequence[str] = ()) -> None:
+    """Warn of options that PETSc never read: misspelt, or of a stage that was `reused`."""
     unused = [o for o in petsc_options if o.startswith("-") and not _was_read(o.lstrip("-"))]
     if unused:
-        observe.warn(f"PETSc options that nothing read: {' '.join(unused)}")
+        kept = f"; reused stages read none ({', '.join(reused)}): --fresh" if reused else ""
+        observe.warn(f"PETSc options that nothing read: {' '.join(unused)}{kept}")
 
 
 def _was_read(name: str) -> bool:

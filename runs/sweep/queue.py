@@ -7,6 +7,7 @@ job gathers.
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -48,6 +49,7 @@ if [ "$$status" = 4 ]; then
 fi
 exit "$$status"
 """
+_OWN = {"array", "dependency", "job-name", "ntasks", "open-mode", "output", "requeue", "signal"}
 _TABLE = {"template", "task", "submit", "array", "after"}
 _MORE = {"number", "join"}
 
@@ -95,7 +97,14 @@ class Queue:
                 '"Job <([0-9]+)>"'
             )
         words: dict[str, Any] = {key: str(value) for key, value in given.items()}
-        return cls(**words | {"template": text})
+        found = cls(**words | {"template": text})
+        try:
+            found.submission(path, 1, ["1"])
+        except (LookupError, ValueError) as error:
+            raise InputError(
+                f"sweep: [queue] submit, array or after is no command line with {{count}} and {{jobs}} in their places: {error!r}"
+            ) from None
+        return found
 
     def submission(self, script: Path, count: int | None, before: Sequence[str]) -> list[str]:
         """The command line that submits a script as an array of `count` after jobs `before`."""
@@ -170,7 +179,7 @@ def _script(
             warning=WARNING,
             directives=_directives(queue.directives),
             cache=shlex.quote(str((folder / "cache").resolve())),
-            body=body,
+            body=_environment() + body,
         )
     except (KeyError, ValueError) as error:
         raise InputError(
@@ -184,13 +193,27 @@ def _script(
 
 
 def _directives(given: Mapping[str, Any]) -> str:
-    """The lines of the [slurm] table: account, partition, time, ..."""
+    """The lines of the [slurm] table: account, partition, time, ...; a flag is true or false."""
     lines = []
     for key, value in given.items():
-        if not _DIRECTIVE.fullmatch(key) or "\n" in str(value):
+        if key in _OWN:
+            advice = "give processes" if key == "ntasks" else "leave it out"
+            raise InputError(f"sweep: slurm.{key} is set by the program: {advice}")
+        line = "\n" not in str(value) and not isinstance(value, list | dict)
+        if not _DIRECTIVE.fullmatch(key) or not line:
             raise InputError(f"sweep: slurm.{key} = {value!r} is no option of sbatch on one line")
-        lines.append(f"#SBATCH --{key}={value}")
+        if value is not False:
+            lines.append(f"#SBATCH --{key}" + ("" if value is True else f"={value}"))
     return "\n".join(lines)
+
+
+def _environment() -> str:
+    """Shell code by which a job finds the program where this process does."""
+    paths = [p for p in os.environ.get("PYTHONPATH", "").split(os.pathsep) if p]
+    if not paths:
+        return ""
+    whole = os.pathsep.join(str(Path(path).resolve()) for path in paths)
+    return f"export PYTHONPATH={shlex.quote(whole)}\n"
 
 
 def _members(sweep: Sweep, folder: Path, members: Sequence[Member], task: str) -> str:

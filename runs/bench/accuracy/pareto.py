@@ -62,9 +62,8 @@ class Choice:
     @property
     def name(self) -> str:
         """A short description."""
-        if self.residual == FULL:
-            return f"{self.residual}, {self.step:g} s"
-        return f"{self.modes} modes, {self.residual}, {self.step:g} s"
+        modes = "" if self.residual == FULL else f"{self.modes} modes, "
+        return f"{modes}{self.residual}, {self.step:g} s"
 
 
 def run() -> list[Table]:
@@ -76,16 +75,14 @@ def run() -> list[Table]:
 def tables(
     folder: Path, meshes: tuple[Mesh, Mesh], counts, most, full_steps, converged: Mesh
 ) -> list[Table]:
-    """`meshes`: of all configurations, of some; `counts` of modes; `most` of the reference, on mesh
-    `converged`.
-    """
+    """`meshes`: of all configurations, of some; `most` modes of the reference, on `converged`."""
     reference, exact = _reference(folder, converged, most)
     given, own = _reference(folder, meshes[0], most)
     found = _choices(given, exact, str(meshes[0]), counts, RESIDUALS, STEPS)
     full = [_full(given, exact, str(meshes[0]), step) for step in full_steps]
     coarse, coarser = _reference(folder, meshes[1], most)
-    best = ("static", "attachment")
-    on_coarse = _choices(coarse, exact, str(meshes[1]), counts[1:], best, STEPS[1:])
+    some = counts[1:], ("static", "attachment"), STEPS[1:]
+    on_coarse = _choices(coarse, exact, str(meshes[1]), *some)
     apart = [errors(exact, one, DURATION) for one in (own, coarser)]
     return [
         _front(found, full, given, reference),
@@ -137,9 +134,8 @@ def _full(given: Prepared, exact: History, mesh: str, step: float) -> Choice:
     )
     with threadpool_limits(1, "blas"):
         found = follow(given.trial, tire, step, 0.0)
-    size = given.run.motions.unknowns
-    off = errors(exact, found, DURATION)
-    return Choice(mesh, size, FULL, 2 * size, step, found.seconds / DURATION, *off)
+    size, cost = given.run.motions.unknowns, found.seconds / DURATION
+    return Choice(mesh, size, FULL, 2 * size, step, cost, *errors(exact, found, DURATION))
 
 
 def front(choices: list[Choice]) -> list[Choice]:

@@ -12,8 +12,8 @@ from one_node import ended, slurm
 from started import environment
 
 import tireroad
-from tireroad.fem.errors import ConvergenceError
-from tireroad.runs.sweep.queue import Queue
+from tireroad.fem.errors import ConvergenceError, InputError
+from tireroad.runs.sweep.queue import Queue, _directives, _environment
 
 pytestmark = pytest.mark.slow
 
@@ -171,6 +171,9 @@ def test_another_queue_by_a_template(tmp_path: Path, launch, table: str, name: s
         (("task", "tasks"), "[queue] needs task"),
         (('"pbs.sh"', '"other.sh"'), "queue.template"),
         (("array", 'number = "[0-9]+"\narray'), "queue.number"),
+        (("{count}", "{n}"), "queue] submit, array or after"),
+        (("{count}", "{count"), "queue] submit, array or after"),
+        (("{jobs}", "{jobs} '"), "queue] submit, array or after"),
     ],
 )
 def test_mistakes_in_a_queue(tmp_path: Path, launch, change, words) -> None:
@@ -179,6 +182,21 @@ def test_mistakes_in_a_queue(tmp_path: Path, launch, change, words) -> None:
     (tmp_path / "pbs.sh").write_text("$nothing")
     done = launch("-m", "runs", "sweep", sweep, "--out", tmp_path / "out", "--slurm")
     assert done.returncode == 2 and words in done.stderr
+
+
+def test_options_of_sbatch(monkeypatch) -> None:
+    """A flag was written as --exclusive=True; a second --signal would have replaced the program's."""
+    given = {"time": "1:00", "exclusive": True, "hold": False}
+    assert _directives(given) == "#SBATCH --time=1:00\n#SBATCH --exclusive"
+    for key, told in (("signal", "leave it out"), ("ntasks", "give processes")):
+        with pytest.raises(InputError, match=f"slurm.{key} is set by the program: {told}"):
+            _directives({key: "4"})
+    with pytest.raises(InputError, match="no option of sbatch"):
+        _directives({"partition": ["a", "b"]})
+    monkeypatch.setenv("PYTHONPATH", "/a b:/c")
+    assert _environment() == "export PYTHONPATH='/a b:/c'\n"
+    monkeypatch.delenv("PYTHONPATH")
+    assert _environment() == ""
 
 
 def test_a_queue_that_prints_no_number() -> None:
