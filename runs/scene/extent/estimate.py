@@ -101,7 +101,13 @@ def estimate(scene: Scene, until: str | None = None) -> Estimate:
         memory=_memory(scene, size, left_out),
         disk=disk(scene, size, left_out),
         work=work,
-        seconds=seconds(work, size, column, bars="accuracy" not in left_out),
+        seconds=seconds(
+            work,
+            size,
+            column,
+            bars="accuracy" not in left_out,
+            load_error=scene.static.on_road and scene.static.error_estimate,
+        ),
     )
 
 

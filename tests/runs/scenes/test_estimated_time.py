@@ -80,6 +80,17 @@ def test_error_bars_count(root: Path, scene: str, share: float) -> None:
     assert "error bars" not in told(root, scene, ["accuracy.estimate=false"]).seconds
 
 
+def test_the_error_of_the_load_counts(root: Path) -> None:
+    """12 s beside 6.6 s of the state (2026-11-25), of which nothing was told."""
+    bare, given = (
+        told(root, "quickstart", [f"static.error_estimate={one}"]) for one in ("false", "true")
+    )
+    assert 12 / 1.6 < given.seconds[LOAD_ERROR] < 1.6 * 12
+    assert given.seconds == bare.seconds | {LOAD_ERROR: given.seconds[LOAD_ERROR]}
+    off = told(root, "point_force", ["static.error_estimate=true"])
+    assert LOAD_ERROR not in off.seconds
+
+
 @pytest.mark.parametrize(
     ("settings", "stages"),
     [
