@@ -119,7 +119,10 @@ class ContactSetup:
 
     @property
     def relief(self) -> float:
-        """Bound of the height difference (m) of the road under the run."""
+        """Bound of the height difference (m) of the road under the run; 0 if the wheel stands, since
+        the road grows with the way travelled."""
+        if not self.rolled.travel:
+            return 0.0
         x0, x1, y0, y1 = self.patch.extent
         strip = x0, x1 + self.rolled.travel, y0, y1
         return self.road.highest(*strip) - self.road.lowest(*strip)

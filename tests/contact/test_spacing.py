@@ -1,5 +1,6 @@
 """How far apart contact points are that the program chooses, and what they settle to on the nodes of the mesh."""
 
+from dataclasses import replace
 from operator import is_
 from types import SimpleNamespace
 
@@ -8,6 +9,7 @@ import pytest
 
 from tireroad.contact.patch import make_patch
 from tireroad.contact.roads.kinds.flat import Flat
+from tireroad.contact.roads.road import make_road
 from tireroad.contact.roads.under_tire import RoadUnderTire
 from tireroad.contact.setup import ContactSetup, Rolled
 from tireroad.contact.spacing import spacing
@@ -117,3 +119,15 @@ def test_nodes_without_a_tread_have_their_static_state(wheel) -> None:
     setup, response, face = wheel
     settled, rise = setup.settled(response, face, Contact(tread="none"))
     assert rise == 0.0 and all(map(is_, vars(settled.patch).values(), vars(setup.patch).values()))
+
+
+def test_a_standing_wheel_meets_no_relief(wheel) -> None:
+    """Its road stays in the run-in: heights were taken to vary the forces of too few points."""
+    road = make_road(kind="sine", amplitude=1e-3, wavelength=0.1)
+    found = []
+    for speed in (0.0, 10.0):
+        rolled = Rolled(speed=speed, duration=0.1, motion=lambda time: 0.0)
+        _, x1, y0, y1 = wheel[0].patch.extent
+        strip = road.prepare(x1, x1 + rolled.travel, y0, y1)
+        found.append(replace(wheel[0], rolled=rolled, road=strip).relief)
+    assert found == [0.0, pytest.approx(2e-3)]
