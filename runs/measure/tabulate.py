@@ -87,6 +87,8 @@ def _check(out: Path) -> None:
     """Make the folder of `out`; InputError if no file of that name can be written there."""
     if out.is_dir():
         raise InputError(f"--out {out} is a folder: name a file, such as {out / 'measured.json'}")
+    if out.exists() and not out.is_file():  # a device would be replaced by the file
+        raise InputError(f"--out {out} is no ordinary file: name another one")
     if out.suffix == ".html":
         raise InputError(f"--out {out}: a page of this name is written beside it; end it in .json")
     try:

@@ -1,6 +1,7 @@
 """Benchmarks and validations one after the other: where they are written, and what a stop leaves."""
 
 import json
+import os
 
 import pytest
 
@@ -33,11 +34,12 @@ def test_a_stop_says_what_is_kept(tmp_path, monkeypatch) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["page.html", ".", "file/out.json"])
+@pytest.mark.parametrize("name", ["page.html", ".", "file/out.json", "pipe"])
 def test_a_name_that_cannot_be_written_is_refused_before_the_work(
     tmp_path, monkeypatch, name
 ) -> None:
     (tmp_path / "file").touch()
+    os.mkfifo(tmp_path / "pipe")
     module = type("M", (), {"ABOUT": "it", "run": staticmethod(lambda: pytest.fail("it ran"))})
     monkeypatch.setattr(tabulate, "modules", lambda package: {"it": module})
     with pytest.raises(InputError, match="--out"):
