@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tireroad.contact.rolling import Tire, looking_ahead
+from tireroad.greens.one_step import ahead_of_mean
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 
 
@@ -17,10 +18,13 @@ class Driven:
 
     `history` (n + 1, k) N at the steps from t = 0 on; `directions` (k, 3) of unit length. After
     each `advance`: `reading` (r,) m; `work` (J) of the prescribed forces so far (trapezoidal rule);
-    `lead`, the additional work if each force has its new value during the whole step.
+    `lead`, the additional work of the mean forces that the `scheme` applies during the steps
+    (greens.one_step.ahead_of_mean).
     """
 
-    def __init__(self, tire: Tire, history: np.ndarray, directions: np.ndarray) -> None:
+    def __init__(
+        self, tire: Tire, history: np.ndarray, directions: np.ndarray, scheme: str = "linear"
+    ) -> None:
         self._tire, self._history, self._directions = tire, history, directions
         self._forced = history.shape[1] > 0
         self._count = tire.same_step.shape[1] - history.shape[1]
@@ -28,6 +32,8 @@ class Driven:
         self.same_step, self.comm = self._same[: self._count, : self._count], tire.comm
         self.ahead = looking_ahead(tire)
         self._beside = LoadedColumns(self._same[self._count :])
+        # The force that `history` begins with was there before.
+        self._ahead = ahead_of_mean(scheme, np.concatenate([history[:1], history]))
         self._step = 0
         self._along = np.zeros(history.shape[1])
         self.work = self.lead = 0.0
@@ -54,7 +60,7 @@ class Driven:
         moved = self._free[self._count :] + self._beside @ acting
         along, self.reading = np.split(moved, [len(now)])
         self.work += float(0.5 * (before + now) @ (along - self._along))
-        self.lead += float(0.5 * (now - before) @ (along - self._along))
+        self.lead += float(self._ahead[self._step - 1] @ (along - self._along))
         self._along = along
 
     def inertia_force(self) -> np.ndarray:

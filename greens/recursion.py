@@ -6,14 +6,15 @@ state advances by
     z_{n+1} = e^{sh} z_n + b0 P f_n + b1 P f_{n+1},   b1 = h phi2(sh),  b0 = h (phi1 - phi2)(sh),
 
 phi1(x) = (e^x - 1)/x, phi2(x) = (e^x - 1 - x)/x^2. With the force constant at its new value b0 = 0
-and b1 = h phi1. Cost: one pass over output and input, 4 q (r + k) flops and 16 q (r + k) bytes."""
+and b1 = h phi1; other forces within a step: greens.one_step. Cost: one pass over output and input,
+4 q (r + k) flops and 16 q (r + k) bytes."""
 
 from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
 
-from tireroad.greens.one_step import NO_BLOCK, Block, late_answers, weights
+from tireroad.greens.one_step import EARLIER, NO_BLOCK, Block, late_answers, mixed, weights
 from tireroad.greens.residual.sparse_columns import LoadedColumns
 from tireroad.greens.response import Response
 from tireroad.greens.spread import Spread
@@ -53,6 +54,7 @@ class Recursion:
         s = response.eigenvalue[mine]
         self._decay = np.exp(s * step)
         self._old, self._new = weights(s * step, step, scheme)
+        self._parts = EARLIER[scheme]
         # Real arithmetic on adjacent (re, im), as the states lie in memory.
         output = np.vstack([response.output[:, mine], response.inertia[0][:, mine]])
         into = np.ascontiguousarray(response.input[mine])
@@ -61,7 +63,8 @@ class Recursion:
         if comm.rank == self._idle and len(response.block):
             self._block = Block(response, step, scheme)
         self._state = np.zeros(len(mine), complex)
-        self._push = np.zeros(len(mine), complex)  # P f of the previous step
+        # P f of the previous step, and of the one before it.
+        self._push = self._before = np.zeros(len(mine), complex)
         self._free = self._state  # at the end of the step without a new force
         self._moved = False  # whether `_free` belongs to this step yet
         self._taken = True  # whether `_state` includes the last force
@@ -97,7 +100,7 @@ class Recursion:
 
     def _answers_next(self, into: np.ndarray) -> LoadedColumns | None:
         """Effect of a unit force at the end of the step after its own, on the root. Collective."""
-        pushed = (self._decay * self._new + self._old)[:, None] * into
+        pushed = (self._decay * self._new + self._parts[0] * self._old)[:, None] * into
         direct = self._output @ np.ascontiguousarray(pushed.T).view(float).T
         if self._block:
             direct += self._block.direct_next()
@@ -114,7 +117,7 @@ class Recursion:
     def start(self, force: np.ndarray) -> None:
         """Begin with a force (k,) N at t = 0, at rest. Collective when looking ahead."""
         self._force = force
-        self._push = (self._input @ force).view(complex)
+        self._push = self._before = (self._input @ force).view(complex)
         self._rate = self._begun @ force
         if self._block:
             self._block.start(force)
@@ -145,7 +148,8 @@ class Recursion:
         if self._moved:
             return
         self._take()
-        self._free = self._decay * self._state + self._old * self._push
+        earlier = mixed(self._parts, self._push, self._before)
+        self._free = self._decay * self._state + self._old * earlier
         if self._block:
             self._block.move()
         self._moved = True
@@ -154,7 +158,7 @@ class Recursion:
         """Add the force that `advance` was given to the states."""
         if self._taken:
             return
-        self._push = (self._input @ self._force).view(complex)
+        self._before, self._push = self._push, (self._input @ self._force).view(complex)
         self._state = self._free + self._new * self._push
         if self._block:
             self._block.advance(self._force)
@@ -172,7 +176,10 @@ class Recursion:
     def look_ahead(self) -> None:
         """Compute the part of the next outputs that does not depend on the force of this step."""
         self._move()
-        self._part = self._output @ (self._decay * self._free).view(float)
+        moved = self._decay * self._free
+        if self._parts[1]:
+            moved += self._old * (self._parts[1] * self._push)
+        self._part = self._output @ moved.view(float)
         if self._block:
             self._part += self._block.seen_next()
 
@@ -217,6 +224,7 @@ class Recursion:
         kept = {
             "state": self._spread.everywhere(self.state),
             "push": self._spread.everywhere(self._push),
+            "push_before": self._spread.everywhere(self._before),
         }
         kept["push_force"] = self._force
         kept["known_ahead"] = self._known if self.ahead else self._known[:0]
@@ -225,8 +233,8 @@ class Recursion:
 
     def restore(self, kept: dict[str, np.ndarray]) -> None:
         """Continue from a snapshot, after `advance`. Collective when looking ahead."""
-        self._state, self._push = (
-            self._spread.mine(kept[name]).copy() for name in ("state", "push")
+        self._state, self._push, self._before = (
+            self._spread.mine(kept[name]).copy() for name in ("state", "push", "push_before")
         )
         self._force = self._unknown = kept["push_force"]
         self._moved, self._taken = False, True

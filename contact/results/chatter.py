@@ -10,8 +10,8 @@ the fastest oscillation of the touching points takes  2 pi / theta  steps,
 cos theta = (1 - 4 mu) / (1 + 2 mu). A mass m on a compliance C has mu = h^2 / (12 m C); its true
 oscillation rotates by (12 mu)^1/2 in a step. At mu = 1 it takes two steps, and beyond it grows
 without bound. Horizontal forces act on bristles and on the tread's shear in the same way; the
-larger mu of the two counts. A force that is constant over the step has X = 0: it damps such an
-oscillation, with an error of first order in the step.
+larger mu of the two counts. Damped and constant forces (greens.one_step) have X >= 0: they damp such
+an oscillation, with an error of second and of first order in the step.
 """
 
 from __future__ import annotations
@@ -43,7 +43,10 @@ LIMIT = 0.05
 WINDOW = 200  # steps over which it is counted
 
 
-ROAD = "points open and close from step to step with constant forces too: that is the road, not chatter"
+ROAD = (
+    "points open and close from step to step with damped forces too: that is the road, not chatter"
+)
+ANY = 1e9  # a limit that no share reaches: another scheme is tried only if the motion grows
 
 
 class Chatter(ConvergenceError):
@@ -60,9 +63,9 @@ class Chatter(ConvergenceError):
 
 @dataclass(frozen=True)
 class Chosen:
-    """The force's course within a step, "linear" or "constant", and the reason.
+    """The force's course within a step (greens.one_step), and the reason for it.
 
-    `limit`: the share of points that open and close from step to step above which the other is
+    `limit`: the share of points that open and close from step to step above which another is
     tried; inf if this one is final.
     """
 
@@ -74,19 +77,20 @@ class Chosen:
         """The choice after this one exceeded its limit; raises the error if none is left.
 
         On a rough road points open and close because it passes by more than their spacing in a
-        step. They do so with constant forces too, which cannot chatter: if more than half as many
+        step. They do so with damped forces too, which cannot chatter: if more than half as many
         do, linear forces are kept.
         """
-        if self.scheme == "linear" and self.limit < math.inf:
-            limit = max(chatter.share / 2, LIMIT)
+        if self.limit == math.inf:
+            raise chatter
+        if self.scheme == "linear":
             return Chosen(
-                "constant",
+                "damped",
                 "forces linear over the step made points open and close from step to step",
-                limit,
+                min(max(chatter.share / 2, LIMIT), ANY),
             )
-        if chatter.share < math.inf and self.limit < math.inf:
-            return Chosen("linear", ROAD)
-        raise chatter
+        if chatter.share == math.inf:
+            return Chosen("constant", "with damped forces too the motion grew without bound")
+        return Chosen("linear", ROAD)
 
 
 def choose(steps: float) -> Chosen:
@@ -96,9 +100,10 @@ def choose(steps: float) -> Chosen:
         count = f" in {steps:.3g} steps" if math.isfinite(steps) else ""
         return Chosen("linear", f"the steps {why} the contact's fastest oscillation{count}", LIMIT)
     return Chosen(
-        "constant",
+        "damped",
         f"the contact's fastest oscillation takes {steps:.3g} steps, fewer than {FEWEST:g}: forces linear over "
         "the step would chatter",
+        ANY,
     )
 
 

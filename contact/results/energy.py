@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from tireroad.greens.one_step import ahead_of_mean
+
 AT_ONCE = 64  # steps of which the work is computed at a time: it takes nine arrays of their size
 
 
@@ -11,13 +13,15 @@ class Work:
     """Work (J) of the changes of the contact forces on the tire, summed over the steps.
 
     Trapezoidal rule: sum (f + f_before).(u - u_before)/2, second order in the step. `lead`: the
-    additional work of forces that have their new value during the whole step, sum
-    (f - f_before).(u - u_before)/2. A checkpoint keeps both, with the last force and displacement.
+    additional work of the mean forces that a `scheme` applies during the steps
+    (greens.one_step.ahead_of_mean). A checkpoint keeps both, with the last forces and displacement.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, scheme: str = "linear") -> None:
         self.total = self.lead = 0.0
-        self._force = self._moved = np.zeros(1)
+        self._scheme = scheme
+        self._forces = np.zeros((2, 1))  # of the last two steps
+        self._moved = np.zeros(1)
 
     def add(self, change: np.ndarray, moved: np.ndarray) -> None:
         """Count n steps: `change` (n, k) N and `moved` (n, k) m of contact.rolling.Instant."""
@@ -26,28 +30,29 @@ class Work:
             self._add(change[some], moved[some])
 
     def _add(self, change: np.ndarray, moved: np.ndarray) -> None:
-        force = np.concatenate([np.broadcast_to(self._force, (1, change.shape[1])), change])
+        before = np.broadcast_to(self._forces, (2, change.shape[1]))
+        path = np.concatenate([before, change])
+        force, ahead = path[1:], ahead_of_mean(self._scheme, path)
         place = np.concatenate([np.broadcast_to(self._moved, (1, moved.shape[1])), moved])
         mean, way = 0.5 * (force[1:] + force[:-1]), np.diff(place, axis=0)
-        ahead = 0.5 * np.diff(force, axis=0)
         # Step by step, so that the sum does not depend on how steps are blocked.
         for work, more in np.stack([mean * way, ahead * way]).sum(axis=2).T.tolist():
             self.total += work
             self.lead += more
-        self._force, self._moved = change[-1].copy(), moved[-1].copy()  # not the whole block
+        self._forces, self._moved = path[-2:].copy(), moved[-1].copy()  # not the whole block
 
     def state(self) -> dict[str, np.ndarray]:
         """The state that a checkpoint keeps."""
         return {
             "work": np.array([self.total, self.lead]),
-            "work_force": self._force,
+            "work_forces": self._forces,
             "work_moved": self._moved,
         }
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
         self.total, self.lead = kept["work"].tolist()
-        self._force, self._moved = kept["work_force"], kept["work_moved"]
+        self._forces, self._moved = kept["work_forces"], kept["work_moved"]
 
 
 class Dissipation:
@@ -95,40 +100,42 @@ class Circulation:
 
     The symmetric part of a residual flexibility stores the work done on it. The skew part, which a
     rolling tire has, does not: its work is what the truncated modes dissipate, less what the drive
-    supplies to them. `lead`: work on the symmetric part that is not stored when forces jump, sum
-    (f - f_before).G_s (f - f_before)/2.
+    supplies to them. `lead`: work on the symmetric part that is not stored, as the mean forces of
+    a `scheme` during the steps are ahead (greens.one_step.ahead_of_mean).
     """
 
-    def __init__(self, flexibility: np.ndarray) -> None:
+    def __init__(self, flexibility: np.ndarray, scheme: str = "linear") -> None:
         """`flexibility` (k, k) m/N."""
+        self._scheme = scheme
         self._skew = (flexibility - flexibility.T) / 2
         self._even = (flexibility + flexibility.T) / 2
         self.work = self.lead = 0.0
-        self._force = np.zeros(len(flexibility))
+        self._forces = np.zeros((2, len(flexibility)))  # of the last two steps
 
     def add(self, forces: np.ndarray) -> None:
         """Count n steps: forces (n, k) N at their ends."""
-        path = np.concatenate([self._force[None], forces])
+        whole = np.concatenate([self._forces, forces])
+        path, ahead = whole[1:], ahead_of_mean(self._scheme, whole)
         # f_a . G_a (f_b - f_a) = f_a . G_a f_b, since f . G_a f = 0.
         jump = np.diff(path, axis=0)
         turned = np.einsum("ni,ni->n", path[:-1], path[1:] @ self._skew.T)
-        jumped = np.einsum("ni,ni->n", jump, jump @ self._even) / 2
+        jumped = np.einsum("ni,ni->n", ahead, jump @ self._even)
         for work, more in zip(turned.tolist(), jumped.tolist(), strict=True):
             self.work += work
             self.lead += more
-        self._force = path[-1]
+        self._forces = whole[-2:]
 
     def state(self) -> dict[str, np.ndarray]:
         """The state that a checkpoint keeps."""
         return {
             "circulation": np.array([self.work, self.lead]),
-            "circulation_force": self._force,
+            "circulation_forces": self._forces,
         }
 
     def set_state(self, kept: dict[str, np.ndarray]) -> None:
         """Continue from `state`."""
         self.work, self.lead = kept["circulation"].tolist()
-        self._force = kept["circulation_force"]
+        self._forces = kept["circulation_forces"]
 
 
 def stored(coordinates: np.ndarray, rates: np.ndarray, stiffness: np.ndarray) -> float:

@@ -38,7 +38,7 @@ class Totals:
     """Results and work of the steps so far, with checks of the contact.
 
     Points at the edge of the `patch` must not touch (`reach` in m), and at most the share `limit`
-    of the points may alternate.
+    of the points may alternate. `work` is that of the loop's own scheme.
     """
 
     patch: Patch

@@ -23,6 +23,7 @@ from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build.model_limit import model_limit
 from tireroad.runs.stages.build.rolling.run_in import first_step
+from tireroad.runs.stages.build.rolling.scheme import recursive
 from tireroad.runs.stages.coarser import COARSER
 from tireroad.runs.stages.companions import Given, companions
 from tireroad.runs.stages.greens import Responses
@@ -172,7 +173,7 @@ class AccuracyStage(Computed[Accuracy]):
             rolling=self.rotating.product,
             step=self.contact.product.step,
             steps=steps,
-            scheme="constant" if self.contact.product.scheme == "constant" else "linear",
+            scheme=recursive(self.contact.product.scheme),
         )
 
     def write(self, file, product: Accuracy) -> None:

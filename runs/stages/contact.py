@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from tireroad.contact.model import solver_name
 from tireroad.contact.results.chatter import Chatter, Chosen
+from tireroad.contact.results.energy import Work
 from tireroad.contact.results.totals import Totals
 from tireroad.contact.rolling import Loop, roll
 from tireroad.contact.setup import ContactSetup
@@ -126,10 +127,10 @@ class ContactStage(Stage[ContactHistory]):
         """Run the loop, writing by blocks; raises Chatter beyond the scheme's limit. Collective."""
         response, chosen = self.greens.product.contact, integration(self.job, plan, scheme.scheme)
         with record.timing("tread and solver"):
-            driven = driven_tire(self.job, chosen.tire, chosen.step, chosen.steps)
+            driven = driven_tire(self.job, chosen)
             loop = self._loop(record, setup, driven or chosen.tire, chosen.step)
-        totals = Totals(setup.patch, setup.reach, scheme.limit)
-        losses = Losses(chosen.tire, response, self.rotating.product, chosen.step)
+        totals = Totals(setup.patch, setup.reach, scheme.limit, work=Work(scheme.scheme))
+        losses = Losses(chosen, response, self.rotating.product)
         with ExitStack() as stack, record.timing("time loop"):
             attributes = {"step": chosen.step, "scheme": chosen.scheme, "road_relief": setup.relief}
             attributes |= {"free_slip": slip, "scheme_reason": scheme.reason}
@@ -156,7 +157,7 @@ class ContactStage(Stage[ContactHistory]):
         pattern.describe(record, setup)
         road_file.describe(record, setup, self.job.scene.road)
         if chosen.scheme != "convolution":
-            work = works(chosen.scheme, totals.work, driven if self.job.scene.force else None)
+            work = works(totals.work, driven if self.job.scene.force else None)
             given = self.rotating.product, response, loop.tire.snapshot(), work
             state = self.static.product
             pressed = float(state.normal_force.sum()) * (state.deflection or 0.0)

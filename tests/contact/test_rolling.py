@@ -40,7 +40,7 @@ def run(response, step, steps, scheme, height=None, motion=shaken, speed=20.0, c
     return list(roll(tire, solver, PATCH, drive, step, steps)), tire, solver
 
 
-@pytest.mark.parametrize("scheme", ["linear", "constant", "convolution"])
+@pytest.mark.parametrize("scheme", ["linear", "damped", "constant", "convolution"])
 @pytest.mark.parametrize("speed", [0.0, 30.0])
 def test_flat_road_at_rest_stays_at_rest_bit_for_bit(scheme: str, speed: float) -> None:
     response = Strip(speed=speed).response(PATCH.points, 6, 3, residual=4)
@@ -53,7 +53,7 @@ def test_flat_road_at_rest_stays_at_rest_bit_for_bit(scheme: str, speed: float) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scheme", "order"), [("linear", 2.0), ("constant", 1.0)])
+@pytest.mark.parametrize(("scheme", "order"), [("linear", 2.0), ("damped", 2.0), ("constant", 1.0)])
 def test_order_of_convergence_with_residual(scheme: str, order: float) -> None:
     response = STRIP.response(PATCH.points, 5, 2, residual=6)
     duration = 0.01
@@ -151,7 +151,7 @@ def test_edge_of_the_patch_is_reported() -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("scheme", ["linear", "constant"])
+@pytest.mark.parametrize("scheme", ["linear", "damped", "constant"])
 def test_same_answer_on_any_number_of_processes(scheme: str) -> None:
     response = STRIP.response(PATCH.points, 5, 3, residual=4)
     one, _, _ = run(response, 1e-4, 150, scheme, height=wavy)

@@ -16,7 +16,7 @@ from tireroad.greens.sharing import sharers
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("scheme", ["linear", "constant"])
+@pytest.mark.parametrize("scheme", ["linear", "damped", "constant"])
 def test_the_same_on_any_number_of_processes(scheme) -> None:
     system = make(m=11)
     force = some_force(4)
@@ -36,7 +36,7 @@ def choose(solved: Solved, free: np.ndarray) -> Solved:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("scheme", ["linear", "constant"])
+@pytest.mark.parametrize("scheme", ["linear", "damped", "constant"])
 def test_looking_ahead_changes_nothing(scheme) -> None:
     """The root has no states, and the others find the next outputs before they know the force; gone on with from a
     checkpoint it has the same bits."""

@@ -54,7 +54,7 @@ DAMPING = {"none": 0.0, "light": 5.0, "critical": 800.0, "nearly": 800.0 * (1 + 
 
 @pytest.mark.parametrize("damping", DAMPING.values(), ids=DAMPING.keys())
 @pytest.mark.parametrize("step", [1e-7, 1e-5, 1e-3, 1e-2])
-@pytest.mark.parametrize("scheme", ["linear", "constant"])
+@pytest.mark.parametrize("scheme", ["linear", "damped", "constant"])
 def test_any_step_and_any_damping(step, damping, scheme) -> None:
     shape, both = responses(SQUARES, damping)
     m, k = len(SQUARES), len(shape)
@@ -71,13 +71,14 @@ def test_any_step_and_any_damping(step, damping, scheme) -> None:
     for response in both:
         tire = Recursion(response=response, step=step, scheme=scheme, comm=MPI.COMM_SELF)
         tire.start(0 * force[0])
-        state, old, size = np.zeros(2 * m), 0 * force[0], 0.0
+        state, old, before, size = np.zeros(2 * m), 0 * force[0], 0 * force[0], 0.0
         for new in force:
             found = tire.predict() + tire.same_step @ new
             tire.advance(new)
-            push = (old, (new - old) / step) if scheme == "linear" else (new, 0 * new)
+            held = (9 * new + 6 * old + before) / 16 if scheme == "damped" else new
+            push = (old, (new - old) / step) if scheme == "linear" else (held, 0 * new)
             state = moved @ np.concatenate([state, *push])
-            old = new
+            before, old = old, new
             size = max(size, np.abs(state[:m]).max())
             assert np.abs(found - shape @ state[:m]).max() < 1e-9 * size
 

@@ -128,8 +128,8 @@ class Time:
     )
     scheme: str = choice(
         "auto",
-        ("auto", "linear", "constant", "convolution"),
-        "contact force within a step; auto: linear where the steps resolve the contact, else constant",
+        ("auto", "linear", "damped", "constant", "convolution"),
+        "contact force within a step; auto: linear where the steps resolve the contact, else damped",
     )
     checkpoint: float = number(
         60.0, "s", "wall-clock time between two checkpoints", least=0.1, most=1e6

@@ -19,6 +19,7 @@ from tireroad.modal.standing import standing_modes
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.stage import Done
 from tireroad.runs.stages.build.point_forces import directions, histories
+from tireroad.runs.stages.build.rolling.scheme import recursive
 from tireroad.runs.stages.build.rolling.stepping import Integration
 from tireroad.runs.stages.build.setup import driven_points
 from tireroad.runs.stages.build.turning import turning_of
@@ -103,7 +104,7 @@ class Driven:
     def march(self, response: Response) -> Array:
         """Readings (nt, 3 k) of another response to prescribed forces, from rest. Collective."""
         taken = self.integration
-        scheme = "linear" if taken.scheme == "convolution" else taken.scheme
+        scheme = recursive(taken.scheme)
         tire = Recursion(response=response, step=taken.step, scheme=scheme, comm=self.job.comm)
         force = self.force()
         tire.start(force[0])

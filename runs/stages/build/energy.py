@@ -14,12 +14,13 @@ from tireroad.greens.response import Response
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.process import observe
 from tireroad.runs.stages.base.record import Record
+from tireroad.runs.stages.build.rolling.stepping import Integration
 
 # Share of the energy exchanged, beyond which the steps are too long or something is wrong.
 # Measured: 0.012 at most where forces were right to 1 % up to 300 Hz, 0.024 where they were off by
 # 35 %.
 _UNBALANCED = 0.02
-_TAKEN = 0.1  # share of the energy exchanged that constant forces over a step may dissipate
+_TAKEN = 0.1  # share of the energy exchanged that the forces of a scheme may dissipate
 _LEAST = 1e-9  # J: below is rounding
 # Share of the energy of the static contact (load times deflection), below which no error matters:
 # a run on a road of 1 um moved 1e-7 of it.
@@ -30,7 +31,7 @@ _SLIGHT = 1e-6
 class Works:
     """Work (J) of the contact's force changes and of the prescribed forces, if any.
 
-    `lead`: additional work of all forces if they are constant over the step; 0 if they are linear.
+    `lead`: additional work of the forces that the scheme applies during the steps.
     """
 
     contact: float
@@ -43,25 +44,24 @@ class Works:
         return self.contact + (self.driven or 0.0)
 
 
-def works(scheme: str, contact: Work, driven: Driven | None) -> Works:
+def works(contact: Work, driven: Driven | None) -> Works:
     """The works of a completed loop."""
     lead = contact.lead + (driven.lead if driven else 0.0)
-    return Works(
-        contact.total, driven.work if driven else None, lead if scheme == "constant" else 0.0
-    )
+    return Works(contact.total, driven.work if driven else None, lead)
 
 
 class Losses:
     """Energy losses of a rolling tire from its states at each step; empty if not known."""
 
-    def __init__(self, tire, response: Response, rolling: RollingModes, step: float) -> None:
-        self._tire = tire
+    def __init__(self, chosen: Integration, response: Response, rolling: RollingModes) -> None:
+        tire = chosen.tire
         self._motion: Motion | None = None
         if isinstance(tire, Recursion) and Motion.known(rolling, response):
-            self._motion = Motion(rolling, response.slow(step), step)
+            self._motion = Motion(rolling, response.slow(chosen.step), chosen.step)
             inputs = response.residual.shape[1]
-            left_out = response.resolved(step).residual[:inputs]
-            self._circulation = Circulation(left_out * (not response.pulse))
+            left_out = response.resolved(chosen.step).residual[:inputs]
+            self._circulation = Circulation(left_out * (not response.pulse), chosen.scheme)
+            self._tire = tire
             tire.keep_samples()
 
     @property
@@ -69,7 +69,7 @@ class Losses:
         """Losses of the run, J; None if they are not known.
 
         Energy lost in the material; work of the drive; loss in the truncated modes less the drive's
-        work on them; work of jumping forces on those modes beyond what they store.
+        work on them; work of forces ahead of their mean on those modes beyond what they store.
         """
         if self._motion is None:
             return None
@@ -80,7 +80,7 @@ class Losses:
         """Account for the steps since the last call. Collective."""
         if self._motion is None or not (samples := self._tire.samples()):
             return
-        states, pushes, forces = zip(*samples, strict=True)
+        states, pushes, forces = map(list, zip(*samples, strict=True))
         self._motion.add(self._tire.everywhere(states), self._tire.everywhere(pushes))
         self._circulation.add(np.array(forces))
 
@@ -133,7 +133,7 @@ def describe_energy(
         _standing(record, rolling, total, left + elastic, slight)
     else:
         lost, drive, beyond, springs_lead = losses.found
-        taken = springs_lead - work.lead if work.lead else 0.0
+        taken = springs_lead - work.lead
         _rolling(record, total, left + elastic, lost, drive, beyond, taken, slight)
 
 
@@ -186,6 +186,6 @@ def _rolling(
         )
     if abs(taken) > _TAKEN * moved + slight:
         record.warnings.append(
-            f"forces constant over the step took {100 * abs(taken) / moved:.2g} % of the energy that moved: what "
-            "bounces on the tread is damped by them; take a smaller time.step to see it"
+            f"the scheme took {100 * abs(taken) / moved:.2g} % of the energy that moved: what bounces on the "
+            "tread is damped by it; take a smaller time.step to see it"
         )

@@ -21,6 +21,7 @@ from tireroad.runs.process.mpi import on_root
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build.forces import Forces, driven_loads
+from tireroad.runs.stages.build.rolling.scheme import recursive
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 P = TypeVar("P")
@@ -80,8 +81,7 @@ def replayed(basis: Basis, forces: Forces, wanted: Collection[int]) -> np.ndarra
     """
     unit = np.eye(basis.coordinates)
     response = couple(basis.states, unit, unit, np.zeros((3, len(unit))))
-    # The rectangles of a convolution have no states to replay: it approximates the linear scheme.
-    scheme = "constant" if forces.scheme == "constant" else "linear"
+    scheme = recursive(forces.scheme)
     tire = Recursion(response=response, step=forces.step, scheme=scheme, comm=MPI.COMM_SELF)
     tire.start(forces.begun)
     found = np.empty((len(wanted), len(unit)))

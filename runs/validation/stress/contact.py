@@ -143,7 +143,7 @@ def cases() -> Iterator[Case]:
     """The list of cases."""
     waves = Drive(wavy, lambda t: 0.0, 20.0)
     for step in (1e-6, 1e-5, 1e-4, 1e-3):
-        for scheme in ("linear", "constant"):
+        for scheme in ("linear", "damped", "constant"):
             yield Case(f"step {step:g} s, {scheme}", drive=waves, step=step, scheme=scheme,
                        steps=max(round(SHORTEST / step), 2000))  # fmt: skip
     for speed in (0.0, 40.0, 80.0, 160.0):

@@ -15,6 +15,7 @@ from tireroad.contact.results.chatter import (
     WINDOW,
     Alternation,
     Chatter,
+    Chosen,
     _steps,
     choose,
     oscillation,
@@ -70,7 +71,9 @@ def test_steps_of_an_oscillation(theta: float, steps: float) -> None:
     assert _steps(1.3) == 2.0 and _steps(np.inf) == 2.0 and _steps(0.0) == np.inf
 
 
-@pytest.mark.parametrize(("scheme", "grows"), [("linear", True), ("constant", False)])
+@pytest.mark.parametrize(
+    ("scheme", "grows"), [("linear", True), ("damped", False), ("constant", False)]
+)
 def test_two_steps_an_oscillation_blow_up_where_forces_are_linear(scheme: str, grows: bool) -> None:
     """The same points held against a shaken road, a little beyond mu = 1 and well within it."""
 
@@ -90,10 +93,12 @@ def test_two_steps_an_oscillation_blow_up_where_forces_are_linear(scheme: str, g
     steps = np.array([oscillation(TREAD, heavy, response, h) for h in (1e-4, 1e-5)])
     assert steps[0] == 2.0 and steps[1] > FEWEST
     assert (largest(1e-4, scheme) > 1e3 * largest(1e-5, "linear")) == grows
-    assert choose(steps[0]).scheme == "constant" and choose(steps[1]).scheme == "linear"
+    assert choose(steps[0]).scheme == "damped" and choose(steps[1]).scheme == "linear"
 
 
-@pytest.mark.parametrize(("scheme", "grows"), [("linear", True), ("constant", False)])
+@pytest.mark.parametrize(
+    ("scheme", "grows"), [("linear", True), ("damped", False), ("constant", False)]
+)
 def test_bristles_too_stiff_for_the_step_blow_up_where_forces_are_linear(scheme, grows) -> None:
     """Points that stick, their normal forces resolved: what horizontal forces do in two steps an oscillation is told."""
 
@@ -138,7 +143,8 @@ def _low(response, step: float, scheme: str) -> np.ndarray:
 def test_the_error_falls_with_the_step() -> None:
     """Forces linear over the step err by 3 %, 200 %, 12 %, 0.4 % as the step is halved: at the longest step
     most states are static, at the next they move undamped, in a contact that it cannot resolve. What is
-    chosen errs less with every halving, and by the second order in the end. Asked: no growth.
+    chosen errs by 3, 0.8, 1.0, 0.4, 0.4 %, and forces constant over the step by twice as much as damped ones.
+    Asked: no growth but by the states that move from one step to the next.
     """
     response = LIVELY.response(PATCH.points, 24, 9, residual=6)
     sizes = 3.84e-4 / 2.0 ** np.arange(5)
@@ -150,12 +156,13 @@ def test_the_error_falls_with_the_step() -> None:
 
     steps = [oscillation(TREAD, PATCH, response.resolved(h), h) for h in sizes]
     chosen = [choose(count).scheme for count in steps]
-    assert chosen == ["linear", "constant", "constant", "linear", "linear"]
+    assert chosen == ["linear", "damped", "damped", "linear", "linear"]
     always = errors(["linear"] * len(sizes))
     assert always[1] > 20 * always[0]
     best = errors(chosen)
-    assert (best[1:] < 1.1 * best[:-1]).all()
-    assert best[0] < 0.04 and best[-1] < 5e-3
+    assert (best[1:] < 1.5 * best[:-1]).all()
+    assert best[0] < 0.04 and (best[1:3] < 0.012).all() and best[-1] < 5e-3
+    assert (best[1:3] < 0.7 * errors(["constant"] * len(sizes))[1:3]).all()
 
 
 def test_alternation_is_counted_window_by_window() -> None:
@@ -192,16 +199,26 @@ def test_points_that_come_and_go_once_do_not_alternate() -> None:
     found.check(LIMIT)
 
 
-def test_linear_stays_where_constant_forces_alternate_as_much() -> None:
+def test_linear_stays_where_damped_forces_alternate_as_much() -> None:
     """On a rough road points open and close by what passes under them; beyond bounds nothing is left to try."""
     linear = choose(3.17)
     assert (linear.scheme, linear.limit) == ("linear", LIMIT)
-    constant = linear.instead(Chatter("", 0.14))
-    assert (constant.scheme, constant.limit) == ("constant", 0.07)
-    road = constant.instead(Chatter("", 0.08))
+    damped = linear.instead(Chatter("", 0.14))
+    assert (damped.scheme, damped.limit) == ("damped", 0.07)
+    road = damped.instead(Chatter("", 0.08))
     assert (road.scheme, road.limit) == ("linear", np.inf) and "the road" in road.reason
-    for chosen in (road, choose(2.0)):
-        with pytest.raises(Chatter):
-            chosen.instead(Chatter("", 0.5))
     with pytest.raises(Chatter):
-        constant.instead(Chatter("grows without bound"))
+        road.instead(Chatter("", 0.5))
+
+
+def test_constant_forces_are_taken_where_the_motion_grows_with_damped_ones() -> None:
+    """Whether these were the first choice or the second; with constant ones nothing is left to try."""
+    grows = Chatter("grows without bound")
+    for damped in (choose(2.0), choose(3.17).instead(grows)):
+        assert damped.scheme == "damped" and 1.0 < damped.limit < np.inf
+        constant = damped.instead(grows)
+        assert (constant.scheme, constant.limit) == ("constant", np.inf)
+        with pytest.raises(Chatter):
+            constant.instead(grows)
+    with pytest.raises(Chatter):
+        Chosen("damped", "as the scene says").instead(grows)

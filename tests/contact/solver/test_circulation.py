@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tireroad.contact.results.energy import Circulation
+from tireroad.contact.results.energy import Circulation, Work
 
 
 @pytest.mark.parametrize("blocks", [1, 7])
@@ -35,3 +35,27 @@ def test_goes_on_from_a_checkpoint() -> None:
     second.set_state(first.state())
     second.add(forces[9:])
     assert second.work == whole.work
+
+
+@pytest.mark.parametrize("scheme", ["linear", "damped", "constant"])
+def test_forces_ahead_of_the_mean_take_what_is_said(scheme: str) -> None:
+    """On a symmetric flexibility: sum of (mean force - (f_n + f_{n-1}) / 2) . G (f_n - f_{n-1}), however blocked."""
+    random = np.random.default_rng(4)
+    forces, symmetric = random.standard_normal((30, 3)), random.standard_normal((3, 3))
+    symmetric = symmetric @ symmetric.T
+    path = np.concatenate([np.zeros((2, 3)), forces])
+    now, last, before = path[2:], path[1:-1], path[:-2]
+    mean = {
+        "linear": (now + last) / 2,
+        "damped": (9 * now + 6 * last + before) / 16,
+        "constant": now,
+    }[scheme]
+    expected = ((mean - (now + last) / 2) * ((now - last) @ symmetric)).sum()
+    found = Circulation(symmetric, scheme)
+    for part in np.array_split(forces, 4):
+        found.add(part)
+    assert found.lead == pytest.approx(expected, abs=1e-12)
+    work = Work(scheme)
+    for part in np.array_split(forces, 3):
+        work.add(part, part @ symmetric)
+    assert work.lead == pytest.approx(expected, abs=1e-12)

@@ -113,16 +113,17 @@ def test_modes_linear_and_large_motions_agree_where_all_should(tires) -> None:
 
 
 def test_the_scheme_that_is_chosen_is_held_against_a_finer_step(tires) -> None:
-    """Both schemes come nearer to the finer step, linear forces by their second order; the one that is chosen is
-    the better one where the steps resolve the contact."""
+    """All schemes come nearer to the finer step, linear and damped forces by their second order; the one that is
+    chosen is the best where the steps resolve the contact."""
     response = tires.response(30, "static")
     exact = schemes._follow(tires, response, 2.5e-5, "linear")
     rows = [schemes._row(tires, response, exact, 1e7, "static", step) for step in (4e-4, 1e-4)]
     for _, _, _, _, chosen, its, *off in rows:
         assert its == off[schemes.SCHEMES.index(chosen)]
-    (*_, coarse, constant), (*_, fine, _) = rows
-    assert float(fine) < float(coarse) / 4
-    assert rows[1][4] == "linear" and float(constant) > float(coarse)
+    coarse, fine = (dict(zip(schemes.SCHEMES, map(float, row[-3:]), strict=True)) for row in rows)
+    for scheme in ("linear", "damped"):
+        assert fine[scheme] < coarse[scheme] / 4
+    assert rows[1][4] == "linear" and fine["constant"] > 3 * fine["damped"] > 3 * fine["linear"]
 
 
 @pytest.mark.slow

@@ -105,7 +105,7 @@ def test_a_companion_is_the_run_it_stands_for(run, whole, cause, sets):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scheme", ["linear", "constant"])
+@pytest.mark.parametrize("scheme", ["linear", "damped", "constant"])
 def test_the_step_is_told_by_the_order_of_the_scheme(whole, scheme):
     """Against steps an eighth as long with linear forces, which are as good as none."""
     limit, step = 200.0, 4e-4

@@ -99,9 +99,9 @@ STIFF = (
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scheme", ["linear", "constant", "auto"])
+@pytest.mark.parametrize("scheme", ["linear", "damped", "constant", "auto"])
 def test_a_stiff_tread_on_long_steps_chatters_where_forces_are_linear(run, scheme: str) -> None:
-    """The balance fails then; forces constant over the step, which "auto" takes, balance with what they take."""
+    """The balance fails then; damped forces, which "auto" takes, and constant ones balance with what they take."""
     more = "[damping]\nmass = 100.0\n[rotation]\nspeed = 50.0\n"
     found, warnings = run(f"stiff-{scheme}", more, *STIFF, f"time.scheme={scheme}")
     moved = max(

@@ -1,4 +1,4 @@
-"""A loop that chatters begins again with forces constant over the step, and is resumed as such."""
+"""A loop that chatters begins again with damped forces, and is resumed as such."""
 
 import h5py
 import numpy as np
@@ -100,13 +100,13 @@ def attempts(monkeypatch):
 
 @pytest.mark.parametrize(
     ("ended", "limits", "scheme"),
-    [(1, [0.05], "constant"), (2, [0.05, 0.1], "linear")],
+    [(1, [0.05], "damped"), (2, [0.05, 0.1], "linear")],
     ids=["chatter", "a rough road"],
 )
 def test_the_other_scheme_is_tried_and_a_stop_after_it_goes_on_as_begun(
     run, tmp_path, attempts, ended: int, limits: list[float], scheme: str
 ) -> None:
-    """With constant forces where linear ones alternate, and with linear ones again where both do."""
+    """With damped forces where linear ones alternate, and with linear ones again where both do."""
     run("whole", f"time.scheme={scheme}")
     tried = attempts(ended)
     with pytest.raises(Stopped):

@@ -22,15 +22,16 @@ from tireroad.greens.sharing import sharers
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.build import corner
 from tireroad.runs.stages.build.point_forces import directions, histories
+from tireroad.runs.stages.build.rolling.stepping import Integration
 
 
-def driven_tire(job: Job, tire, step: float, steps: int) -> Driven | None:
+def driven_tire(job: Job, chosen: Integration) -> Driven | None:
     """The tire under prescribed forces and with wheel readings; None if the scene has neither."""
     forces = job.scene.force
     if not forces and not corner.readings(job):
         return None
-    time = step * np.arange(steps + 1)
-    return Driven(tire, histories(forces, time), directions(forces))
+    time = chosen.step * np.arange(chosen.steps + 1)
+    return Driven(chosen.tire, histories(forces, time), directions(forces), chosen.scheme)
 
 
 def make_loop(spec, setup: ContactSetup, tire, step: float) -> Loop:
@@ -117,14 +118,15 @@ def forces(
 ) -> Forces:
     """Run the loop of the job's scene with another response, step or setup (settled), in memory.
 
-    `scheme` "linear" or "constant"; `contact` replaces the scene's table. Raises ConvergenceError
+    `scheme`: see greens.one_step; `contact` replaces the scene's table. Raises ConvergenceError
     if the road touches outside the patch. Collective.
     """
     kept = response.resolved(step)
     comm = sharers(kept, job.comm)
     tire = Recursion(response=kept, step=step, scheme=scheme, comm=comm, look_ahead=True)
     spec = contact or job.scene.contact
-    loop = make_loop(spec, setup, driven_tire(job, tire, step, steps) or tire, step)
+    driven = driven_tire(job, Integration(tire, step, steps, scheme))
+    loop = make_loop(spec, setup, driven or tire, step)
     (total, axle), every = np.zeros((2, steps, 3)), np.ones(len(setup.patch.points))
     given = setup.patch, setup.drive, step, steps
     with threadpool_limits(1, "blas"):

@@ -37,6 +37,11 @@ def reported(record: Record, chosen: Chosen) -> Chosen:
     return chosen
 
 
+def recursive(scheme: str) -> str:
+    """The scheme of a recursion that repeats a run: a convolution approximates linear forces."""
+    return "linear" if scheme == "convolution" else scheme
+
+
 def of_given_forces(scene: Scene) -> str:
     """The scheme for prescribed forces without contact.
 
