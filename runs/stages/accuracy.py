@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from tireroad.contact.respaced import ratio
 from tireroad.contact.results.error_bars import CAUSES, Bars, Measured, measured, total
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -30,11 +31,9 @@ from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
 SHARE = 0.33  # of the run's own cost: budget of all companion runs together
-_FEWEST, _PERIODS = (
-    64,
-    2,
-)  # least steps after the run-in that companions repeat, and periods of `up_to`
-_LOOPS = 3.5  # cost of five companion runs, in time loops per repeated step
+_FEWEST, _PERIODS = 64, 2  # least steps after the run-in, and periods of `up_to`, to repeat
+# Cost of five companion runs in time loops per repeated step, by the spacing of that of the points.
+_LOOPS = {2.0: 3.5, 0.5: 6.0}
 _COARSE = 0.14  # cost on elements of twice the size, as a share of the run's cost before the loop
 FORCES = ("contact_force", "axle_force")
 _UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
@@ -98,10 +97,11 @@ class AccuracyStage(Computed[Accuracy]):
         limit = model_limit(setup, self.rotating.product, history.step).frequency
         up_to = min(limit, self.job.scene.accuracy.up_to)
         least = max(_FEWEST, int(np.ceil(_PERIODS / (up_to * history.step))))
-        steps = self._window(start + least, len(history.time))
+        given = self._given(len(history.time))
+        steps = self._window(start + least, given)
         if steps - start < 2:
             return self._none("the run is too short for a companion run with twice the step")
-        given = self._given(steps)
+        given = given.first(steps)
         runs = {"contact_force": history.total_force, "axle_force": history.axle_force}
         runs = {name: values[start:steps] for name, values in runs.items() if values is not None}
         exact = {
@@ -154,13 +154,14 @@ class AccuracyStage(Computed[Accuracy]):
             centre=np.zeros(0), window=0.0, up_to=0.0, mean={}, by_cause={}, absent=absent
         )
 
-    def _window(self, least: int, steps: int) -> int:
-        """Last of `steps` in companion runs: `least`, more for `SHARE` of the run's estimated cost."""
+    def _window(self, least: int, given: Given) -> int:
+        """Last step in companion runs: `least`, more for `SHARE` of the run's estimated cost."""
         work = estimate(self.job.scene).work
         loop = work["contact loop"]
         before = sum(work.values()) - loop
-        part = (SHARE * (before + loop) - _COARSE * before) / (_LOOPS * loop)
-        count = int(np.clip(round(part * steps), min(least, steps), steps))
+        loops = _LOOPS[ratio(given.settled.patch)]
+        part = (SHARE * (before + loop) - _COARSE * before) / (loops * loop)
+        count = int(np.clip(round(part * given.steps), min(least, given.steps), given.steps))
         return count - count % 2
 
     def _given(self, steps: int) -> Given:

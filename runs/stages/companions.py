@@ -87,6 +87,12 @@ class Given:
         except (ConvergenceError, InputError):
             return None
 
+    def first(self, steps: int) -> Given:
+        """The same for fewer steps."""
+        other = replace(self, steps=steps)
+        other.__dict__["settled"] = self.settled
+        return other
+
     def of(self, job: Job) -> Given:
         """The same with another job; `base` stays that of the run."""
         other = replace(self, job=job)
