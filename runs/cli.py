@@ -163,10 +163,10 @@ def _validate(args: argparse.Namespace) -> None:
 
 def _results(directory: Path) -> Path:
     """The folder, if it is one of results; says which of its files are left out."""
-    if not (directory / "summary.json").is_file():
-        raise InputError(f"{directory}: no result folder: it has no summary.json")
     from tireroad.runs.files.present import remarks
+    from tireroad.runs.files.reader import check_results
 
+    check_results(directory)
     for text in remarks(directory):
         print(f"note: {text}", file=sys.stderr)
     return directory

@@ -24,7 +24,7 @@ import h5py
 
 from tireroad.fem.form_cache import user_folder
 from tireroad.runs.files import store
-from tireroad.runs.files.disk import replacing, write_text
+from tireroad.runs.files.disk import Refused, replacing, write_text
 from tireroad.runs.process import observe
 
 VARIABLE, OFF = "TIREROAD_CACHE", "off"
@@ -152,13 +152,16 @@ class Cache:
 
     def keep(self, stage: str, key: str, path: Path, figures: Mapping[str, Any]) -> None:
         """Store a finished file and its figures; if that fails, others compute the stage again."""
-        if self.folder is not None and (stage in SHARED or not self._own):
-            with suppress(OSError):
-                self.folder.mkdir(parents=True, exist_ok=True)
-                text = json.dumps(figures, default=store.plain)
-                write_text(self._figures(stage, key), text)
-                _link(path, self.place(stage, key))
-                self._prune()
+        if self.folder is None or (self._own and stage not in SHARED):
+            return
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            text = json.dumps(figures, default=store.plain)
+            write_text(self._figures(stage, key), text)
+            _link(path, self.place(stage, key))
+            self._prune()
+        except (OSError, Refused) as error:
+            observe.say(f"  not kept for other runs, {VARIABLE} = {self.folder}: {error}")
 
     def _figures(self, stage: str, key: str) -> Path:
         return self.place(stage, key).with_suffix(".json")

@@ -23,6 +23,22 @@ from tireroad.runs.files.present import left_out
 from tireroad.runs.files.store import AGAIN, verify
 
 
+def check_results(directory: Path) -> None:
+    """Raise InputError, with what to give instead, unless the folder holds results of a run."""
+    if (directory / "summary.json").is_file():
+        return
+    if (directory / "sweep.csv").is_file():
+        raise InputError(
+            f"{directory}: the results of a sweep: see sweep.html in it; each of its runs has a folder in "
+            f"{directory / 'members'}"
+        )
+    if not directory.exists():
+        raise InputError(f"{directory}: there is no such folder")
+    if not directory.is_dir():
+        raise InputError(f"{directory}: a file: give the folder with the results of a run")
+    raise InputError(f"{directory}: no result folder: it has no summary.json")
+
+
 class RunResults(Mapping[str, NDArray[Any]]):
     """The datasets of all result files in a folder, read on access.
 
@@ -36,8 +52,7 @@ class RunResults(Mapping[str, NDArray[Any]]):
 
     def __init__(self, directory: str | Path) -> None:
         self.directory = Path(directory)
-        if not (self.directory / "summary.json").is_file():
-            raise InputError(f"{self.directory}: no result folder: it has no summary.json")
+        check_results(self.directory)
         self.left_out = left_out(self.directory)
         self._units: dict[str, str] | None = None
 

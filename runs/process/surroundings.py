@@ -46,6 +46,14 @@ def crowded(processes: int) -> list[str]:
 
 
 def _check_temporary() -> None:
+    for name in ("TMPDIR", "TEMP", "TMP"):  # in MPI's order, which takes the first that is set
+        if given := os.environ.get(name):
+            if not (os.path.isdir(given) and os.access(given, os.W_OK | os.X_OK)):
+                raise InputError(
+                    f"{name} = {given} is no folder that can be written, and MPI keeps its files there: set it to "
+                    "another, or unset it"
+                )
+            break
     try:
         folder = Path(tempfile.gettempdir())
     except FileNotFoundError:

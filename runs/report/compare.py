@@ -114,7 +114,10 @@ def _change(row: Row, index: int) -> str:
         return ""
     if row.unit.startswith("dB"):
         return f"{value - first:+.1f} dB"
-    return f"{100 * (value / first - 1):+.2g} %" if first else ""
+    if not first:
+        return ""
+    change = 100 * (value / first - 1)
+    return f"{change:+.2g} %" if abs(change) < 99.5 else f"{change:+.0f} %"
 
 
 def _figures(

@@ -10,6 +10,7 @@ import pytest
 from tireroad.runs.cli import main
 from tireroad.runs.files import cache as shared
 from tireroad.runs.files.cache import Cache
+from tireroad.runs.files.disk import Refused
 from tireroad.runs.stages import coarser
 
 SCENE = """
@@ -124,6 +125,23 @@ def test_the_longest_unused_goes_first(home: Path, monkeypatch: pytest.MonkeyPat
 def test_a_cache_that_cannot_be_written_is_none(home: Path) -> None:
     (home / "cache").write_text("a file")
     assert "static    done" in run(home, "one", "time=", "contact=", "road=")
+
+
+def test_a_cache_that_takes_no_more_is_told_and_the_run_goes_on(
+    home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A folder that exists but cannot be written, or is full: it ended the run with status 3."""
+    source = home / "stage.h5"
+    source.write_bytes(b"x")
+
+    def refuses(path: Path, text: str) -> None:
+        raise Refused(f"{path}: cannot be written")
+
+    monkeypatch.setattr(shared, "write_text", refuses)
+    Cache.of_user().keep("static", "a", source, {})
+    said = capsys.readouterr().out
+    assert "not kept for other runs, TIREROAD_CACHE = " in said and "cannot be written" in said
+    assert Cache.of_user().entries() == []
 
 
 def test_off_is_off(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,7 +42,7 @@ def test_what_is_not_there_is_named(folder: Path) -> None:
     run = tireroad.load(folder)
     with pytest.raises(KeyError, match="contact/total_force"):
         run["contact/axle_force"]
-    with pytest.raises(InputError, match=r"summary\.json"):
+    with pytest.raises(InputError, match=r"no such folder"):
         tireroad.load(folder / "nothing")
     (folder / "static.h5").write_bytes(b"no HDF5")
     with pytest.raises(InputError, match="damaged"):
@@ -71,3 +71,17 @@ def test_a_changed_summary_is_not_believed(folder: Path) -> None:
     path.write_text(json.dumps(table).replace("1.5", "2.5"))
     with pytest.raises(InputError, match=r"summary\.json is damaged"):
         _ = tireroad.load(folder).summary
+
+
+def test_what_holds_no_results_is_told_for_what_it_is(tmp_path: Path) -> None:
+    (tmp_path / "sweep.csv").touch()
+    (tmp_path / "empty").mkdir()
+    said = {
+        ".": r"a sweep: see sweep\.html .*members",
+        "sweep.csv": "a file: give the folder",
+        "nosuch": "there is no such folder",
+        "empty": r"it has no summary\.json",
+    }
+    for name, text in said.items():
+        with pytest.raises(InputError, match=text):
+            tireroad.load(tmp_path / name)

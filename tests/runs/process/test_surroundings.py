@@ -194,3 +194,11 @@ program()
     done = subprocess.run(command, capture_output=True, env=environment(), timeout=LONG, text=True)
     assert done.returncode == 2 and done.stderr.count("\n") == 1
     assert f"the Python package {package} is missing" in done.stderr
+
+
+def test_a_folder_of_temporary_files_that_is_not_there_is_named(scene: Path) -> None:
+    """MPI ended with status 1 and five lines of its own."""
+    missing = environment() | {"TMPDIR": str(scene.parent / "nosuch")}
+    ended = shell('exec "$@"', "run", scene, cwd=scene.parent, env=missing)
+    assert ended.returncode == 2
+    assert ended.stderr.decode().startswith("error: TMPDIR = ") and b"nosuch" in ended.stderr

@@ -13,8 +13,8 @@ import pytest
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.reader import RunResults
-from tireroad.runs.report.compare import compare
-from tireroad.runs.report.differences import assurance, level_rows, scene_rows
+from tireroad.runs.report.compare import _change, compare
+from tireroad.runs.report.differences import Row, assurance, level_rows, scene_rows
 
 
 def write(folder: Path, load: float, level: float, frequencies: list[float], turn: bool) -> Path:
@@ -122,3 +122,9 @@ def test_a_level_of_nothing_is_left_out(tmp_path: Path) -> None:
     found = level_rows([RunResults(run) for run in runs])
     (row,) = (row for row in found if (row.group, row.name) == ("axle force z", "100 Hz"))
     assert row.values == (5.0, None)
+
+
+def test_large_changes_are_whole_percents() -> None:
+    """Twice was +1e+02 %."""
+    row = Row("contact", "step", "s", (1.0, 2.0, 1.013, 21.0, 0.0))
+    assert [_change(row, k) for k in range(5)] == ["", "+100 %", "+1.3 %", "+2000 %", "-100 %"]
