@@ -3,7 +3,8 @@
 Starts from a trial's errors by cause, each with a known order in its size
 (contact.results.error_bars.orders), and its measured seconds by stage, scaled with the sizes of the
 stages (scene.extent.estimate). Rungs are climbed one at a time, each time the one that removes most
-squared error per cost, until the target is predicted to be met.
+squared error per cost, until the target is predicted to be met; then those that it is met without
+are left again, the most expensive first.
 """
 
 from __future__ import annotations
@@ -53,7 +54,39 @@ def planned(ladders: Ladders, trial: Trial, processes: int) -> Settings | None:
             break
         cause, finer = max(choices, key=lambda one: _worth(over, one[0], one[1], now, costs, rates))
         over, now = _finer(over, cause, now, finer, rates), finer
+    now = _without_excess(ladders, trial, now, costs, rates)
     return now if now != trial.settings else None
+
+
+def _without_excess(
+    ladders: Ladders, trial: Trial, now: Settings, costs: _Costs, rates: Mapping[str, float]
+) -> Settings:
+    """`now`, without the rungs above the trial's that the target is predicted to be met without.
+
+    The rung that removes most error per cost comes first, and is no longer needed if one that
+    removes more has to follow.
+    """
+    assert trial.found is not None
+    begun, first = trial.settings, trial.found.over(ladders.scene.accuracy)
+
+    def met(settings: Settings) -> bool:
+        over = first
+        for cause in CAUSES:
+            if settings.rungs[cause] > begun.rungs[cause]:
+                over = _finer(over, cause, begun, settings, rates)
+        return worst(over)[0] <= AIM
+
+    while met(now):
+        lower = (
+            ladders.at(now.rungs | {cause: now.rungs[cause] - 1})
+            for cause in CAUSES
+            if now.rungs[cause] > begun.rungs[cause]
+        )
+        enough = [one for one in lower if one is not None and met(one)]
+        if not enough:
+            break
+        now = min(enough, key=costs)
+    return now
 
 
 def _worthwhile(

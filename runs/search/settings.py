@@ -19,7 +19,7 @@ PASSING = 2.25  # contact points that pass per period of it, at least
 POINTS = 1 / 32  # of the outer radius: largest spacing of points
 # An estimate can be smaller than the true error by this factor, and seldom by more
 # (docs/verification/accuracy-on-demand.md): searches aim at the target over it.
-MARGIN = 1.25
+MARGIN = 1.2
 MARGINAL = f"estimated at {100 / MARGIN:.0f} % of that, because estimates can be too small"
 
 

@@ -16,6 +16,7 @@ from tireroad.runs.process.signals import Stopped
 from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.scene.load import load
 from tireroad.runs.scene.sections.kinds import torus
+from tireroad.runs.search import planning
 from tireroad.runs.search import search as searching
 from tireroad.runs.search.journal import Journal, Trial
 from tireroad.runs.search.kept import to_resume
@@ -221,3 +222,28 @@ def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
     assert load(out / "scene.toml") == load(out / "chosen.toml")
     assert not (out / "search").exists()
     assert len(Journal(out, load(file, smooth)).trials) == 1
+
+
+@pytest.mark.parametrize(
+    "errors", [(0.02, 0.08, 0.04, 0.12), (0.05, 0.13, 0.035, 0.13), (0.2, 0.2, 0.2, 0.2)]
+)
+def test_no_rung_is_climbed_that_the_target_is_met_without(file, errors) -> None:
+    """Points, cheaper, were refined before the mesh, which alone would have done."""
+    scene = load(file, ["accuracy.target=0.15"])
+    ladders = Ladders.of(scene)
+    first = ladders.first()
+    history = dict(zip(CAUSES, errors, strict=True))
+    found = Found(history, dict.fromkeys(CAUSES, 0.0), (), dict.fromkeys(CAUSES, ()))
+    trial = Trial(first, estimate(applied(scene, first)).work, 1.0, found, "linear")
+    now = planning.planned(ladders, trial, 1)
+
+    def predicted(settings: Settings) -> float:
+        rates = orders(first.order)
+        ends = [e * size_ratio(c, first, settings) ** rates[c] for c, e in history.items()]
+        return float(np.linalg.norm(ends)) / 0.15
+
+    assert predicted(now) <= planning.AIM < predicted(first)
+    for cause, rung in now.rungs.items():
+        if rung:
+            lower = ladders.at(now.rungs | {cause: rung - 1})
+            assert predicted(lower) > planning.AIM, cause
