@@ -225,9 +225,9 @@ def test_a_tiny_tire_from_its_scene_to_its_results(file, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(
-    "errors", [(0.02, 0.08, 0.04, 0.12), (0.05, 0.13, 0.035, 0.13), (0.2, 0.2, 0.2, 0.2)]
+    "errors", [(0.02, 0.05, 0.02, 0.15), (0.02, 0.08, 0.02, 0.3), (0.2, 0.2, 0.2, 0.2)]
 )
-def test_no_rung_is_climbed_that_the_target_is_met_without(file, errors) -> None:
+def test_no_rung_is_climbed_that_the_target_is_clearly_met_without(file, errors) -> None:
     """Points, cheaper, were refined before the mesh, which alone would have done."""
     scene = load(file, ["accuracy.target=0.15"])
     ladders = Ladders.of(scene)
@@ -246,4 +246,4 @@ def test_no_rung_is_climbed_that_the_target_is_met_without(file, errors) -> None
     for cause, rung in now.rungs.items():
         if rung:
             lower = ladders.at(now.rungs | {cause: rung - 1})
-            assert predicted(lower) > planning.AIM, cause
+            assert predicted(lower) > planning._CLEAR * planning.AIM, cause
