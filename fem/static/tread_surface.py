@@ -9,7 +9,7 @@ from scipy.interpolate import LinearNDInterpolator
 from tireroad.fem.matrices.probe import line_shape
 from tireroad.fem.tire.mesh import Lattice
 
-_WINDOW = np.radians(75)  # around the lowest point, where the face points downwards
+_WINDOW = np.radians(75)  # around the lowest point, where the face of a round section points down
 _STEP = 1e-6  # rad, of the difference quotients; affects Newton's rate only, not the result
 _NEWTON = 30
 _CLOSE = 1e-11  # m
@@ -23,6 +23,20 @@ class TreadSurface:
         self._lattice, self._positions = lattice, positions
         self._shape = lattice.face_shape
         self._located: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+        self._across = self._seen_from_below()
+
+    def _seen_from_below(self) -> tuple[float, float]:
+        """Section angles (rad) between which points are sought.
+
+        At least `_WINDOW` to either side. A tread that is wide for its height has larger angles,
+        though it is flat: all as far as y rises with the angle on the lowest meridian.
+        """
+        places, arc = self._positions.reshape(*self._shape, 3), self._lattice.arc
+        i, j = np.unravel_index(places[:, :, 2].argmin(), self._shape)
+        turns = np.flatnonzero(np.diff(places[i, :, 1]) <= 0)
+        last = turns[turns >= j].min(initial=len(arc) - 1)
+        first = turns[turns < j].max(initial=-1) + 1
+        return min(-_WINDOW, arc[first]), max(_WINDOW, arc[last])
 
     def weights(self, ring: np.ndarray, arc: np.ndarray) -> sparse.csr_matrix:
         """Shape functions (k, s) of the face at angles around the axle and the section, rad."""
@@ -102,7 +116,7 @@ class TreadSurface:
             if not open_.any():
                 break
             place[open_] -= self._newton_step(place[open_], defect[open_])
-            place[:, 1] = np.clip(place[:, 1], -_WINDOW, _WINDOW)
+            place[:, 1] = np.clip(place[:, 1], *self._across)
         found &= np.abs(self.at(*place.T)[:, :2] - target).max(axis=1) <= 1e3 * _CLOSE
         return place[:, 0], place[:, 1], found
 
@@ -119,7 +133,7 @@ class TreadSurface:
         ring, arc = np.meshgrid(self._lattice.ring, self._lattice.arc, indexing="ij")
         ring = (ring.ravel() + np.pi) % (2 * np.pi) - np.pi
         arc = arc.ravel()
-        low = (np.abs(ring) < _WINDOW) & (np.abs(arc) < _WINDOW)
+        low = (np.abs(ring) < _WINDOW) & (arc >= self._across[0]) & (arc <= self._across[1])
         inverse = LinearNDInterpolator(
             self._positions[low, :2], np.stack([ring[low], arc[low]], axis=-1)
         )

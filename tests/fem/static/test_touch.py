@@ -50,3 +50,19 @@ def test_a_tire_whose_crown_is_no_node_touches_below_its_nodes(make_body):
     assert loader.touch < equilibrium.road.tread_height().min() - 1e-5
     loader.carry(50.0)
     assert loader.load() == pytest.approx(50.0, rel=1e-8)
+
+
+def test_a_tread_wide_for_its_height_is_found_to_its_ends():
+    """Beyond 75 degrees of the section too, where it still faces down; not where it has turned up."""
+    lattice = Lattice(thesis_torus(segments=32, elements_arc=12, order=2), np.array([0, 0.5, 1]))
+    ring, arc = (part.ravel() for part in np.meshgrid(lattice.ring, lattice.arc, indexing="ij"))
+    end = lattice.arc.max()
+    assert end > np.radians(85)
+    flat = position(ring, np.stack([0.32 - 0.02 * arc**2, 0.1 * arc], axis=-1))
+    y = 0.1 * np.array([-0.99, -0.9, -0.5, 0.0, 0.5, 0.9, 0.99]) * end
+    _, place, found = TreadSurface(lattice, flat).locate(0 * y, y)
+    assert found.all()
+    np.testing.assert_allclose(place, y / 0.1, atol=1e-9)
+    folded = position(ring, np.stack([0.32 - 0.02 * arc**2, 0.1 * np.sin(arc)], axis=-1))
+    _, place, found = TreadSurface(lattice, folded).locate(0 * y, 0.1 * np.sin(y / 0.1))
+    assert np.abs(place).max() <= np.pi / 2 and found[2:5].all()
