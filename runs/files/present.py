@@ -29,10 +29,10 @@ def left_out(directory: Path) -> dict[str, str]:
     summary.json; a file of an unfinished stage if it was written for the folder's scene; any other
     file always. Without a readable summary nothing is known, and every file counts. Not collective.
     """
-    entries = _entries(directory)
-    if entries is None:
+    table = _table(directory)
+    if table is None:
         return {}
-    found = {}
+    entries, found = table["stages"], {}
     for stage in STAGES:
         name, entry = f"{stage}.h5", entries.get(stage)
         if not has_result(entry) and (directory / name).is_file():
@@ -46,6 +46,14 @@ def left_out(directory: Path) -> dict[str, str]:
     return found
 
 
+def ending(summary: Mapping[str, Any]) -> str:
+    """A sentence on a run that was stopped or failed, from its summary.json; else ""."""
+    told = summary.get("ended")
+    if not isinstance(told, Mapping):
+        return ""
+    return f"the run ended in stage {told.get('stage')}, {told.get('reason')}"
+
+
 def _read(path: Path) -> bytes | None:
     try:
         return path.read_bytes()
@@ -54,20 +62,22 @@ def _read(path: Path) -> bytes | None:
 
 
 def remarks(directory: Path) -> list[str]:
-    """The files left out, a sentence each."""
-    return [
+    """How the run ended, unless it finished, and the files left out, a sentence each."""
+    table = _table(directory)
+    ended = [f"{directory}: {text}"] if table and (text := ending(table)) else []
+    return ended + [
         f"{directory / name} is left out: {reason}" for name, reason in left_out(directory).items()
     ]
 
 
-def _entries(directory: Path) -> dict[str, Any] | None:
-    """The stages of summary.json; None if it is absent or damaged, which its readers report."""
+def _table(directory: Path) -> dict[str, Any] | None:
+    """summary.json; None if it is absent or damaged, which its readers report."""
     try:
         table = json.loads((directory / "summary.json").read_text(encoding="utf-8"))
-        known = {name: dict(entry) for name, entry in table["stages"].items()}
+        table["stages"] = {name: dict(entry) for name, entry in table["stages"].items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
-    return known if is_table_as_signed(table) else None
+    return table if is_table_as_signed(table) else None
 
 
 def _is_of_scene(directory: Path, name: str) -> bool:

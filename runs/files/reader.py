@@ -19,7 +19,7 @@ from tireroad.runs.files.checksum import (
     signed,
     text_digest,
 )
-from tireroad.runs.files.present import left_out
+from tireroad.runs.files.present import ending, left_out
 from tireroad.runs.files.store import AGAIN, verify
 
 
@@ -65,6 +65,11 @@ class RunResults(Mapping[str, NDArray[Any]]):
     def summary(self) -> dict[str, Any]:
         """Per stage: seconds, headline figures and indicators with units, warnings."""
         return self._table()["stages"]
+
+    @property
+    def ending(self) -> str:
+        """How the run ended if it was stopped or failed, else ""."""
+        return ending(self._table())
 
     def finished(self, scenes: Iterable[str]) -> bool:
         """Whether the run of one of these scenes, resolved as in scene.toml, is finished.

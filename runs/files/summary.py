@@ -82,6 +82,11 @@ class Summary:
         }
         self._write()
 
+    def end(self, stage: str, reason: str) -> None:
+        """Enter that the run ends in a stage, failed or stopped, for those that read the results."""
+        self.data["ended"] = {"stage": stage, "reason": reason}
+        self._write()
+
     def _is_scene(self) -> bool:
         """Whether the folder's scene.toml is that of this run."""
         path, text = self._scene

@@ -11,6 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tireroad.fem.errors import InputError
 from tireroad.runs.files.disk import write_text
+from tireroad.runs.files.present import UNFINISHED
 from tireroad.runs.files.reader import RunResults
 from tireroad.runs.report import comparison_figures as pictures
 from tireroad.runs.report.differences import (
@@ -146,10 +147,12 @@ def _figures(
 
 
 def _missing(runs: Sequence[RunResults], names: Sequence[str]) -> list[str]:
-    """Result files that some runs have and others lack."""
-    files = [{key.partition("/")[0] for key in run} for run in runs]
-    return [
-        f"{name} has no {', '.join(f'{file}.h5' for file in sorted(set.union(*files) - own))}"
+    """Runs that did not finish, and result files that some runs have and others lack."""
+    unfinished = {Path(name).stem for name in UNFINISHED}
+    files = [{key.partition("/")[0] for key in run} - unfinished for run in runs]
+    ended = [f"{name}: {run.ending}" for name, run in zip(names, runs, strict=True) if run.ending]
+    return ended + [
+        f"{name} has no {', '.join(f'{file}.h5' for file in sorted(set.union(*files) - own))}: left out there."
         for name, own in zip(names, files, strict=True)
         if set.union(*files) - own
     ]

@@ -67,8 +67,9 @@ def render(directory: Path) -> str:
     """The page as text."""
     problems: list[str] = []
     summary = read_summary(directory / "summary.json", problems)
-    text, scene = read_scene(directory / "scene.toml", problems)
+    scene_text, scene = read_scene(directory / "scene.toml", problems)
     stages = summary.get("stages", {})
+    ended = [("run", text)] if (text := present.ending(summary)) else []
     judged = verdicts(summary.get("stages_known", {}))
     sections, left_out, provenance = build_sections(directory, scene, stages, problems)
     with Results(directory, scene) as results:
@@ -87,7 +88,7 @@ def render(directory: Path) -> str:
         answer=facts,
         script=live.script(),
         style=live.style(),
-        warnings=[("report", problem) for problem in problems] + remarked,
+        warnings=ended + [("report", problem) for problem in problems] + remarked,
         stages=stages,
         judged=judged,
         costs=costs(stages),
@@ -95,7 +96,7 @@ def render(directory: Path) -> str:
         provenance=provenance,
         sections=sections,
         left_out=left_out,
-        scene_text=text,
+        scene_text=scene_text,
     )
 
 

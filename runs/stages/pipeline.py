@@ -30,6 +30,7 @@ from tireroad.runs.scene.plan import skipped
 from tireroad.runs.scene.resolved import dumps
 from tireroad.runs.scene.rules.road import check_road
 from tireroad.runs.scene.tables.scene import Scene
+from tireroad.runs.stages.base import failed
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.base.stage import Done, Part, Shared, Stage
 from tireroad.runs.stages.build.setup import Setup
@@ -129,11 +130,12 @@ def _parts(job: Job, reasons: Mapping[str, str], summary: Summary) -> dict[str, 
     """The product of each part of the pipeline, by name. Collective."""
     done: dict[str, Done] = {}
     for kind in PARTS:
-        if (found := _done(job, kind, done, reasons, summary)) is not None:
-            done[kind.name] = found
-        job.settle(done)
-        if found is not None and kind is Setup and "contact" not in reasons:
-            _ = found.product  # a road too narrow for the footprint is refused before the modes
+        with failed.entered(kind.name, summary, job.comm):
+            if (found := _done(job, kind, done, reasons, summary)) is not None:
+                done[kind.name] = found
+            job.settle(done)
+            if found is not None and kind is Setup and "contact" not in reasons:
+                _ = found.product  # a road too narrow for the footprint is refused before the modes
     return done
 
 

@@ -121,6 +121,7 @@ def histories(
 def response(results: Results) -> Section:
     """The section on point forces (response.h5)."""
     name = "response.h5"
+    results.file(name)
     section = Section("Point forces", "Displacement at the driven points.")
     time, moved = results.optional(name, "time"), results.optional(name, "displacement")
     force = results.optional(name, "force")

@@ -1,4 +1,6 @@
-"""Failures of stages during one sweep, so that members that share a stage do not repeat them.
+"""Failures of stages: entered in the summary, and kept during a sweep.
+
+Members of a sweep that share a stage do not repeat its failure.
 
 The environment variable TIREROAD_FAILURES names a folder with a file for each stage that has
 failed, by its name and the hash of its inputs. A sweep on this machine gives its workers an empty
@@ -8,13 +10,32 @@ one. Without it nothing is remembered: a run by itself may be tried again.
 from __future__ import annotations
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from mpi4py import MPI
 
 from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.disk import write_text
+from tireroad.runs.files.summary import Summary
+from tireroad.runs.process.signals import Stopped
 
 VARIABLE = "TIREROAD_FAILURES"
+
+
+@contextmanager
+def entered(stage: str, summary: Summary, comm: MPI.Comm) -> Iterator[None]:
+    """Within the context, an error or a stop is entered in the summary by the root process."""
+    try:
+        yield
+    except BaseException as error:
+        if comm.rank == 0:
+            stopped = isinstance(error, Stopped)
+            told = f"stopped by {error}: resume goes on" if stopped else str(error) or repr(error)
+            with suppress(Exception):  # of the first error, whatever else goes wrong
+                summary.end(stage, told)
+        raise
 
 
 def remember(stage: str, key: str, run: str, error: ConvergenceError) -> None:

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
+from mpi4py import MPI
 from synthetic_results import put, sealed, write_results
 from synthetic_scene import SCENE
 
 import tireroad
+from tireroad.fem.errors import ConvergenceError
 from tireroad.runs.files.checksum import signed
 from tireroad.runs.files.export import export
-from tireroad.runs.files.present import left_out
+from tireroad.runs.files.present import left_out, remarks
 from tireroad.runs.files.summary import Summary
 from tireroad.runs.report.compare import compare
 from tireroad.runs.report.page import render
+from tireroad.runs.stages.base import failed
 
 NAME = "synthetic-torus"
 OTHER = SCENE + "# another scene\n"
@@ -159,3 +165,27 @@ def test_without_a_summary_every_file_counts(folder: Path) -> None:
     (folder / "scene.toml").write_text(signed(OTHER))
     (folder / "summary.json").unlink()
     assert left_out(folder) == {}
+
+
+def test_how_a_run_ended_is_told_by_all_that_show_its_results(folder: Path, tmp_path: Path) -> None:
+    """A tire that buckled under its load had a page like any other, but for the files it lacks."""
+    whole = tmp_path / "whole"
+    shutil.copytree(folder, whole)
+    summary = begun(folder, SCENE)
+    with pytest.raises(ConvergenceError), failed.entered("modes", summary, MPI.COMM_SELF):
+        raise ConvergenceError("13 negative eigenvalues")
+    told = "the run ended in stage modes, 13 negative eigenvalues"
+    assert remarks(folder)[0].endswith(told) and tireroad.load(folder).ending == told
+    assert told in render(folder)
+    assert told in compare([whole, folder], tmp_path / "out").read_text()
+    finish(folder, SCENE)
+    assert tireroad.load(folder).ending == "" and "the run ended" not in render(folder)
+
+
+def test_a_checkpoint_is_nothing_that_a_finished_run_lacks(folder: Path, tmp_path: Path) -> None:
+    whole = tmp_path / "whole"
+    shutil.copytree(folder, whole)
+    with h5py.File(folder / "checkpoint.h5", "w") as file:
+        file.attrs["scene"] = SCENE
+        file["state"] = np.zeros(3)
+    assert "checkpoint" not in compare([whole, folder], tmp_path / "out").read_text()
