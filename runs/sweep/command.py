@@ -65,8 +65,8 @@ def _queue(family: Sweep, folder: Path, source: Path) -> None:
     first, rest = shared_first(family)
     scripts = queue.write_scripts(family, folder, first, rest, source)
     for script in scripts.values():
-        observe.say(f"{script}")
-    jobs = queue.submit(family, scripts, {"first": len(first), "rest": len(rest)})
+        observe.say(f"{script.path}")
+    jobs = queue.submit(family, scripts)
     observe.say("submitted: " + ", ".join(f"{name} as job {job}" for name, job in jobs.items()))
 
 

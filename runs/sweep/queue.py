@@ -1,8 +1,8 @@
 """Submits a sweep to Slurm, or through a template to another batch system, as job scripts.
 
 Members share stages through the cache in the sweep's folder. The first job computes one member of
-each group that shares a static state and modes; after it, an array job runs the rest, and a last
-job gathers.
+each group that shares a static state and modes; after it, array jobs run the rest, and a last job
+gathers.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from tireroad.runs.sweep.definition import Sweep
 from tireroad.runs.sweep.local import command
 from tireroad.runs.sweep.members import Member
 
+MOST = 1000  # tasks of an array job: Slurm's own limit unless a cluster sets another (MaxArraySize)
 WARNING = 120  # s before the time limit at which a job is signalled to write a checkpoint
 _DIRECTIVE = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
 SLURM = """\
@@ -132,37 +133,62 @@ def _has_group(pattern: str) -> bool:
         return False
 
 
+@dataclass(frozen=True)
+class Script:
+    """A job script, and the `tasks` of its array; None if it is no array job."""
+
+    path: Path
+    tasks: int | None = None
+
+
 def write_scripts(
     sweep: Sweep, folder: Path, first: Sequence[Member], rest: Sequence[Member], source: Path
-) -> dict[str, Path]:
-    """Write the job scripts; by name: `first`, `rest` (if there are any) and `gather`."""
+) -> dict[str, Script]:
+    """Write the job scripts; by name: `first`, `rest` (if there are any) and `gather`.
+
+    More than `MOST` members are divided into several: `rest`, `rest-2`, ...
+    """
     queue, scripts = Queue.of(sweep), {}
-    for name, members in (("first", first), ("rest", rest)):
-        if members:
-            body = _members(sweep, folder, members, queue.task)
-            scripts[name] = _script(sweep, folder, name, body, queue)
+    for group, members in (("first", first), ("rest", rest)):
+        for k in range(0, len(members), MOST):
+            some, name = members[k : k + MOST], f"{group}-{k // MOST + 1}" if k else group
+            body = _members(sweep, folder, some, queue.task)
+            scripts[name] = Script(_script(sweep, folder, name, body, queue), len(some))
     again = [sys.executable, "-P", "-m", "tireroad.runs", "sweep", str(source.resolve())]
     body = f"{shlex.join([*again, '--out', str(folder.resolve()), '--gather'])} &\nchild=$!"
-    scripts["gather"] = _script(sweep, folder, "gather", body, queue, processes=1)
+    scripts["gather"] = Script(_script(sweep, folder, "gather", body, queue, processes=1))
     return scripts
 
 
-def submit(sweep: Sweep, scripts: Mapping[str, Path], counts: Mapping[str, int]) -> dict[str, str]:
+def submit(sweep: Sweep, scripts: Mapping[str, Script]) -> dict[str, str]:
     """Submit the scripts, each after the ones before; returns the job numbers by name."""
     queue = Queue.of(sweep)
     jobs: dict[str, str] = {}
     for name, script in scripts.items():
-        line = queue.submission(script, counts.get(name), list(jobs.values()))
+        line = queue.submission(script.path, script.tasks, list(jobs.values()))
         try:
             done = subprocess.run(line, capture_output=True, text=True)
         except FileNotFoundError:
             raise InputError(
-                f"sweep: {line[0]} is not on this machine; the scripts are in {script.parent}"
+                f"sweep: {line[0]} is not on this machine; the scripts are in {script.path.parent}"
             ) from None
         if done.returncode:
-            raise ConvergenceError(f"sweep: {shlex.join(line)}: {done.stderr.strip()}")
+            raise ConvergenceError(
+                f"sweep: {shlex.join(line)}: {done.stderr.strip()}{_submitted(jobs)}"
+            )
         jobs[name] = queue.numbered(done.stdout)
     return jobs
+
+
+def _submitted(jobs: Mapping[str, str]) -> str:
+    """What to do about the jobs before one that was refused."""
+    if not jobs:
+        return ""
+    told = ", ".join(f"{name} as job {job}" for name, job in jobs.items())
+    return (
+        f". Submitted before: {told}. Cancel them before the sweep is submitted again, which would compute their "
+        "members twice; what they finish is kept"
+    )
 
 
 def _script(
