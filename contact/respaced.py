@@ -18,11 +18,11 @@ MOST = 1000  # points that touch at rest with half the spacing, up to which a fa
 def ratio(patch: Patch) -> float:
     """Spacing of a companion's points over that of a patch in its static state.
 
-    Half, if up to `MOST` points then touch: a run with finer points shows most of the error itself, while that
-    of coarser ones is nearly independent of it. The forces of a footprint fewer than `ACROSS`
-    points wide depend on where these happen to lie (cobblestones, 17 mm wide, points 16, 11.3, 8,
-    5.7 and 4 mm apart: mean 547, 515, 521, 548, 545 N), so there it is half in any case. On a
-    curved road the companion is always coarser.
+    Half, if up to `MOST` points then touch: a run with finer points shows most of the error itself,
+    while that of coarser ones is nearly independent of it. The forces of a footprint fewer than
+    `ACROSS` points wide depend on where these happen to lie (cobblestones, 17 mm wide, points 16,
+    11.3, 8, 5.7 and 4 mm apart: mean 547, 515, 521, 548, 545 N), so there it is half in any case.
+    On a curved road the companion is always coarser.
     """
     least = patch.touching.min()
     if patch.places is None or patch.frames is not None or not least:

@@ -29,7 +29,10 @@ def left_out(directory: Path) -> dict[str, str]:
     summary.json; a file of an unfinished stage if it was written for the folder's scene; any other
     file always. Without a readable summary nothing is known, and every file counts. Not collective.
     """
-    table = _table(directory)
+    return _left_out(directory, _table(directory))
+
+
+def _left_out(directory: Path, table: Mapping[str, Any] | None) -> dict[str, str]:
     if table is None:
         return {}
     entries, found = table["stages"], {}
@@ -66,7 +69,8 @@ def remarks(directory: Path) -> list[str]:
     table = _table(directory)
     ended = [f"{directory}: {text}"] if table and (text := ending(table)) else []
     return ended + [
-        f"{directory / name} is left out: {reason}" for name, reason in left_out(directory).items()
+        f"{directory / name} is left out: {reason}"
+        for name, reason in _left_out(directory, table).items()
     ]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -89,14 +89,16 @@ class Given:
 
     def first(self, steps: int) -> Given:
         """The same for fewer steps."""
-        other = replace(self, steps=steps)
-        other.__dict__["settled"] = self.settled
-        return other
+        return self._keeping("settled", steps=steps)
 
     def of(self, job: Job) -> Given:
         """The same with another job; `base` stays that of the run."""
-        other = replace(self, job=job)
-        other.__dict__["base"] = self.base
+        return self._keeping("base", job=job)
+
+    def _keeping(self, name: str, **changes: Any) -> Given:
+        """The same with `changes`, and the cached property `name` as here."""
+        other = replace(self, **changes)
+        other.__dict__[name] = getattr(self, name)
         return other
 
     def repeated(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from itertools import chain
 
 import numpy as np
 from mpi4py import MPI
@@ -33,18 +34,21 @@ def orders() -> Table:
             for scheme in _SCHEMES
         ]
         slopes = [""] * 3 if before is None else list(np.log2(np.array(before) / errors).tolist())
-        rows.append(
-            [steps, *(value for pair in zip(errors, slopes, strict=True) for value in pair)]
-        )
+        rows.append([steps, *_in_turn(errors, slopes)])
         before = errors
     shown = [(f"{name} force", "-") for name in _SCHEMES]
-    orders = [("order" + " " * k, "-") for k in range(3)]  # columns of different names
-    columns = [("steps", "-"), *(one for pair in zip(shown, orders, strict=True) for one in pair)]
+    beside = [("order" + " " * k, "-") for k in range(3)]  # columns of different names
+    columns = [("steps", "-"), *_in_turn(shown, beside)]
     return Table(
         "Error of the contact forces over the time step, residual flexibility on", columns, rows,
         ["Against 6,400 steps of the second-order scheme, at 25 instants. Asked: orders 2, 2 and 1."],
         {"x": "steps", "y": [name for name, _ in shown], "log": "xy", "by": None},
     )  # fmt: skip
+
+
+def _in_turn(one: list, other: list) -> list:
+    """One of each list after the other."""
+    return list(chain.from_iterable(zip(one, other, strict=True)))
 
 
 def _forces(response, scheme: str, steps: int) -> np.ndarray:
