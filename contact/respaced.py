@@ -15,20 +15,24 @@ ACROSS = 8  # points across the footprint below which twice their spacing gives 
 MOST = 1000  # points that touch at rest with half the spacing, up to which a factor solves them
 
 
-def ratio(patch: Patch) -> float:
+def ratio(patch: Patch, most: float = MOST) -> float:
     """Spacing of a companion's points over that of a patch in its static state.
 
-    Half, if up to `MOST` points then touch: a run with finer points shows most of the error itself,
-    while that of coarser ones is nearly independent of it. The forces of a footprint fewer than
-    `ACROSS` points wide depend on where these happen to lie (cobblestones, 17 mm wide, points 16,
-    11.3, 8, 5.7 and 4 mm apart: mean 547, 515, 521, 548, 545 N), so there it is half in any case.
-    On a curved road the companion is always coarser.
+    Half, if at most `most` points then touch: a run with finer points shows most of the error
+    itself, while that of coarser ones is nearly independent of it. The forces of a footprint fewer
+    than `ACROSS` points wide depend on where these happen to lie (cobblestones, 17 mm wide, points
+    16, 11.3, 8, 5.7 and 4 mm apart: mean 547, 515, 521, 548, 545 N), so there it is half in any
+    case. On a curved road the companion is always coarser.
     """
     least = patch.touching.min()
     if patch.places is None or patch.frames is not None or not least:
         return 2.0
-    finer = 4 * np.count_nonzero(patch.force)
-    return 0.5 if finer <= MOST or least < ACROSS else 2.0
+    return 0.5 if finer_touching(patch) <= most or least < ACROSS else 2.0
+
+
+def finer_touching(patch: Patch) -> int:
+    """Points that touch at rest with half the spacing, from a patch in its static state."""
+    return 4 * int(np.count_nonzero(patch.force))
 
 
 def thinned(patch: Patch) -> Patch:

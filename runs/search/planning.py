@@ -24,10 +24,10 @@ from tireroad.runs.search.shares import worst
 
 AIM = 0.9 / MARGIN  # of the target; 0.9: the orders hold only asymptotically
 AT_ONCE = {"mesh": 2, "modes": 2, "points": 2, "step": 1}  # most rungs per plan: same reason
-# Of the target. A cause is refined only above SMALL; above EVEN (the value of four equal shares) if
-# another cause that cannot be refined alone misses the target, so that none becomes finer than that
-# one requires.
-SMALL, EVEN = 0.25, 0.5
+# Of the aim: a cause is refined only above it. If another cause misses the aim alone and has no more
+# rungs, or no more per plan, only a cause that does so too is: the next trial cannot meet the target,
+# and shows whether the others are needed (cobblestones under a soft torus: they were not).
+SMALL = 0.25
 # Of the aim: rungs are left again only where the rest is predicted this far below it. Left at the aim
 # itself, a radial tire needed a third trial (bench accuracy_on_demand, sine).
 _CLEAR = 0.85
@@ -103,7 +103,7 @@ def _worthwhile(
         return unknown  # its companion run fails: the coarse setting behind it is refined first
     climbing = {cause for cause, _ in choices}
     stuck = any(error > AIM for cause, error in known.items() if cause not in climbing)
-    return [one for one in choices if known[one[0]] > AIM * (EVEN if stuck else SMALL)]
+    return [one for one in choices if known[one[0]] > AIM * (1.0 if stuck else SMALL)]
 
 
 def fits(scene: Scene, settings: Settings, processes: int) -> bool:

@@ -9,7 +9,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from tireroad.contact.respaced import ratio
 from tireroad.contact.results.error_bars import CAUSES, Bars, Measured, measured, total
 from tireroad.contact.setup import ContactSetup
 from tireroad.fem.errors import ConvergenceError, InputError
@@ -19,22 +18,18 @@ from tireroad.runs.files.disk import Refused
 from tireroad.runs.files.store import put
 from tireroad.runs.process import observe
 from tireroad.runs.process.mpi import on_root
-from tireroad.runs.scene.extent.estimate import estimate
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build.model_limit import model_limit
 from tireroad.runs.stages.build.rolling.run_in import first_step
 from tireroad.runs.stages.build.rolling.scheme import recursive
-from tireroad.runs.stages.coarser import COARSER
-from tireroad.runs.stages.companions import Given, companions
+from tireroad.runs.stages.companions.budget import Budget, least_steps
+from tireroad.runs.stages.companions.coarser import COARSER
+from tireroad.runs.stages.companions.given import Given
+from tireroad.runs.stages.companions.runs import companions
 from tireroad.runs.stages.greens import Responses
 from tireroad.runs.stages.stored.contact_file import ContactHistory
 
-SHARE = 0.33  # of the run's own cost: budget of all companion runs together
-_FEWEST, _PERIODS = 64, 2  # least steps after the run-in, and periods of `up_to`, to repeat
-# Cost of five companion runs in time loops per repeated step, by the spacing of that of the points.
-_LOOPS = {2.0: 3.5, 0.5: 6.0}
-_COARSE = 0.14  # cost on elements of twice the size, as a share of the run's cost before the loop
 FORCES = ("contact_force", "axle_force")
 _UNITS = {"mean": "N", "deviation": "N", "level": "dB", "history": "-"}
 
@@ -96,9 +91,10 @@ class AccuracyStage(Computed[Accuracy]):
         start += start % 2  # even: where a step of the companion with twice the step begins
         limit = model_limit(setup, self.rotating.product, history.step).frequency
         up_to = min(limit, self.job.scene.accuracy.up_to)
-        least = max(_FEWEST, int(np.ceil(_PERIODS / (up_to * history.step))))
-        given = self._given(len(history.time))
-        steps = self._window(start + least, given)
+        least = start + least_steps(history.step, up_to)
+        budget = Budget.of(self.job.scene, len(history.time))
+        given = self._given(budget.steps, budget.most_touching(least))
+        steps = budget.window(least, given)
         if steps - start < 2:
             return self._none("the run is too short for a companion run with twice the step")
         given = given.first(steps)
@@ -154,17 +150,7 @@ class AccuracyStage(Computed[Accuracy]):
             centre=np.zeros(0), window=0.0, up_to=0.0, mean={}, by_cause={}, absent=absent
         )
 
-    def _window(self, least: int, given: Given) -> int:
-        """Last step in companion runs: `least`, more for `SHARE` of the run's estimated cost."""
-        work = estimate(self.job.scene).work
-        loop = work["contact loop"]
-        before = sum(work.values()) - loop
-        loops = _LOOPS[ratio(given.settled.patch)]
-        part = (SHARE * (before + loop) - _COARSE * before) / (loops * loop)
-        count = int(np.clip(round(part * given.steps), min(least, given.steps), given.steps))
-        return count - count % 2
-
-    def _given(self, steps: int) -> Given:
+    def _given(self, steps: int, most: float) -> Given:
         return Given(
             job=self.job,
             static=self.static,
@@ -175,6 +161,7 @@ class AccuracyStage(Computed[Accuracy]):
             step=self.contact.product.step,
             steps=steps,
             scheme=recursive(self.contact.product.scheme),
+            most=most,
         )
 
     def write(self, file, product: Accuracy) -> None:

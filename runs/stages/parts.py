@@ -2,7 +2,7 @@
 
 from tireroad.runs.stages.accuracy import AccuracyStage
 from tireroad.runs.stages.base.stage import Part
-from tireroad.runs.stages.coarser import STATIC_TO_GREENS
+from tireroad.runs.stages.companions.coarser import STATIC_TO_GREENS
 from tireroad.runs.stages.contact import ContactStage
 from tireroad.runs.stages.motion import MotionStage
 from tireroad.runs.stages.response import ResponseStage

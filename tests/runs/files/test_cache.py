@@ -11,7 +11,7 @@ from tireroad.runs.cli import main
 from tireroad.runs.files import cache as shared
 from tireroad.runs.files.cache import Cache
 from tireroad.runs.files.disk import Refused
-from tireroad.runs.stages import coarser
+from tireroad.runs.stages.companions import coarser
 
 SCENE = """
 [tire]

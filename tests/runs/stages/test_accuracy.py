@@ -18,8 +18,9 @@ from tireroad.runs.scene.load import load
 from tireroad.runs.stages.base.job import Job
 from tireroad.runs.stages.build.setup import points_of
 from tireroad.runs.stages.build.wall import backed
-from tireroad.runs.stages.coarser import coarser, coarser_job
-from tireroad.runs.stages.companions import Given, companions
+from tireroad.runs.stages.companions.coarser import coarser, coarser_job
+from tireroad.runs.stages.companions.given import Given
+from tireroad.runs.stages.companions.runs import companions
 from tireroad.runs.stages.pipeline import run_scene
 
 pytestmark = pytest.mark.slow
