@@ -208,12 +208,16 @@ ALONE: dict[str, Callable[[argparse.Namespace], None]] = {
 }
 
 
-def _alone(function: Callable[[], None]) -> int:
+READERS = "check", "report", "export", "compare", "info", "cache"  # leave nothing to go on from
+
+
+def _alone(args: argparse.Namespace) -> int:
     """Run a single-process command, on the root process under mpirun; returns the exit status."""
     if rank_before_mpi() != 0:
         return DONE
     signals.stop_on_signals()
-    status, message = mpi.judged(function)
+    kept = "the same command begins again" if args.command in READERS else mpi.KEPT
+    status, message = mpi.judged(lambda: ALONE[args.command](args), kept)
     if message:
         print(message, file=sys.stderr)
     return status
@@ -238,10 +242,9 @@ def main(argv: list[str]) -> int:
             args = parser().parse_args(argv)
     except SystemExit as ending:
         return handed_over(int(ending.code or 0))
-    if args.command == "resume":
-        args = _resumed(args)
+    args = _resumed(args) if args.command == "resume" else args
     if args.command == "run":
         return handed_over(_run(args, options))
     if args.command == "reproduce":
         return handed_over(_together(lambda comm: _reproduce(args, comm)))
-    return _alone(lambda: ALONE[args.command](args))
+    return _alone(args)

@@ -37,15 +37,21 @@ def on_root(comm: Any, function: Callable[[], T]) -> T:
     return parallel.on_root(comm, function, (InputError, ConvergenceError, Removed))
 
 
-def judged(function: Callable[[], None]) -> tuple[int, str]:
-    """Run `function`; returns the resulting exit status and the message for the user."""
-    status, message = _judged(function)
+KEPT = "what was finished is kept, the same command or resume goes on"
+
+
+def judged(function: Callable[[], None], kept: str = KEPT) -> tuple[int, str]:
+    """Run `function`; returns the resulting exit status and the message for the user.
+
+    `kept`: what the user is told after a stop that does not say so itself.
+    """
+    status, message = _judged(function, kept)
     if status == BUG and raised():
-        return STOPPED, f"stopped by {raised()}: the same command or resume goes on"
+        return STOPPED, f"stopped by {raised()}: {kept}"
     return status, message
 
 
-def _judged(function: Callable[[], None]) -> tuple[int, str]:
+def _judged(function: Callable[[], None], kept: str) -> tuple[int, str]:
     try:
         function()
     except (ConvergenceError, Removed, Refused) as error:
@@ -53,7 +59,7 @@ def _judged(function: Callable[[], None]) -> tuple[int, str]:
     except InputError as error:
         return INPUT, f"error: {error}"
     except Stopped as stop:
-        return STOPPED, f"stopped by {stop}: {stop.kept}"
+        return STOPPED, f"stopped by {stop}: {stop.kept or kept}"
     except MemoryError as error:
         return GAVE_UP, f"error: out of memory ({error}): use a coarser mesh, fewer modes or points"
     except FailedOnRoot:

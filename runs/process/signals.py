@@ -25,10 +25,10 @@ class Stopped(BaseException):
     """The user or the batch system requested a stop: exit status 4.
 
     Not an Exception, so that no solver callback mistakes it for its own failure. `kept`: what the
-    user is told of the work so far.
+    user is told of the work so far, if not the usual.
     """
 
-    kept = "what was finished is kept, the same command or resume goes on"
+    kept = ""
 
 
 class Deferred:

@@ -208,6 +208,9 @@ def _file(name: str, path: tuple[str, ...], source: Source) -> Any:
     return str(file)
 
 
+_OF_A_SWEEP = ("sweep", "axis", "member", "scene", "slurm")  # keys that a scene has not
+
+
 def _everywhere(of: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
     """The paths of all keys and tables below dataclass `of`."""
     found = []
@@ -228,6 +231,10 @@ def _unknown(of: type, path: tuple[str, ...], name: str, values: dict, source: S
         this = values.get(selector, default)
         if this is not _WRONG and this not in kinds:
             _of_another_kind((*path, name), selector, kinds, this, source)
+        return
+    if not path and name in _OF_A_SWEEP:
+        text = f"unknown key {name}: a sweep is a file of its own, with scene = and [[axis]], for ./tireroad sweep (docs/how-to/sweep.md)"
+        source.add_as_is((name,), text)
         return
     known = list(every_field(of))
     near = difflib.get_close_matches(name, known, 1, 0.6)

@@ -10,7 +10,9 @@ from mpi4py import MPI
 from started import environment
 
 from tireroad.fem.errors import ConvergenceError, InputError
-from tireroad.runs.process import mpi
+from tireroad.runs import cli
+from tireroad.runs.process import mpi, signals
+from tireroad.runs.process.statuses import STOPPED
 
 CASE = """
 import sys, time
@@ -111,3 +113,15 @@ def test_all_here_sees_who_is_late() -> None:
         time.sleep(0.5)
     came = mpi.all_here(comm, None if late else 0.1)
     assert came is (late or comm.size == 1)
+
+
+@pytest.mark.parametrize(("command", "words"), [("check", "begins again"), ("sweep", "resume")])
+def test_a_stop_says_what_the_command_goes_on_from(monkeypatch, capsys, command, words) -> None:
+    def stopped(args) -> None:
+        raise signals.Stopped("SIGINT")
+
+    monkeypatch.setitem(cli.ALONE, command, stopped)
+    monkeypatch.setattr(signals, "stop_on_signals", lambda: None)
+    assert cli.main([command, "any.toml"]) == STOPPED
+    said = capsys.readouterr().err
+    assert said.startswith("stopped by SIGINT: ") and words in said and len(said.splitlines()) == 1

@@ -135,3 +135,10 @@ def test_a_list_written_as_a_table_is_said_with_its_line(scene_file) -> None:
     assert ", line 3: force must be written [[force]] in the scene" in message
     inner = "[[tire.region]]\n[[tire.region.material]]\n"
     assert "must be written [tire.region.material]" in refused(scene_file(inner))
+
+
+@pytest.mark.parametrize("table", ["[sweep]\na = 1", "[[axis]]\nkey = 'static.load'"])
+def test_a_sweep_s_tables_in_a_scene_name_its_own_file(scene_file, table: str) -> None:
+    message = refused(scene_file(table))
+    assert "a file of its own" in message and "./tireroad sweep" in message
+    assert message.count("\n") == 0
