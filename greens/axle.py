@@ -109,3 +109,17 @@ def by_momentum(response: Response, total: np.ndarray, frequency: np.ndarray) ->
         slope=None,
     )
     return from_moment(total, moment.receptance(frequency), frequency)
+
+
+def remaining(response: Response, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Rate of momentum (nt, 3) N of what no state contains, where its moment is known.
+
+    It follows the forces statically, d/dt int rho u = left_out f'' (+ rows of f', greens.basis.Basis.felt;
+    those of f are in Response.direct_momentum_rate). `first`, `second` (nt, k): the derivatives of the
+    forces, N/s and N/s^2.
+    """
+    if response.left_out is None:
+        return np.zeros((len(first), 3))
+    inertia, *rest = np.split(response.left_out, len(response.left_out) // 3)
+    rate = second @ inertia.T
+    return rate + first @ rest[0].T if rest else rate

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from tireroad.fem.static.state import StaticState
+from tireroad.greens.axle import remaining
 from tireroad.greens.coupling import Wheel
 from tireroad.modal.basis import ModalBasis
 from tireroad.runs.files.store import put
@@ -147,5 +148,6 @@ class ResponseStage(Computed[PointResponse]):
                 displacement[k] = free + tire.same_step @ force[k]
                 axle[k] = force[k] @ direction - tire.inertia_force()
                 bar.advance()
+        axle -= remaining(seen.whole.resolved(seen.integration.step), seen.force(1), seen.force(2))
         displacement, moment = np.split(displacement, [3 * len(direction)], axis=1)
         return displacement, axle, moment

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
 
 @OUTPUTS.register(
-    "impulse", "impulse responses (Green's functions) between the driven points, over [time]"
+    "impulse",
+    "impulse responses (Green's functions) between the driven points, over [time]; flexibility that responds at once is written beside them",
 )
 class Impulse(Output):
     def numbers(self, points: int) -> int:
@@ -20,8 +21,16 @@ class Impulse(Output):
         return points**2
 
     def curves(self, seen: Driven, record: Record) -> Curves:
-        """g (nt, k, k) along the forces, without the residual's delta function at t = 0."""
+        """g (nt, k, k) along the forces, and the weight (k, k) of delta(t), where there is one.
+
+        The receptance is the Fourier transform of both, as residual flexibility without states
+        responds at the instant of the impulse.
+        """
         if seen.time is None:
             return {}
+        response = seen.response
         with record.timing("impulse responses"):
-            return {"impulse": (seen.along(seen.response.impulse(seen.time)), "m/(N s)")}
+            found: Curves = {"impulse": (seen.along(response.impulse(seen.time)), "m/(N s)")}
+        if response.residual.any():
+            found["impulse_at_once"] = seen.along(response.residual[None])[0], "m/N"
+        return found
