@@ -23,7 +23,7 @@ from tireroad.runs.search.settings import CAUSES, MARGIN, Ladders, Settings, app
 from tireroad.runs.search.shares import worst
 
 AIM = 0.9 / MARGIN  # of the target; 0.9: the orders hold only asymptotically
-AT_ONCE = {"mesh": 2, "modes": 2, "points": 2, "step": 1}  # most rungs per plan: same reason
+AT_ONCE = {"mesh": 2, "modes": 2, "points": 1, "step": 1}  # most rungs per plan: same reason
 # Of the aim: a cause is refined only above it. If another cause misses the aim alone and has no more
 # rungs, or no more per plan, only a cause that does so too is: the next trial cannot meet the target,
 # and shows whether the others are needed (cobblestones under a soft torus: they were not).

@@ -11,8 +11,11 @@ from tireroad.runs.scene.schema import Pitch
 from tireroad.runs.scene.tables.accuracy import Accuracy
 from tireroad.runs.scene.tables.scene import Scene
 
-FINER = 2**0.5  # factor per rung of modes and points; the step is halved
-RUNGS = 10
+FINER = 2**0.5  # factor per rung of modes; step and spacing of the points are halved
+# A grid of points that is no part of the next one places their errors anew: on cobblestones a radial
+# tire was 10, 14 and 10 % off with points 7.8, 5.5 and 3.9 mm apart. Halved, the next grid has all
+# points of this one, and was this one's companion.
+RUNGS = {"mesh": 10, "modes": 10, "points": 5, "step": 10}
 MODES = 2.25  # highest mode over highest frequency of interest, lowest rung: valid to half of it
 SAMPLES = 8  # steps per period of that frequency on the lowest rung
 PASSING = 2.25  # contact points that pass per period of it, at least
@@ -66,7 +69,7 @@ class Ladders:
     def at(self, rungs: dict[str, int]) -> Settings | None:
         """The settings on these rungs; None if a ladder has no such rung."""
         meshes = self._meshes
-        if rungs["mesh"] >= len(meshes) or max(rungs.values()) > RUNGS:
+        if rungs["mesh"] >= len(meshes) or any(rungs[cause] > RUNGS[cause] for cause in CAUSES):
             return None
         step = self._step / 2 ** rungs["step"]
         return Settings(
@@ -74,7 +77,7 @@ class Ladders:
             order=self.scene.tire.shape.search_order(self.scene.tire),
             up_to=MODES * self.scene.accuracy.up_to * FINER ** rungs["modes"],
             residual=self._residual,
-            pitch=self._pitch / FINER ** rungs["points"],
+            pitch=self._pitch / 2 ** rungs["points"],
             step=step,
             rungs=dict(rungs),
         )
@@ -87,7 +90,7 @@ class Ladders:
 
     def finest(self) -> Settings:
         """The finest settings."""
-        top = {cause: RUNGS for cause in CAUSES} | {"mesh": len(self._meshes) - 1}
+        top = RUNGS | {"mesh": len(self._meshes) - 1}
         found = self.at(top)
         assert found is not None
         return found
