@@ -57,6 +57,7 @@ def compiled(comm: Any, make: Callable[[Path], Any]) -> Any:
     folder that the user can change, not the scene.
     """
     folder = Path(comm.bcast(str(_workshop()) if comm.rank == 0 else None))
+    _pass_over_options(folder)
     try:
         with _announced(folder):
             made = make(folder)
@@ -72,6 +73,19 @@ def compiled(comm: Any, make: Callable[[Path], Any]) -> Any:
     if comm.rank == 0:
         _keep(folder)
     return made
+
+
+def _pass_over_options(folder: Path) -> None:
+    """Let FFCx and dolfinx look for a user's options in `folder` where ~/.config may not be entered.
+
+    They fail there (a home of another user, in a container) instead of going without.
+    """
+    try:
+        os.stat(Path.home() / ".config" / "ffcx")
+    except PermissionError:
+        os.environ.setdefault("XDG_CONFIG_HOME", str(folder))
+    except OSError:
+        pass  # none, the usual case
 
 
 @cache

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -42,8 +41,12 @@ class Turning:
     inertia: str = "full"
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.speed) and self.speed >= 0.0):
-            raise InputError(f"speed = {self.speed:g} rad/s must be 0 or more, and finite")
+        try:
+            _RATES.check(finite(self.speed), "rad/s")
+        except (TypeError, ValueError):
+            raise InputError(
+                f"speed = {self.speed!r} rad/s must be a number, 0 or more, and finite"
+            ) from None
         if self.inertia not in INERTIAS:
             raise InputError(f'inertia = "{self.inertia}" is unknown: take "full" or "doppler"')
         if not isinstance(self.damping, StrainEnergy):

@@ -3,6 +3,8 @@
 import os
 import signal
 import sys
+import tempfile
+from pathlib import Path
 
 from tireroad.runs.process import signals, streams
 from tireroad.runs.process.packages import missing
@@ -13,6 +15,7 @@ def program() -> None:
     """The command `tireroad`: takes the process's arguments and sets its exit status."""
     signal.pthread_sigmask(signal.SIG_BLOCK, signals.STOP_SIGNALS)
     streams.mend()
+    _need_home()
     # A second BLAS thread waits by spinning: half as much processor time again for no second less, from
     # 30,000 to 100,000 unknowns. More cores are used by more processes.
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
@@ -31,6 +34,13 @@ def program() -> None:
             raise
         print(f"stopped by {signals.raised()} before anything was begun", file=sys.stderr)
         os._exit(handed_over(STOPPED, for_all=False))
+
+
+def _need_home() -> None:
+    """Where the user has no home (a number without a name, in a container), take a temporary folder:
+    dolfinx cannot even be imported without one."""
+    if os.path.expanduser("~") == "~":
+        os.environ["HOME"] = str(Path(tempfile.gettempdir()) / f"tireroad-{os.getuid()}")
 
 
 def _status(arguments: list[str]) -> int:

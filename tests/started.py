@@ -19,5 +19,12 @@ MPIRUN = {
 
 
 def environment(**extra: str) -> dict[str, str]:
-    """The environment of a started program; a copy, without what MPI puts into this process's."""
-    return {**MPIRUN, **os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", **extra}
+    """The environment of a started program; a copy, without what MPI puts into this process's.
+
+    A worker of pytest inherits that if MPI was begun before it was started, as by tests/fem/conftest.py.
+    """
+    ours = {k: v for k, v in os.environ.items() if k in MPIRUN or not k.startswith(_OF_MPI)}
+    return {**MPIRUN, **ours, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", **extra}
+
+
+_OF_MPI = ("OMPI_", "PMIX_", "PRTE_")

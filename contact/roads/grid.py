@@ -111,6 +111,11 @@ class Grid:
         """The smallest step of the grid, m."""
         return min(self._x.step, self._y.step)
 
+    @property
+    def shortest_wave(self) -> float:
+        """The shortest wave that its points resolve, m."""
+        return 2 * self.spacing
+
     def height(self, x: Array, y: Array) -> Array:
         """Bilinear heights (m) at x, y (m) of equal shape; beyond the strip those of its edge."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)

@@ -147,6 +147,7 @@ class PreparedRoad:
         self.spacing = road.spacing
         self.filled: int = getattr(road, "filled", 0)
         self.notes: tuple[str, ...] = getattr(road, "notes", ())
+        self._shortest: float = getattr(road, "shortest_wave", 0.0)
 
     @property
     def extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -207,7 +208,7 @@ class PreparedRoad:
             return None
         pitch = max(min(0.25 * self.spacing, _COARSEST), length / _MOST_SEEN)
         x: Array = np.float64(first) + np.float64(pitch) * np.arange(int(length / pitch))
-        return texture_of(self.height(np.asarray(x), np.zeros(len(x))), pitch)
+        return texture_of(self.height(np.asarray(x), np.zeros(len(x))), pitch, self._shortest)
 
     def highest(self, x0: float, x1: float, y0: float, y1: float) -> float:
         """Upper bound (m) of the heights in a strip, including the flat start."""

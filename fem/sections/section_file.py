@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from tireroad.fem.sections.outline import RADII, Outline, arcs
 UNITS = {"m": 1.0, "mm": 1e-3}
 LARGEST = 1_000_000  # bytes
 _TABLES = {"name", "unit", "tread", "held", "outline", "layer", "part", "cords", "compound"}
-_COMPOUND = {
+_COMPOUND: dict[str, float | None] = {
     "youngs_modulus": None,
     "poisson_ratio": 0.49,
     "density": None,
@@ -23,13 +24,27 @@ _COMPOUND = {
     "loss_factor": 0.0,
 }
 
-# As those of [tire.material] and [[tire.region]].
-_RANGES = {
+# As those of [tire.material] and [[tire.region]], but for densities in g/cm3, and of [[tire.cords]].
+COMPOUND_RANGES = {
     "youngs_modulus": (1e3, 1e13),
     "poisson_ratio": (-0.99, 0.4999),
-    "density": (1.0, 3e4),
+    "density": (100.0, 3e4),
     "dynamic": (0.01, 100.0),
     "loss_factor": (0.0, 2.0),
+}
+CORD_RANGES = {
+    "youngs_modulus": (1e3, 1e13),
+    "area": (1e-12, 1e-3),
+    "spacing": (1e-6, 0.1),
+    "density": (0.0, 3e4),
+    "compression": (0.0, 1.0),
+}
+_CORDS: dict[str, float | None] = {
+    "youngs_modulus": None,
+    "area": None,
+    "spacing": None,
+    "density": 0.0,
+    "compression": 1.0,
 }
 
 
@@ -59,20 +74,27 @@ def _construction(raw: dict[str, Any]) -> Construction:
         raise InputError(f'unit = "{unit}": must be "m" or "mm"')
     scale = UNITS[unit]
     layers = [_layer(one, scale) for one in _tables(raw, "layer", least=1)]
-    if twice := {one.name for one in layers if [o.name for o in layers].count(one.name) > 1}:
-        raise InputError(
-            f"layer {min(twice)!r}: the name of two layers; parts and cords refer to one"
-        )
+    if twice := _twice(layers):
+        raise InputError(f"layer {twice!r}: the name of two layers; parts and cords refer to one")
+    cords = [_cords(one, scale) for one in _tables(raw, "cords")]
+    if twice := _twice(cords):
+        raise InputError(f"cords {twice!r}: the name of two lines; results have one of each name")
     held = scale * _number(raw, "held", "the file") if "held" in raw else None
     return Construction(
         outline=_outline(_table(raw, "outline"), scale),
         layers=layers,
         parts=[_part(one, scale) for one in _tables(raw, "part")],
-        cords=[_cords(one, scale) for one in _tables(raw, "cords")],
+        cords=cords,
         compounds={name: _compound(name, one) for name, one in _table(raw, "compound").items()},
         tread=scale * _number(raw, "tread", "the file"),
         held=held,
     )
+
+
+def _twice(named: Sequence[Layer | CordLine]) -> str | None:
+    """The first name that two of them have; None if each has its own."""
+    names = [one.name for one in named]
+    return next((name for name in names if names.count(name) > 1), None)
 
 
 def _outline(table: dict[str, Any], scale: float) -> Outline:
@@ -114,32 +136,12 @@ def _part(table: dict[str, Any], scale: float) -> Part:
 
 def _cords(table: dict[str, Any], scale: float) -> CordLine:
     """Area in m2 and spacing in m whatever the unit of the drawing, as in [[tire.cords]]."""
-    keys = {
-        "name",
-        "under",
-        "to",
-        "angle",
-        "youngs_modulus",
-        "area",
-        "spacing",
-        "density",
-        "compression",
-    }
-    _known(table, keys, "[[cords]]")
+    _known(table, {"name", "under", "to", "angle", *_CORDS}, "[[cords]]")
     name = _text(table, "name", "[[cords]]")
     angle = _number(table, "angle", f"cords {name!r}")
     if not -90.0 <= angle <= 90.0:
         raise InputError(f"cords {name!r}: angle = {angle:g} deg must lie between -90 and 90")
-    numbers = {
-        key: _number(table, key, f"cords {name!r}", default)
-        for key, default in (
-            ("youngs_modulus", None),
-            ("area", None),
-            ("spacing", None),
-            ("density", 0.0),
-            ("compression", 1.0),
-        )
-    }
+    numbers = _numbers(table, _CORDS, CORD_RANGES, f"cords {name!r}")
     return CordLine(
         name=name,
         under=_text(table, "under", f"cords {name!r}"),
@@ -154,8 +156,18 @@ def _compound(name: str, table: Any) -> dict[str, float]:
     if not isinstance(table, dict):
         raise InputError(f"{where} must be a table")
     _known(table, set(_COMPOUND), where)
-    found = {key: _number(table, key, where, default) for key, default in _COMPOUND.items()}
-    for key, (least, most) in _RANGES.items():
+    return _numbers(table, _COMPOUND, COMPOUND_RANGES, where)
+
+
+def _numbers(
+    table: dict[str, Any],
+    defaults: Mapping[str, float | None],
+    ranges: Mapping[str, tuple[float, float]],
+    where: str,
+) -> dict[str, float]:
+    """The numbers of a table by key, within their ranges."""
+    found = {key: _number(table, key, where, default) for key, default in defaults.items()}
+    for key, (least, most) in ranges.items():
         if not least <= found[key] <= most:
             raise InputError(f"{where}: {key} = {found[key]:g} must lie from {least:g} to {most:g}")
     return found

@@ -139,9 +139,11 @@ class Cache:
 
         None if there is no intact file of these inputs.
         """
-        if self.folder is None or store.why_not(self.place(stage, key), key, stage):
+        if self.folder is None:
             return None
         try:
+            if store.why_not(self.place(stage, key), key, stage):
+                return None
             figures = json.loads(self._figures(stage, key).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None

@@ -51,7 +51,10 @@ class RunResults(Mapping[str, NDArray[Any]]):
     """
 
     def __init__(self, directory: str | Path) -> None:
-        self.directory = Path(directory)
+        try:
+            self.directory = Path(directory)
+        except TypeError:
+            raise InputError(f"{directory!r}: no path of a folder with results") from None
         check_results(self.directory)
         self.left_out = left_out(self.directory)
         self._units: dict[str, str] | None = None

@@ -196,13 +196,14 @@ def driven_points(time: NDArray, force: NDArray | None, moved: NDArray, names: l
             here.plot(*drawn, color=COLOURS[column], label=component)
         here.set_title(name)
         here.set_ylabel("displacement in µm")
-        if force is not None:
+        if force is not None and force[:, point].any():
             other = here.twinx()
             other.plot(*envelope(time, force[:, point]), color=MUTED, lw=0.8, ls="--")
             other.set_ylabel("force in N (dashed)", color="#52606d")
             other.grid(visible=False)
             other.spines["right"].set_visible(True)
-    axes[0, 0].legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)
+    above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.12)}  # the title, which may be long
+    axes[0, 0].legend(ncols=3, **above, borderaxespad=0.0)
     _over_time(axes[-1, 0], time)
     return encode(figure)
 

@@ -13,7 +13,7 @@ PREFIXES = {
 
 
 def quantity(value: object, unit: str = "") -> str:
-    """`value` with its unit: 0.0123 "m" gives "12.3 mm"; texts and flags pass unchanged."""
+    """`value` with its unit: 0.0123 "m" gives "12.3 mm"; flags in words, texts as they are."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if value is None:
@@ -21,7 +21,7 @@ def quantity(value: object, unit: str = "") -> str:
     if isinstance(value, (list, tuple)):
         return ", ".join(quantity(part, unit) for part in value)
     if not isinstance(value, (int, float)):
-        return str(value)
+        return f"{value} {SYMBOLS.get(unit, unit)}".rstrip()
     factor, symbol = _prefix(value, unit)
     return f"{digits(value / factor)} {symbol}".rstrip()
 

@@ -22,7 +22,8 @@ All keys of a scene file with default, unit, range and meaning. The page is gene
 `python3 -m tireroad.runs.scene.reference docs/keys.md`; `tireroad check SCENE.toml` prints the same for the keys
 of one scene, with their values. Times are in s, lengths in m, forces in N, stresses in Pa, speeds of rotation in
 rad/s. An absent key has its default. A table marked "absent by default" is optional, and the stage that needs it
-does not run without it. An unknown key is an error.
+does not run without it. An unknown key is an error. In `--set` and in sweeps, tables that can be repeated are counted
+from 0: `force.1.amplitude` belongs to the second `[[force]]`, `tire.cords.0.angle` to the first `[[tire.cords]]`.
 """
 COLUMNS = "| key | default | unit | values | meaning |\n|---|---|---|---|---|\n"
 

@@ -153,7 +153,8 @@ class ContactStage(Stage[ContactHistory]):
         contact_figures.describe(record, totals, loop.solver, chosen, chosen.steps - done)
         contact_figures.alternation(record, totals.alternation.worst, scheme)
         contact_figures.points(record, setup.patch, self.static.product.footprint(), setup.relief)
-        contact_figures.excursion(record, totals.figures.excursion, self.static.product.deflection)
+        deflection, held = self.static.product.deflection, self.job.scene.axle.kind == "fixed"
+        contact_figures.excursion(record, totals.figures.excursion, deflection, held=held)
         pattern.describe(record, setup)
         road_file.describe(record, setup, self.job.scene.road)
         if chosen.scheme != "convolution":

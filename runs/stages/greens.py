@@ -16,6 +16,7 @@ from tireroad.modal.basis import ModalBasis
 from tireroad.modal.rolling import RollingModes
 from tireroad.runs.files.store import put
 from tireroad.runs.scene.tables.cavity import has_air
+from tireroad.runs.scene.tables.scene import PointForce
 from tireroad.runs.stages.base.record import Record
 from tireroad.runs.stages.base.stage import Computed, Done
 from tireroad.runs.stages.build import cavity, corner
@@ -61,7 +62,7 @@ class GreensStage(Computed[Responses]):
             "readings": corner.readings(self.job),
             "damping": repr(turning_of(self.job).damping),
             "greens": asdict(scene.greens),
-            "forces": [asdict(force) for force in scene.force],
+            "forces": [_place(force) for force in scene.force],
             "points": setup.patch.index.tolist() if setup else [],
             "pitch": points_of(self.job, self.static.product) if setup else None,
             "components": components(self.job) if setup else (),
@@ -176,3 +177,8 @@ def _share_of_residual(record, where: str, response: Response) -> None:
     part = np.divide(diagonal, total, out=np.zeros_like(total), where=total != 0)
     name = f"share of the residual in the static flexibility of the {where}"
     record.indicators[name] = (float(part.max()), "-")
+
+
+def _place(force: PointForce) -> dict:
+    """Where and in which direction a force acts; its course over time is no matter here."""
+    return {k: v for k, v in asdict(force).items() if k not in ("amplitude", "frequency")}

@@ -90,8 +90,7 @@ class ResponseStage(Computed[PointResponse]):
         """The contact loop's results at the driven points."""
         if history.driven is None:
             return {"time": (history.time, "s")}
-        largest = float(np.abs(history.driven).max())
-        record.headline["largest displacement"] = (largest, "m")
+        record.headline["largest displacement"] = (_largest(history.driven), "m")
         curves: Curves = {
             "time": (history.time, "s"),
             "force": (histories(self.job.scene.force, history.time), "N"),
@@ -111,15 +110,16 @@ class ResponseStage(Computed[PointResponse]):
         """Displacements and axle force under the prescribed forces. Collective."""
         scene, chosen, force = self.job.scene, seen.integration, seen.force()
         displacement, axle, moment = self._marched(record, seen, force)
+        moved = displacement.reshape(len(force), -1, 3)
         record.headline |= {
             "step": (chosen.step, "s"),
             "scheme": (chosen.scheme, "-"),
-            "largest displacement": (float(np.abs(displacement).max()), "m"),
+            "largest displacement": (_largest(moved), "m"),
         }
         curves: Curves = {
             "time": (seen.time, "s"),
             "force": (force, "N"),
-            "displacement": (displacement.reshape(len(force), -1, 3), "m"),
+            "displacement": (moved, "m"),
         }
         if scene.output.axle_force and scene.modes.on_axle_alone:
             curves["axle_force"] = axle, "N"
@@ -151,3 +151,8 @@ class ResponseStage(Computed[PointResponse]):
         axle -= remaining(seen.whole.resolved(seen.integration.step), seen.force(1), seen.force(2))
         displacement, moment = np.split(displacement, [3 * len(direction)], axis=1)
         return displacement, axle, moment
+
+
+def _largest(moved: np.ndarray) -> float:
+    """Length (m) of the largest displacement (nt, k, 3) of a point."""
+    return float(np.linalg.norm(moved, axis=2).max())

@@ -6,8 +6,9 @@ import itertools
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -79,6 +80,7 @@ def _crossed(path: Path, raw: Mapping[str, Any], plan: str) -> tuple[tuple[str, 
     keys = tuple(str(axis["key"]) for axis in axes)
     if len(set(keys)) < len(keys):
         raise InputError(f"{path}: two [[axis]] tables have the same key")
+    _check_apart(f"{path}: [[axis]]", keys)
     for key, axis in zip(keys, axes, strict=True):
         check_keys(f"{path}: axis {key}", axis, _AXIS[plan])
     if plan == "latin-hypercube":
@@ -103,7 +105,9 @@ def _listed(path: Path, raw: Mapping[str, Any]) -> tuple[tuple[str, ...], list[M
                 f"{path}: member {name}: set must be a table of keys and values, "
                 f'such as {{ "static.load" = 300.0 }}, not {described(settings)}'
             )
-        members.append(Member(name, dict(settings)))
+        given = list(_keyed(settings))
+        _check_apart(f"{path}: member {name}", [key for key, _ in given])
+        members.append(Member(name, dict(given)))
     if not members:
         raise InputError(f'{path}: plan = "list" needs [[member]] tables')
     _check_count(path, len(members))
@@ -115,6 +119,32 @@ def _listed(path: Path, raw: Mapping[str, Any]) -> tuple[tuple[str, ...], list[M
         )
     keys = dict.fromkeys(key for member in members for key in member.settings)
     return tuple(keys), members
+
+
+def _keyed(settings: Mapping[str, Any], table: str = "") -> Iterator[tuple[str, Any]]:
+    """Keys and values of a member; contact.slip = 0.1 without quotes is a key in a table to TOML."""
+    for key, value in settings.items():
+        path = f"{table}{key}"
+        if isinstance(value, dict) and "." not in key and path in _tables_of_scene():
+            yield from _keyed(value, f"{path}.")
+        else:
+            yield path, value
+
+
+@cache
+def _tables_of_scene() -> frozenset[str]:
+    parents = (dotted.split(".")[:-1] for dotted, *_ in walk(Scene))
+    return frozenset(".".join(parts[:k]) for parts in parents for k in range(1, len(parts) + 1))
+
+
+def _check_apart(where: str, keys: Sequence[str]) -> None:
+    """Raise InputError for a key given twice, or with a table that holds it: one would be lost."""
+    for key in keys:
+        if keys.count(key) > 1:
+            raise InputError(f"{where}: {key} is given twice")
+        for other in keys:
+            if other.startswith(f"{key}."):
+                raise InputError(f"{where}: {key} holds {other}: give one of them")
 
 
 def _values(where: str, axis: Mapping[str, Any]) -> list[Any]:

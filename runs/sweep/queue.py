@@ -40,7 +40,7 @@ $directives
 export TIREROAD_CACHE=$cache OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 child=
 again() { [ -n "$$child" ] && kill -USR1 "$$child"; }
-trap again USR1
+trap again USR1 TERM
 $body
 wait "$$child"
 status=$$?

@@ -161,3 +161,18 @@ def test_folders_without_a_lock_are_removed_when_nobody_makes_them(tmp_path: Pat
     os.utime(folders[3], (1e9, 1e9))
     form_cache._sweep(tmp_path)
     assert [folder.exists() for folder in folders] == [False, True, True, False]
+
+
+def test_a_user_s_options_that_may_not_be_looked_for_are_passed_over(tmp_path, monkeypatch) -> None:
+    """FFCx failed in a home of another user; the advice to set XDG_CACHE_HOME had no effect."""
+
+    def refused(path: object) -> None:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setenv("XDG_CONFIG_HOME", "")  # to be put back afterwards
+    monkeypatch.delenv("XDG_CONFIG_HOME")
+    form_cache._pass_over_options(tmp_path)
+    assert "XDG_CONFIG_HOME" not in os.environ
+    monkeypatch.setattr(form_cache.os, "stat", refused)
+    form_cache._pass_over_options(tmp_path)
+    assert os.environ["XDG_CONFIG_HOME"] == str(tmp_path)

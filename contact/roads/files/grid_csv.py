@@ -66,6 +66,11 @@ def _csv_rows(file: Path, lines: Iterator[Line]) -> tuple[Array, Array, Rows]:
     listed = header == ["x", "y", "z"]
     # The text of the corner is ignored: a zero replaces it.
     _, _, rest = first.partition(",")
+    if ";" in rest:
+        raise InputError(
+            f"road.file {file}, line {number}: fields separated by semicolons: take commas, and points in the "
+            "numbers instead of decimal commas"
+        )
     axis = None if listed else _first_line(file, (number, f"0,{rest}"), len(header))
     positions, spool, count = [], Spool(f"road.file {file}"), 0
     for block in _blocks(lines):
@@ -85,7 +90,13 @@ def _csv_rows(file: Path, lines: Iterator[Line]) -> tuple[Array, Array, Rows]:
 
 def _first_line(file: Path, line: Line, width: int) -> Array:
     """The positions across of a matrix. InputError explains the layout if they do not ascend."""
-    axis = _numbers(file, [line], width)[0, 1:]
+    try:
+        axis = _numbers(file, [line], width)[0, 1:]
+    except InputError as error:
+        raise InputError(
+            f"{error}; a list of points begins with the line x,y,z, a matrix with a corner that is not read, then the "
+            "y of its columns"
+        ) from error
     if len(axis) > 1 and not np.all(np.diff(axis) > 0):
         raise InputError(
             f"road.file {file}, line {line[0]}: the first line must hold a corner that is not read, "

@@ -57,7 +57,7 @@ class Profile:
         self._phase = 2.0 * np.pi * rng.random(WAVES)
         self._pitch = shortest / 16.0
         self._chunks: dict[int, Array] = {}
-        self.spacing = 0.5 * shortest
+        self.shortest_wave, self.spacing = shortest, 0.5 * shortest
 
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m) at x, m, for any y."""

@@ -57,6 +57,7 @@ class Layered:
     def __init__(self, base: Road | None, fields: Sequence[Tiles], rms: float, skew: float) -> None:
         self._base, self._fields, self._rms, self._skew = base, fields, rms, Skewed(skew)
         self.spacing = min(field.spacing for field in fields)
+        self.shortest_wave = min(field.shortest_wave for field in fields)
 
     def height(self, x: Array, y: Array) -> Array:
         """Heights (m) at x, y (m) of equal shape."""

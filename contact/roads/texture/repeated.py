@@ -29,6 +29,7 @@ class Repeated:
         self._first: float = getattr(road, "measured", (0.0, 0.0))[0]
         self._seam = min(_SEAM * length, _LONGEST)
         self.spacing = road.spacing
+        self.shortest_wave: float = getattr(road, "shortest_wave", 0.0)
         self.filled: int = getattr(road, "filled", 0)
         self.notes: tuple[str, ...] = (
             *getattr(road, "notes", ()),

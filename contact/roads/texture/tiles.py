@@ -65,7 +65,7 @@ class Tiles:
         self._halves: dict[int, Array] = {}  # ordered by use, the last one at the end
         # Lowest and highest point of each half ever drawn, so that bounds do not draw it again.
         self._ends: dict[int, tuple[float, float]] = {}
-        self.spacing = 0.5 * shortest
+        self.shortest_wave, self.spacing = shortest, 0.5 * shortest
 
     def _places(self) -> tuple[int, int]:
         """Points of a tile along and across, the first number even."""

@@ -22,9 +22,10 @@ def add(results: Results, section: Section, names: list[str]) -> None:
     if frequency is None or found is None or not len(frequency):
         return
     other = results.optional(name, "transmissibility/free_rim")
+    dashed = "" if other is None else "; dashed: by modes of a tire with a free rim"
     section.show(
         transmissibilities(frequency, found, other, names),
-        "Force on the axle per force at the point, by momentum; dashed: by modes of a tire with a free rim.",
+        f"Force on the axle per force at the point, by momentum{dashed}.",
     )
     turning, held = (
         results.optional(name, f"transmissibility/{part}") for part in ("moment", "free_rim_moment")
@@ -63,6 +64,10 @@ def transmissibilities(
                 label = component if dashes == "-" else None
                 here.plot(frequency, level, dashes, color=COLOURS[column], label=label)
         here.set(title=names[point], ylabel=reference)
-        here.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)
+        if here.lines:
+            here.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.12), borderaxespad=0.0)
+        else:
+            here.set_yticks([])
+            here.text(0.5, 0.5, "none, by symmetry", ha="center", transform=here.transAxes)
     axes[-1, 0].set_xlabel("frequency in Hz")
     return encode(figure)

@@ -123,6 +123,8 @@ def road_height(scene: Scene) -> float:
         high, low = road.highest(*strip), road.lowest(*strip)
     except InputError:
         return lift
+    if not math.isfinite(high - low):  # heights that are missing, which the run refuses
+        return lift
     level = 0.5 * (high + low) if getattr(surface, "datum", "zero") == "mean" else 0.0
     return max(high - level + scene.road.offset, 0.0) + lift
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from tireroad.runs.stages.build.driven import Driven
 
 
-@OUTPUTS.register("acceleration", "acceleration of the driven points")
+@OUTPUTS.register("acceleration", "acceleration of the driven points, in scenes without [contact]")
 class Acceleration(Output):
     in_contact: ClassVar[bool] = False
 

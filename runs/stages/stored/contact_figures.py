@@ -68,8 +68,11 @@ def points(record: Record, patch: Patch, extent: Footprint, relief: float) -> No
         )
 
 
-def excursion(record: Record, most: float, deflection: float | None) -> None:
-    """Record how far the contact moved from the state about which the tire is linearised."""
+def excursion(record: Record, most: float, deflection: float | None, *, held: bool) -> None:
+    """Record how far the contact moved from the state about which the tire is linearised.
+
+    `held`: whether the axle is.
+    """
     record.indicators["largest motion of the contact beyond the static state"] = (most, "m")
     if not deflection:
         return
@@ -79,6 +82,6 @@ def excursion(record: Record, most: float, deflection: float | None) -> None:
         record.warnings.append(
             f"the contact moved by up to {1e3 * most:.3g} mm beyond the static state, {share:.2g} of the static "
             f"deflection of {1e3 * deflection:.3g} mm: the tire is linear about that state, so forces are doubtful "
-            "beyond a third of it; take a lower road, a longer road.run_in or road.longest_wave, or a wheel that moves "
-            '(axle.kind = "corner")'
+            "beyond a third of it; take a lower road, or a longer road.run_in or road.longest_wave"
+            + (', or a wheel that moves (axle.kind = "corner")' if held else "")
         )

@@ -52,12 +52,15 @@ def test_a_small_reach_is_named_and_no_motion_of_millimetres_is_called_growth() 
 
 def test_beyond_a_third_of_the_deflection_it_is_said() -> None:
     record = Record()
-    excursion(record, 2e-3, 0.01)
+    excursion(record, 2e-3, 0.01, held=True)
     assert not record.warnings
     assert record.indicators["that, of the static deflection"] == (0.2, "-")
-    excursion(record, 4e-3, 0.01)
+    excursion(record, 4e-3, 0.01, held=True)
     assert "0.4 of the static deflection of 10 mm" in record.warnings[0]
-    excursion(record, 4e-3, None)
+    assert 'axle.kind = "corner"' in record.warnings[0]
+    excursion(record, 4e-3, None, held=True)
+    excursion(record, 4e-3, 0.01, held=False)
+    assert "corner" not in record.warnings[1], "advised to take what it is"
 
 
 def test_a_footprint_of_few_points_is_told_where_the_road_has_heights() -> None:

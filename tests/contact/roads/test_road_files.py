@@ -128,6 +128,30 @@ def test_a_line_without_end_is_refused(tmp_path: Path) -> None:
         read_grid(tmp_path / "long.csv")
 
 
+def test_millimetres_of_a_road_that_is_the_same_across_are_noticed_along_it(tmp_path: Path) -> None:
+    """Waves of 1 mm told in mm: slopes across are none, and the tire met hills of 1 m."""
+    wave = np.sin(2 * np.pi * X / 0.1)[:, None] + 0 * Y
+    np.savez(tmp_path / "wave.npz", x=X, y=Y, z=wave)
+    with pytest.raises(InputError, match='height_unit = "mm"'):
+        read_grid(tmp_path / "wave.npz")
+    np.savez(tmp_path / "right.npz", x=X, y=Y, z=1e-3 * wave)
+    read_grid(tmp_path / "right.npz")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x;-0,1;0,1\n0;0,001;0,002\n", "semicolons"),
+        ("X [m],Y [m],Z [m]\n0,0,0\n", "begins with the line x,y,z"),
+        ("x,z\n0,0\n1,0\n", "begins with the line x,y,z"),
+    ],
+)
+def test_csv_of_other_programs_is_told_the_layout(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "other.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_grid(tmp_path / "other.csv")
+
+
 def test_plain_matrix_is_told_the_layout(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "plain.csv", Z, delimiter=",")
     with pytest.raises(InputError, match=r"line 1: the first line must hold a corner"):

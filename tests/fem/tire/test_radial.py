@@ -1,5 +1,7 @@
 """Sections from layers: outlines, the built-in radial tire of many sizes, the section file."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -81,6 +83,19 @@ def test_a_section_file_is_built_as_drawn(tmp_path):
         ("tread = 60.0", "", "tread must be a number"),
         ('name = "inner"', 'name = "outer"', "'outer': the name of two layers"),
         ("angle = 20", "angle = 240", "angle = 240 deg must lie between"),
+        (
+            "youngs_modulus = 1.7e11",
+            "youngs_modulus = 170",
+            "'belt': youngs_modulus = 170 must lie",
+        ),
+        ("area = 2.1e-7", "area = 0.21", "'belt': area = 0.21 must lie from 1e-12 to 0.001"),
+        ("spacing = 1.2e-3", "spacing = 1.2", "'belt': spacing = 1.2 must lie from 1e-06 to 0.1"),
+        (
+            "spacing = 1.2e-3",
+            "spacing = 1.2e-3\ncompression = 50",
+            "compression = 50 must lie from 0",
+        ),
+        ("density = 1100", "density = 1.1", "density = 1.1 must lie from 100"),
         ('compound = "soft"', 'compound = "sof"', "no compound 'sof'"),
         ('under = "outer"', 'under = "middle"', "'middle'; there are outer, inner"),
         ("thickness = 4", "thickness = -4", "needs a thickness above 0"),
@@ -88,7 +103,7 @@ def test_a_section_file_is_built_as_drawn(tmp_path):
         ("[320, 0]", "[320, 1]", "not at the crown"),
         ("angle = 20", "angel = 20", "unknown key 'angel'"),
         ("arcs = [", "arcs = [[1]", "TOML"),
-        ("density = 1000", "density = 5e-324", "density = 4.94066e-324 must lie from 1"),
+        ("density = 1000", "density = 5e-324", "density = 4.94066e-324 must lie from 100"),
         ("loss_factor = 0.2", "loss_factor = -1", "loss_factor = -1 must lie from 0"),
         ("along = [50, 100]", "along = [100, 50]", "ascend"),
         ("tread = 60.0", "tread = 60.0\nheld = 50.0", "the rim holds the face from 0.05 m"),
@@ -99,6 +114,35 @@ def test_what_is_wrong_in_a_section_file_is_told(tmp_path, old, new, message):
     path.write_text(FILE.replace(old, new))
     with pytest.raises(InputError, match=message):
         read(path).section(12)
+
+
+def test_two_lines_of_cords_of_one_name_are_refused(tmp_path):
+    """Both were built, and results had one of them: half of the largest force."""
+    path, first, second = tmp_path / "section.toml", FILE.index("[[cords]]"), FILE.index("[compound.rubber]")  # fmt: skip
+    path.write_text(FILE[:second] + FILE[first:])
+    with pytest.raises(InputError, match="'belt': the name of two lines"):
+        read(path)
+
+
+def test_ranges_are_those_of_a_scene():
+    """But for the density of a compound, which a scene knows in kg/m3."""
+    from tireroad.fem.sections.section_file import COMPOUND_RANGES, CORD_RANGES
+    from tireroad.runs.scene.schema import key_of
+    from tireroad.runs.scene.tables.tire import Cords
+
+    keys = {name: key_of(item) for name, item in Cords.__dataclass_fields__.items()}
+    for name, (least, most) in CORD_RANGES.items():
+        assert (keys[name].limits.least, keys[name].limits.most) == (least, most), name
+    assert COMPOUND_RANGES["youngs_modulus"] == CORD_RANGES["youngs_modulus"]
+
+
+def test_the_documented_section_file_is_one(tmp_path):
+    """Two of its compounds were missing."""
+    page = Path(__file__).parents[3] / "docs/section-file.md"
+    block = page.read_text().split("```toml\n")[1].split("```")[0]
+    (tmp_path / "section.toml").write_text(block)
+    mesh = read(tmp_path / "section.toml").section(20, 2)
+    assert set(mesh.regions) == {"tread", "sidewall", "ply"}
 
 
 @pytest.mark.parametrize(

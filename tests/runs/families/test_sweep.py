@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -136,9 +137,29 @@ def test_a_list_names_its_members(folder: Path) -> None:
     assert sweep.load(sweep.members[0]).tire.material.law.youngs_modulus == 30e6
 
 
+@pytest.mark.parametrize("key", ['"static.load"', "static.load"])
+def test_a_key_without_quotes_leaves_the_rest_of_its_table(folder: Path, key: str) -> None:
+    """To TOML it is a table; the scene's other keys in it became defaults, without a word."""
+    sweep = sweep_of(
+        folder, f'[[member]]\nname = "a"\n[member.set]\n{key} = 400.0\n"modal.count" = 5\n'
+    )
+    base = sweep_of(folder, '[[member]]\nname = "a"\nset = { "modal.count" = 5 }\n')
+    found, plain = (one.load(one.members[0]).static for one in (sweep, base))
+    assert sweep.axes == ("static.load", "modal.count")
+    assert found == replace(plain, load=400.0)
+
+
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
+        (
+            '[[member]]\n[member.set]\n"static.load" = 1.0\nstatic.load = 2.0\n',
+            "load is given twice",
+        ),
+        (
+            '[[member]]\n[member.set]\n"static" = 3\n"static.load" = 1.0\n',
+            "static holds static.load",
+        ),
         ('[[axis]]\nkey = "static.lod"\nvalues = [1.0]\n', "static.load"),
         ('[[axis]]\nkey = "static.load"\nvalues = [-1.0]\n', "1_load--1"),
         ('[[axis]]\nkey = "static.load"\nvalues = []\n', "must be a list"),

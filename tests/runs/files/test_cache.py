@@ -148,3 +148,13 @@ def test_off_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TIREROAD_CACHE", "off")
     assert Cache.of_user().folder is None and Cache.of_user().entries() == []
     assert "TIREROAD_CACHE is off" in Cache.of_user().described()
+
+
+def test_a_cache_that_may_not_be_entered_is_none(tmp_path: Path, monkeypatch) -> None:
+    """A home of another user: the look-up was taken for a refused write, and the run ended."""
+
+    def refused(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(shared.store, "why_not", refused)
+    assert Cache(tmp_path).fetch("static", "0" * 64, tmp_path / "static.h5") is None

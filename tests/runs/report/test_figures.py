@@ -27,6 +27,8 @@ from tireroad.runs.report.verdicts import verdict
         (0, "N", "0 N"),
         (True, "", "yes"),
         (None, "m", "–"),
+        ("230.6 / 461.2", "Hz", "230.6 / 461.2 Hz"),
+        ("not estimated: too short", "-", "not estimated: too short"),
         ([0.5, 2], "deg", "0.5 °, 2 °"),
         (float("nan"), "N", "nan N"),
         (float("inf"), "m", "inf m"),
