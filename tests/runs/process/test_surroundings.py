@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from started import ROOT, environment
 
+from tireroad.runs import start
 from tireroad.runs.cli import main
 from tireroad.runs.stages.modes import ModesStage
 
@@ -202,3 +203,13 @@ def test_a_folder_of_temporary_files_that_is_not_there_is_named(scene: Path) -> 
     ended = shell('exec "$@"', "run", scene, cwd=scene.parent, env=missing)
     assert ended.returncode == 2
     assert ended.stderr.decode().startswith("error: TMPDIR = ") and b"nosuch" in ended.stderr
+
+
+def test_without_a_home_a_temporary_folder_takes_its_place(monkeypatch) -> None:
+    """dolfinx cannot be imported without one (docker run --user with a number that has no name)."""
+    monkeypatch.setenv("HOME", "/somewhere")
+    start._need_home()
+    assert os.environ["HOME"] == "/somewhere"
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
+    start._need_home()
+    assert os.environ["HOME"].endswith(f"tireroad-{os.getuid()}")
