@@ -13,6 +13,7 @@ from tireroad.runs.files.disk import write_text
 from tireroad.runs.report.comparison_figures import pen
 from tireroad.runs.report.figures import canvas, encode, styled
 from tireroad.runs.report.quantities import quantity
+from tireroad.runs.scene.resolved import literal
 from tireroad.runs.sweep.gather import Column, Gathered, numeric
 from tireroad.runs.sweep.levels import Levels, levels
 from tireroad.runs.version import PROGRAM, VERSION
@@ -35,6 +36,7 @@ def write_page(table: Gathered, folder: Path, title: str, failed: Sequence[str])
     loader = FileSystemLoader(Path(__file__).parent)
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     pages.filters["quantity"] = quantity
+    pages.filters["setting"] = _setting
     path = folder / "sweep.html"
     text = pages.get_template("sweep.html.j2").render(
         title=title,
@@ -46,6 +48,11 @@ def write_page(table: Gathered, folder: Path, title: str, failed: Sequence[str])
     )
     write_text(path, text)
     return path
+
+
+def _setting(value: object) -> str:
+    """A setting as in a scene, texts without quotes; "–" where the member has none."""
+    return "–" if value is None else value if isinstance(value, str) else literal(value)
 
 
 def _figures(table: Gathered) -> list[tuple[str, str]]:

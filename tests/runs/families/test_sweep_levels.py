@@ -6,7 +6,7 @@ from scipy import stats
 
 from tireroad.runs.sweep.gather import Column, Gathered
 from tireroad.runs.sweep.levels import levels
-from tireroad.runs.sweep.page import TOTAL, _chosen, _figures
+from tireroad.runs.sweep.page import TOTAL, _chosen, _figures, write_page
 
 LOUD = np.array([[0.0, 10.0], [1.0, 12.0], [-1.0, 11.0], [0.5, 10.5]])
 
@@ -88,3 +88,12 @@ def test_members_without_bands_are_drawn_as_far_as_they_go(recwarn) -> None:
     shown = [text for _, text in _figures(full)]
     assert any("first that has bands, m1, in dB" in text for text in shown)
     assert sum(TOTAL in text for text in shown) == 1 and not recwarn.list
+
+
+def test_settings_are_shown_as_in_a_scene(tmp_path) -> None:
+    """Tables and flags were Python's."""
+    points = ({"dx": 0.005, "dy": 0.004}, "auto", True, None)
+    page = write_page(table({"contact.points": points}, LOUD, None), tmp_path, "points", [])
+    cells = page.read_text()
+    for text in ("{ &#34;dx&#34; = 0.005, &#34;dy&#34; = 0.004 }", "auto", "true", "–"):
+        assert f"<td>{text}</td>" in cells, text
